@@ -1,0 +1,1 @@
+"""What touches hardware: one folder a device, its emulator beside it."""

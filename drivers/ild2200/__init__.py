@@ -1,0 +1,1 @@
+"""Micro-Epsilon optoNCDT ILD2200-10 laser over a serial line (pyserial)."""

@@ -1,0 +1,122 @@
+"""The small interfaces that a device of each kind meets. A third device needs only these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from drivers.readings import Reading, RobotState, Signal
+
+
+class Device(Protocol):
+    """Anything that is opened, delivers readings in the background, and is closed.
+
+    `open` connects, identifies the device and starts its background thread or process; it
+    returns when the first values have arrived, or raises a `DeviceError` within its deadline.
+    `collect` reduces everything since its last call; `latest` peeks at about the last tenth of a
+    second. Both raise a `DeviceError` when the device has failed or its values are stale.
+    `close` never raises and never hangs, may be called twice, and leaves no thread or process.
+    """
+
+    name: str
+    signals: Sequence[Signal]
+
+    def open(self) -> None: ...
+    def close(self) -> None: ...
+    def identity(self) -> Mapping[str, str]: ...
+    def collect(self) -> Reading: ...
+    def latest(self) -> Reading: ...
+
+
+class Robot(Device, Protocol):
+    """An arm that stands still. Nothing here moves it but `go_to_reference`."""
+
+    def state(self) -> RobotState: ...
+
+    def go_to_reference(
+        self, program: str, q_rad: Sequence[float], tolerance_rad: float, deadline_s: float
+    ) -> None:
+        """Loads and plays a program taught on the pendant, and verifies the arrival by reading."""
+
+
+class Dynamometer(Device, Protocol):
+    """A force sensor. `values` of its readings are tared; the first three signals are
+    force_x_N, force_y_N, force_z_N in the sensor's own axes, then moments, then raw channels."""
+
+    def reset(self) -> None:
+        """Holds the charge amplifier in Reset (force meaningless) for its settle time."""
+
+    def operate(self) -> None:
+        """Switches to Operate and waits for the settle time."""
+
+    def tare(self, reading: Reading) -> None:
+        """From now on the forces and moments of `reading` (raw channels included) count as zero."""
+
+
+class DisplacementSensor(Device, Protocol):
+    """A laser; first signal `laser_mm`, the distance in its measuring range."""
+
+    range_mm: float
+
+
+Command = Literal["pause", "redo_step", "redo_repetition", "skip", "abort"]
+
+
+@dataclass(frozen=True, slots=True)
+class Prompt:
+    """A question to the operator; the first of `answers` is what the emulated operator gives."""
+
+    key: str  # "mount", "confirm_move", "unload", "paused", "interrupt", "settle_deadline", ...
+    text: str
+    answers: tuple[str, ...] = ("ok",)
+    # what the emulated rig needs to carry it out: {"q_rad", "direction"} for "mount"
+    details: Mapping[str, object] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LiveView:
+    """All that the person at the screw sees, ten times a second.
+
+    `stale` names devices whose value is older than its deadline; their numbers must not look live.
+    """
+
+    phase: str  # "zero", "approach", "step", "settling", "sampling", "unloading", "paused"
+    pose: str
+    direction: str
+    repetition: int
+    repetitions: int
+    step: int
+    steps: int
+    force_N: float
+    target_N: float
+    band_N: float
+    displacement_mm: float
+    stiffness_N_per_mm: float  # of the last points: how far to turn; nan when unknown
+    settle_remaining_s: float
+    samples: int
+    samples_wanted: int
+    stale: tuple[str, ...] = ()
+    message: str = ""
+
+
+class Loader(Protocol):
+    """Whoever turns the screw: a person at a console or a page, or the scripted stand-in."""
+
+    name: str
+
+    def open(self) -> None: ...
+    def close(self) -> None: ...
+    def identity(self) -> Mapping[str, str]: ...
+
+    def ask(self, prompt: Prompt) -> str:
+        """Blocks until one of `prompt.answers` is given, and returns it."""
+
+    def guide(self, view: LiveView) -> None:
+        """Shows where the force is and where it should go; returns at once."""
+
+    def notify(self, text: str, level: Literal["info", "warning", "error"] = "info") -> None:
+        """One line that must reach the operator."""
+
+    def command(self) -> Command | None:
+        """What the operator has asked for since the last call, if anything."""

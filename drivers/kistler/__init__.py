@@ -1,0 +1,1 @@
+"""Kistler 9257B dynamometer with charge amplifier through an NI DAQ (nidaqmx)."""

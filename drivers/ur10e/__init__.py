@@ -1,0 +1,1 @@
+"""Universal Robots UR10e over RTDE (ur-rtde) and the Dashboard server."""

@@ -1,0 +1,1 @@
+"""The application: protocols, the measuring procedure, data sets, commands."""

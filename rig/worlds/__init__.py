@@ -1,0 +1,1 @@
+"""Simulated rigs behind the emulators; shares nothing with identification."""
