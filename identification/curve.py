@@ -1,0 +1,45 @@
+"""The types that flow between the application and the identification: samples become curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One level of one run (pose, direction, repetition, branch, step) after settling.
+
+    force N, displacement m: means of the `n` second values of the level, zero line subtracted.
+    u_force, u_displacement: standard uncertainty of these means (type A and instrument resolution;
+    gains, common to all points, are not in them).
+    """
+
+    repetition: int
+    branch: str  # "zero", "loading", "unloading", "cycle"
+    step: int
+    force: float
+    displacement: float
+    u_force: float
+    u_displacement: float
+    n: int
+
+
+@dataclass(frozen=True)
+class Curve:
+    """All points of one pose and direction, in the order of measurement.
+
+    gain_sd_force, gain_sd_displacement: relative standard uncertainties of the two gains, common
+    to every point.
+    """
+
+    pose: str
+    direction: str
+    unit_vector: tuple[float, float, float]
+    points: tuple[Point, ...]
+    gain_sd_force: float
+    gain_sd_displacement: float
