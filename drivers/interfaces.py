@@ -42,7 +42,7 @@ class Robot(Device, Protocol):
 
 class Dynamometer(Device, Protocol):
     """A force sensor. `values` of its readings are tared; the first three signals are
-    force_x_N, force_y_N, force_z_N in the sensor's own axes, then moments, then raw channels."""
+    force_x_N, force_y_N, force_z_N on the robot in its base frame, then moments, then raw channels."""
 
     def reset(self) -> None:
         """Holds the charge amplifier in Reset (force meaningless) for its settle time."""
