@@ -1,0 +1,256 @@
+"""YAML files into typed values, with every problem of the file in one message.
+
+The file is composed into nodes that know their line and column, turned into plain values by
+YAML 1.2's rules (`1e3` is a number, `yes` is text), and validated strictly against a pydantic
+model or an annotated dataclass. Problems are located, worded with the unit that the key states,
+and collected; nothing is ever coerced from text to number or from number to truth value.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from rig import yamlwords as words
+from rig.errors import InputError, did_you_mean
+from rig.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, refuse
+
+T = TypeVar("T")
+
+MAX_BYTES = 1_000_000
+
+
+@dataclass
+class Document(Generic[T]):
+    """A validated file that can still say where each of its values stands."""
+
+    name: str
+    text: str
+    value: T
+    places: dict[Key, Place] = field(repr=False)
+
+    def problem(self, path: Key, what: str) -> Problem:
+        """A problem with the value at `path` (or the nearest enclosing one that is in the file)."""
+        return _problem(self.places, path, what)
+
+    def refuse(self, problems: Sequence[Problem]) -> None:
+        """Raises one InputError for all problems; returns when there are none."""
+        if problems:
+            refuse(self.name, problems)
+
+
+def load_yaml(path: Path, type_: type[T]) -> T:
+    """Reads and validates a file; `type_`: a pydantic model or an annotated dataclass.
+
+    Raises InputError with one line per problem: `FILE:LINE:COLUMN: key.path: what is wrong; what
+    is allowed`.
+    """
+    return read_document(path, type_).value
+
+
+def load_yaml_text(text: str, name: str, type_: type[T]) -> T:
+    """As `load_yaml`, for text that messages call `name`."""
+    return read_document_text(text, name, type_).value
+
+
+def read_document(path: Path, type_: type[T]) -> Document[T]:
+    """As `load_yaml`, keeping text and places for checks across keys."""
+    return read_document_text(read_text(path), str(path), type_)
+
+
+def read_text(path: Path) -> str:
+    """Text of a small UTF-8 file; raises InputError for anything that is none."""
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: a folder; a YAML file is wanted.")
+        if not path.exists():
+            raise InputError(f"{path}: no such file.{_neighbours(path)}")
+        if not path.is_file():
+            raise InputError(f"{path}: not a regular file; a YAML file is wanted.")
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise InputError(
+                f"{path}: {size / 1e6:.1f} MB; these files have at most {MAX_BYTES / 1e6:.0f} MB. "
+                "Is it a YAML file?"
+            )
+        raw = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}.") from error
+    return _decode(raw, str(path))
+
+
+def _neighbours(path: Path) -> str:
+    near = sorted(p.name for p in path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
+    return did_you_mean(path.name, near[:40]) if near else ""
+
+
+def _decode(raw: bytes, name: str) -> str:
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise InputError(f"{name}: UTF-16 text; save the file as UTF-8.")
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        byte = raw[error.start]
+        raise InputError(
+            f"{name}:{line}: the byte 0x{byte:02X} is no UTF-8 text; save the file as UTF-8."
+        ) from error
+    if "\0" in text:
+        raise InputError(f"{name}: binary data; a YAML text file is wanted.")
+    return text
+
+
+def read_document_text(text: str, name: str, type_: type[T]) -> Document[T]:
+    """As `read_document`, for text that messages call `name`."""
+    reader = Reader()
+    data = reader.read(compose(text, name))
+    if not isinstance(data, dict):
+        found = words.value_words(data, "")
+        refuse(name, [*reader.problems, Problem(1, 1, f"{found}; `key: value` lines are wanted.")])
+    value, problems = _validate(data, reader, type_)
+    if problems or value is None:
+        refuse(name, problems)
+    return Document(name, text, value, reader.places)
+
+
+def _validate(data: object, reader: Reader, type_: type[T]) -> tuple[T | None, list[Problem]]:
+    adapter: TypeAdapter[T] = TypeAdapter(type_)
+    value: T | None = None
+    errors: list[Any] = []
+    try:
+        value = adapter.validate_json(json.dumps(data), strict=True)
+    except ValidationError as error:
+        errors = list(error.errors(include_url=False))
+    if errors or _any_bool(data):
+        _Judge(data, reader, adapter.json_schema(mode="validation")).add(errors)
+    return value, reader.problems
+
+
+def _any_bool(data: object) -> bool:
+    if isinstance(data, dict | list):
+        return any(map(_any_bool, data.values() if isinstance(data, dict) else data))
+    return isinstance(data, bool)
+
+
+class _Judge:
+    """Turns validation errors into located problems in plain words."""
+
+    def __init__(self, data: object, reader: Reader, schema: words.Schema) -> None:
+        self._data = data
+        self._reader = reader
+        self._schema = schema
+
+    def add(self, errors: Sequence[Any]) -> None:
+        for error in errors:
+            self._error(str(error["type"]), self._path(error["loc"]), error)
+        # JSON's true equals the literal 1 to the validator; to whoever wrote it, it does not.
+        for path, value in _leaves(self._data, ()):
+            if isinstance(value, bool):
+                nodes = words.schemas_at(self._schema, path)
+                if nodes and not any(_takes_bool(n) for n in nodes):
+                    self._value_problem(path, value)
+
+    def _path(self, loc: Sequence[str | int]) -> Key:
+        """The validator's location without the names of alternatives, which no file contains."""
+        path: Key = ()
+        for n, part in enumerate(loc):
+            known = (*path, part) in self._reader.places
+            if known or (n == len(loc) - 1 and words.schemas_at(self._schema, (*path, part))):
+                path = (*path, part)
+        return path
+
+    def _error(self, kind: str, path: Key, error: Any) -> None:
+        places, keys = self._reader.places, self._reader.keys
+        if any(path[:n] in self._reader.bad for n in range(1, len(path) + 1)):
+            return
+        if kind in ("missing", "missing_argument") and path not in places:
+            if isinstance(path[-1], int):  # a list too short for its fixed length
+                self._value_problem(path[:-1], self._at(path[:-1]))
+                return
+            at = keys.get(path[:-1], places[path[:-1]])
+            nodes = words.schemas_at(self._schema, path)
+            allowed = words.allowed_words(self._schema, nodes, words.unit_of(path))
+            self._reader.complain(path, at, f"is missing; wanted: {allowed or 'a value'}.")
+        elif kind in ("extra_forbidden", "unexpected_keyword_argument"):
+            nodes = words.schemas_at(self._schema, path[:-1])
+            free = [k for k in words.known_keys(nodes) if (*path[:-1], k) not in places]
+            hint = did_you_mean(str(path[-1]), free or words.known_keys(nodes))
+            if str(path[-1]).isdecimal() and self._at(path) is None:  # {range_mm: 1,5}
+                hint = " A comma ends a value here; write a point as decimal mark."
+            self._reader.complain(path, keys.get(path, places[path]), f"unknown key.{hint}")
+        elif kind in ("value_error", "assertion_error"):
+            what = str(error.get("ctx", {}).get("error", error["msg"]))
+            self._reader.complain(path, places[path], what)
+        else:
+            self._value_problem(path, self._at(path))
+
+    def _value_problem(self, path: Key, value: object) -> None:
+        if path in self._reader.bad:
+            return
+        unit = words.unit_of(path)
+        nodes = words.schemas_at(self._schema, path)
+        allowed = words.allowed_words(self._schema, nodes, unit)
+        what = f"{words.value_words(value, unit)} is not allowed"
+        what += f"; wanted: {allowed}." if allowed else "."
+        self._reader.complain(path, self._reader.places[path], what + _hint(value, nodes))
+
+    def _at(self, path: Key) -> object:
+        value: Any = self._data
+        for key in path:
+            value = value[key]
+        return value
+
+
+def _leaves(data: object, path: Key) -> list[tuple[Key, object]]:
+    if isinstance(data, dict):
+        return [leaf for k, v in data.items() for leaf in _leaves(v, (*path, k))]
+    if isinstance(data, list):
+        return [leaf for i, v in enumerate(data) for leaf in _leaves(v, (*path, i))]
+    return [(path, data)]
+
+
+def _takes_bool(node: words.Schema) -> bool:
+    options = _options(node)
+    if options:
+        return any(isinstance(option, bool) for option in options)
+    return node.get("type", "boolean") == "boolean"
+
+
+def _hint(value: object, nodes: Sequence[words.Schema]) -> str:
+    """What probably happened, for the mistakes that YAML makes easy."""
+    kinds = {node.get("type") for node in nodes}
+    if isinstance(value, str) and kinds & {"number", "integer"}:
+        if re.fullmatch(r"[-+]?[0-9]+,[0-9]+", value):
+            return " Write a point as decimal mark."
+        if PLAIN_NUMBER.fullmatch(value):
+            return " Write it without quotes."
+        if PLAIN_NUMBER.match(value):
+            return " Write the number alone; the unit stands in the key."
+    if "boolean" in kinds and str(value).lower() in ("yes", "no", "on", "off", "y", "n"):
+        return " This is text in YAML 1.2; write true or false."
+    if isinstance(value, int | float) and kinds & {"string"}:
+        return " Put it in quotes if it is a name."
+    if isinstance(value, str):
+        options = [str(o) for n in nodes for o in _options(n)]
+        close = did_you_mean(value, options)
+        return close if len(options) > 1 and close.startswith(" Did") else ""
+    return ""
+
+
+def _options(node: words.Schema) -> list[object]:
+    options = node.get("enum", [node["const"]] if "const" in node else [])
+    return list(options) if isinstance(options, list) else []
+
+
+def _problem(places: dict[Key, Place], path: Key, what: str) -> Problem:
+    near = path
+    while near not in places:
+        near = near[:-1]
+    where = words.place(path)
+    return Problem(*places[near], f"{where}: {what}" if where else what)
