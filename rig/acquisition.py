@@ -1,0 +1,116 @@
+"""The rhythm of the measurement: live values ten times a second, sampling slots on the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from drivers.clock import Clock
+from drivers.errors import DeviceError
+from drivers.interfaces import Device, DisplacementSensor, Dynamometer, Robot
+from drivers.readings import Reading
+from rig.limits import Live
+from rig.recorder import Slot
+
+TICK_S = 0.1
+# A sped-up clock must not make the loop spin: between two ticks at least so much wall time.
+TICK_WALL_S = 0.005
+
+
+@dataclass(frozen=True)
+class Devices:
+    """The three devices of a station."""
+
+    robot: Robot
+    dynamometer: Dynamometer
+    laser: DisplacementSensor
+
+    def all(self) -> tuple[Device, ...]:
+        """In the order in which they are opened."""
+        return (self.robot, self.dynamometer, self.laser)
+
+
+def open_devices(devices: Devices, stack: ExitStack, say: Callable[[str], None]) -> None:
+    """Opens every device; whatever happens later, `stack` closes those that were opened."""
+    for device in devices.all():
+        stack.callback(device.close)
+        device.open()
+        identity = ", ".join(f"{k} {v}" for k, v in device.identity().items())
+        say(f"{device.name}: ready ({identity})")
+
+
+class Acquisition:
+    """Waits for ticks and slots, and collects the devices; the only place that reads them."""
+
+    def __init__(
+        self, devices: Devices, clock: Clock, rate_Hz: float, session_offset_s: float = 0.0
+    ) -> None:
+        self._devices = devices
+        self._clock = clock
+        self._period = 1.0 / rate_Hz
+        self._tick = max(TICK_S, TICK_WALL_S * clock.speed)
+        self._origin = clock.now() - session_offset_s
+        self._next_tick = clock.now()
+        self._next_slot = clock.now() + self._period
+        self._number = 0
+
+    def now(self) -> float:
+        """Seconds of the session clock."""
+        return self._clock.now() - self._origin
+
+    def wait(self) -> Slot | None:
+        """Sleeps until the next tick or slot; returns the slot when its time has come.
+
+        Slots are multiples of the sampling period; one that could not be served in time is left
+        out, and the next one says how many are missing.
+        """
+        wake = min(self._next_tick, self._next_slot)
+        self._clock.sleep_until(wake)
+        now = self._clock.now()
+        if now >= self._next_tick:
+            self._next_tick = now + self._tick
+        if now < self._next_slot:
+            return None
+        lateness = now - self._next_slot
+        missed = int(lateness // self._period)
+        self._number += 1 + missed
+        self._next_slot += (1 + missed) * self._period
+        return Slot(
+            number=self._number,
+            session_s=now - self._origin,
+            lateness_s=lateness,
+            missed=missed,
+            robot=self._devices.robot.collect(),
+            dynamometer=self._devices.dynamometer.collect(),
+            laser=self._devices.laser.collect(),
+        )
+
+    def average(self, seconds: float) -> tuple[Reading, Reading, Reading]:
+        """Robot, dynamometer and laser over a fresh span of `seconds` (for taring and datum).
+
+        Blocks that began before the call are discarded, so that nothing older gets in.
+        """
+        for device in self._devices.all():
+            device.collect()
+        self._clock.sleep(seconds)
+        devices = self._devices
+        return devices.robot.collect(), devices.dynamometer.collect(), devices.laser.collect()
+
+    def live(self, displacement_mm: Callable[[float], float]) -> Live:
+        """The newest values of all devices; raises the error of one that has none."""
+        force = self._devices.dynamometer.latest()
+        laser = self._devices.laser.latest()
+        x, y, z = force.values[:3]
+        return Live(
+            # the laser and the DAQ block in parallel; the older of the two dates the pair
+            t=min(force.end, laser.end) - self._origin,
+            force_N=(x, y, z),
+            displacement_mm=displacement_mm(laser.values[0]),
+            robot=self._devices.robot.state(),
+        )
+
+
+def explain(error: DeviceError, hands: str) -> str:
+    """One message: device, fault, remedy, and what to do with the hands."""
+    return f"{error} {hands}"

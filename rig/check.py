@@ -1,0 +1,88 @@
+"""`rig check`: the plan, then each device's state, one line each. Moves and writes nothing."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.errors import DeviceError
+from rig.emulation import EmulatedRig
+from rig.measure import SAFETY_NOTE, poses_and_programs
+from rig.plan import Plan, plan
+from rig.protocol import load_protocol
+from rig.station import load_station
+from rig.station_devices import make_devices, station_clock
+
+
+@dataclass(frozen=True)
+class DeviceState:
+    """One device: ready, with its identity, or the error that says why not."""
+
+    name: str
+    identity: dict[str, str]
+    error: DeviceError | None = None
+
+    def line(self) -> str:
+        """One line for the operator."""
+        if self.error is not None:
+            return f"  {self.name:12} NOT READY  {self.error.fault}. {self.error.remedy}"
+        details = ", ".join(f"{k} {v}" for k, v in self.identity.items())
+        return f"  {self.name:12} ready      {details}"
+
+
+@dataclass(frozen=True)
+class Check:
+    """What `rig check` found."""
+
+    plan: Plan
+    station: str
+    emulated: bool
+    devices: tuple[DeviceState, ...]
+
+    @property
+    def first_error(self) -> DeviceError | None:
+        """What decides over the exit status."""
+        return next((d.error for d in self.devices if d.error is not None), None)
+
+    def to_text(self) -> str:
+        """Plan and devices for the terminal."""
+        mark = " (EMULATED: no hardware)" if self.emulated else ""
+        lines = [self.plan.to_text(), "", f"Devices of station {self.station}{mark}"]
+        return "\n".join([*lines, *(d.line() for d in self.devices), "", SAFETY_NOTE])
+
+    def to_json(self) -> dict[str, object]:
+        """The same for programs."""
+        devices = {
+            d.name: {"ready": d.error is None, "identity": d.identity,
+                     "problem": None if d.error is None else str(d.error)}
+            for d in self.devices
+        }  # fmt: skip
+        return {
+            "schema": "rig.check/1",
+            "station": self.station,
+            "emulated": self.emulated,
+            "plan": self.plan.to_json(),
+            "devices": devices,
+        }
+
+
+def check(protocol_file: Path, station_name: str | None) -> Check:
+    """Validates protocol and station, then asks every device; one that fails hides no other."""
+    protocol = load_protocol(protocol_file)
+    station = load_station(station_name or protocol.station, protocol_file.parent)
+    the_plan = plan(protocol, station)
+    name, emulated = station.name, station.emulation is not None
+    states: list[DeviceState] = []
+    with ExitStack() as stack:
+        if emulated:
+            rig = EmulatedRig(station, *poses_and_programs(protocol))
+            station = stack.enter_context(rig)
+        for device in make_devices(station, station_clock(station)).all():
+            stack.callback(device.close)
+            try:
+                device.open()
+                states.append(DeviceState(device.name, dict(device.identity())))
+            except DeviceError as error:
+                states.append(DeviceState(device.name, {}, error))
+    return Check(the_plan, name, emulated, tuple(states))

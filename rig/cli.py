@@ -1,0 +1,214 @@
+"""The command `rig`: arguments only. Every command imports what it needs when it runs."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+from types import TracebackType
+from typing import Annotated, Any
+
+import typer
+
+app = typer.Typer(
+    name="rig",
+    help="How stiff is this arm, and why does the simulation disagree with it?",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+JsonOption = Annotated[
+    str | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - : stdout.")
+]
+StationOption = Annotated[
+    str | None,
+    typer.Option(
+        help="A station's name or file, instead of the protocol's; emulated: none needed."
+    ),
+]
+ProtocolArgument = Annotated[Path, typer.Argument(metavar="PROTOCOL.yaml")]
+DatasetArgument = Annotated[Path, typer.Argument(metavar="DATASET.h5")]
+
+
+def say(text: str) -> None:
+    """Progress and notes go to standard error: standard output belongs to results."""
+    typer.echo(text, err=True)
+
+
+def give(result: Any, json_file: str | None) -> None:
+    """Prints the text of a result, or writes its JSON where asked."""
+    if json_file is not None:
+        text = json.dumps(result.to_json(), indent=2, allow_nan=False)
+        if json_file == "-":
+            typer.echo(text)
+            return
+        Path(json_file).write_text(text + "\n", encoding="utf-8")
+    typer.echo(result.to_text())
+
+
+@app.command()
+def measure(
+    protocol: Annotated[Path | None, typer.Argument(metavar="PROTOCOL.yaml")] = None,
+    station: StationOption = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DATASET.h5", help="The new data set.")
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(metavar="DATASET.h5", help="Go on where an interrupted run stopped."),
+    ] = None,
+) -> None:
+    """Carry out a procedure on a station, guide the operator, write the data set."""
+    from rig import measure as measuring
+    from rig.errors import InputError
+
+    if (protocol is None) == (resume is None):
+        raise InputError("rig measure: give a PROTOCOL.yaml, or --resume DATASET.h5.")
+    if resume is not None:
+        path = measuring.resume(resume, say)
+    else:
+        assert protocol is not None
+        path = measuring.measure(protocol, station, output, say)
+    say(f"{path}: complete. Next: rig analyze {path}")
+
+
+@app.command()
+def check(
+    protocol: ProtocolArgument, station: StationOption = None, json_file: JsonOption = None
+) -> None:
+    """Validate a protocol, show its plan, and ask every device whether it is ready."""
+    from rig.check import check as run_check
+
+    result = run_check(protocol, station)
+    give(result, json_file)
+    if result.first_error is not None:
+        raise result.first_error
+
+
+@app.command()
+def emulate(station: Annotated[str, typer.Argument(metavar="STATION.yaml")] = "emulated") -> None:
+    """Start the emulators of a station by hand, until Ctrl-C."""
+    from rig.emulation import serve_by_hand
+    from rig.station import load_station
+
+    serve_by_hand(load_station(station))
+
+
+@app.command()
+def analyze(
+    dataset: DatasetArgument,
+    weighting: Annotated[
+        str, typer.Option(help="proportional, 1/s^2 or none: how the points are weighted.")
+    ] = "proportional",
+    intercept: Annotated[bool, typer.Option(help="Fit an intercept too.")] = False,
+    errors_in_variables: Annotated[
+        bool, typer.Option(help="Count the force's uncertainty as well as the displacement's.")
+    ] = False,
+    keep_after_knee: Annotated[
+        bool, typer.Option(help="Count the steps after a knee towards k.")
+    ] = False,
+    figures: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Draw the figures into this folder.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Curve, stiffness k, pointwise k and anisotropy, with uncertainties."""
+    from rig import analyze as analysis
+    from rig.dataset import load
+
+    options = analysis.Options(
+        weighting=analysis.weighting(weighting),
+        intercept=intercept,
+        errors_in_variables=errors_in_variables,
+        keep_after_knee=keep_after_knee,
+    )
+    result = analysis.analyze(load(dataset), options)
+    give(result, json_file)
+    if figures is not None:
+        from rig.figures import draw
+
+        for path in draw(result, figures):
+            say(f"figure: {path}")
+
+
+@app.command("import")
+def import_(
+    table: Annotated[Path, typer.Argument(metavar="TABLE.csv")],
+    meta: Annotated[Path, typer.Argument(metavar="META.yaml")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DATASET.h5")],
+) -> None:
+    """Bring in measurements that were taken with other software."""
+    from rig.tables import import_table
+
+    result = import_table(table, meta, output)
+    say(f"{output}: {len(result.columns['force_N'])} rows. Next: rig analyze {output}")
+
+
+@app.command()
+def export(
+    dataset: DatasetArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.csv|.parquet")],
+) -> None:
+    """Write a data set as CSV or Parquet."""
+    from rig.dataset import load
+    from rig.tables import export_table
+
+    export_table(load(dataset), output)
+    say(f"{output}: written")
+
+
+def main() -> None:
+    """Runs the command and turns every ending into its exit status; no traceback for users."""
+    sys.excepthook = _report_bug
+    from rig.intruders import refuse_intruders
+
+    sys.exit(_guarded(refuse_intruders) or _guarded(lambda: app(standalone_mode=False)))
+
+
+def _guarded(act: Any) -> int:
+    import click
+
+    from drivers.errors import DeviceError, SafetyStop
+    from rig.errors import InputError, MeasurementStopped
+
+    try:
+        act()
+    except click.exceptions.Exit as ending:
+        return ending.exit_code
+    except click.ClickException as error:
+        error.show()
+        return 2
+    except InputError as error:
+        say(str(error))
+        return 2
+    except SafetyStop as error:
+        say(f"Stopped for safety. {error}")
+        return 4
+    except DeviceError as error:
+        say(str(error))
+        return 3
+    except MeasurementStopped as error:
+        say(f"Stopped: {error}")
+        return 4
+    except (KeyboardInterrupt, click.Abort):
+        say("Interrupted.")
+        return 130
+    except BrokenPipeError:  # `rig ... | head`: nobody reads any more, which is no fault
+        sys.stderr.close()
+        return 0
+    return 0
+
+
+def _report_bug(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """What nobody foresaw: the traceback goes to a file, one message to the user."""
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="rig-bug-", suffix=".txt", delete=False, encoding="utf-8"
+    ) as file:
+        traceback.print_exception(kind, error, trace, file=file)
+    say(f"This is a bug in rig ({kind.__name__}: {error}). Please report it with {file.name}.")

@@ -1,0 +1,229 @@
+"""`rig measure`: from a protocol to a data set, whatever happens on the way."""
+
+from __future__ import annotations
+
+import signal
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from drivers.errors import DeviceError, SafetyStop
+from rig import dataset as datasets
+from rig.acquisition import open_devices
+from rig.emulation import EmulatedRig
+from rig.errors import InputError, MeasurementStopped
+from rig.journal import Journal, Record, journal_path, replay
+from rig.limits import UNLOAD
+from rig.measured_meta import measured_meta
+from rig.progress import Progress, read_progress
+from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
+from rig.recorder import Recorder
+from rig.runner import Runner
+from rig.station import Station, load_station, parse_station
+from rig.station_devices import make_devices, make_loader, station_clock
+
+SAFETY_NOTE = (
+    "Software monitoring is no safety function: keep the emergency stop within reach, "
+    "and your hands where the arm can't trap them."
+)
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One measurement: where it goes, what is to be done, what has been done already."""
+
+    output: Path
+    protocol: MeasurementProtocol
+    station: Station
+    journal: Journal
+    progress: Progress
+
+
+def measure(protocol_file: Path, station_name: str | None, output: Path | None, say: Say) -> Path:
+    """Carries out a protocol on its station and returns the data set's path.
+
+    Raises InputError before any device is opened; DeviceError, MeasurementStopped or
+    KeyboardInterrupt after the data so far have been written.
+    """
+    protocol = load_protocol(protocol_file)
+    station = load_station(station_name or protocol.station, protocol_file.parent)
+    path = output or default_output(protocol_file)
+    _refuse_existing(path)
+    start = {
+        "uuid": str(uuid.uuid4()),
+        "created": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "origin": "emulated" if station.emulation else "measured",
+        "title": protocol.title,
+        "software": f"stiffness-rig {version('stiffness-rig')}",
+        "protocol": protocol.text,
+        "station": station.text,
+        "meta": measured_meta(protocol, station).model_dump(mode="json"),
+    }
+    # The devices come first: a run that never began leaves no file behind.
+    with _opened(protocol, station, say) as rig:
+        journal = Journal.create(journal_path(path), start)
+        return _carry_out(Job(path, protocol, station, journal, Progress()), rig, say)
+
+
+def resume(path: Path, say: Say) -> Path:
+    """Goes on with an interrupted measurement at the step where it stopped."""
+    journal_file = journal_path(path)
+    if not journal_file.exists():
+        raise InputError(
+            f"{path}: there is no {journal_file.name} beside it, so there is nothing to resume. "
+            "A complete measurement needs no resuming; measure again for another data set."
+        )
+    records = replay(journal_file)
+    start = records[0].data
+    protocol = parse_protocol(start["protocol"], path)
+    station = parse_station(start["station"], path)
+    with _opened(protocol, station, say) as rig:
+        journal = Journal.reopen(journal_file)
+        progress = read_progress(journal.records)
+        journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
+        say(f"resuming after {progress.rows} rows")
+        return _carry_out(Job(path, protocol, station, journal, progress), rig, say)
+
+
+def default_output(protocol_file: Path) -> Path:
+    """Beside where the command runs: protocol's name and local time."""
+    return Path(f"{protocol_file.stem}_{datetime.now():%Y%m%d-%H%M%S}.h5")
+
+
+def _refuse_existing(path: Path) -> None:
+    if path.exists() or journal_path(path).exists():
+        raise InputError(
+            f"{path}: exists already, and measurements are never overwritten. "
+            "Choose another name with -o, or go on with an interrupted one by --resume."
+        )
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist. Create it first.")
+
+
+@dataclass(frozen=True)
+class _Rig:
+    """Open devices and operator, as a station made them."""
+
+    station: Station
+    devices: Any
+    loader: Any
+    clock: Any
+
+
+@contextmanager
+def _opened(protocol: MeasurementProtocol, station: Station, say: Say) -> Iterator[_Rig]:
+    """Everything that the procedure talks to; closed again in any case."""
+    with ExitStack() as stack:
+        if station.emulation is not None:
+            say("EMULATED station: whatever is measured here is no measurement of a real arm.")
+            emulated = EmulatedRig(station, *poses_and_programs(protocol))
+            station = stack.enter_context(emulated)
+        clock = station_clock(station)
+        devices = make_devices(station, clock)
+        open_devices(devices, stack, say)
+        loader = make_loader(station, clock)
+        stack.callback(loader.close)
+        loader.open()
+        yield _Rig(station, devices, loader, clock)
+
+
+def poses_and_programs(
+    protocol: MeasurementProtocol,
+) -> tuple[dict[str, tuple[float, ...]], dict[str, tuple[float, ...]]]:
+    """Joint angles (rad) by pose name, and by the name of the program that leads there."""
+    poses = {name: tuple(pose.q_rad) for name, pose in protocol.poses.items()}
+    programs = {p.program: tuple(p.q_rad) for p in protocol.poses.values() if p.program}
+    return poses, programs
+
+
+def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
+    devices = {device.name: device for device in rig.devices.all()}
+    signals = {name: device.signals for name, device in devices.items()}
+    descriptor = {
+        "devices": {n: dict(d.identity()) for n, d in devices.items()}
+        | {"operator": dict(rig.loader.identity())},
+        "signals": [
+            {"name": s.name, "unit": s.unit, "long_name": s.long_name}
+            for columns in signals.values()
+            for s in columns
+        ],
+    }
+    assert rig.station.laser is not None
+    recorder = Recorder(job.journal, signals, rig.station.laser.sign, job.progress.rows)
+    runner = Runner(
+        job.protocol,
+        rig.devices,
+        rig.loader,
+        rig.clock,
+        recorder,
+        job.progress,
+        lambda: _build(job),
+    )
+    reason, complete = "a bug", False
+    try:
+        job.journal.append("descriptor", descriptor)
+        say(SAFETY_NOTE)
+        with _ctrl_c(runner.interrupt):
+            runner.run()
+        reason, complete = "all runs done", True
+    except MeasurementStopped as stop:
+        reason = str(stop)
+        raise
+    except DeviceError as error:
+        reason = str(error)
+        recorder.event("device_failed", reason, device=error.device)
+        rig.loader.notify(f"{reason} {UNLOAD}", "error")
+        raise
+    except KeyboardInterrupt:
+        reason = "interrupted by Ctrl-C"
+        raise
+    finally:
+        with _ctrl_c(lambda: say("writing the data set; this takes a moment")):
+            _finish(job, recorder, reason, complete=complete)
+    return job.output
+
+
+def _finish(job: Job, recorder: Recorder, reason: str, *, complete: bool) -> None:
+    """Stop record, data set, and, when that is complete and reads back, the end of the journal."""
+    if complete:
+        recorder.stop(reason, complete=True)
+    else:
+        recorder.event("stopped", reason)
+    job.journal.close()
+    _build(job)
+    if complete and datasets.read_back(job.output).complete:
+        journal_path(job.output).unlink()
+
+
+def _build(job: Job) -> None:
+    records: list[Record] = replay(journal_path(job.output))
+    datasets.write(datasets.from_records(records, job.output), job.output)
+
+
+@contextmanager
+def _ctrl_c(act: Callable[[], object]) -> Iterator[None]:
+    def handler(_number: int, _frame: FrameType | None) -> None:
+        act()
+
+    try:
+        earlier = signal.signal(signal.SIGINT, handler)
+    except ValueError:  # not the main thread, in tests: Ctrl-C goes elsewhere
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, earlier)
+
+
+def exit_status(error: DeviceError) -> int:
+    """3 a device failed; 4 stopped for safety."""
+    return 4 if isinstance(error, SafetyStop) else 3

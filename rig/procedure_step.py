@@ -1,0 +1,197 @@
+"""One force step: guide the hand into the band, let the arm settle, sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+from drivers.interfaces import Loader, Prompt
+from rig.errors import MeasurementStopped
+from rig.limits import UNLOAD
+from rig.protocol import MeasurementProtocol, Run, Step
+from rig.recorder import Place, Recorder, Slot, Vector
+from rig.settle import SettleWindow
+from rig.supervision import Supervision
+
+
+class TopReached(Exception):
+    """The run's own displacement limit ends its loading branch."""
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """The repetition of a run under way; `start_s` is where its `time_s` begins."""
+
+    index: int
+    run: Run
+    repetition: int
+    unit_vector: Vector
+    start_s: float = nan
+    segment: int = 0
+
+
+class StepProcedure:
+    """Measures one step after the other; knows nothing of runs, taring and repetitions."""
+
+    def __init__(
+        self,
+        protocol: MeasurementProtocol,
+        supervision: Supervision,
+        recorder: Recorder,
+        loader: Loader,
+    ) -> None:
+        self._protocol = protocol
+        self._supervision = supervision
+        self._recorder = recorder
+        self._loader = loader
+        self._window = SettleWindow(protocol.settle)
+        self._done: list[tuple[float, float]] = []  # (force N, displacement mm) of earlier steps
+
+    def restart(self) -> None:
+        """A new setup: earlier steps say nothing about how far to turn."""
+        self._done.clear()
+
+    def measure(self, where: Where, step: Step, steps: int) -> str:
+        """Carries out the step and returns how it went, in words."""
+        show = self._supervision.show
+        half_width = self._protocol.force_band.half_width_N(step.target_N)
+        show(step=step.number, steps=steps, target_N=step.target_N, band_N=half_width)
+        show(samples=0, samples_wanted=self._wanted())
+        deadline = self._supervision.now() + self._protocol.step_deadline_s
+        while True:
+            first_row = self._recorder.rows
+            reached = self._approach(where, step, deadline)
+            settled = self._settle(where, step, banded=reached)
+            if settled != "left the band":
+                break
+            self._recorder.discard(first_row, "the force left its band while settling")
+        self._sample(where, step)
+        view = self._supervision.view
+        self._done.append((view.force_N, view.displacement_mm))
+        words = ["measured"] if reached else ["band not reached"]
+        return ", ".join(words if settled == "settled" else [*words, settled])
+
+    def _approach(self, where: Where, step: Step, deadline: float) -> bool:
+        """Guides the hand until the force is in its band; False if it was given up."""
+        top = where.run.stop_at_displacement_mm
+        self._supervision.show(phase="approach", stiffness_N_per_mm=self._stiffness())
+        while True:
+            live, _ = self._supervision.tick()
+            view = self._supervision.view
+            if abs(view.force_N - step.target_N) <= view.band_N:
+                return True
+            if top is not None and step.branch == "loading" and live.displacement_mm > top:
+                raise TopReached
+            if self._supervision.now() > deadline:
+                if self._give_up(where, step):
+                    return False
+                deadline = self._supervision.now() + self._protocol.step_deadline_s
+
+    def _give_up(self, where: Where, step: Step) -> bool:
+        text = (
+            f"{step.target_N:g} N were not reached within {self._protocol.step_deadline_s:g} s; "
+            f"the force is {self._supervision.view.force_N:.4g} N"
+        )
+        answers = ("record", "continue", "skip", "abort")
+        answer = self._supervision.ask(Prompt("step_deadline", f"{text}.", answers))
+        if answer == "record":
+            self.event(where, "band_not_reached", text, step=step.number)
+            return True
+        self._supervision.obey(answer)
+        return False
+
+    def _settle(self, where: Where, step: Step, *, banded: bool) -> str:
+        """Hands off; records while the arm comes to rest. Returns how it ended."""
+        start = self._supervision.now()
+        self._window.restart(start)
+        while not self._window.settled(self._supervision.now()):
+            now = self._supervision.now()
+            remaining = self._window.remaining_s(now)
+            self._supervision.show(phase="settling", settle_remaining_s=remaining)
+            live, slot = self._supervision.tick()
+            view = self._supervision.view
+            self._window.add(live.t, view.force_N, live.displacement_mm)
+            if slot is not None:
+                self.record(slot, where, step, settled=False)
+            # The arm relaxes a little: twice the band is still this step, more is another force.
+            if banded and abs(view.force_N - step.target_N) > 2 * view.band_N:
+                return "left the band"
+            if now - start > self._protocol.settle.deadline_s:
+                return self._not_settled(where, step)
+        return "settled"
+
+    def _not_settled(self, where: Where, step: Step) -> str:
+        settle = self._protocol.settle
+        text = f"step {step.number} has not settled within {settle.deadline_s:g} s"
+        self.event(where, "not_settled", text, step=step.number)
+        if settle.at_deadline == "stop":
+            raise MeasurementStopped(f"{text}; the protocol stops there. {UNLOAD}")
+        if settle.at_deadline == "ask":
+            answers = ("record", "redo_step", "skip", "abort")
+            self._supervision.obey(
+                self._supervision.ask(Prompt("settle_deadline", f"{text}.", answers))
+            )
+        else:
+            self._loader.notify(f"{text}; it is recorded, and marked as not settled", "warning")
+        return "not settled"
+
+    def _sample(self, where: Where, step: Step) -> None:
+        taken = 0
+        while taken < self._wanted():
+            self._supervision.show(phase="sampling", settle_remaining_s=0.0, samples=taken)
+            _, slot = self._supervision.tick()
+            if slot is not None and self.record(slot, where, step, settled=True):
+                taken += 1
+
+    def zero_plateau(self, where: Where, seconds: float) -> None:
+        """Samples without load for so long."""
+        zero = Step(0, "zero", 0.0)
+        wanted = round(seconds * self._protocol.sampling.rate_Hz)
+        self._supervision.show(phase="zero", step=0, target_N=0.0, samples_wanted=wanted)
+        taken = 0
+        while taken < wanted:
+            self._supervision.show(samples=taken)
+            _, slot = self._supervision.tick()
+            if slot is not None and self.record(slot, where, zero, settled=True):
+                taken += 1
+
+    def record(self, slot: Slot, where: Where, step: Step, *, settled: bool) -> bool:
+        """Writes the slot; False, and an event, if a device had no valid value in it."""
+        missing = slot.without_value()
+        if missing:
+            text = f"no valid value from {', '.join(missing)} in slot {slot.number}"
+            self.event(where, "no_value", text)
+            return False
+        place = Place(
+            pose=where.run.pose,
+            direction=where.run.direction,
+            unit_vector=where.unit_vector,
+            repetition=where.repetition,
+            branch=step.branch,
+            step=step.number,
+            target_N=step.target_N,
+            run_start_s=where.start_s,
+            segment=where.segment,
+            settled=settled,
+        )
+        self._recorder.sample(slot, place)
+        return True
+
+    def event(self, where: Where, kind: str, text: str, **data: Any) -> None:
+        """Something that happened in this repetition."""
+        place = {"pose": where.run.pose, "direction": where.run.direction}
+        repetition = {"run": where.index, "repetition": where.repetition}
+        self._recorder.event(kind, text, **repetition, **place, **data)
+
+    def _wanted(self) -> int:
+        """Samples per step: as many as asked for, and at least as long as the hold."""
+        sampling = self._protocol.sampling
+        return max(sampling.samples_per_step, round(self._protocol.hold_s * sampling.rate_Hz))
+
+    def _stiffness(self) -> float:
+        """Over the last two steps, N/mm: tells how far to turn; nan before there are two."""
+        if len(self._done) < 2:
+            return nan
+        (f0, u0), (f1, u1) = self._done[-2:]
+        return (f1 - f0) / (u1 - u0) if u1 != u0 else nan

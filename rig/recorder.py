@@ -1,0 +1,134 @@
+"""From three readings to one row of the data set, on disk before it counts as recorded."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import nan, sqrt
+from pathlib import Path
+from typing import Any
+
+from drivers.readings import Reading, Signal
+from rig.journal import Journal
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """All readings of one sampling slot. Times in s of the session clock."""
+
+    number: int
+    session_s: float
+    lateness_s: float
+    missed: int
+    robot: Reading
+    dynamometer: Reading
+    laser: Reading
+
+    def without_value(self) -> list[str]:
+        """Devices that delivered no valid value in this slot."""
+        readings = {"robot": self.robot, "dynamometer": self.dynamometer, "laser": self.laser}
+        return [name for name, reading in readings.items() if reading.count == 0]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in the procedure a row belongs."""
+
+    pose: str
+    direction: str
+    unit_vector: Vector
+    repetition: int
+    branch: str
+    step: int
+    target_N: float
+    run_start_s: float
+    segment: int
+    settled: bool
+
+
+class Recorder:
+    """Writes rows and events to the journal; counts rows, so that they can be discarded later."""
+
+    def __init__(
+        self, journal: Journal, signals: Mapping[str, Sequence[Signal]], sign: int, rows: int = 0
+    ) -> None:
+        self._journal = journal
+        self._signals = signals
+        self._sign = sign
+        self.rows = rows
+        self.datum_mm = nan
+
+    def displacement_mm(self, laser_mm: float) -> float:
+        """Displacement along the direction since the datum."""
+        return self._sign * (laser_mm - self.datum_mm)
+
+    def sample(self, slot: Slot, place: Place) -> None:
+        """One row; when this returns, it is on disk."""
+        values: dict[str, float] = {}
+        sd: dict[str, float] = {}
+        devices = {"robot": slot.robot, "dynamometer": slot.dynamometer, "laser": slot.laser}
+        for device, reading in devices.items():
+            for signal, value, spread in zip(
+                self._signals[device], reading.values, reading.sd, strict=True
+            ):
+                values[signal.name] = value
+                sd[signal.name] = spread
+        values["force_N"], sd["force_N"] = along(slot.dynamometer, place.unit_vector)
+        values["displacement_mm"] = self.displacement_mm(slot.laser.values[0])
+        sd["displacement_mm"] = slot.laser.sd[0]
+        values["settled"] = float(place.settled)
+        values["slots_missed"] = float(slot.missed)
+        self._journal.append(
+            "sample",
+            {
+                "number": slot.number,
+                "session_s": round(slot.session_s, 6),
+                "time_s": round(slot.session_s - place.run_start_s, 6),
+                "pose": place.pose,
+                "direction": place.direction,
+                "repetition": place.repetition,
+                "branch": place.branch,
+                "step": place.step,
+                "target_N": place.target_N,
+                "recorded": True,
+                "lateness_s": round(slot.lateness_s, 6),
+                "segment": place.segment,
+                "values": values,
+                "sd": sd,
+                "count": {name: r.count for name, r in devices.items()},
+                "invalid": {name: r.invalid for name, r in devices.items()},
+                "age_s": {name: round(r.age_s, 4) for name, r in devices.items()},
+            },
+        )
+        self.rows += 1
+
+    def event(self, kind: str, text: str, **data: Any) -> None:
+        """Something that happened, in words, with what a program needs to know of it."""
+        self._journal.append("event", {"kind": kind, "text": text, **data})
+
+    def discard(self, first: int, reason: str) -> None:
+        """Rows from `first` to the newest stay in the file, marked as not to be used."""
+        if first < self.rows:
+            last = self.rows - 1
+            text = f"rows {first} to {last} discarded: {reason}"
+            self.event("discard", text, first=first, last=last, reason=reason)
+
+    def stop(self, reason: str, *, complete: bool) -> None:
+        """The last record. Without one the data set counts as incomplete."""
+        self._journal.append("stop", {"reason": reason, "complete": complete})
+
+
+def along(force: Reading, unit_vector: Vector) -> tuple[float, float]:
+    """Component of the force along the direction, and the spread of its single values, N."""
+    value = sum(f * e for f, e in zip(force.values, unit_vector, strict=False))
+    variance = sum((s * e) ** 2 for s, e in zip(force.sd, unit_vector, strict=False) if e)
+    return value, sqrt(variance)
+
+
+def free_space_MB(folder: Path) -> float:
+    """Space left where the data set goes."""
+    stat = os.statvfs(folder)
+    return stat.f_bavail * stat.f_frsize / 1e6

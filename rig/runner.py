@@ -1,0 +1,220 @@
+"""The procedure as a state machine: mount, then for each repetition unload, reset, tare, zero
+plateau, steps, unload, zero plateau, rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import degrees, isnan, nan, radians
+
+from drivers.clock import Clock
+from drivers.interfaces import Loader, Prompt
+from rig.acquisition import Acquisition, Devices
+from rig.errors import MeasurementStopped
+from rig.limits import Watch
+from rig.procedure_step import StepProcedure, TopReached, Where
+from rig.progress import Progress
+from rig.protocol import MeasurementProtocol, Run, Step
+from rig.recorder import Recorder
+from rig.supervision import Supervision, Wish
+
+TARE_S = 2.0
+# Within this the arm counts as standing in its reference pose: RTDE shows commanded poses to
+# 0.001 deg, and by hand on the pendant a joint is brought there to about a tenth of a degree.
+POSE_TOLERANCE_DEG = 0.5
+
+
+class Runner:
+    """Carries out a protocol. `run` returns when it is done, or raises why it is not.
+
+    `checkpoint` is called whenever there is time to bring the data set up to date.
+    """
+
+    def __init__(
+        self,
+        protocol: MeasurementProtocol,
+        devices: Devices,
+        loader: Loader,
+        clock: Clock,
+        recorder: Recorder,
+        progress: Progress,
+        checkpoint: Callable[[], None],
+    ) -> None:
+        self._protocol = protocol
+        self._devices = devices
+        self._loader = loader
+        self._recorder = recorder
+        self._progress = progress
+        self._checkpoint = checkpoint
+        rate_Hz = protocol.sampling.rate_Hz
+        self._acquisition = Acquisition(devices, clock, rate_Hz, progress.session_s)
+        self._watch = Watch(protocol.limits)
+        self._supervision = Supervision(
+            self._acquisition, loader, recorder, self._watch, checkpoint, protocol.repetitions
+        )
+        self._steps = StepProcedure(protocol, self._supervision, recorder, loader)
+        self._mounted: tuple[str, str] | None = None
+        self._segment = progress.segment
+
+    def interrupt(self) -> None:
+        """Ctrl-C: the first asks, the second stops at once (raises KeyboardInterrupt)."""
+        self._supervision.interrupt()
+
+    def run(self) -> None:
+        """All runs and repetitions that are not done yet."""
+        if self._progress.open_step_row is not None:
+            self._recorder.discard(self._progress.open_step_row, "interrupted before its end")
+        # In Reset nothing that happens while the rig is set up can overload the amplifier.
+        self._devices.dynamometer.reset()
+        for index, run, repetition in self._protocol.sequence():
+            if (index, repetition) not in self._progress.repetitions:
+                self._repetition_until_accepted(index, run, repetition)
+                self._checkpoint()
+
+    def _repetition_until_accepted(self, index: int, run: Run, repetition: int) -> None:
+        where = Where(index, run, repetition, self._protocol.directions[run.direction])
+        first_row = self._progress.first_rows.get((index, repetition), self._recorder.rows)
+        self._supervision.show(
+            pose=run.pose, direction=run.direction, repetition=repetition, step=0
+        )
+        self._supervision.look_along(where.unit_vector)
+        while True:
+            self._steps.event(where, "repetition_start", f"{run.direction}, {repetition}")
+            outcome = "measured"
+            try:
+                self._repetition(where)
+            except Wish as wish:
+                if wish.what != "skip":
+                    self._recorder.discard(first_row, "repetition redone")
+                    self._steps.event(where, "repetition_redone", "measured again")
+                    self._progress.forget_repetition(index, repetition)
+                    continue
+                outcome = f"skipped: {self._reason()}"
+            self._steps.event(where, "repetition_done", outcome, outcome=outcome)
+            self._progress.repetitions.add((index, repetition))
+            self._loader.notify(f"{run.direction}, repetition {repetition}: {outcome}")
+            return
+
+    def _repetition(self, where: Where) -> None:
+        self._mount(where)
+        where = self._zeroed(where)
+        self._steps.zero_plateau(where, self._protocol.zero.before_s)
+        self._all_steps(where)
+        self._supervision.show(phase="unloading", step=0, target_N=0.0)
+        self._unload()
+        self._steps.event(where, "unloaded", "screw turned back")
+        self._steps.zero_plateau(where, self._protocol.zero.after_s)
+        self._supervision.show(phase="rest")
+        until = self._supervision.now() + self._protocol.rest_s
+        while self._supervision.now() < until:
+            self._supervision.tick()
+
+    def _all_steps(self, where: Where) -> None:
+        steps = self._protocol.steps(where.run)
+        top_reached = False
+        for step in steps:
+            key = (where.index, where.repetition, step.branch, step.number)
+            if key in self._progress.steps or (top_reached and step.branch == "loading"):
+                continue
+            try:
+                self._step_until_accepted(where, step, len(steps))
+            except TopReached:
+                top_reached = True
+                limit = where.run.stop_at_displacement_mm
+                self._steps.event(where, "top", f"displacement is above {limit:g} mm")
+            self._progress.steps.add(key)
+
+    def _step_until_accepted(self, where: Where, step: Step, steps: int) -> None:
+        data = {"branch": step.branch, "step": step.number}
+        text = f"{step.branch} to {step.target_N:g} N"
+        while True:
+            first_row = self._recorder.rows
+            self._steps.event(where, "step_start", text, **data)
+            try:
+                outcome = self._steps.measure(where, step, steps)
+            except Wish as wish:
+                if wish.what == "redo_repetition":
+                    raise
+                self._recorder.discard(first_row, wish.what.replace("_", " "))
+                if wish.what == "redo_step":
+                    continue
+                outcome = f"skipped: {self._reason()}"
+            self._steps.event(where, "step_done", f"{text}: {outcome}", outcome=outcome, **data)
+            return
+
+    def _mount(self, where: Where) -> None:
+        """Pose and setup, when they change; the amplifier is in Reset meanwhile."""
+        run = where.run
+        if self._mounted == (run.pose, run.direction):
+            return
+        self._devices.dynamometer.reset()
+        pose = self._protocol.poses[run.pose]
+        self._supervision.show(phase="mounting")
+        if self._protocol.move_arm and pose.program is not None:
+            self._play(pose.program, pose.q_rad)
+            words = f"The arm stands in {run.pose}."
+        else:
+            q = ", ".join(f"{degrees(a):.2f}" for a in pose.q_rad)
+            words = f"Bring the arm to pose {run.pose} ({q} deg), then let it stand."
+        axis = ", ".join(f"{v:g}" for v in where.unit_vector)
+        words += f" Set up screw, dynamometer and laser along {run.direction} ({axis}), "
+        words += f"not touching. {self._protocol.prompts.get('before_run', '')}"
+        rig = {"q_rad": list(pose.q_rad), "direction": list(where.unit_vector)}
+        self._supervision.ask(Prompt("mount", words.strip(), ("ok",), rig))
+        self._verify_pose(run.pose, pose.q_rad)
+        self._mounted = (run.pose, run.direction)
+        self._recorder.datum_mm = nan
+        self._steps.restart()
+        self._steps.event(where, "mounted", f"set up along {run.direction} in pose {run.pose}")
+
+    def _play(self, program: str, q_rad: tuple[float, ...]) -> None:
+        """The arm moves: only because the protocol says so and the operator confirms it."""
+        text = f"THE ARM WILL MOVE: {program} is played on the controller. Stand clear."
+        if self._supervision.ask(Prompt("confirm_move", text, ("move", "abort"))) != "move":
+            raise MeasurementStopped("the operator did not confirm the arm's motion")
+        tolerance = radians(POSE_TOLERANCE_DEG)
+        deadline = self._protocol.step_deadline_s
+        self._devices.robot.go_to_reference(program, q_rad, tolerance, deadline)
+
+    def _verify_pose(self, name: str, q_rad: tuple[float, ...]) -> None:
+        while True:
+            q = self._devices.robot.state().q
+            off = [degrees(abs(a - b)) for a, b in zip(q, q_rad, strict=True)]
+            worst = max(range(len(off)), key=off.__getitem__)
+            if off[worst] <= POSE_TOLERANCE_DEG:
+                return
+            text = (
+                f"Joint {worst + 1} is {off[worst]:.2f} deg away from pose {name} "
+                f"(allowed {POSE_TOLERANCE_DEG:g} deg). Correct the pose, then check again."
+            )
+            answer = self._supervision.ask(Prompt("pose", text, ("check again", "accept", "abort")))
+            if answer == "accept":
+                self._recorder.event("pose_accepted", text)
+                return
+            self._supervision.obey(answer)
+
+    def _unload(self) -> None:
+        text = "Turn the screw back until it no longer touches the arm, then confirm."
+        self._supervision.ask(Prompt("unload", text))
+
+    def _zeroed(self, where: Where) -> Where:
+        """Unload, reset and operate the amplifier, tare, set the datum of a new setup."""
+        self._supervision.show(phase="taring", step=0, target_N=0.0)
+        self._unload()
+        self._devices.dynamometer.reset()
+        self._devices.dynamometer.operate()
+        _, force, laser = self._acquisition.average(TARE_S)
+        self._devices.dynamometer.tare(force)
+        if isnan(self._recorder.datum_mm):
+            self._recorder.datum_mm = laser.values[0]
+        self._acquisition.average(0.0)  # what was read before taring is no force
+        self._supervision.restart()
+        self._segment += 1
+        where = replace(where, start_s=self._supervision.now(), segment=self._segment)
+        data = {"datum_mm": self._recorder.datum_mm, "segment": self._segment}
+        self._steps.event(where, "tared", "amplifier reset, force tared", **data)
+        return where
+
+    def _reason(self) -> str:
+        return self._supervision.ask(Prompt("skip_reason", "Why? (one line)", ()))

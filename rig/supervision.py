@@ -1,0 +1,164 @@
+"""One look at everything, ten times a second: devices, limits, operator's wishes, Ctrl-C.
+
+Wishes and faults leave the step under way as exceptions, so that no phase of the procedure has
+to know them.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+from typing import Any
+
+from drivers.errors import DeviceError
+from drivers.interfaces import Command, LiveView, Loader, Prompt
+from rig.acquisition import Acquisition
+from rig.errors import MeasurementStopped
+from rig.limits import UNLOAD, Breach, Live, Watch
+from rig.recorder import Recorder, Slot, Vector
+
+PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
+
+
+class Wish(Exception):
+    """The operator wants the step under way to be left."""
+
+    def __init__(self, what: Command) -> None:
+        super().__init__(what)
+        self.what = what
+
+
+class Supervision:
+    """Owns the live view; `tick` is the only wait of the procedure, `ask` its only question."""
+
+    def __init__(
+        self,
+        acquisition: Acquisition,
+        loader: Loader,
+        recorder: Recorder,
+        watch: Watch,
+        checkpoint: Callable[[], None],
+        repetitions: int,
+    ) -> None:
+        self._acquisition = acquisition
+        self._loader = loader
+        self._recorder = recorder
+        self._watch = watch
+        self._checkpoint = checkpoint
+        self._unit_vector: Vector = (nan, nan, nan)
+        self._warned: set[str] = set()
+        self._interrupts = 0
+        self._prompts = 0
+        self.view = LiveView(
+            phase="idle", pose="", direction="", repetition=0, repetitions=repetitions, step=0,
+            steps=0, force_N=nan, target_N=nan, band_N=nan, displacement_mm=nan,
+            stiffness_N_per_mm=nan, settle_remaining_s=0.0, samples=0, samples_wanted=0,
+        )  # fmt: skip
+
+    def now(self) -> float:
+        """Seconds of the session clock."""
+        return self._acquisition.now()
+
+    def show(self, **changes: Any) -> None:
+        """Changes fields of the live view."""
+        self.view = replace(self.view, **changes)
+
+    def look_along(self, unit_vector: Vector) -> None:
+        """The direction whose force component is shown from now on."""
+        self._unit_vector = unit_vector
+
+    def restart(self) -> None:
+        """After taring or remounting values jump without motion, and warnings are due again."""
+        self._watch.restart()
+        self._warned.clear()
+
+    def interrupt(self) -> None:
+        """Ctrl-C: the first asks at the next tick, the second stops at once."""
+        self._interrupts += 1
+        if self._interrupts > 1:
+            raise KeyboardInterrupt
+
+    def tick(self) -> tuple[Live, Slot | None]:
+        """Waits for the next tick; watches limits, operator and Ctrl-C on the way."""
+        slot = self._acquisition.wait()
+        live = self._acquisition.live(self._recorder.displacement_mm)
+        force = sum(f * e for f, e in zip(live.force_N, self._unit_vector, strict=True))
+        self.show(force_N=force, displacement_mm=live.displacement_mm)
+        for breach in self._watch.breaches(live):
+            self._on_breach(breach)
+        if not self._prompts:
+            self._loader.guide(self.view)
+            self._hear()
+        return live, slot
+
+    def ask(self, prompt: Prompt) -> str:
+        """Asks without looking away: limits and devices are watched until the answer comes."""
+        answers: list[str] = []
+        failures: list[DeviceError] = []
+
+        def wait_for_answer() -> None:
+            try:
+                answers.append(self._loader.ask(prompt))
+            except DeviceError as error:
+                failures.append(error)
+
+        thread = threading.Thread(target=wait_for_answer, name="prompt", daemon=True)
+        self._prompts += 1
+        thread.start()
+        try:
+            while thread.is_alive():
+                self.tick()
+        finally:
+            self._prompts -= 1
+        if failures:
+            raise failures[0]
+        self._recorder.event("prompt", prompt.text, key=prompt.key, answer=answers[0])
+        return answers[0]
+
+    def obey(self, answer: str) -> None:
+        """Turns an answer or a command into what it asks for; others do nothing."""
+        if answer == "abort":
+            raise MeasurementStopped(f"stopped by the operator. {UNLOAD}")
+        if answer == "redo_step":
+            raise Wish("redo_step")
+        if answer == "redo_repetition":
+            raise Wish("redo_repetition")
+        if answer == "skip":
+            raise Wish("skip")
+
+    def _hear(self) -> None:
+        """What the operator has asked for since the last tick."""
+        if self._interrupts:
+            prompt = Prompt("interrupt", "Stop the measurement?", ("abort", "continue"))
+            answer = self.ask(prompt)
+            self._interrupts = 0
+            self.obey(answer)
+        command = self._loader.command()
+        if command == "pause":
+            self._pause("Paused. The arm may be under load.")
+        elif command is not None:
+            self.obey(command)
+
+    def _pause(self, text: str) -> None:
+        self._recorder.event("pause", text)
+        self._checkpoint()
+        answer = self.ask(Prompt("paused", text, PAUSE_ANSWERS))
+        self._recorder.event("resume", f"after the pause: {answer}")
+        # What was under way before a pause of unknown length is measured again from its start.
+        self.obey("redo_step" if answer == "continue" and self.view.step else answer)
+
+    def _on_breach(self, breach: Breach) -> None:
+        if breach.action == "stop":
+            self._recorder.event("limit", breach.text, action="stop")
+            text = f"{breach.text}; the measurement is stopped. {UNLOAD}"
+            self._loader.notify(text, "error")
+            raise MeasurementStopped(text)
+        if breach.action == "pause" and not self._prompts:
+            self._recorder.event("limit", breach.text, action="pause")
+            self._pause(f"{breach.text}. {UNLOAD}")
+        elif breach.quantity not in self._warned:
+            self._warned.add(breach.quantity)
+            self._recorder.event("limit", breach.text, action="warn")
+            self._loader.notify(breach.text, "warning")
