@@ -20,7 +20,8 @@ class Emulator(Protocol):
         """Starts serving on loopback or a pseudo terminal; returns what the station file needs
         in place of "emulated" (an address, an address:port, a path)."""
 
-    def stop(self) -> None: ...
+    def stop(self) -> None:
+        """Ends every thread and closes every socket; may be called twice."""
 
     def inject(self, fault: str) -> None:
         """Shows the fault from now on; raises ValueError for one that `faults` does not list."""

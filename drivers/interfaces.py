@@ -22,17 +22,27 @@ class Device(Protocol):
     name: str
     signals: Sequence[Signal]
 
-    def open(self) -> None: ...
-    def close(self) -> None: ...
-    def identity(self) -> Mapping[str, str]: ...
-    def collect(self) -> Reading: ...
-    def latest(self) -> Reading: ...
+    def open(self) -> None:
+        """Connects, identifies, starts; returns with the first values, or raises DeviceError."""
+
+    def close(self) -> None:
+        """Releases everything; never raises."""
+
+    def identity(self) -> Mapping[str, str]:
+        """What the device says of itself: model, serial number, versions, settings."""
+
+    def collect(self) -> Reading:
+        """Everything since the last call, reduced; each single value is given once."""
+
+    def latest(self) -> Reading:
+        """About the last tenth of a second, collected or not."""
 
 
 class Robot(Device, Protocol):
     """An arm that stands still. Nothing here moves it but `go_to_reference`."""
 
-    def state(self) -> RobotState: ...
+    def state(self) -> RobotState:
+        """The newest values; raises when they are stale."""
 
     def go_to_reference(
         self, program: str, q_rad: Sequence[float], tolerance_rad: float, deadline_s: float
@@ -105,9 +115,14 @@ class Loader(Protocol):
 
     name: str
 
-    def open(self) -> None: ...
-    def close(self) -> None: ...
-    def identity(self) -> Mapping[str, str]: ...
+    def open(self) -> None:
+        """Takes the terminal, or connects to the emulated screw."""
+
+    def close(self) -> None:
+        """Gives it back; never raises, may be called twice."""
+
+    def identity(self) -> Mapping[str, str]:
+        """Who turns the screw, and its pitch."""
 
     def ask(self, prompt: Prompt) -> str:
         """Blocks until one of `prompt.answers` is given, and returns it."""

@@ -33,7 +33,8 @@ class Scene(Protocol):
 
     speed: float
 
-    def now(self) -> float: ...
+    def now(self) -> float:
+        """Seconds of the scene."""
 
     def force_N(self, t: Array) -> Array:
         """(n, 3) force on the robot in the base frame."""
@@ -41,7 +42,8 @@ class Scene(Protocol):
     def displacement_m(self, t: Array) -> Array:
         """(n,) displacement of the laser's target along the mounted direction."""
 
-    def arm(self, t: Array) -> ArmSignals: ...
+    def arm(self, t: Array) -> ArmSignals:
+        """The robot's signals at the instants t (n,)."""
 
     def turn(self, advance_m: float) -> None:
         """Turns the screw by so much advance (negative loosens), at the hand's speed."""

@@ -11,9 +11,12 @@ class JournalRecord(Protocol):
     """What of a journal record matters here."""
 
     @property
-    def kind(self) -> str: ...
+    def kind(self) -> str:
+        """One of the journal's kinds of record."""
+
     @property
-    def data(self) -> dict[str, Any]: ...
+    def data(self) -> dict[str, Any]:
+        """What was recorded."""
 
 
 @dataclass
