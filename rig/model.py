@@ -1,0 +1,401 @@
+"""Robot files and model files: YAML into `Arm` and `ArmModel`, SI inside, every value checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arm import Arm, tool_offset, tool_transform, unit_vector
+from identification.elastic import MATERIALS, Beam, Section, cantilever, tube
+from identification.inverse import BRANCHES, solutions
+from rig.errors import InputError, did_you_mean
+from rig.model_schema import (
+    BeamFile,
+    BeamKind,
+    ComplianceKind,
+    ModelFile,
+    MountingFile,
+    RobotFile,
+    SegmentFile,
+    TubeFile,
+)
+from rig.yamlfile import Document, read_document
+from rig.yamlnodes import Problem
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+MODELS = Path(__file__).resolve().parents[1] / "data" / "models"
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+# --- what comes out ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class CouplingSpec:
+    """base_distance m, beta rad; `half`: compliance (6, 6) of one arm's half of the connection in
+    mirror axes, None for a rigid or a point connection."""
+
+    base_distance: float
+    beta: float
+    load_axes: Literal["base", "mirror"]
+    kind: Literal["rigid", "point", "compliant"]
+    half: Array | None = None
+    described: str = ""
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """stiffness N/m along `direction`, a unit vector in the load axes; `name` as written."""
+
+    name: str
+    direction: tuple[float, float, float]
+    stiffness: float
+
+
+@dataclass(frozen=True, eq=False)
+class ArmModel:
+    """A model file, read and checked. q (6,) rad, tool (4, 4), mounting: compliance (6, 6) of the
+    base or None; `effects` verbatim; `links` in use (empty: rigid links)."""
+
+    name: str
+    arm: Arm
+    q: Array
+    tool: Array
+    links: tuple[Beam, ...]
+    mounting: Array | None
+    effects: tuple[dict[str, Any], ...]
+    coupling: CouplingSpec | None
+    required: tuple[Requirement, ...]
+    reach: float | None
+
+    def compliance(self) -> Array:
+        """Compliance (6, 6) at the tool of the single arm, effects left out."""
+        return self.arm.compliance(self.q, self.tool, links=self.links, base=self.mounting)
+
+
+# --- reading -------------------------------------------------------------------------------------
+
+
+def robot_names() -> list[str]:
+    """Robots that data/models holds."""
+    return sorted(p.stem for p in MODELS.glob("*.yaml") if "rig.robot/1" in p.read_text("utf-8"))
+
+
+def load_robot(name_or_path: str | Path) -> Arm:
+    """The arm of a robot file: a name (ur10e) or a path.
+
+    Raises InputError when there is no such robot, or its file does not hold one.
+    """
+    return _robot(name_or_path)[0]
+
+
+def robot_reach(name_or_path: str | Path) -> float:
+    """Nominal reach about the shoulder in m, as the maker states it."""
+    return _robot(name_or_path)[1]
+
+
+def load_model(path: str | Path) -> ArmModel:
+    """A model file. Raises InputError with every problem found."""
+    document = read_document(Path(path), ModelFile)
+    written = document.value
+    _check_model(document)
+    arm, reach = _model_arm(document)
+    tool = _tool(document)
+    return ArmModel(
+        name=document.name,
+        arm=arm,
+        q=_pose(document, arm, tool),
+        tool=tool,
+        links=_model_links(document, arm),
+        mounting=_mounting(written.mounting),
+        effects=tuple(written.effects),
+        coupling=_coupling(document),
+        required=tuple(_requirement(document, i) for i in range(len(written.required))),
+        reach=reach,
+    )
+
+
+def _robot(name_or_path: str | Path) -> tuple[Arm, float]:
+    path = Path(name_or_path)
+    if path.suffix not in (".yaml", ".yml"):
+        path = MODELS / f"{name_or_path}.yaml"
+        known = robot_names()
+        if str(name_or_path) not in known:
+            hint = did_you_mean(str(name_or_path), known)
+            raise InputError(
+                f'robot "{name_or_path}" is unknown.{hint} Or give the path of a robot file (.yaml).'
+            )
+    document = read_document(path, RobotFile)
+    written = document.value
+    arm = _checked(
+        document,
+        (),
+        lambda: Arm(
+            name=written.name,
+            d=np.array(written.dh.d_m),
+            a=np.array(written.dh.a_m),
+            alpha=np.array(written.dh.alpha_rad),
+            mass=np.array(written.mass_kg),
+            centre=np.array(written.centre_of_mass_m),
+            torque_limit=np.array(written.joint_torque_limits_Nm),
+            q_min=np.deg2rad(written.joint_limits_deg.min),
+            q_max=np.deg2rad(written.joint_limits_deg.max),
+            joint_stiffness=np.array(written.joint_stiffness_Nm_per_rad),
+            joint_stiffness_relative_sd=np.full(6, written.joint_stiffness_relative_sd),
+            payload_limit=written.payload_limit_kg,
+            links=_segments(document, written.link_segments),
+        ),
+    )
+    return arm, written.reach_mm / 1e3
+
+
+def _check_model(document: Document[ModelFile]) -> None:
+    """What holds across keys."""
+    written, pose = document.value, document.value.pose
+    problems: list[Problem] = []
+    if (written.robot is None) == (written.dh is None):
+        problems.append(document.problem(("robot",), "give either robot or dh, and one of them."))
+    ways = [pose.q_deg is not None, pose.q_rad is not None, pose.position_mm is not None]
+    if sum(ways) != 1:
+        problems.append(
+            document.problem(("pose",), "give one of q_deg, q_rad, or position_mm with direction.")
+        )
+    elif ways[2] and (pose.direction is None or pose.branch is None):
+        problems.append(
+            document.problem(
+                ("pose",), "position_mm needs the tool's direction and the branch beside it."
+            )
+        )
+    if written.tool.length_mm is not None and written.tool.flange_T_tcp is not None:
+        problems.append(document.problem(("tool",), "give length_mm or flange_T_tcp, not both."))
+    both = (
+        written.joint_stiffness_relative_sd is not None and written.joint_stiffness_sd is not None
+    )
+    if both:
+        problems.append(
+            document.problem(
+                ("joint_stiffness_sd",), "stands beside joint_stiffness_relative_sd; keep one."
+            )
+        )
+    if written.dh is not None and written.joint_stiffness_Nm_per_rad is None:
+        problems.append(
+            document.problem((), "joint_stiffness_Nm_per_rad is missing; dh alone brings none.")
+        )
+    document.refuse(problems)
+
+
+def _model_arm(document: Document[ModelFile]) -> tuple[Arm, float | None]:
+    written = document.value
+    reach: float | None = None
+    if written.robot is not None:
+        try:
+            arm, reach = _robot(_beside(document.name, written.robot))
+        except InputError as error:
+            document.refuse([document.problem(("robot",), str(error))])
+            raise
+    else:
+        dh = written.dh
+        assert dh is not None
+        arm = _checked(
+            document,
+            ("dh",),
+            lambda: Arm("dh", d=np.array(dh.d_m), a=np.array(dh.a_m), alpha=np.array(dh.alpha_rad)),
+        )
+    stiffness = arm.joint_stiffness
+    relative = arm.joint_stiffness_relative_sd
+    if written.joint_stiffness_Nm_per_rad is not None:
+        stiffness, relative = np.array(written.joint_stiffness_Nm_per_rad), np.zeros(6)
+    if written.joint_stiffness_relative_sd is not None:
+        relative = np.broadcast_to(np.array(written.joint_stiffness_relative_sd, dtype=float), (6,))
+    if written.joint_stiffness_sd is not None:
+        relative = np.array(written.joint_stiffness_sd) / stiffness
+    return arm.with_stiffness(stiffness, relative), reach
+
+
+def _beside(model: str, robot: str) -> str | Path:
+    """A path of a robot file is meant relative to the model file."""
+    return Path(model).parent / robot if robot.endswith((".yaml", ".yml")) else robot
+
+
+def _tool(document: Document[ModelFile]) -> Array:
+    written = document.value.tool
+    if written.flange_T_tcp is None:
+        return tool_offset([0.0, 0.0, (written.length_mm or 0.0) / 1e3])
+    matrix = np.array(written.flange_T_tcp)
+    return _checked(document, ("tool", "flange_T_tcp"), lambda: tool_transform(matrix))
+
+
+def _pose(document: Document[ModelFile], arm: Arm, tool: Array) -> Array:
+    pose = document.value.pose
+    if pose.q_deg is not None:
+        return _within(document, ("pose", "q_deg"), arm, np.deg2rad(pose.q_deg))
+    if pose.q_rad is not None:
+        return _within(document, ("pose", "q_rad"), arm, np.array(pose.q_rad))
+    assert pose.position_mm is not None
+    assert pose.direction is not None
+    assert pose.branch is not None
+    if pose.branch not in BRANCHES:
+        what = f'"{pose.branch}" is no branch.{did_you_mean(pose.branch, BRANCHES)}'
+        document.refuse([document.problem(("pose", "branch"), what)])
+    direction = np.array(pose.direction)
+    target = _checked(
+        document,
+        ("pose", "direction"),
+        lambda: tool_pose(np.array(pose.position_mm) / 1e3, direction, np.deg2rad(pose.turn_deg)),
+    )
+    found = _checked(document, ("pose",), lambda: solutions(arm, target @ np.linalg.inv(tool)))
+    if pose.branch not in found:
+        reached = "; branches that reach it: " + ", ".join(found) if found else ""
+        what = (
+            f"{arm.name} does not reach {list(pose.position_mm)} mm with the tool along "
+            f"{list(pose.direction)} in branch {pose.branch}{reached}. "
+            "Move the position, or name another branch."
+        )
+        document.refuse([document.problem(("pose", "position_mm"), what)])
+    return found[pose.branch]
+
+
+def tool_pose(position: Array, direction: Array, turn: float = 0.0) -> Array:
+    """Tool pose (4, 4): z axis along the unit vector `direction`; x axis as near as possible to
+    the base's x axis (to its y axis where the tool points along x), then turned about z by `turn`.
+
+    Raises ValueError when `direction` is no unit vector.
+    """
+    z = unit_vector(direction)
+    wish = np.eye(3)[1 if abs(z[0]) > 0.99 else 0]
+    x = wish - (wish @ z) * z
+    x /= np.linalg.norm(x)
+    y = np.cross(z, x)
+    T = np.eye(4)
+    c, s = np.cos(turn), np.sin(turn)
+    T[:3, :3] = np.column_stack([c * x + s * y, c * y - s * x, z])
+    T[:3, 3] = position
+    return T
+
+
+def _within(document: Document[ModelFile], place: tuple[str, str], arm: Arm, q: Array) -> Array:
+    outside = (q < arm.q_min) | (q > arm.q_max)
+    if outside.any():
+        i = int(np.argmax(outside))
+        low, high = np.rad2deg([arm.q_min[i], arm.q_max[i]])
+        what = (
+            f"{np.rad2deg(q[i]):.6g} deg at joint {i + 1}; "
+            f"{arm.name} allows {low:.6g} to {high:.6g} deg."
+        )
+        document.refuse([document.problem((*place, i), what)])
+    return q
+
+
+def _model_links(document: Document[ModelFile], arm: Arm) -> tuple[Beam, ...]:
+    wanted = document.value.link_segments
+    if wanted == "none":
+        return ()
+    if wanted == "robot":
+        if not arm.links:
+            what = f"the model of {arm.name} has no link segments; list them here."
+            document.refuse([document.problem(("link_segments",), what)])
+        return arm.links
+    return _segments(document, wanted)
+
+
+def _segments(document: Document[Any], written: list[SegmentFile]) -> tuple[Beam, ...]:
+    out = []
+    for i, segment in enumerate(written):
+        place = ("link_segments", i)
+        section = _section(document, (*place, "tube"), segment.tube)
+        build = _beam_of(segment, section)
+        out.append(_checked(document, place, build))
+    return tuple(out)
+
+
+def _beam_of(segment: SegmentFile, section: Section) -> Callable[[], Beam]:
+    return lambda: Beam(section, segment.from_m, segment.to_m, segment.frame, segment.name)
+
+
+def _section(
+    document: Document[Any], place: tuple[str | int, ...], written: TubeFile | BeamFile
+) -> Section:
+    material = MATERIALS.get(written.material)
+    if material is None:
+        what = f'"{written.material}" is unknown.{did_you_mean(written.material, MATERIALS)}'
+        document.refuse([document.problem((*place, "material"), what)])
+        raise AssertionError
+    wall = None if written.wall_mm is None else written.wall_mm / 1e3
+    return _checked(document, place, lambda: tube(material, written.diameter_mm / 1e3, wall))
+
+
+def _mounting(written: MountingFile | None) -> Array | None:
+    if written is None:
+        return None
+    tilt, turn = 1 / written.tilt_Nm_per_rad, 1 / written.turn_Nm_per_rad
+    return np.diag([0.0, 0.0, 0.0, tilt, tilt, turn])
+
+
+def _coupling(document: Document[ModelFile]) -> CouplingSpec | None:
+    written = document.value.coupling
+    if written is None:
+        return None
+    kind: Literal["rigid", "point", "compliant"] = "compliant"
+    half: Array | None = None
+    if isinstance(written.kind, BeamKind):
+        beam = written.kind.beam
+        section = _section(document, ("coupling", "kind", "beam"), beam)
+        half = cantilever(section, beam.half_length_mm / 1e3)
+        described = (
+            f"{beam.material} beam, diameter {beam.diameter_mm:g} mm, "
+            f"half length {beam.half_length_mm:g} mm"
+        )
+    elif isinstance(written.kind, ComplianceKind):
+        half = np.array(written.kind.compliance_m_rad_per_N_Nm)
+        described = "compliance given as 6 x 6"
+        _check_compliance(document, half)
+    else:
+        kind = written.kind
+        described = kind
+    return CouplingSpec(
+        base_distance=written.base_distance_mm / 1e3,
+        beta=float(np.deg2rad(written.beta_deg)),
+        load_axes=written.load_axes,
+        kind=kind,
+        half=half,
+        described=described,
+    )
+
+
+def _check_compliance(document: Document[ModelFile], half: Array) -> None:
+    scale = np.abs(half).max()
+    what = ""
+    if not np.abs(half - half.T).max() <= 1e-9 * scale:
+        what = "a compliance is symmetric; this matrix is not."
+    elif np.linalg.eigvalsh(half)[0] < -1e-9 * scale:
+        what = "a compliance has no negative eigenvalue; this matrix has one."
+    if what:
+        place = ("coupling", "kind", "compliance_m_rad_per_N_Nm")
+        document.refuse([document.problem(place, what)])
+
+
+def _requirement(document: Document[ModelFile], i: int) -> Requirement:
+    written = document.value.required[i]
+    stiffness = written.stiffness_N_per_mm * 1e3
+    if isinstance(written.direction, str):
+        return Requirement(written.direction, AXES[written.direction], stiffness)
+    given = written.direction
+    _checked(document, ("required", i, "direction"), lambda: unit_vector(given))
+    name = "(" + ", ".join(f"{v:g}" for v in given) + ")"
+    return Requirement(name, given, stiffness)
+
+
+def _checked(document: Document[Any], place: tuple[str | int, ...], build: Callable[[], T]) -> T:
+    """`build()`, its ValueError told as a problem of the file at `place`."""
+    try:
+        return build()
+    except ValueError as error:
+        document.refuse([document.problem(place, f"{error}.")])
+        raise
