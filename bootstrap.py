@@ -1,0 +1,96 @@
+"""Sets everything up in `.venv` and runs the demonstration or the tests; needs Python only.
+
+    python3 bootstrap.py demo     the paper's procedure on the emulated station, then its analysis
+    python3 bootstrap.py test     style, types, import rules and tests, as CI runs them
+
+Further words after `test` go to pytest: `python3 bootstrap.py test -m slow`.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+HOME = Path(__file__).resolve().parent
+VENV = HOME / ".venv"
+BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
+PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
+SUPPORTED = ((3, 11), (3, 12))  # ur-rtde has wheels for no newer ones
+STAMP = VENV / "installed-for.txt"
+DEMO = HOME / "out" / "demo"
+
+
+def main() -> int:
+    """Runs what the command line asks for; returns its exit status."""
+    words = sys.argv[1:]
+    if not words or words[0] not in ("demo", "test"):
+        print(__doc__, file=sys.stderr)
+        return 2
+    if sys.version_info[:2] not in SUPPORTED:
+        return _with_supported_python()
+    extras = "[dev]" if words[0] == "test" else ""
+    _install(extras)
+    return _demo() if words[0] == "demo" else _test(words[1:])
+
+
+def _with_supported_python() -> int:
+    for major, minor in reversed(SUPPORTED):
+        found = shutil.which(f"python{major}.{minor}")
+        # A launcher may stand in the path for a version that it doesn't have.
+        if found and subprocess.run([found, "-c", ""], capture_output=True, check=False).returncode == 0:  # fmt: skip # noqa: E501
+            return subprocess.call([found, *sys.argv])
+    here = ".".join(map(str, sys.version_info[:3]))
+    print(
+        f"This is Python {here}; stiffness-rig needs 3.11 or 3.12, because the robot's client "
+        "library has wheels for these. Install one of them, then run this command with it.",
+        file=sys.stderr,
+    )
+    return 2
+
+
+def _install(extras: str) -> None:
+    wanted = "\n".join(
+        [extras, (HOME / "pyproject.toml").read_text(), (HOME / "constraints.txt").read_text()]
+    )
+    done = STAMP.read_text() if STAMP.exists() else ""
+    if done == wanted or (done.startswith("[dev]") and done[len("[dev]") :] == wanted):
+        return
+    print("Setting up .venv (some minutes the first time)", file=sys.stderr, flush=True)
+    if not PYTHON.exists():
+        subprocess.check_call([sys.executable, "-m", "venv", str(VENV)])
+    install = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.check_call([*install, "-c", "constraints.txt", "-e", f".{extras}"], cwd=HOME)
+    STAMP.write_text(wanted)
+
+
+def _demo() -> int:
+    shutil.rmtree(DEMO, ignore_errors=True)
+    DEMO.mkdir(parents=True)
+    data, figures = str(DEMO / "paper_xy.h5"), str(DEMO / "figures")
+    rig = str(BIN / "rig")
+    measure = [rig, "measure", "protocols/paper_xy.yaml", "--station", "emulated", "-o", data]
+    analyze = [rig, "analyze", data, "--figures", figures]
+    return subprocess.call(measure, cwd=HOME) or subprocess.call(analyze, cwd=HOME)
+
+
+def _test(words: list[str]) -> int:
+    checks = [
+        ["ruff", "check", "."],
+        ["ruff", "format", "--check", "."],
+        ["mypy"],
+        ["lint-imports"],
+        ["pytest", "-n", "2", *words],
+    ]
+    for check in checks:
+        print("+", " ".join(check), flush=True)
+        status = subprocess.call([str(BIN / check[0]), *check[1:]], cwd=HOME)
+        if status:
+            return status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
