@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import InputError, MeasurementStopped
+from rig.files import sync_folder
 
 KINDS = ("start", "descriptor", "sample", "event", "stop")
 SCHEMA = "rig.journal/1"
@@ -172,17 +173,6 @@ def replay(path: Path) -> list[Record]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}.") from error
     return _parse(content, path)[0]
-
-
-def sync_folder(folder: Path) -> None:
-    """Makes names in a folder durable; on Windows the file system does it by itself."""
-    if sys.platform == "win32":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _line(number: int, kind: str, data: Mapping[str, Any]) -> bytes:

@@ -1,0 +1,183 @@
+"""Reading the HDF5 layout of `rig.hdf5`, checked whole before anything is believed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rig.columns import Values
+from rig.dataset import ORIGINS, Dataset
+from rig.errors import InputError
+from rig.hdf5 import MANIFEST, SAMPLES, SCHEMA, SCHEMA_VERSION, content_of, digest_of
+from rig.meta import Meta
+from rig.yamlfile import load_yaml_text
+
+# What h5py raises on files that are damaged in one way or another.
+_BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError,
+           OverflowError, MemoryError, RecursionError)  # fmt: skip
+
+
+def read_uuid(path: Path) -> str:
+    """UUID of the file, "" if there is none or it cannot be read."""
+    with suppress(*_BROKEN), h5py.File(path, "r") as file:
+        return str(file.attrs["uuid"])
+    return ""
+
+
+def read_file(path: Path) -> Dataset:
+    """The data set of an HDF5 file, checked whole. InputError for anything wrong."""
+    _check_magic(path)
+    try:
+        with h5py.File(path, "r") as file:
+            return _Reading(file, path).dataset()
+    except _BROKEN as error:
+        words = _first_line(error)
+        cut = " It is shorter than it was: cut off while copying?" if "truncated" in words else ""
+        raise _damaged(path, f"the HDF5 library says: {words}.{cut}") from error
+
+
+def _first_line(error: BaseException) -> str:
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
+
+
+def _damaged(path: Path, what: str) -> InputError:
+    return InputError(
+        f"{path}: damaged: {what} Restore it from a copy, or build it anew from its journal."
+    )
+
+
+def _check_magic(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            head = file.read(8)
+    except OSError as error:
+        reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
+        raise InputError(f"{path}: cannot be read: {reason}.") from error
+    if head != b"\x89HDF\r\n\x1a\n":
+        found = "an empty file" if not head else "no HDF5 file"
+        hint = " A table comes in with `rig import`." if path.suffix in (".csv", ".txt") else ""
+        raise InputError(f"{path}: {found}; a data set (.h5) is wanted.{hint}")
+
+
+class _Reading:
+    """One pass over an open file."""
+
+    def __init__(self, file: h5py.File, path: Path) -> None:
+        self._file = file
+        self._path = path
+        self._rows = 0
+        self._contents: dict[str, Values] = {}  # read once, for checksum and result
+
+    def dataset(self) -> Dataset:
+        root = dict(self._file.attrs)
+        self._check_schema(root)
+        self._rows = int(root["rows"])
+        listed = self._verified()
+        columns, units, long_names = self._columns(listed)
+        texts = {n: self._text(f"entry/texts/{n}") for n in _below("entry/texts/", listed)}
+        origin = str(root["origin"])
+        if origin not in ORIGINS:
+            raise _damaged(self._path, f'its origin is "{origin}".')
+        return Dataset(
+            path=self._path,
+            uuid=str(root["uuid"]),
+            created=str(root["created"]),
+            origin=origin,
+            complete=bool(root["complete"]),
+            meta=load_yaml_text(texts["meta"], f"{self._path}: entry/texts/meta", Meta),
+            columns=columns,
+            units=units,
+            long_names=long_names,
+            texts=texts,
+            software=str(root["software"]),
+            stop_reason=str(root["stop_reason"]),
+            title=str(root["title"]).removeprefix("EMULATED: "),
+            **{k: json.loads(self._text(f"entry/record/{k}"))
+               for k in ("events", "devices", "calibration")},
+        )  # fmt: skip
+
+    def _check_schema(self, root: dict[str, Any]) -> None:
+        if root.get("schema") != SCHEMA:
+            raise InputError(
+                f"{self._path}: an HDF5 file of another program (no schema = {SCHEMA} among its "
+                "attributes). Bring its values in as a table with `rig import`."
+            )
+        stored = int(root["schema_version"])
+        if stored > SCHEMA_VERSION:
+            raise InputError(
+                f"{self._path}: written by a newer version of this program (layout {stored}, "
+                f"{root.get('software')}); this one reads layouts up to {SCHEMA_VERSION}. Update."
+            )
+
+    def _verified(self) -> dict[str, str]:
+        """The manifest, after everything in it was compared with the file."""
+        text = self._text(MANIFEST)
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        if digest != str(self._file[MANIFEST].attrs["sha256"]):
+            raise _damaged(self._path, f"/{MANIFEST} has changed since it was written.")
+        listed: dict[str, str] = json.loads(text)
+        for name, expected in listed.items():
+            if name != "/" and name not in self._file:
+                raise _damaged(self._path, f"/{name} is missing.")
+            self._verify(name, expected)
+        return listed
+
+    def _verify(self, name: str, expected: str) -> None:
+        node = self._file[name]
+        place = name if name == "/" else f"/{name}"
+        if name.startswith(f"{SAMPLES}/") and node.shape != (self._rows,):
+            raise _damaged(self._path, f"{place} has the shape {node.shape}, not ({self._rows},).")
+        try:
+            content = content_of(node)
+        except _BROKEN as error:
+            raise _damaged(self._path, f"{place} cannot be read: {_first_line(error)}.") from error
+        if digest_of(node, content) != expected:
+            raise _damaged(self._path, f"{place} has changed since it was written.")
+        if content is not None:
+            self._contents[name] = content
+
+    def _columns(
+        self, listed: dict[str, str]
+    ) -> tuple[dict[str, Values], dict[str, str], dict[str, str]]:
+        nodes = [self._file[f"{SAMPLES}/{n}"] for n in _below(f"{SAMPLES}/", listed) if n != "time"]
+        nodes.sort(key=lambda node: int(node.attrs["column_index"]))
+        columns: dict[str, Values] = {}
+        units, long_names = {}, {}
+        for node in nodes:
+            name = str(node.attrs.get("column_name", node.name.rsplit("/", 1)[1]))
+            columns[name] = _values(node, self._contents[node.name.lstrip("/")])
+            units[name] = str(node.attrs.get("units", ""))
+            long_names[name] = str(node.attrs.get("long_name", ""))
+        return columns, units, long_names
+
+    def _text(self, name: str) -> str:
+        node = self._file.get(name)
+        if not isinstance(node, h5py.Dataset) or node.shape != ():
+            raise _damaged(self._path, f"/{name} is missing.")
+        value = node[()]
+        return value.decode("utf-8") if isinstance(value, bytes) else str(value)
+
+
+def _below(prefix: str, listed: dict[str, str]) -> list[str]:
+    return [name.removeprefix(prefix) for name in listed if name.startswith(prefix)]
+
+
+def _values(node: h5py.Dataset, raw: Values) -> Values:
+    if raw.dtype == object:
+        return np.array([v.decode("utf-8") for v in raw], dtype=str)
+    if raw.dtype.kind == "S":
+        return _decoded(raw)
+    return raw.astype(np.bool_) if node.attrs.get("kind") == "flag" else raw
+
+
+def _decoded(raw: Values) -> Values:
+    """Text of fixed-length UTF-8; pure ASCII goes the fast way."""
+    if raw.size == 0 or raw.view(np.uint8).max() < 128:
+        return raw.astype(f"U{max(1, raw.dtype.itemsize)}")
+    return np.char.decode(raw, "utf-8")
