@@ -86,25 +86,33 @@ class Placement:
         return torques
 
 
-def _turn(axis: Array, angle: Array) -> Array:
-    """(n, 3, 3) rotations by `angle` (n) rad about a unit axis (Rodrigues' formula)."""
+def _skew(axis: Array) -> Array:
     x, y, z = axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, versine = np.sin(angle), 1.0 - np.cos(angle)
-    turns: Array = np.eye(3) + sine[:, None, None] * skew + versine[:, None, None] * (skew @ skew)
-    return turns
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+_SKEWS = np.stack([_skew(axis) for axis in _AXES])
+_SKEWS_SQUARED = _SKEWS @ _SKEWS
+
+
+def _motions(q: Array) -> tuple[Array, Array]:
+    """Turns (n, 6, 3, 3) and shifts (n, 6, 3) of space when joint angles are q (n, 6) and each
+    joint turns alone about its line at q = 0 (Rodrigues' formula)."""
+    sine, versine = np.sin(q)[..., None, None], 1.0 - np.cos(q)[..., None, None]
+    turns = np.eye(3) + sine * _SKEWS + versine * _SKEWS_SQUARED
+    return turns, _POINTS - (turns @ _POINTS[..., None])[..., 0]
 
 
 def place(q: Array) -> Placement:
     """The arm at joint angles q (6) rad."""
     rotation, shift = np.eye(3), np.zeros(3)
     axes, points, centres = np.empty((6, 3)), np.empty((6, 3)), np.empty((6, 3))
+    turns, shifts = (motion[0] for motion in _motions(q[None]))
     for joint in range(6):
         axes[joint] = rotation @ _AXES[joint]
         points[joint] = rotation @ _POINTS[joint] + shift
-        turn = _turn(_AXES[joint], q[joint : joint + 1])[0]
-        shift = shift + rotation @ (_POINTS[joint] - turn @ _POINTS[joint])
-        rotation = rotation @ turn
+        shift = shift + rotation @ shifts[joint]
+        rotation = rotation @ turns[joint]
         centres[joint] = rotation @ _CENTRES[joint] + shift
     return Placement(
         axes, points, rotation @ _FLANGE_AXES, rotation @ _FLANGE_ORIGIN + shift, centres
@@ -113,13 +121,11 @@ def place(q: Array) -> Placement:
 
 def tool_poses(q: Array, tcp_m: Array) -> Array:
     """(n, 6) position (m) and rotation vector (rad) of the tool for joint angles q (n, 6) rad."""
-    rotation = np.broadcast_to(np.eye(3), (len(q), 3, 3))
-    shift = np.zeros((len(q), 3))
-    for joint in range(6):
-        turn = _turn(_AXES[joint], q[:, joint])
-        moved = _POINTS[joint] - turn @ _POINTS[joint]
-        shift = shift + np.einsum("nij,nj->ni", rotation, moved)
-        rotation = rotation @ turn
+    turns, shifts = _motions(q)
+    rotation, shift = turns[:, 0], shifts[:, 0]
+    for joint in range(1, 6):
+        shift = shift + (rotation @ shifts[:, joint, :, None])[..., 0]
+        rotation = rotation @ turns[:, joint]
     position = shift + rotation @ (_FLANGE_ORIGIN + _FLANGE_AXES @ tcp_m)
     return np.hstack([position, _rotation_vectors(rotation @ _FLANGE_AXES)])
 

@@ -99,7 +99,7 @@ class WorldScene:
         rows = self._read(t, slice(None))
         target, torque = rows[:, _TARGET], rows[:, _TORQUE]
         q = target + rows[:, _JOINTS]
-        holding = self.world.placement.gravity_torques() / _NM_PER_A
+        holding = self.world.gravity_torques / _NM_PER_A
         warm = (1.0 - np.exp(-t / _WARM_UP_S))[:, None]
         return ArmSignals(
             q=q,
@@ -117,7 +117,7 @@ class WorldScene:
             self.world.turn(advance_m)
 
     def mount(self, direction: Sequence[float]) -> None:
-        """Screw and laser along a unit vector, unloaded; the controller has taken the joints back."""
+        """Screw and laser along a unit vector, unloaded, the joints taken back."""
         with self._lock:
             self._command()
             self.world.mount(direction)

@@ -113,6 +113,7 @@ class World:
         if tcp_m is not None:
             self.tcp_m = _vector("tool position", tcp_m, 3)
         self.placement = place(self.q)
+        self.gravity_torques = self.placement.gravity_torques()
         self._set_up()
 
     def mount(self, direction: Sequence[float]) -> None:
