@@ -113,7 +113,7 @@ class Reader:
     paths that have a problem already. An instance reads one document.
     """
 
-    def __init__(self) -> None:  # noqa: D107 (the class says it)
+    def __init__(self) -> None:
         self.places: dict[Key, Place] = {}
         self.keys: dict[Key, Place] = {}
         self.problems: list[Problem] = []
