@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
-from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -18,7 +17,7 @@ from rig import dataset as datasets
 from rig.acquisition import open_devices
 from rig.emulation import EmulatedRig
 from rig.errors import InputError, MeasurementStopped
-from rig.journal import Journal, Record, journal_path, replay
+from rig.journal import Journal, journal_path, replay
 from rig.limits import UNLOAD
 from rig.measured_meta import measured_meta
 from rig.progress import Progress, read_progress
@@ -62,10 +61,10 @@ def measure(protocol_file: Path, station_name: str | None, output: Path | None, 
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "origin": "emulated" if station.emulation else "measured",
         "title": protocol.title,
-        "software": f"stiffness-rig {version('stiffness-rig')}",
+        "software": datasets.software_version(),
         "protocol": protocol.text,
         "station": station.text,
-        "meta": measured_meta(protocol, station).model_dump(mode="json"),
+        "meta": measured_meta(protocol, station).model_dump_json(indent=2, exclude_none=True),
     }
     # The devices come first: a run that never began leaves no file behind.
     with _opened(protocol, station, say) as rig:
@@ -192,19 +191,18 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
 
 
 def _finish(job: Job, recorder: Recorder, reason: str, *, complete: bool) -> None:
-    """Stop record, data set, and, when that is complete and reads back, the end of the journal."""
+    """Stop record and data set; the journal goes when that is complete and has been read back."""
     if complete:
         recorder.stop(reason, complete=True)
     else:
         recorder.event("stopped", reason)
     job.journal.close()
-    _build(job)
-    if complete and datasets.read_back(job.output).complete:
-        journal_path(job.output).unlink()
+    datasets.finish(job.output)
 
 
 def _build(job: Job) -> None:
-    records: list[Record] = replay(journal_path(job.output))
+    """Brings the data set up to date; the journal goes on."""
+    records = replay(journal_path(job.output))
     datasets.write(datasets.from_records(records, job.output), job.output)
 
 
