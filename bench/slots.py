@@ -2,10 +2,11 @@
 
     .venv/bin/python bench/slots.py [--minutes 10]
 
-Both sides talk to the same kind of emulated station in real time (laser 10 000 values/s, DAQ 8 x 1000
-values/s, RTDE 125 messages/s). Ours is `rig measure`. The plain loop is what a user would write first:
-open the three client libraries, `time.sleep(1)`, read what is there, decode the laser's bytes in a
-Python loop, write a CSV row. The emulators run in a process of their own and are not counted.
+Both sides talk to the same kind of emulated station in real time (laser 10 000 values/s, DAQ
+8 x 1000 values/s, RTDE 125 messages/s). Ours is `rig measure`. The plain loop is what a user would
+write first: open the three client libraries, `time.sleep(1)`, read what is there, decode the
+laser's bytes in a Python loop, write a CSV row. The emulators run in a process of their own and
+are not counted.
 """
 
 from __future__ import annotations
@@ -123,16 +124,15 @@ def ours(folder: Path, seconds: int) -> tuple[np.ndarray, int, Meter, float]:
 
 def plain_loop(seconds: int, folder: Path) -> int:
     """What a user would write first; prints one lateness per second. Runs in its own process."""
+    import grpc
     import nidaqmx
     import serial
     from nidaqmx.constants import AcquisitionType
     from nidaqmx.grpc_session_options import GrpcSessionOptions
+    from rtde_receive import RTDEReceiveInterface
 
-    import grpc
-    from drivers.kistler.settings import KistlerSettings  # noqa: F401
     from rig.emulation import EmulatedRig
     from rig.station import load_station
-    from rtde_receive import RTDEReceiveInterface
 
     station = load_station(str(folder / "stations" / "bench.yaml"), None)
     with EmulatedRig(station, {}, {}) as live:
@@ -175,9 +175,10 @@ def report(name: str, late: np.ndarray, missed: int, meter: Meter, wall: float) 
     ms = 1000 * np.abs(late)
     quarter = meter.rss_MB[len(meter.rss_MB) // 4]
     print(
-        f"{name:14} slots {late.size:5}  missed {missed:3}  lateness ms: median {np.median(ms):8.3f}"
-        f"  p99 {np.quantile(ms, 0.99):8.3f}  max {ms.max():8.3f}  CPU {100 * meter.cpu_s / wall:5.1f} %"
-        f" of a core  memory MB: {quarter:6.1f} -> {np.median(meter.rss_MB[-9:-1]):6.1f}"
+        f"{name:12} slots {late.size:4} missed {missed:2}  lateness ms: "
+        f"median {np.median(ms):8.3f} p99 {np.quantile(ms, 0.99):8.3f} max {ms.max():8.3f}  "
+        f"CPU {100 * meter.cpu_s / wall:5.1f} % of a core  "
+        f"memory MB: {quarter:6.1f} -> {np.median(meter.rss_MB[-9:-1]):6.1f}"
     )
 
 

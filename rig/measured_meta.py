@@ -22,10 +22,11 @@ def measured_meta(protocol: MeasurementProtocol, station: Station) -> Meta:
         raise InputError(f"{station.path}: measuring needs dynamometer and laser.")
     arm = load_robot(protocol.robot)
     force, laser = station.dynamometer, station.laser
+    c1, c2, c3, c4, c5, c6 = (float(k) for k in arm.joint_stiffness)
     return Meta(
         robot=protocol.robot,
         poses={
-            name: MetaPose(q_rad=tuple(p.q_rad), tcp_xyz_mm=tuple(p.tcp_xyz_mm))
+            name: MetaPose(q_rad=p.q_rad, tcp_xyz_mm=p.tcp_xyz_mm)
             for name, p in protocol.poses.items()
         },
         directions=dict(protocol.directions),
@@ -44,7 +45,7 @@ def measured_meta(protocol: MeasurementProtocol, station: Station) -> Meta:
             ),
         ),
         simulation=Simulation(
-            joint_stiffness_Nm_per_rad=tuple(float(k) for k in arm.joint_stiffness),
+            joint_stiffness_Nm_per_rad=(c1, c2, c3, c4, c5, c6),
             joint_stiffness_relative_sd=float(max(arm.joint_stiffness_relative_sd)),
         ),
     )

@@ -3,19 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 from math import inf, sqrt
 
-
-@dataclass(frozen=True, slots=True)
-class SettleCriterion:
-    """Limits over the last `window_s` seconds: |slope| of a straight line, and sd about it."""
-
-    window_s: float
-    force_slope_N_per_s: float
-    force_spread_N: float
-    displacement_slope_mm_per_s: float
-    displacement_spread_mm: float
+from rig.protocol import Settle
 
 
 def line(points: list[tuple[float, float]]) -> tuple[float, float]:
@@ -39,7 +29,7 @@ def line(points: list[tuple[float, float]]) -> tuple[float, float]:
 class SettleWindow:
     """Live values of the last seconds; `add` as they come, `settled` when asked."""
 
-    def __init__(self, criterion: SettleCriterion) -> None:
+    def __init__(self, criterion: Settle) -> None:
         self._criterion = criterion
         self._points: deque[tuple[float, float, float]] = deque()
         self._since = inf

@@ -24,7 +24,8 @@ title: test
 station: emulated
 robot: ur10e
 poses:
-  P1: {q_deg: [13.43, -99.84, -108.10, -62.06, 90.0, -76.57], tcp_xyz_mm: [0, 0, 0], program: go.urp}
+  P1: {q_deg: [13.43, -99.84, -108.10, -62.06, 90.0, -76.57], tcp_xyz_mm: [0, 0, 0],
+    program: go.urp}
 move_arm: false
 joint_encoder: output
 directions: {x: [1, 0, 0]}
@@ -181,7 +182,7 @@ def test_skip_asks_for_the_reason_and_goes_on(bench: Bench) -> None:
 
 def test_abort_keeps_rows_and_says_what_to_do_with_the_hands(bench: Bench) -> None:
     at(bench, 2, lambda: bench.loader.commands.append("abort"))
-    with pytest.raises(MeasurementStopped, match="stopped by the operator. Turn the screw back"):
+    with pytest.raises(MeasurementStopped, match=r"stopped by the operator\. Turn the screw back"):
         bench.run()
     assert bench.steps()[:1] == ALL[:1]
 
@@ -220,7 +221,7 @@ def test_a_limit_may_pause_instead(bench: Bench) -> None:
 def test_a_dead_device_ends_the_run_and_keeps_the_rows(bench: Bench) -> None:
     error = ReadTimeout("laser", "silent for 1.0 s", "Check its cable.")
     at(bench, 2, lambda: bench.arm.broken.update(laser=error))
-    with pytest.raises(ReadTimeout, match="laser: silent for 1.0 s. Check its cable."):
+    with pytest.raises(ReadTimeout, match=r"laser: silent for 1\.0 s\. Check its cable\."):
         bench.run()
     assert bench.steps()[:1] == ALL[:1]
 
