@@ -198,7 +198,15 @@ class World:
             self._unloaded_s += dt
             if self._unloaded_s > CONTROLLER_WAITS_S:
                 self._retake(dt)
+                self._keep_clear()
         return self.state
+
+    def _keep_clear(self) -> None:
+        """While the controller brings the arm back, the hand keeps the screw off it."""
+        too_far = self.advance_m - self._displacement(0.0, 0.0)
+        if too_far > 0:
+            self.advance_m -= too_far
+            self.target_m -= too_far
 
     def _retake(self, dt: float) -> None:
         for element in self._elements:
