@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import hypot
 from pathlib import Path
@@ -22,6 +23,7 @@ from rig.protocolfile import (
     check,
 )
 from rig.yamlfile import Document, read_document, read_document_text
+from rig.yamlnodes import Key
 
 __all__ = [
     "ForceBand",
@@ -121,16 +123,19 @@ class MeasurementProtocol:
 
 def load_protocol(path: Path) -> MeasurementProtocol:
     """Reads and checks a protocol file, whole; raises InputError with all its problems."""
-    return _built(read_document(path, ProtocolFile), path)
+    return _built(read_document(path, ProtocolFile, _check), path)
 
 
 def parse_protocol(text: str, path: Path) -> MeasurementProtocol:
     """As `load_protocol`, for the text of a protocol that `path` (a data set) holds."""
-    return _built(read_document_text(text, str(path), ProtocolFile), path)
+    return _built(read_document_text(text, str(path), ProtocolFile, _check), path)
+
+
+def _check(written: ProtocolFile) -> Iterator[tuple[Key, str]]:
+    return check(written, robot_names())
 
 
 def _built(document: Document[ProtocolFile], path: Path) -> MeasurementProtocol:
-    check(document, robot_names())
     written = document.value
     prompts = written.prompts.before_run
     return MeasurementProtocol(

@@ -15,7 +15,6 @@ from typing import Annotated, ClassVar, Literal
 from annotated_types import Gt, Interval, Le, MinLen
 
 from rig.errors import did_you_mean
-from rig.yamlfile import Document
 from rig.yamlnodes import Key
 
 Triple = tuple[float, float, float]
@@ -209,17 +208,19 @@ class ProtocolFile:
 Found = Iterator[tuple[Key, str]]
 
 
-def check(document: Document[ProtocolFile], robots: list[str]) -> None:
-    """Raises InputError with everything that does not hold across the keys of the file.
+def check(written: ProtocolFile, robots: list[str]) -> Found:
+    """(path, what is wrong) for everything that does not hold across the keys of the file.
 
     `robots`: the known names; a robot may also be the path of a robot file.
     """
-    written = document.value
-    found = [*_names(written, robots), *_poses(written), *_directions(written), *_times(written)]
+    yield from _names(written, robots)
+    yield from _poses(written)
+    yield from _directions(written)
+    yield from _times(written)
     for n, run in enumerate(written.runs):
-        found += [(("runs", n, *path), what) for path, what in _run(written, run)]
-    found += _duplicates(written)
-    document.refuse([document.problem(path, what) for path, what in found])
+        for path, what in _run(written, run):
+            yield ("runs", n, *path), what
+    yield from _duplicates(written)
 
 
 def _names(written: ProtocolFile, robots: list[str]) -> Found:
@@ -239,14 +240,11 @@ def _poses(written: ProtocolFile) -> Found:
             yield path, "give the joint positions as q_deg or as q_rad, and one of them."
             continue
         key, turn, unit = ("q_deg", 360.0, "deg") if pose.q_deg else ("q_rad", 2 * pi, "rad")
-        for i, angle in enumerate(getattr(pose, key)):
-            if abs(angle) > turn * (1 + 1e-9):
-                hint = " Are these degrees? Then call them q_deg." if unit == "rad" else ""
-                allowed = f"allowed: -{turn:.5g} to {turn:.5g} {unit}"
-                yield (
-                    (*path, key, i),
-                    f"{angle:.10g} {unit} is beyond a full turn; {allowed}.{hint}",
-                )
+        beyond = [f"{q:.10g}" for q in getattr(pose, key) if abs(q) > turn * (1 + 1e-9)]
+        if beyond:
+            hint = " Are these degrees? Then call them q_deg." if unit == "rad" else ""
+            what = f"{', '.join(beyond)} {unit}: beyond a full turn; allowed: -{turn:.5g} to "
+            yield (*path, key), f"{what}{turn:.5g} {unit}.{hint}"
         for i, value in enumerate(pose.tcp_xyz_mm):
             if abs(value) > 2000:
                 yield (

@@ -96,12 +96,12 @@ def load_station(name_or_path: str | Path, beside: Path | None = None) -> Statio
     or with the known names.
     """
     path = _find(str(name_or_path), beside)
-    return _built(read_document(path, StationFile), path)
+    return _built(read_document(path, StationFile, _check), path)
 
 
 def parse_station(text: str, path: Path) -> Station:
     """As `load_station`, for the text of a station that `path` (a data set) holds."""
-    return _built(read_document_text(text, str(path), StationFile), path)
+    return _built(read_document_text(text, str(path), StationFile, _check), path)
 
 
 def _find(name: str, beside: Path | None) -> Path:
@@ -123,16 +123,14 @@ def _find(name: str, beside: Path | None) -> Path:
 
 
 def _built(document: Document[StationFile], path: Path) -> Station:
-    _check(document)
     written = document.value
     values = {f.name: getattr(written, f.name) for f in dataclasses.fields(written)}
     del values["schema"]
     return Station(**values, text=document.text, path=path)
 
 
-def _check(document: Document[StationFile]) -> None:
-    """What holds across keys: all endpoints emulated, or none."""
-    written = document.value
+def _check(written: StationFile) -> list[tuple[Key, str]]:
+    """(path, what is wrong) across keys; endpoints are all emulated, or none is."""
     found: list[tuple[Key, str]] = []
     for device, key in ENDPOINTS:
         settings = getattr(written, device)
@@ -149,7 +147,7 @@ def _check(document: Document[StationFile]) -> None:
     found += _faults(written)
     if not (written.robot or written.dynamometer or written.laser):
         found.append(((), "robot, dynamometer and laser are missing; a station has one at least."))
-    document.refuse([document.problem(path, what) for path, what in found])
+    return found
 
 
 def _operator(written: StationFile) -> list[tuple[Key, str]]:

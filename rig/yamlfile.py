@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -22,6 +23,7 @@ from rig.errors import InputError, did_you_mean
 from rig.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, refuse
 
 T = TypeVar("T")
+_UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 MAX_BYTES = 1_000_000
 
@@ -59,9 +61,16 @@ def load_yaml_text(text: str, name: str, type_: type[T]) -> T:
     return read_document_text(text, name, type_).value
 
 
-def read_document(path: Path, type_: type[T]) -> Document[T]:
-    """As `load_yaml`, keeping text and places for checks across keys."""
-    return read_document_text(read_text(path), str(path), type_)
+Check = Callable[[T], Iterable[tuple[Key, str]]]
+
+
+def read_document(path: Path, type_: type[T], check: Check[T] | None = None) -> Document[T]:
+    """As `load_yaml`, keeping text and places.
+
+    `check` yields (path, what is wrong) for what does not hold across keys. Its findings join the
+    others, also where nothing but mistyped words is wrong with the shape.
+    """
+    return read_document_text(read_text(path), str(path), type_, check)
 
 
 def read_text(path: Path) -> str:
@@ -106,30 +115,45 @@ def _decode(raw: bytes, name: str) -> str:
     return text
 
 
-def read_document_text(text: str, name: str, type_: type[T]) -> Document[T]:
+def read_document_text(
+    text: str, name: str, type_: type[T], check: Check[T] | None = None
+) -> Document[T]:
     """As `read_document`, for text that messages call `name`."""
     reader = Reader()
     data = reader.read(compose(text, name))
     if not isinstance(data, dict):
         found = words.value_words(data, "")
         refuse(name, [*reader.problems, Problem(1, 1, f"{found}; `key: value` lines are wanted.")])
-    value, problems = _validate(data, reader, type_)
-    if problems or value is None:
-        refuse(name, problems)
+    value = _validate(data, reader, type_)
+    if value is not None and check is not None:
+        for path, what in check(value):
+            if not reader.is_bad(path):
+                reader.problems.append(_problem(reader.places, path, what))
+    if reader.problems or value is None:
+        refuse(name, reader.problems)
     return Document(name, text, value, reader.places)
 
 
-def _validate(data: object, reader: Reader, type_: type[T]) -> tuple[T | None, list[Problem]]:
+def _validate(data: dict[str, object], reader: Reader, type_: type[T]) -> T | None:
+    """The value, also when only mistyped words stood in its way; problems go to the reader."""
     adapter: TypeAdapter[T] = TypeAdapter(type_)
-    value: T | None = None
-    errors: list[Any] = []
-    try:
-        value = adapter.validate_json(json.dumps(data), strict=True)
-    except ValidationError as error:
-        errors = list(error.errors(include_url=False))
+    first = _attempt(adapter, data)  # (named: or mypy infers T | None for the adapter)
+    value, errors = first
     if errors or _any_bool(data):
-        _Judge(data, reader, adapter.json_schema(mode="validation")).add(errors)
-    return value, reader.problems
+        judge = _Judge(data, reader, adapter.json_schema(mode="validation"))
+        judge.add(errors)
+        if errors and judge.correct():
+            second = _attempt(adapter, data)
+            value, errors = second
+            judge.add(errors)
+    return value
+
+
+def _attempt(adapter: TypeAdapter[T], data: object) -> tuple[T | None, list[Any]]:
+    try:
+        return adapter.validate_json(json.dumps(data), strict=True), []
+    except ValidationError as error:
+        return None, list(error.errors(include_url=False))
 
 
 def _any_bool(data: object) -> bool:
@@ -145,9 +169,13 @@ class _Judge:
         self._data = data
         self._reader = reader
         self._schema = schema
+        self._renames: dict[Key, str | None] = {}  # unknown key -> known one, None: to be dropped
+        self._words: dict[Key, str] = {}  # mistyped word -> the one that was probably meant
 
     def add(self, errors: Sequence[Any]) -> None:
-        for error in errors:
+        """Words a validation's errors; places that have a problem already are left alone."""
+        # Unknown keys first: what they stand for is then not called missing.
+        for error in sorted(errors, key=lambda e: str(e["type"]) not in _UNKNOWN_KEY):
             self._error(str(error["type"]), self._path(error["loc"]), error)
         # JSON's true equals the literal 1 to the validator; to whoever wrote it, it does not.
         for path, value in _leaves(self._data, ()):
@@ -155,6 +183,21 @@ class _Judge:
                 nodes = words.schemas_at(self._schema, path)
                 if nodes and not any(_takes_bool(n) for n in nodes):
                     self._value_problem(path, value)
+
+    def correct(self) -> bool:
+        """Puts what was probably meant into the data and drops unknown keys; True if it did.
+
+        Only to find what else is wrong: the file is refused all the same.
+        """
+        for path, meant in self._renames.items():
+            parent = self._at(path[:-1])
+            value = parent.pop(path[-1])
+            if meant is not None and meant not in parent:
+                parent[meant] = value
+                self._reader.rename(path, meant)
+        for path, word in self._words.items():
+            self._at(path[:-1])[path[-1]] = word
+        return bool(self._renames or self._words)
 
     def _path(self, loc: Sequence[str | int]) -> Key:
         """The validator's location without the names of alternatives, which no file contains."""
@@ -166,32 +209,41 @@ class _Judge:
         return path
 
     def _error(self, kind: str, path: Key, error: Any) -> None:
-        places, keys = self._reader.places, self._reader.keys
-        if any(path[:n] in self._reader.bad for n in range(1, len(path) + 1)):
+        reader = self._reader
+        if reader.is_bad(path):
             return
-        if kind in ("missing", "missing_argument") and path not in places:
-            if isinstance(path[-1], int):  # a list too short for its fixed length
-                self._value_problem(path[:-1], self._at(path[:-1]))
-                return
-            at = keys.get(path[:-1], places[path[:-1]])
-            nodes = words.schemas_at(self._schema, path)
-            allowed = words.allowed_words(self._schema, nodes, words.unit_of(path))
-            self._reader.complain(path, at, f"is missing; wanted: {allowed or 'a value'}.")
-        elif kind in ("extra_forbidden", "unexpected_keyword_argument"):
-            nodes = words.schemas_at(self._schema, path[:-1])
-            free = [k for k in words.known_keys(nodes) if (*path[:-1], k) not in places]
-            hint = did_you_mean(str(path[-1]), free or words.known_keys(nodes))
-            if str(path[-1]).isdecimal() and self._at(path) is None:  # {range_mm: 1,5}
-                hint = " A comma ends a value here; write a point as decimal mark."
-            self._reader.complain(path, keys.get(path, places[path]), f"unknown key.{hint}")
+        if kind in ("missing", "missing_argument") and path not in reader.places:
+            self._missing(path)
+        elif kind in _UNKNOWN_KEY:
+            self._unknown_key(path)
         elif kind in ("value_error", "assertion_error"):
             what = str(error.get("ctx", {}).get("error", error["msg"]))
-            self._reader.complain(path, places[path], what)
+            reader.complain(path, reader.places[path], what)
         else:
             self._value_problem(path, self._at(path))
 
+    def _missing(self, path: Key) -> None:
+        key, above = path[-1], path[:-1]
+        if isinstance(key, int):  # a list too short for its fixed length
+            self._value_problem(above, self._at(above))
+        elif key not in [m for p, m in self._renames.items() if p[:-1] == above]:
+            at = self._reader.keys.get(above, self._reader.places[above])
+            nodes = words.schemas_at(self._schema, path)
+            allowed = words.allowed_words(self._schema, nodes, words.unit_of(path))
+            self._reader.complain(path, at, f"is missing; wanted: {allowed or 'a value'}.")
+
+    def _unknown_key(self, path: Key) -> None:
+        reader, key, above = self._reader, str(path[-1]), path[:-1]
+        known = words.known_keys(words.schemas_at(self._schema, above))
+        free = [k for k in known if (*above, k) not in reader.places]
+        hint = did_you_mean(key, free or known)
+        if key.isdecimal() and self._at(path) is None:  # {range_mm: 1,5}
+            hint = " A comma ends a value here; write a point as decimal mark."
+        reader.complain(path, reader.keys.get(path, reader.places[path]), f"unknown key.{hint}")
+        self._renames[path] = _closest(key, free)
+
     def _value_problem(self, path: Key, value: object) -> None:
-        if path in self._reader.bad:
+        if self._reader.is_bad(path):
             return
         unit = words.unit_of(path)
         nodes = words.schemas_at(self._schema, path)
@@ -199,8 +251,11 @@ class _Judge:
         what = f"{words.value_words(value, unit)} is not allowed"
         what += f"; wanted: {allowed}." if allowed else "."
         self._reader.complain(path, self._reader.places[path], what + _hint(value, nodes))
+        meant = _closest(value, _texts(nodes)) if isinstance(value, str) else None
+        if meant is not None:
+            self._words[path] = meant
 
-    def _at(self, path: Key) -> object:
+    def _at(self, path: Key) -> Any:
         value: Any = self._data
         for key in path:
             value = value[key]
@@ -237,10 +292,18 @@ def _hint(value: object, nodes: Sequence[words.Schema]) -> str:
     if isinstance(value, int | float) and kinds & {"string"}:
         return " Put it in quotes if it is a name."
     if isinstance(value, str):
-        options = [str(o) for n in nodes for o in _options(n)]
+        options = _texts(nodes)
         close = did_you_mean(value, options)
         return close if len(options) > 1 and close.startswith(" Did") else ""
     return ""
+
+
+def _closest(word: str, known: Sequence[str]) -> str | None:
+    return next(iter(get_close_matches(word, sorted(known), n=1)), None)
+
+
+def _texts(nodes: Sequence[words.Schema]) -> list[str]:
+    return [o for n in nodes for o in _options(n) if isinstance(o, str)]
 
 
 def _options(node: words.Schema) -> list[object]:

@@ -130,6 +130,17 @@ class Reader:
         where = words.place(path)
         self.problems.append(Problem(*at, f"{where}: {what}" if where else what))
 
+    def is_bad(self, path: Key) -> bool:
+        """True where the value at `path`, or one that contains it, has a problem already."""
+        return any(path[:n] in self.bad for n in range(1, len(path) + 1))
+
+    def rename(self, path: Key, name: str) -> None:
+        """From now on the value at `path` is also known under another key beside it."""
+        n = len(path)
+        for places in (self.places, self.keys):
+            below = [p for p in places if p[:n] == path]
+            places.update({(*path[:-1], name, *p[n:]): places[p] for p in below})
+
     def _value(self, node: Node, path: Key, at: Place) -> object:
         self.places[path] = at
         if node.tag not in _CORE_TAGS:
