@@ -258,18 +258,22 @@ def along(compliance: Array, direction: ArrayLike) -> Array:
 
 
 def unit_vector(direction: ArrayLike) -> Array:
-    """`direction` (..., 3), checked. Raises ValueError when it has not length 1 (within 1e-6)."""
+    """`direction` (..., 3), checked and normalised.
+
+    Raises ValueError when its length is not 1 within 1e-3 (components typed with four digits pass).
+    """
     n = np.asarray(direction, dtype=float)
     if n.shape[-1:] != (3,):
         raise ValueError(f"a direction has three components, not shape {n.shape}")
-    length = np.linalg.norm(n, axis=-1)
-    wrong = ~(np.abs(length - 1.0) <= 1e-6)
+    length = np.linalg.norm(n, axis=-1, keepdims=True)
+    wrong = ~(np.abs(length[..., 0] - 1.0) <= 1e-3)
     if wrong.any():
+        first = np.argmax(wrong)
+        given = n.reshape(-1, 3)[first].tolist()
         raise ValueError(
-            f"direction {np.atleast_2d(n)[np.atleast_1d(wrong)][0].tolist()} has length "
-            f"{np.atleast_1d(length)[np.atleast_1d(wrong)][0]:.6g}; a unit vector is wanted"
+            f"direction {given} has length {length.reshape(-1)[first]:.6g}; a unit vector is wanted"
         )
-    return n
+    return np.asarray(n / length)
 
 
 def invert_compliance(C: Array) -> Array:

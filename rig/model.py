@@ -74,6 +74,7 @@ class ArmModel:
     coupling: CouplingSpec | None
     required: tuple[Requirement, ...]
     reach: float | None
+    note: str = ""
 
     def compliance(self) -> Array:
         """Compliance (6, 6) at the tool of the single arm, effects left out."""
@@ -119,6 +120,7 @@ def load_model(path: str | Path) -> ArmModel:
         coupling=_coupling(document),
         required=tuple(_requirement(document, i) for i in range(len(written.required))),
         reach=reach,
+        note=written.note,
     )
 
 
@@ -130,7 +132,7 @@ def _robot(name_or_path: str | Path) -> tuple[Arm, float]:
         if str(name_or_path) not in known:
             hint = did_you_mean(str(name_or_path), known)
             raise InputError(
-                f'robot "{name_or_path}" is unknown.{hint} Or give the path of a robot file (.yaml).'
+                f'robot "{name_or_path}" is unknown.{hint} Or give a robot file (.yaml).'
             )
     document = read_document(path, RobotFile)
     written = document.value

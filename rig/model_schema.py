@@ -157,9 +157,10 @@ class MountingFile:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelFile:
-    """A model file as it is written."""
+    """A model file as it is written; `note` is shown with every result of it."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = _Forbid
+    note: str = ""
     robot: Annotated[str, MinLen(1)] | None = None
     dh: DhTable | None = None
     pose: PoseFile

@@ -1,0 +1,187 @@
+"""Volumes that one arm reaches, and that two mirrored arms reach together, above the base plane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.arm import JOINTS, Arm, tool_transform
+
+Array = NDArray[np.float64]
+_CHUNK = 50_000  # rows that stay in the processor's cache
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """single, coupled: m^3; definition: in words, because volumes of different ones differ."""
+
+    single: float
+    coupled: float
+    definition: str
+
+    @property
+    def ratio(self) -> float:
+        """Share of the single arm's volume in which both arms can meet."""
+        return self.coupled / self.single
+
+
+def analytic(reach: float, distance: float) -> Workspace:
+    """Half ball of radius `reach` about the base, and half of the lens that two such balls share
+    (m): `V = pi (4 R + D)(2 R - D)^2 / 12` for the whole lens (spherical caps, height R - D/2).
+
+    Raises ValueError when a length is not above 0.
+    """
+    if not (reach > 0 and distance > 0):
+        raise ValueError(f"reach {reach:g} m and base distance {distance:g} m must be above 0 m")
+    single = 2 / 3 * np.pi * reach**3
+    lens = 0.0
+    if distance < 2 * reach:
+        lens = np.pi * (4 * reach + distance) * (2 * reach - distance) ** 2 / 12
+    return Workspace(
+        float(single),
+        float(lens / 2),
+        f"reach model: ball of {reach:g} m about each base, upper half; "
+        f"coupled where both balls overlap, bases {distance:g} m apart",
+    )
+
+
+def tool_points(arm: Arm, q: ArrayLike, tool: ArrayLike | None = None) -> Array:
+    """Positions (n, 3) m of the tool for q (n, 6): the last column of `fk`, without the rest."""
+    angles = np.asarray(q, dtype=float)
+    x, y, z = (tool_transform(tool)[:3, 3] if tool is not None else np.zeros(3))[:, None]
+    for i in range(JOINTS - 1, -1, -1):
+        c, s = np.cos(angles[:, i]), np.sin(angles[:, i])
+        ca, sa = np.cos(arm.alpha[i]), np.sin(arm.alpha[i])
+        along, across = x + arm.a[i], ca * y - sa * z
+        x, y, z = c * along - s * across, s * along + c * across, sa * y + ca * z + arm.d[i]
+    return np.stack([x, y, z], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """Cells (radius, height, azimuth) about axis 1 that samples fell into; edges of size `cell`.
+
+    One azimuth where joint 1 turns all the way round.
+    """
+
+    cells: NDArray[np.bool_]
+    cell: float
+
+    def contains(self, x: Array, y: Array, z: Array) -> NDArray[np.bool_]:
+        """Whether points (same shapes, m, base frame) lie in a reached cell."""
+        radius = (np.hypot(x, y) / self.cell).astype(int)
+        height = np.floor(z / self.cell).astype(int)
+        sectors = self.cells.shape[2]
+        azimuth = np.zeros_like(radius)
+        if sectors > 1:
+            turn = np.arctan2(y, x) / (2 * np.pi) % 1.0
+            azimuth = np.minimum((turn * sectors).astype(int), sectors - 1)
+        inside = (radius < self.cells.shape[0]) & (height >= 0) & (height < self.cells.shape[1])
+        out = np.zeros(radius.shape, dtype=bool)
+        at = radius[inside], height[inside], azimuth[inside]
+        out[inside] = self.cells[at]
+        return out
+
+    def volume(self) -> float:
+        """Volume of all reached cells in m^3."""
+        rings = np.pi * self.cell**2 * (2 * np.arange(self.cells.shape[0]) + 1)
+        filled = self.cells.sum(axis=(1, 2)) / self.cells.shape[2]
+        return float(rings @ filled) * self.cell
+
+
+def sample(
+    arm: Arm,
+    samples: int,
+    seed: int = 0,
+    *,
+    tool: ArrayLike | None = None,
+    cell: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Reached:
+    """Monte Carlo over the joint space within the joint limits (uniform), above the base plane.
+
+    Joints that turn more than once are sampled over one turn. Memory stays below 100 MB whatever
+    the number of samples; `progress` gets the share that is done. cell: m; by default it shrinks
+    with the number of samples, so that neither missed cells nor half-filled ones at the rim count.
+    """
+    if samples < 1:
+        raise ValueError(f"{samples} samples; at least 1 is wanted")
+    cell = _cell(samples) if cell is None else cell
+    if not cell > 0:
+        raise ValueError(f"cells of {cell:g} m; above 0 m is wanted")
+    rng = np.random.default_rng(seed)
+    low, span = arm.q_min, np.minimum(arm.q_max - arm.q_min, 2 * np.pi)
+    full_turn = bool(span[0] >= 2 * np.pi)
+    sectors = 1 if full_turn else 180
+    limit = _outermost(arm, tool)
+    shape = (int(limit / cell) + 2, int((limit + abs(arm.d[0])) / cell) + 2, sectors)
+    cells = np.zeros(shape, dtype=bool)
+    for start in range(0, samples, _CHUNK):
+        q = low + span * rng.random((min(_CHUNK, samples - start), JOINTS))
+        if full_turn:
+            q[:, 0] = 0.0  # turning about axis 1 changes neither radius nor height
+        p = tool_points(arm, q, tool)
+        p = p[p[:, 2] > 0]
+        turn = np.arctan2(p[:, 1], p[:, 0]) / (2 * np.pi) % 1.0
+        azimuth = np.minimum((turn * sectors).astype(int), sectors - 1)
+        radius = (np.hypot(p[:, 0], p[:, 1]) / cell).astype(int)
+        cells[radius, (p[:, 2] / cell).astype(int), azimuth] = True
+        if progress is not None:
+            progress(min(1.0, (start + _CHUNK) / samples))
+    return Reached(cells, cell)
+
+
+def monte_carlo(
+    arm: Arm,
+    distance: float,
+    samples: int = 1_000_000,
+    seed: int = 0,
+    *,
+    tool: ArrayLike | None = None,
+    cell: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Workspace:
+    """Volumes from `sample`: what one arm reaches, and what it shares with its mirror image whose
+    base stands `distance` m away along x."""
+    reached = sample(arm, samples, seed, tool=tool, cell=cell, progress=progress)
+    what = "flange" if tool is None else "tool"
+    return Workspace(
+        reached.volume(),
+        _shared(reached, distance),
+        f"Monte Carlo: {samples} joint positions, uniform within the joint limits; cells of "
+        f"{reached.cell * 1e3:.3g} mm about axis 1 that the {what} falls into, z > 0; coupled "
+        f"where its mirror image, base {distance:g} m away, does too",
+    )
+
+
+def _shared(reached: Reached, distance: float) -> float:
+    """Volume in which a point and its mirror image in the plane x = distance / 2 are reached."""
+    step = max(reached.cell, 0.01)
+    limit = reached.cells.shape[0] * reached.cell
+    half = distance / 2
+    if half >= limit:
+        return 0.0
+    # the shared body is symmetric to the plane: count its half beyond the plane
+    x = np.arange(half + step / 2, limit, step)
+    y = np.arange(-limit + step / 2, limit, step)
+    count = 0
+    grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
+    for z in np.arange(step / 2, reached.cells.shape[1] * reached.cell, step):
+        level = np.full_like(grid_x, z)
+        both = reached.contains(grid_x, grid_y, level)
+        both &= reached.contains(distance - grid_x, grid_y, level)
+        count += int(both.sum())
+    return 2 * count * step**3
+
+
+def _outermost(arm: Arm, tool: ArrayLike | None) -> float:
+    """No point of the tool is farther from the base than the sum of all lengths."""
+    extra = 0.0 if tool is None else float(np.linalg.norm(tool_transform(tool)[:3, 3]))
+    return float(np.hypot(arm.a, arm.d).sum()) + extra
+
+
+def _cell(samples: int) -> float:
+    return float(0.01 * (500_000 / samples) ** (1 / 3))

@@ -1,0 +1,253 @@
+"""`rig couple`: the single arm and the coupled pair of a model file, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification import workspace
+from identification.arm import along, invert_compliance
+from identification.coupling import Kind, State, coupled, decide, mirror_axes
+from identification.coupling import base_distance as distance_of
+from identification.when import Schedule
+from identification.workspace import Workspace
+from rig.coupling_path import read_path, run_path
+from rig.errors import InputError
+from rig.model import ArmModel, CouplingSpec, load_model
+
+Array = NDArray[np.float64]
+_AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the rule says of one requirement, N/m."""
+
+    direction: str
+    required: float
+    single: float
+    coupled: float
+    state: State
+
+
+@dataclass(frozen=True, eq=False)
+class CouplingResult:
+    """Stiffness N/m (3,): `single` along the base axes, `pair[kind]` along the load axes, with
+    standard uncertainties of the same shape."""
+
+    model: ArmModel
+    spec: CouplingSpec
+    workspaces: tuple[Workspace, ...]
+    single: Array
+    u_single: Array
+    pair: dict[str, Array]
+    u_pair: dict[str, Array]
+    decisions: tuple[Decision, ...]
+    schedule: Schedule | None
+    notes: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """`rig.coupling/1`, with further keys."""
+        first, *others = self.workspaces
+        out: dict[str, Any] = {
+            "schema": "rig.coupling/1",
+            "model": self.model.name,
+            "load_axes": self.spec.load_axes,
+            "kind": self.spec.described,
+            "workspace_m3": _volumes(first),
+            "workspace_others_m3": [_volumes(w) for w in others],
+            "single_N_per_mm": _per_axis(self.single / 1e3),
+            "single_standard_uncertainty_N_per_mm": _per_axis(self.u_single / 1e3),
+            "coupled_N_per_mm": {k: _per_axis(v / 1e3) for k, v in self.pair.items()},
+            "coupled_standard_uncertainty_N_per_mm": {
+                k: _per_axis(v / 1e3) for k, v in self.u_pair.items()
+            },
+            "gain": {k: _per_axis(v / self.single) for k, v in self.pair.items()},
+            "decision": [
+                {
+                    "required_N_per_mm": d.required / 1e3,
+                    "direction": d.direction,
+                    "state": d.state,
+                }
+                for d in self.decisions
+            ],
+            "notes": list(self.notes),
+        }
+        # a rigid or point model states no beam: nothing compliant can be computed from it
+        out["coupled_N_per_mm"].setdefault("compliant", None)
+        out["gain"].setdefault("compliant", None)
+        if self.schedule is not None:
+            out["schedule"] = [
+                {"from_s": i.start, "to_s": i.end, "state": i.state}
+                for i in self.schedule.intervals()
+            ]
+        return out
+
+    def to_text(self) -> str:
+        """Tables for a terminal."""
+        from rig.couple_text import text
+
+        return text(self)
+
+
+def couple(
+    model: str | Path,
+    *,
+    samples: int = 1_000_000,
+    seed: int = 0,
+    path: str | Path | None = None,
+    dead_band: float = 0.0,
+    progress: Callable[[float], None] | None = None,
+) -> CouplingResult:
+    """Workspace, stiffness and decisions of a model file; along `path` (CSV) the schedule too.
+
+    samples: joint positions of the Monte Carlo workspace, 0 leaves it out. Raises InputError.
+    """
+    read = load_model(model)
+    spec = _spec(read)
+    C = _regular_compliance(read)
+    kinds = _kinds(spec)
+    single = _stiffness(C, np.eye(3))
+    pair = {name: _pair(C, spec, kind, half) for name, kind, half in kinds}
+    u_single, u_pair = _uncertainty(read, spec, kinds)
+    track = read_path(Path(path)) if path is not None else None
+    if not 0 <= dead_band < 1:
+        raise InputError(f"--dead-band is {dead_band:g}; wanted: at least 0 and below 1.")
+    return CouplingResult(
+        model=read,
+        spec=spec,
+        workspaces=_workspaces(read, spec, samples, seed, progress),
+        single=single,
+        u_single=u_single,
+        pair=pair,
+        u_pair=u_pair,
+        decisions=_decisions(read, C, spec),
+        schedule=run_path(read, spec, track, dead_band) if track is not None else None,
+        notes=tuple(_notes(read, spec)),
+    )
+
+
+def _spec(model: ArmModel) -> CouplingSpec:
+    if model.coupling is None:
+        raise InputError(
+            f"{model.name}: no `coupling` block; rig couple needs base_distance_mm, beta_deg, "
+            "load_axes and kind. data/models/F1.yaml shows one."
+        )
+    return model.coupling
+
+
+def _regular_compliance(model: ArmModel) -> Array:
+    C = model.compliance()
+    try:
+        invert_compliance(C)
+    except ValueError as error:
+        degrees = ", ".join(f"{v:.4g}" for v in np.rad2deg(model.q))
+        raise InputError(f"{model.name}: pose ({degrees}) deg: {error}.") from error
+    return C
+
+
+def _kinds(spec: CouplingSpec) -> list[tuple[str, Kind, Array | None]]:
+    kinds: list[tuple[str, Kind, Array | None]] = [("rigid", "rigid", None)]
+    if spec.half is not None:
+        kinds.append(("compliant", "compliant", spec.half))
+    kinds.append(("point", "point", None))
+    return kinds
+
+
+def load_axes(spec: CouplingSpec) -> Array:
+    """Columns (3, 3): the axes that coupled loads act along, base frame."""
+    return mirror_axes(spec.beta) if spec.load_axes == "mirror" else np.eye(3)
+
+
+def _stiffness(C: Array, axes: Array) -> Array:
+    return np.array([along(C, axes[:, i]) for i in range(3)])
+
+
+def _pair(C: Array, spec: CouplingSpec, kind: Kind, half: Array | None) -> Array:
+    return _stiffness(coupled(C, spec.beta, kind, half), load_axes(spec))
+
+
+def _uncertainty(
+    model: ArmModel, spec: CouplingSpec, kinds: list[tuple[str, Kind, Array | None]]
+) -> tuple[Array, dict[str, Array]]:
+    """First order in the logarithms of the joint stiffnesses (GUM), by central differences."""
+    arm, step = model.arm, 1e-4
+    variances = {name: np.zeros(3) for name in ["single", *(k[0] for k in kinds)]}
+    for i, sd in enumerate(arm.joint_stiffness_relative_sd):
+        sides = []
+        for sign in (1, -1):
+            factor = np.ones(6)
+            factor[i] += sign * step
+            varied = arm.with_stiffness(arm.joint_stiffness * factor)
+            C = varied.compliance(model.q, model.tool, links=model.links, base=model.mounting)
+            found = {"single": _stiffness(C, np.eye(3))}
+            found |= {name: _pair(C, spec, kind, half) for name, kind, half in kinds}
+            sides.append(found)
+        for name in variances:
+            variances[name] += ((sides[0][name] - sides[1][name]) / (2 * step) * sd) ** 2
+    roots = {name: np.sqrt(total) for name, total in variances.items()}
+    return roots.pop("single"), roots
+
+
+def _decisions(model: ArmModel, C: Array, spec: CouplingSpec) -> tuple[Decision, ...]:
+    """Components of a requirement count in the base axes for the single arm, in the load axes for
+    the pair, as its table does."""
+    kind = next(k for k in _kinds(spec) if k[0] == spec.kind)
+    pair_compliance = coupled(C, spec.beta, kind[1], kind[2])
+    out = []
+    for need in model.required:
+        single = float(along(C, need.direction))
+        pair = float(along(pair_compliance, load_axes(spec) @ np.array(need.direction)))
+        state = decide(need.stiffness, single, pair)
+        out.append(Decision(need.name, need.stiffness, single, pair, state))
+    return tuple(out)
+
+
+def _workspaces(
+    model: ArmModel,
+    spec: CouplingSpec,
+    samples: int,
+    seed: int,
+    progress: Callable[[float], None] | None,
+) -> tuple[Workspace, ...]:
+    out = []
+    reach = model.reach
+    if reach is not None:
+        out.append(workspace.analytic(reach, spec.base_distance))
+    if samples > 0 or not out:
+        out.append(
+            workspace.monte_carlo(
+                model.arm, spec.base_distance, samples or 300_000, seed, progress=progress
+            )
+        )
+    return tuple(out)
+
+
+def _notes(model: ArmModel, spec: CouplingSpec) -> list[str]:
+    notes = [model.note] if model.note else []
+    node = model.arm.fk(model.q, model.tool)[:3, 3]
+    distance = distance_of(node, spec.beta)
+    if abs(distance - spec.base_distance) > 0.5e-3:
+        notes.append(
+            f"With this pose and angle the bases stand {distance * 1e3:.1f} mm apart, not "
+            f"{spec.base_distance * 1e3:g} mm: the latter counts for the workspace, the pose for "
+            "the stiffness."
+        )
+    if model.effects:
+        notes.append("The model's effects are left out: stiffness here is that of the springs.")
+    if spec.half is None:
+        notes.append("No beam in the model: compliant coupling is not computed.")
+    return notes
+
+
+def _volumes(w: Workspace) -> dict[str, Any]:
+    return {"single": w.single, "coupled": w.coupled, "ratio": w.ratio, "definition": w.definition}
+
+
+def _per_axis(values: Array) -> dict[str, float]:
+    return {axis: float(v) for axis, v in zip(_AXES, values, strict=True)}

@@ -1,0 +1,101 @@
+"""A path that asks for stiffness: CSV of time, pose, direction and requirement."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.when import Schedule, schedule
+from rig.errors import InputError, did_you_mean
+from rig.model import ArmModel, CouplingSpec
+
+Array = NDArray[np.float64]
+_Q = tuple(f"q{i}_rad" for i in range(1, 7))
+_DIRECTION = ("direction_x", "direction_y", "direction_z")
+_COLUMNS = ("time_s", *_Q, *_DIRECTION, "required_N_per_mm")
+
+
+@dataclass(frozen=True, eq=False)
+class Path6:
+    """time (n,) s, q (n, 6) rad or None (the model's pose throughout), direction (n, 3) in the
+    base frame, required (n,) N/m."""
+
+    name: str
+    time: Array
+    q: Array | None
+    direction: Array
+    required: Array
+
+
+def read_path(path: Path) -> Path6:
+    """Columns time_s, q1_rad ... q6_rad (all or none), direction_x, _y, _z, required_N_per_mm.
+
+    `#` starts a comment line. Raises InputError with the line and the column.
+    """
+    try:
+        text = path.read_text("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a UTF-8 table: {error}.") from error
+    lines = [(i, line) for i, line in enumerate(text.splitlines(), 1)]
+    lines = [(i, line) for i, line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if len(lines) < 2:
+        raise InputError(f"{path}: no rows; a header and at least one row are wanted.")
+    header = [name.strip() for name in next(csv.reader([lines[0][1]]))]
+    with_q = any(name in header for name in _Q)
+    wanted = [name for name in _COLUMNS if with_q or name not in _Q]
+    missing = [name for name in wanted if name not in header]
+    if missing:
+        hint = did_you_mean(missing[0], header)
+        raise InputError(f"{path}:{lines[0][0]}: no column {missing[0]}.{hint}")
+    places = {name: header.index(name) for name in wanted}
+    rows = np.array(
+        [[_number(path, i, line, n, places[n]) for n in wanted] for i, line in lines[1:]]
+    )
+    table = dict(zip(wanted, rows.T, strict=True))
+    return Path6(
+        str(path),
+        table["time_s"],
+        np.stack([table[n] for n in _Q], axis=-1) if with_q else None,
+        np.stack([table[n] for n in _DIRECTION], axis=-1),
+        table["required_N_per_mm"] * 1e3,
+    )
+
+
+def run_path(model: ArmModel, spec: CouplingSpec, path: Path6, dead_band: float) -> Schedule:
+    """The schedule of coupling and release; InputError for rows that make no path."""
+    q = path.q if path.q is not None else np.broadcast_to(model.q, (path.time.size, 6))
+    if (path.required < 0).any():
+        row = int(np.argmax(path.required < 0)) + 1
+        raise InputError(f"{path.name}: row {row}: required_N_per_mm must be at least 0 N/mm.")
+    try:
+        return schedule(
+            model.arm,
+            path.time,
+            q,
+            path.direction,
+            path.required,
+            beta=spec.beta,
+            tool=model.tool,
+            kind=spec.kind,
+            half=spec.half,
+            dead_band=dead_band,
+        )
+    except ValueError as error:
+        raise InputError(f"{path.name}: {error}.") from error
+
+
+def _number(path: Path, line_number: int, line: str, column: str, place: int) -> float:
+    cells = next(csv.reader([line]))
+    cell = cells[place].strip() if place < len(cells) else ""
+    try:
+        value = float(cell)
+    except ValueError:
+        value = float("nan")
+    if not isfinite(value):
+        raise InputError(f'{path}:{line_number}: {column} is "{cell}"; wanted: a finite number.')
+    return value
