@@ -31,6 +31,13 @@ class History:
         self._rows[self._count] = row
         self._count += 1
 
+    def cut(self, time: float) -> None:
+        """Forgets what lies after `time`, which then is the last instant."""
+        row = self.at(np.array([time]), slice(None))[0]
+        while self._count > 1 and self._times[self._count - 1] >= time:
+            self._count -= 1
+        self.append(max(time, float(np.nextafter(self.newest, np.inf))), row)
+
     def at(self, t: Array, columns: slice) -> Array:
         """(n, columns) values at instants t (n), linear in between; what is older than the first
         row has the first row's values."""

@@ -1,7 +1,8 @@
 """A world that goes on in time: what the emulators sense.
 
 The scene is integrated on demand in steps on a fixed grid, always to the first grid instant not
-before now; a command acts from there on, so that nothing an emulator has already seen can change.
+before now. A turn of the screw acts from there on, a new set-up or pose at once; what an emulator
+may already have seen does not change.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from rig.worlds.arm import Array, tool_poses
 from rig.worlds.history import History
 from rig.worlds.world import World
 
-TICK_S = 0.05  # while the screw turns or the arm moves
+TICK_S = 0.05  # while the screw turns
 IDLE_TICKS = 4  # otherwise
 KEPT_S, KEPT_WALL_S = 30.0, 4.0  # of the scene, and more where it runs fast
-JOINT_SPEED_RAD_PER_S = 0.5  # on the way to another pose
+COMMAND_S = 1e-6  # that a new set-up or pose takes to show
 FUTURE_TOLERANCE_S = 1e-6
 
 # The floor: tones (Hz) and their amplitude (m), and how stiffly the arm passes them on (N/m).
@@ -62,12 +63,11 @@ class WorldScene:
         self._friction = random.uniform(0.7, 1.4, 6)
         if poses:
             world.move(*poses[0])
-        self._from, self._moving = world.q, (0.0, 0.0)
         self._first_command_s: float | None = None
         self._tick = 0
         self._history = History(_WIDTH, max(KEPT_S, KEPT_WALL_S * speed), TICK_S)
         self._lock = threading.RLock()
-        self._record()
+        self._record(0.0)
         self._go_on()
 
     def now(self) -> float:
@@ -113,43 +113,39 @@ class WorldScene:
     def turn(self, advance_m: float) -> None:
         """The hand begins to turn the screw; returns at once."""
         with self._lock:
-            self._command()
+            self._advance()
+            self._note_command()
             self.world.turn(advance_m)
 
     def mount(self, direction: Sequence[float]) -> None:
         """Screw and laser along a unit vector, unloaded, the joints taken back."""
         with self._lock:
-            self._command()
+            self._advance()
             self.world.mount(direction)
+            self._note_command()
+            self._start_anew()
 
     def move(self, q_rad: Sequence[float]) -> None:
-        """The arm begins to move to another pose, unloaded; returns at once."""
+        """The arm stands unloaded in another pose from now on."""
         with self._lock:
-            start = self._command()
-            before = self._target(start)
+            self._advance()
             self.world.move(q_rad, self._tool(q_rad))
-            way = float(np.abs(self.world.q - before).max())
-            self._from = before
-            self._moving = (start, start + way / JOINT_SPEED_RAD_PER_S)
+            self._start_anew()
+
+    def _note_command(self) -> None:
+        if self._first_command_s is None:
+            self._first_command_s = self.now()
+
+    def _start_anew(self) -> None:
+        now = self.now()
+        self._history.cut(now)
+        self._record(now + COMMAND_S)
 
     def _tool(self, q_rad: Sequence[float]) -> Sequence[float] | None:
         for q, tcp_m in self._poses:
             if len(q_rad) == len(q) and np.allclose(q, q_rad, atol=1e-3):
                 return tcp_m
         return None
-
-    def _command(self) -> float:
-        self._advance()
-        if self._first_command_s is None:
-            self._first_command_s = self.now()
-        return self._tick * TICK_S
-
-    def _target(self, time: float) -> Array:
-        start, end = self._moving
-        if time >= end:
-            return self.world.q
-        share = (time - start) / (end - start)
-        return self._from + share * (self.world.q - self._from)
 
     def _read(self, t: Array, columns: slice) -> Array:
         if len(t) == 0:
@@ -167,19 +163,17 @@ class WorldScene:
             self._go_on()
 
     def _go_on(self) -> None:
-        busy = self.world.turning or self._tick * TICK_S < self._moving[1]
-        ticks = 1 if busy else IDLE_TICKS
-        self._tick += ticks
-        self.world.step(ticks * TICK_S)
-        self._record()
+        self._tick += 1 if self.world.turning else IDLE_TICKS
+        self.world.step(self._tick * TICK_S - self._history.newest)
+        self._record(self._tick * TICK_S)
 
-    def _record(self) -> None:
-        world, time = self.world, self._tick * TICK_S
+    def _record(self, time: float) -> None:
+        world = self.world
         row = np.empty(_WIDTH)
         row[_FORCE] = world.state.force_N * world.direction
         row[_MOVED] = world.state.displacement_m
         row[_JOINTS] = world.state.joints_rad
-        row[_TARGET] = self._target(time)
+        row[_TARGET] = world.q
         row[_TORQUE] = world.torques_per_N * world.state.force_N
         self._history.append(time, row)
 

@@ -197,16 +197,17 @@ class World:
         else:
             self._unloaded_s += dt
             if self._unloaded_s > CONTROLLER_WAITS_S:
-                self._retake(dt)
-                self._keep_clear()
+                self._return_joints(dt)
         return self.state
 
-    def _keep_clear(self) -> None:
-        """While the controller brings the arm back, the hand keeps the screw off it."""
-        too_far = self.advance_m - self._displacement(0.0, 0.0)
-        if too_far > 0:
-            self.advance_m -= too_far
-            self.target_m -= too_far
+    def _return_joints(self, dt: float) -> None:
+        """The controller brings the arm back, and the hand keeps the screw off it."""
+        before = self._displacement(0.0, 0.0)
+        self._retake(dt)
+        back = before - self._displacement(0.0, 0.0)
+        if back > 0:
+            self.advance_m -= back
+            self.target_m -= back
 
     def _retake(self, dt: float) -> None:
         for element in self._elements:
