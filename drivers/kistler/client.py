@@ -191,11 +191,8 @@ class Kistler9257B:
 
     def _await_first_block(self, until: float) -> None:
         while self._stream.age_s() == math.inf:
-            failure = self._stream.failure
-            if failure is not None:
-                if isinstance(failure, ReadTimeout):
-                    raise CannotConnect(DEVICE, failure.fault, failure.remedy) from failure
-                raise failure
+            if self._stream.failure is not None:
+                raise self._stream.failure
             if time.monotonic() > until:
                 raise CannotConnect(
                     DEVICE,
@@ -233,7 +230,8 @@ class Kistler9257B:
                 volts = daq.read()
             except DAQ_ERRORS as error:
                 if not stop.is_set():
-                    stream.fail(device_error(error, self.settings, connecting=False))
+                    first = stream.age_s() == math.inf
+                    stream.fail(device_error(error, self.settings, connecting=first))
                 return
             end = timeline.end_of_block(self._clock.now())
             stream.put(self._block(volts.T, end - period, end))

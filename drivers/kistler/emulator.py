@@ -78,6 +78,7 @@ class KistlerEmulator:
         self._raw: RawListener | None = None
         self._port = 0
         self._stopping = threading.Event()
+        self.tasks = Tasks(self, settings)
         self.calls: list[str] = []  # names of the calls other than reads, for tests
 
     def start(self) -> str:
@@ -89,7 +90,7 @@ class KistlerEmulator:
             interceptors=[_Gate(self._before, self._serialize)],
             options=[("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", -1)],
         )
-        stubs.add_NiDAQmxServicer_to_server(TaskService(Tasks(self, self._settings)), self._server)
+        stubs.add_NiDAQmxServicer_to_server(TaskService(self.tasks), self._server)
         self._port = self._server.add_insecure_port("127.0.0.1:0")
         self._server.start()
         if self._fault in _RAW:

@@ -23,17 +23,16 @@ class Trouble:
     remedy: str
 
 
-_RESUME = "then go on with --resume"
 _BY_NI_CODE = {
     -201003: Trouble(
         ReadTimeout,
         'the DAQ device "{device}" is not accessible: unplugged or without power',
-        f"Check its cable and power, {_RESUME}.",
+        "Check its cable and power, {again}.",
     ),
     -200324: Trouble(
         ReadTimeout,
         'the DAQ device "{device}" is absent or was taken by another computer',
-        f"Check its cable, power and network reservation, {_RESUME}.",
+        "Check its cable, power and network reservation, {again}.",
     ),
     -200220: Trouble(
         ReadTimeout,
@@ -59,34 +58,34 @@ _BY_NI_CODE = {
     -200279: Trouble(
         BadReply,
         "samples were overwritten before they were read: this computer fell behind",
-        f"Close other programs or lower `sample_rate_Hz` in the station file, {_RESUME}.",
+        "Close other programs or lower `sample_rate_Hz` in the station file, {again}.",
     ),
     -200361: Trouble(
         BadReply,
         "the FIFO of the DAQ device overflowed: its bus could not keep up",
-        f"Give the device a USB port of its own or lower `sample_rate_Hz`, {_RESUME}.",
+        "Give the device a USB port of its own or lower `sample_rate_Hz`, {again}.",
     ),
     -200284: Trouble(
         ReadTimeout,
         "no samples came within {stale_after_s:g} s: the sample clock of the DAQ device stands",
-        f'Reset "{{device}}" in NI MAX or replug it, {_RESUME}.',
+        'Reset "{device}" in NI MAX or replug it, {again}.',
     ),
     -50405: Trouble(
         ReadTimeout,
         "the data transfer was aborted, as when the DAQ device was pulled out",
-        f"Replug the device, wait until the computer knows it again, {_RESUME}.",
+        "Replug the device, wait until the computer knows it again, {again}.",
     ),
     -50103: Trouble(
         BadReply,
         'another program holds the DAQ device "{device}"',
-        f"Close that program (NI MAX test panels too), {_RESUME}.",
+        "Close that program (NI MAX test panels too), {again}.",
     ),
 }
 _BY_GRPC_STATUS = {
     "UNAVAILABLE": Trouble(
         ReadTimeout,
         "the connection to the gRPC device server at {grpc_server} was lost",
-        f"Check the server's computer and the network, {_RESUME}.",
+        "Check the server's computer and the network, {again}.",
     ),
     "NO_SERVER": Trouble(
         CannotConnect,
@@ -97,7 +96,7 @@ _BY_GRPC_STATUS = {
     "DEADLINE_EXCEEDED": Trouble(
         ReadTimeout,
         "the gRPC device server at {grpc_server} does not answer within {limit_s:g} s",
-        f"Restart the server on the DAQ's computer, {_RESUME}.",
+        "Restart the server on the DAQ's computer, {again}.",
     ),
     "UNIMPLEMENTED": Trouble(
         BadReply,
@@ -127,7 +126,8 @@ def device_error(error: Exception, settings: KistlerSettings, *, connecting: boo
     if connecting and not _is_nonsense(error):
         kind = CannotConnect
     words = vars(settings) | {
-        "limit_s": settings.connect_deadline_s if connecting else settings.stale_after_s
+        "limit_s": settings.connect_deadline_s if connecting else settings.stale_after_s,
+        "again": "then start again" if connecting else "then go on with --resume",
     }
     raised = kind(DEVICE, trouble.fault.format(**words), trouble.remedy.format(**words))
     raised.__cause__ = error
@@ -152,8 +152,8 @@ def _trouble(error: Exception, connecting: bool) -> Trouble:
             "Check that device and server are what the station file says, and restart them.",
         )
     status = _grpc_status(error)
-    if connecting and status == "UNAVAILABLE":
-        status = "NO_SERVER"
+    if status in {"UNAVAILABLE", "CANCELLED"}:  # a server that shuts down cancels its calls
+        status = "NO_SERVER" if connecting else "UNAVAILABLE"
     return _BY_GRPC_STATUS.get(status) or Trouble(
         BadReply,
         f"the gRPC device server at {{grpc_server}} failed with {status or type(error).__name__}",

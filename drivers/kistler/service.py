@@ -60,6 +60,7 @@ class Task:
     kind: ChannelType = ChannelType.ANALOG_INPUT
     low: float = -5.0
     high: float = 5.0
+    terminal: int = -1
     rate: float = 1000.0
     buffer: int = 10_000
     started: float | None = None
@@ -90,6 +91,11 @@ class Tasks:
             if name not in self._tasks:
                 raise NiError(-200088, "Task specified is invalid or does not exist.")
             return self._tasks[name]
+
+    def all(self) -> list[Task]:
+        """Tasks that were not cleared, in the order of creation."""
+        with self._lock:
+            return list(self._tasks.values())
 
     def clear(self, name: str) -> None:
         """Forgets the task; unknown names are no error at the end."""
@@ -168,6 +174,7 @@ class TaskService(stubs.NiDAQmxServicer):  # type: ignore[misc]
         task.channels = self._tasks.inputs(request.physical_channel)
         task.kind = ChannelType.ANALOG_INPUT
         task.low, task.high = request.min_val, request.max_val
+        task.terminal = request.terminal_config_raw
         return messages.CreateAIVoltageChanResponse()
 
     def CfgSampClkTiming(self, request: Any, context: Any) -> Any:
