@@ -31,7 +31,8 @@ class Dataset:
     <device>_age_s; <name>_errors is the standard deviation of the single values within a sample.
     units, long_names: per column. events: what happened, each with `kind`, `text`, and in
     `sample` the number of samples before it. texts: "protocol", "station", "meta" as they were
-    given. created: ISO 8601 with offset; session_s counts from there in measured data.
+    given, and "comments" of an imported table. created: ISO 8601 with offset; session_s counts
+    from there in measured data.
     """
 
     path: Path | None
@@ -55,6 +56,11 @@ class Dataset:
     def rows(self) -> int:
         """Number of samples, discarded ones included."""
         return len(self.columns["force_N"])
+
+    @property
+    def imported(self) -> bool:
+        """True if it came from a table; `origin` is "emulated" where that table says so."""
+        return "comments" in self.texts
 
     @property
     def used(self) -> Values:

@@ -8,9 +8,10 @@
       devices/<name>      NXcollection: identity as attributes, for whoever browses the file
       manifest            SHA-256 of every object above, attributes included
 
-Text columns have a fixed length (so that they compress) and say so in `_Encoding`, which xarray
-decodes. Flags are stored as 0 and 1: netCDF has no truth values. Objects that the manifest does not
-name are ignored: results of other programs may be put beside.
+Text columns are strings of variable length, which every reader shows as text; beyond 200 000 rows
+UTF-8 bytes of fixed length, which take 30 bytes less a cell (xarray on h5netcdf then shows bytes).
+Flags are stored as 0 and 1: netCDF has no truth values. Objects that the manifest does not name are
+ignored: results of other programs may be put beside.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ SAMPLES = "entry/samples"
 MANIFEST = "entry/manifest"
 _CHUNK_ROWS = 65_536
 _LONGEST_FIXED_TEXT = 64
+_MOST_STRINGS = 200_000
 # Written by the library itself, with addresses that differ from file to file.
 _LIBRARY_ATTRIBUTES = {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME", "_Netcdf4Dimid"}
 
@@ -112,10 +114,10 @@ def _write_time(group: h5py.Group, dataset: Dataset) -> h5py.Dataset:
     """Seconds since the session's begin where that is known, else seconds of the run."""
     columns = dataset.columns
     time = _put_column(group, "time", columns.get("session_s", columns["time_s"]))
-    since = f" since {dataset.created}" if dataset.origin != "imported" else ""
-    time.attrs["units"] = f"seconds{since}" if since and "session_s" in columns else "s"
     time.attrs["long_name"] = "time"
-    if time.attrs["units"] != "s":
+    time.attrs["units"] = "s"
+    if "session_s" in columns and not dataset.imported:  # a table does not say when it began
+        time.attrs["units"] = f"seconds since {dataset.created}"
         time.attrs["calendar"] = "proleptic_gregorian"
         time.attrs["standard_name"] = "time"
     time.make_scale("time")
@@ -134,35 +136,33 @@ def _free_name(name: str, taken: set[str]) -> str:
 
 
 def _put_column(group: h5py.Group, name: str, values: Values) -> h5py.Dataset:
-    data, encoding = values, ""
-    if values.dtype.kind == "b":
-        data = values.astype(np.int8)
-    elif values.dtype.kind in "UO":
-        data, encoding = _encoded(values)
-    dtype = h5py.string_dtype() if data.dtype == object else data.dtype
-    if len(data) == 0:
-        column = group.create_dataset(name, shape=(0,), dtype=dtype)
+    data = _storable(values)
+    if data.dtype == object or len(data) == 0:  # neither can be chunked and filtered
+        dtype = h5py.string_dtype() if data.dtype == object else data.dtype
+        column = group.create_dataset(name, data=data, dtype=dtype)
     else:
         column = group.create_dataset(
-            name, data=data, dtype=dtype, chunks=(min(len(data), _CHUNK_ROWS),),
+            name, data=data, chunks=(min(len(data), _CHUNK_ROWS),),
             compression="gzip", compression_opts=1, shuffle=True, fletcher32=True,
         )  # fmt: skip
-    if encoding:
-        column.attrs["_Encoding"] = encoding
     if values.dtype.kind == "b":
         column.attrs["kind"] = "flag"
     return column
 
 
-def _encoded(values: Values) -> tuple[Values, str]:
-    """Bytes of a fixed length, and their encoding; long texts stay of variable length."""
+def _storable(values: Values) -> Values:
+    """Numbers as they are, flags as 0 and 1, text as Python strings or as bytes of fixed length."""
+    if values.dtype.kind == "b":
+        return values.astype(np.int8)
+    if values.dtype.kind not in "UO":
+        return values
     texts = values.astype(str)
-    if texts.dtype.itemsize > 4 * _LONGEST_FIXED_TEXT:
-        return texts.astype(object), ""
+    if len(texts) <= _MOST_STRINGS or texts.dtype.itemsize > 4 * _LONGEST_FIXED_TEXT:
+        return texts.astype(object)
     try:
-        return texts.astype(np.bytes_), "utf-8"
+        return texts.astype(np.bytes_)
     except UnicodeEncodeError:  # not ASCII: slower
-        return np.char.encode(texts, "utf-8"), "utf-8"
+        return np.char.encode(texts, "utf-8")
 
 
 def _put_text(group: h5py.Group, name: str, text: str) -> None:

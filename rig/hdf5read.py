@@ -30,6 +30,13 @@ def read_uuid(path: Path) -> str:
     return ""
 
 
+def holds_import(path: Path) -> bool:
+    """True for a data set that was imported from a table, and so can be made anew."""
+    with suppress(*_BROKEN), h5py.File(path, "r") as file:
+        return file.attrs["schema"] == SCHEMA and "entry/texts/comments" in file
+    return False
+
+
 def read_file(path: Path) -> Dataset:
     """The data set of an HDF5 file, checked whole. InputError for anything wrong."""
     _check_magic(path)

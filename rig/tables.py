@@ -1,0 +1,374 @@
+"""Tables of measurements: bringing them in from CSV, and giving data sets out as CSV or Parquet."""
+
+from __future__ import annotations
+
+import sys
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig import csvcells
+from rig.columns import BRANCHES, KNOWN, NO_STEP, TABLE_COLUMNS, Column, Values, empty, unit_of
+from rig.csvblocks import Block, CsvFile, close_match
+from rig.dataset import Dataset, Origin, software_version, write
+from rig.errors import InputError, did_you_mean
+from rig.files import in_place_of
+from rig.journal import journal_path
+from rig.meta import Meta
+from rig.yamlfile import read_document
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Progress = Callable[[str, float], None]  # what is being done, and how much of it is: 0 to 1
+
+_EMULATED_MARK = "# EMULATED:"
+_INCOMPLETE_MARK = "# INCOMPLETE:"
+_BIGGEST_COUNT = 2**53  # the largest number up to which float64 holds every whole number
+_EXPORT_ROWS = 50_000
+
+
+def import_table(
+    csv: Path, meta_yaml: Path, out: Path | None = None, progress: Progress | None = None
+) -> Dataset:
+    """The data set of a table and its META.yaml; written to `out` if that is given.
+
+    A table that says it comes from emulated devices stays marked so. A column `discarded` (0 or 1)
+    is honoured; other unknown columns are kept and ignored. InputError names file, line, column
+    and value of the first thing wrong, or file and place in META.yaml.
+    """
+    document = read_document(meta_yaml, Meta)
+    if out is not None:
+        _check_target(out)
+    table = _Table(csv, document.value, str(meta_yaml))
+    columns = table.read(progress or _silent)
+    dataset = _dataset(csv, table, columns, document.value, document.text)
+    if out is not None:
+        (progress or _silent)("writing", 0.0)
+        write(dataset, out)
+        (progress or _silent)("writing", 1.0)
+    return dataset
+
+
+def _silent(_: str, __: float) -> None:
+    """Progress that nobody looks at."""
+
+
+@contextmanager
+def terminal_progress() -> Iterator[Progress]:
+    """A progress bar on standard error while that is a terminal; otherwise silence."""
+    if not sys.stderr.isatty():
+        yield _silent
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bars
+
+    with Bars(console=Console(stderr=True), transient=True) as bars:
+        tasks = {"": bars.add_task("", total=1.0)}
+
+        def show(what: str, fraction: float) -> None:
+            bars.update(tasks[""], description=what, completed=fraction)
+
+        yield show
+
+
+def _check_target(out: Path) -> None:
+    """Imported data sets may be made anew; measurements are never written over."""
+    from rig.hdf5read import holds_import
+
+    if journal_path(out).exists():
+        raise InputError(f"{out}: a measurement is under way there (journal). Choose another name.")
+    if out.exists() and not holds_import(out):
+        raise InputError(
+            f"{out}: exists and is no imported data set, so it is not overwritten. "
+            "Choose another name, or move it away."
+        )
+
+
+def _dataset(
+    csv: Path, table: _Table, columns: dict[str, Values], meta: Meta, meta_text: str
+) -> Dataset:
+    comments = table.comments
+    origin: Origin = "imported"
+    if any(c.startswith(_EMULATED_MARK) for c in comments):
+        origin = "emulated"
+    incomplete = [c for c in comments if c.startswith(_INCOMPLETE_MARK)]
+    texts = {"protocol": "", "station": "", "meta": meta_text, "comments": "\n".join(comments)}
+    events = [{"sample": 0, "kind": "import", "text": f"imported from {csv.name}"}]
+    events += [{"sample": 0, "kind": "note", "text": note} for note in table.notes]
+    return Dataset(
+        path=None,
+        uuid=str(uuid.uuid4()),
+        created=datetime.now().astimezone().isoformat(timespec="seconds"),
+        origin=origin,
+        complete=not incomplete,
+        meta=meta,
+        columns=columns,
+        units={name: unit_of(name) for name in columns},
+        long_names={name: _long_name(name) for name in columns},
+        events=events,
+        texts=texts,
+        software=software_version(),
+        stop_reason="said by the imported table" if incomplete else "imported",
+        title=csv.name,
+    )
+
+
+def _long_name(name: str) -> str:
+    return KNOWN[name].long_name if name in KNOWN else name.replace("_", " ")
+
+
+class _Table:
+    """One table on its way to columns."""
+
+    def __init__(self, path: Path, meta: Meta, meta_name: str) -> None:
+        self._path = path
+        self._meta = meta
+        self._meta_name = meta_name
+        self.comments: list[str] = []
+        self.notes: list[str] = []
+
+    def read(self, progress: Progress) -> dict[str, Values]:
+        """All columns, checked and completed."""
+        words: set[str] = set()
+        while True:
+            try:
+                with CsvFile(self._path) as file:
+                    return self._read(file, words, progress)
+            except csvcells.TextColumns as found:
+                words |= found.names
+
+    def _read(self, file: CsvFile, words: set[str], progress: Progress) -> dict[str, Values]:
+        self._check_names(file)
+        readings = {name: _reading(name, words) for name in file.names}
+        parts: dict[str, list[Values]] = {name: [] for name in file.names}
+        for block in file.blocks():
+            for name, values in csvcells.parse(file, block, readings).items():
+                column = KNOWN[name] if name in TABLE_COLUMNS else None
+                checked = self._checked(file, block, column, values) if column else values
+                parts[name].append(checked)
+            progress("reading", file.fraction)
+        self.comments = file.comments
+        given = {name: np.concatenate(p) for name, p in parts.items() if p}
+        if not given:
+            raise InputError(f"{self._path}: no samples; there is nothing below the header.")
+        return self._completed(given)
+
+    def _check_names(self, file: CsvFile) -> None:
+        for column in KNOWN.values():
+            if column.required and column.name not in file.names:
+                hint = close_match(column.name.lower(), [n.lower() for n in file.names])
+                near = next((n for n in file.names if n.lower() == hint), "") if hint else ""
+                mean = f' Is it "{near}"? Rename it.' if near else ""
+                raise InputError(
+                    f"{self._path}: the column {column.name} is missing; the header has "
+                    f"{', '.join(file.names[:12])}.{mean}"
+                )
+        self.notes = []
+        for name in file.names:
+            near = "" if name in KNOWN else close_match(name, TABLE_COLUMNS)
+            if near and near not in file.names:
+                self.notes.append(f'column "{name}" is kept and ignored; is "{near}" meant?')
+
+    # ------------------------------------------------------------------ one block of a column
+
+    def _checked(self, file: CsvFile, block: Block, column: Column, values: Values) -> Values:
+        if column.kind == "word":
+            return self._checked_words(file, block, column, values)
+        if column.finite:
+            bad = np.flatnonzero(~np.isfinite(values))
+            if len(bad):
+                raise self._cell(file, block, column.name, bad[0], "every row needs a finite value")
+        if column.kind == "flag":
+            bad = np.flatnonzero(~np.isin(values, (0.0, 1.0)))
+            if len(bad):
+                raise self._cell(file, block, column.name, bad[0], "wanted: 0 or 1")
+            return np.equal(values, 1.0)
+        return self._counts(file, block, column, values) if column.kind == "count" else values
+
+    def _counts(self, file: CsvFile, block: Block, column: Column, values: Values) -> Values:
+        lowest, wanted = 1, "wanted: a whole number, 1, 2, 3 ..."
+        if column.name == "step":
+            values = np.where(np.isnan(values), NO_STEP, values)
+            lowest, wanted = NO_STEP, "wanted: a whole number from 0, or nothing (continuous)"
+        with np.errstate(invalid="ignore"):
+            good = (values >= lowest) & (values < _BIGGEST_COUNT) & (values == np.floor(values))
+        bad = np.flatnonzero(~good)
+        if len(bad):
+            raise self._cell(file, block, column.name, bad[0], wanted)
+        return values.astype(np.int64)
+
+    def _checked_words(self, file: CsvFile, block: Block, column: Column, words: Values) -> Values:
+        known = self._known_words(column.name)
+        bad = np.flatnonzero(~np.isin(words, known))
+        if not len(bad):
+            return words
+        word = str(words[bad[0]])
+        if column.name == "branch":
+            what = f"allowed: {', '.join(BRANCHES)}"
+        elif self._meta.robot == "none" and column.name == "pose":
+            what = f"robot: none in {self._meta_name} has no poses; remove the column"
+        else:
+            what = f"{self._meta_name} does not define it"
+        hint = did_you_mean(word, known) if word and known != [""] else ""
+        raise self._cell(file, block, column.name, bad[0], what, hint)
+
+    def _known_words(self, name: str) -> list[str]:
+        if name == "branch":
+            return list(BRANCHES)
+        if name == "direction":
+            return list(self._meta.directions)
+        return [""] if self._meta.robot == "none" else list(self._meta.poses)
+
+    def _cell(
+        self, file: CsvFile, block: Block, name: str, row: int, what: str, hint: str = ""
+    ) -> InputError:
+        cell = block.cells(row)[file.names.index(name)]
+        unit = unit_of(name)
+        value = f'"{csvcells.shown(cell)}"' if cell else "an empty cell"
+        with_unit = f"{value} ({unit})" if unit and cell else value
+        line = int(block.lines[row])
+        return file.error(line, f"column {name}: {with_unit} is not allowed; {what}.{hint}")
+
+    # ------------------------------------------------------------------ what the table leaves out
+
+    def _completed(self, given: dict[str, Values]) -> dict[str, Values]:
+        rows = len(given["force_N"])
+        defaults: dict[str, Callable[[], Values]] = {
+            "time_s": lambda: np.arange(rows, dtype=np.float64),
+            "pose": lambda: self._only("pose", list(self._meta.poses), rows),
+            "direction": lambda: self._only("direction", list(self._meta.directions), rows),
+            "repetition": lambda: np.ones(rows, np.int64),
+            "branch": lambda: np.full(rows, "cycle"),
+            "step": lambda: np.full(rows, NO_STEP, np.int64),
+            "discarded": lambda: empty("flag", rows),
+        }
+        columns: dict[str, Values] = {}
+        for name in TABLE_COLUMNS:
+            if name in given:
+                columns[name] = given.pop(name)
+            elif name in defaults:
+                columns[name] = defaults[name]()
+        self._note_order(columns)
+        return columns | given
+
+    def _only(self, what: str, names: list[str], rows: int) -> Values:
+        if what == "pose" and self._meta.robot == "none":
+            return empty("word", rows)
+        if len(names) > 1:
+            raise InputError(
+                f"{self._path}: the column {what} is missing, and {self._meta_name} defines "
+                f"{len(names)}: {', '.join(names)}. Add the column, or leave one in META."
+            )
+        return np.full(rows, names[0])
+
+    def _note_order(self, columns: Mapping[str, Values]) -> None:
+        """Rows stand in the order of measurement; a clock that goes back is worth a word."""
+        run = [columns[n] for n in ("pose", "direction", "repetition")]
+        same = np.logical_and.reduce([c[1:] == c[:-1] for c in run])
+        back = np.flatnonzero(same & (np.diff(columns["time_s"]) < 0))
+        if len(back):
+            self.notes.append(f"time_s goes back {len(back)} times, first at sample {back[0] + 2}")
+        if "session_s" in columns and np.any(np.diff(columns["session_s"]) < 0):
+            at = int(np.flatnonzero(np.diff(columns["session_s"]) < 0)[0])
+            self.notes.append(f"session_s goes back, first at sample {at + 2}")
+
+
+def _reading(name: str, words: set[str]) -> csvcells.Reading:
+    if name in TABLE_COLUMNS:
+        return "word" if KNOWN[name].kind == "word" else "number"
+    return "word" if name in words else "further"
+
+
+# -------------------------------------------------------------------------------------- export
+
+
+def export_table(dataset: Dataset, out: Path, progress: Progress | None = None) -> None:
+    """Writes .csv (comment lines, then one row a sample, all columns) or .parquet.
+
+    What `import_table` reads back gives the same samples, bit for bit. InputError for another
+    ending, a missing library, or a folder that refuses.
+    """
+    progress = progress or _silent
+    if out.suffix == ".csv":
+        with in_place_of(out) as temporary:
+            _write_csv(dataset, temporary, progress)
+    elif out.suffix == ".parquet":
+        _write_parquet(dataset, out)
+    else:
+        raise InputError(f'{out}: the ending "{out.suffix}" is not known; allowed: .csv, .parquet.')
+
+
+def _frame(dataset: Dataset) -> pd.DataFrame:
+    import pandas as pd
+
+    names = [n for n in TABLE_COLUMNS if n in dataset.columns]
+    names += [n for n in dataset.columns if n not in names]
+    if dataset.meta.robot == "none":
+        names.remove("pose")
+    columns = {n: dataset.columns[n] for n in names}
+    if not columns["discarded"].any():
+        del columns["discarded"]
+    else:
+        columns["discarded"] = columns["discarded"].astype(np.int8)
+    return pd.DataFrame(columns)
+
+
+def _header_lines(dataset: Dataset) -> list[str]:
+    facts = {
+        "data set": dataset.uuid,
+        "title": dataset.title,
+        "created": dataset.created,
+        "origin": dataset.origin,
+        "software": dataset.software,
+    }
+    lines = [*dataset.banners(), "rig.table/1", *(f"{k}: {v}" for k, v in facts.items() if v)]
+    return ["# " + line.replace("\r", " ").replace("\n", " ") for line in lines]
+
+
+def _write_csv(dataset: Dataset, path: Path, progress: Progress) -> None:
+    frame = _frame(dataset)
+    frame["step"] = frame["step"].astype("Int64").mask(frame["step"] == NO_STEP)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(line + "\n" for line in _header_lines(dataset))
+        for first in range(0, max(1, len(frame)), _EXPORT_ROWS):
+            part = frame.iloc[first : first + _EXPORT_ROWS]
+            part.to_csv(file, index=False, header=first == 0, lineterminator="\n")
+            progress("writing", min(1.0, (first + _EXPORT_ROWS) / max(1, len(frame))))
+
+
+def _write_parquet(dataset: Dataset, out: Path) -> None:
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise InputError(
+            f'{out}: Parquet needs the library pyarrow: pip install "stiffness-rig[parquet]". '
+            "CSV needs nothing."
+        ) from None
+    table = pa.Table.from_pandas(_frame(dataset), preserve_index=False)
+    facts = {
+        "schema": "rig.table/1",
+        "uuid": dataset.uuid,
+        "created": dataset.created,
+        "origin": dataset.origin,
+        "complete": str(dataset.complete).lower(),
+        "title": dataset.title,
+        "software": dataset.software,
+        "banner": "\n".join(dataset.banners()),
+        **dataset.texts,
+    }
+    old = table.schema.metadata or {}
+    new = {f"rig.{k}".encode(): v.encode() for k, v in facts.items()}
+    fields = [
+        field.with_metadata({b"units": dataset.units.get(field.name, "").encode()})
+        for field in table.schema
+    ]
+    table = table.cast(pa.schema(fields, metadata=old | new))
+    with in_place_of(out) as temporary:
+        pq.write_table(table, temporary, compression="zstd")
