@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -308,3 +309,102 @@ def test_records_are_numbered_rows(bench: Bench) -> None:
     bench.run()
     records: list[Record] = replay(bench.path)
     assert [r.number for r in records] == list(range(len(records)))
+
+
+def test_resume_does_not_repeat_what_is_done(bench: Bench) -> None:
+    error = ReadTimeout("laser", "silent", "Check.")
+
+    def script(view: LiveView) -> None:
+        if (view.repetition, view.step, view.phase) == (2, 2, "sampling"):
+            bench.arm.broken["laser"] = error
+
+    bench.loader.script = script
+    with pytest.raises(ReadTimeout):
+        bench.run()
+    before = len(bench.records("sample"))
+    bench.arm.broken.clear()
+    bench.loader.script = lambda _view: None
+    bench.run()
+    assert bench.steps() == ALL
+    assert {r["repetition"] for r in bench.records("sample")[before:]} == {2}
+    assert {r["step"] for r in bench.records("sample")[before:]} == {0, 2, 3}
+
+
+def test_an_operator_who_cannot_be_asked_is_a_failed_device(bench: Bench) -> None:
+    error = ReadTimeout("operator", "no terminal to ask at", "Start rig in a terminal.")
+
+    def refuse(_prompt: Any) -> str:
+        raise error
+
+    bench.loader.ask = refuse  # type: ignore[method-assign]
+    with pytest.raises(ReadTimeout, match="no terminal"):
+        bench.run()
+
+
+def test_a_force_that_relaxes_out_of_its_band_is_approached_again(bench: Bench) -> None:
+    def relax() -> None:
+        bench.arm.u -= 0.05  # 5 N at 100 N/mm, while hands are off
+
+    done: list[bool] = []
+
+    def script(view: LiveView) -> None:
+        if view.step == 2 and view.phase == "settling" and not done:
+            done.append(True)
+            relax()
+
+    bench.loader.script = script
+    bench.run()
+    forces = [r["values"]["force_N"] for r in bench.good() if r["step"] == 2]
+    assert forces == pytest.approx([40.0] * len(forces), abs=0.5)
+
+
+def test_a_hold_is_sampled_for_as_long_as_it_lasts(bench: Bench) -> None:
+    bench.protocol = parse_protocol(PROTOCOL.replace("hold_s: 0", "hold_s: 7"), bench.path)
+    bench.run()
+    settled = [r for r in bench.good() if r["step"] == 1 and r["values"]["settled"]]
+    assert len(settled) == 2 * 7
+
+
+def test_loading_ends_at_the_displacement_of_the_run(bench: Bench) -> None:
+    run = "steps_N: [20, 40, 60]"
+    text = PROTOCOL.replace(run, f"{run}, stop_at_displacement_mm: 3")
+    bench.protocol = parse_protocol(text, bench.path)
+    bench.arm.yield_N = 50.0
+    bench.run()
+    assert bench.steps() == [s for s in ALL if s[2] != 3]
+    assert [e["text"] for e in bench.events("top")] == ["displacement is above 3 mm"] * 2
+    assert not bench.events("band_not_reached")
+
+
+def test_a_slot_without_a_valid_value_is_no_row_but_an_event(bench: Bench) -> None:
+    laser = bench.devices.laser
+    collect = laser.collect
+    empty = iter([True, False] * 500)
+
+    def sometimes() -> Any:
+        reading = collect()
+        return replace(reading, count=0) if next(empty) else reading
+
+    laser.collect = sometimes  # type: ignore[method-assign]
+    bench.run()
+    assert all(r["count"]["laser"] > 0 for r in bench.records("sample"))
+    assert "no valid value from laser" in bench.events("no_value")[0]["text"]
+    assert bench.steps() == ALL
+
+
+@pytest.mark.parametrize(("at_deadline", "outcome"), [("record", "not settled"), ("stop", "")])
+def test_an_arm_that_does_not_settle(bench: Bench, at_deadline: str, outcome: str) -> None:
+    text = PROTOCOL.replace("at_deadline: record", f"at_deadline: {at_deadline}")
+    bench.protocol = parse_protocol(text, bench.path)
+
+    def creep(view: LiveView) -> None:
+        if view.phase == "settling":
+            bench.arm.u += 0.0005
+
+    bench.loader.script = creep
+    if at_deadline == "stop":
+        with pytest.raises(MeasurementStopped, match="has not settled within 20 s"):
+            bench.run()
+    else:
+        bench.run()
+        assert all(outcome in e["outcome"] for e in bench.events("step_done"))
