@@ -1,0 +1,351 @@
+"""What a protocol will do to the arm and how long it takes, before anything moves.
+
+Displacements are those of the robot file's joint springs: an expectation with its stated relative
+standard deviation, no measurement. Torques are `J^T F` of the load and the weight of the links.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arm import Arm, along, tool_offset
+from rig.model import load_robot
+from rig.protocol import MeasurementProtocol, Run
+from rig.protocolfile import ProtocolFile
+from rig.station import Station
+from rig.yamlfile import read_document_text
+from rig.yamlnodes import Key, Problem, refuse
+
+Array = NDArray[np.float64]
+
+# A margin smaller than this share of what is allowed is worth a warning.
+MARGIN = 0.2
+# A charge amplifier's drift is taken as a straight line; longer than this it is none.
+QUASI_STATIC_S = 1000.0
+# What hands and devices take, in s; the text of the plan names every one.
+MOUNT_S = 300.0
+SCREW_S = 10.0
+UNLOAD_S = 15.0
+TARE_S = 2.0
+AMPLIFIER_S = 4.0  # Reset and Operate, where no station says it
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run: forces N, displacement mm at the top, stiffness N/mm, torques Nm (6,) there.
+
+    `hold_torque_Nm`: what the joints hold at the top level, weight of the links included;
+    `load_torque_Nm`: the load's part alone. `duration_s`: one repetition, mounting left out.
+    """
+
+    pose: str
+    direction: str
+    unit_vector: tuple[float, float, float]
+    forces_N: tuple[float, ...]
+    steps: int
+    stiffness_N_per_mm: float
+    displacement_mm: float
+    load_torque_Nm: tuple[float, ...]
+    hold_torque_Nm: tuple[float, ...]
+    torque_limit_Nm: tuple[float, ...]
+    duration_s: float
+
+    @property
+    def worst_joint(self) -> int:
+        """Index of the joint that comes closest to its torque limit."""
+        return int(np.argmax(np.abs(self.hold_torque_Nm) / np.asarray(self.torque_limit_Nm)))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What will happen. `speed`: times real time, above 1 for emulated stations only."""
+
+    title: str
+    robot: str
+    station: str | None
+    runs: tuple[PlannedRun, ...]
+    repetitions: int
+    mounts: int
+    samples: int
+    duration_s: float
+    speed: float
+    stiffness_relative_sd: float
+    assumptions: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def to_text(self) -> str:
+        """A table of the runs, duration with its assumptions, warnings."""
+        station = f", station {self.station}" if self.station else ""
+        steps = sum(run.steps for run in self.runs)
+        lines = [f"Plan: {self.title} (robot {self.robot}{station})", "", *_table(self.runs), ""]
+        lines += [
+            f"Together: {len(self.runs)} runs of {steps} steps, {self.repetitions} times; "
+            f"at least {self.samples} samples",
+            f"Duration: about {_time(self.duration_s)}"
+            + (f"; at {self.speed:g} times real time {_time(self.duration_s / self.speed)}"
+               if self.speed > 1 else ""),
+        ]  # fmt: skip
+        lines += [f"  {text}" for text in self.assumptions]
+        lines += ["", *(f"Warning: {text}" for text in self.warnings)] if self.warnings else []
+        return "\n".join(lines)
+
+    def to_json(self) -> dict[str, object]:
+        """The same for programs."""
+        return {
+            "schema": "rig.plan/1",
+            "title": self.title,
+            "robot": self.robot,
+            "station": self.station,
+            "repetitions": self.repetitions,
+            "samples": self.samples,
+            "duration_s": self.duration_s,
+            "speed": self.speed,
+            "joint_stiffness_relative_sd": self.stiffness_relative_sd,
+            "runs": [
+                {
+                    "pose": run.pose,
+                    "direction": run.direction,
+                    "unit_vector": list(run.unit_vector),
+                    "forces_N": list(run.forces_N),
+                    "steps": run.steps,
+                    "expected_stiffness_N_per_mm": run.stiffness_N_per_mm,
+                    "expected_displacement_mm": run.displacement_mm,
+                    "load_torque_Nm": list(run.load_torque_Nm),
+                    "hold_torque_Nm": list(run.hold_torque_Nm),
+                    "torque_limit_Nm": list(run.torque_limit_Nm),
+                    "duration_s": run.duration_s,
+                }
+                for run in self.runs
+            ],
+            "assumptions": list(self.assumptions),
+            "warnings": list(self.warnings),
+        }
+
+
+def plan(protocol: MeasurementProtocol, station: Station | None = None) -> Plan:
+    """Works out what the protocol will do on the station.
+
+    Raises InputError where a pose or a load is beyond what arm, laser or dynamometer can take.
+    """
+    arm = load_robot(protocol.robot)
+    runs = tuple(_planned(protocol, run, arm, station) for run in protocol.runs)
+    warnings: list[str] = []
+    errors: list[tuple[Key, str]] = list(_beyond_joints(protocol, arm))
+    for n, run in enumerate(runs):
+        for share, what, remedy in _shares(protocol, run, arm, station):
+            if share > 1:
+                errors.append((("runs", n), f"{what}. {remedy}"))
+            elif share > 1 - MARGIN:
+                warnings.append(f"{_name(run)}: {what}: {100 * (1 - share):.0f} % to spare.")
+    _refuse(protocol, errors)
+    warnings += _time_warnings(protocol, runs)
+    pairs = [(run.pose, run.direction) for _, run, _ in protocol.sequence()]
+    mounts = 1 + sum(a != b for a, b in pairwise(pairs))
+    emulated = station is not None and station.emulation is not None
+    duration_s = protocol.repetitions * sum(run.duration_s for run in runs)
+    return Plan(
+        title=protocol.title,
+        robot=arm.name,
+        station=station.name if station else None,
+        runs=runs,
+        repetitions=protocol.repetitions,
+        mounts=mounts,
+        samples=protocol.repetitions * sum(_samples(protocol, run) for run in protocol.runs),
+        duration_s=duration_s + (0.0 if emulated else mounts * MOUNT_S),
+        speed=station.emulation.speed if station and station.emulation else 1.0,
+        stiffness_relative_sd=float(np.max(arm.joint_stiffness_relative_sd)),
+        assumptions=tuple(_assumptions(protocol, arm, mounts, emulated)),
+        warnings=tuple(warnings),
+    )
+
+
+# --- one run -------------------------------------------------------------------------------------
+
+
+def _planned(
+    protocol: MeasurementProtocol, run: Run, arm: Arm, station: Station | None
+) -> PlannedRun:
+    pose, vector = protocol.poses[run.pose], protocol.directions[run.direction]
+    tool = tool_offset(np.asarray(pose.tcp_xyz_mm) / 1e3)
+    stiffness = float(along(arm.compliance(pose.q_rad, tool), vector)) / 1e3  # N/mm
+    top = run.forces_N[-1]
+    displacement_mm = top / stiffness
+    if run.stop_at_displacement_mm is not None:
+        displacement_mm = min(displacement_mm, run.stop_at_displacement_mm)
+    load = arm.load_torques(pose.q_rad, [*(top * np.asarray(vector)), 0.0, 0.0, 0.0], tool)
+    # The joints carry the links' weight, and push back against the load.
+    hold = arm.gravity_torques(pose.q_rad) - load
+    return PlannedRun(
+        pose=run.pose,
+        direction=run.direction,
+        unit_vector=vector,
+        forces_N=run.forces_N,
+        steps=len(protocol.steps(run)),
+        stiffness_N_per_mm=stiffness,
+        displacement_mm=displacement_mm,
+        load_torque_Nm=_floats(load),
+        hold_torque_Nm=_floats(hold),
+        torque_limit_Nm=_floats(arm.torque_limit),
+        duration_s=_repetition_s(protocol, run, station),
+    )
+
+
+def _floats(values: Array) -> tuple[float, ...]:
+    return tuple(float(v) for v in values)
+
+
+def _per_step(protocol: MeasurementProtocol) -> int:
+    sampling = protocol.sampling
+    return max(sampling.samples_per_step, ceil(protocol.hold_s * sampling.rate_Hz))
+
+
+def _samples(protocol: MeasurementProtocol, run: Run) -> int:
+    """Of one repetition: plateaus and settled steps; those taken while settling come on top."""
+    zero_s = protocol.zero.before_s + protocol.zero.after_s
+    plateaus = round(zero_s * protocol.sampling.rate_Hz)
+    return plateaus + len(protocol.steps(run)) * _per_step(protocol)
+
+
+def _repetition_s(protocol: MeasurementProtocol, run: Run, station: Station | None) -> float:
+    sensor = station.dynamometer if station else None
+    amplifier_s = sensor.reset_settle_s + sensor.operate_settle_s if sensor else AMPLIFIER_S
+    sampled_s = _samples(protocol, run) / protocol.sampling.rate_Hz
+    steps = len(protocol.steps(run)) * (SCREW_S + protocol.settle.window_s)
+    return amplifier_s + TARE_S + sampled_s + steps + UNLOAD_S + protocol.rest_s
+
+
+# --- margins -------------------------------------------------------------------------------------
+
+
+def _shares(
+    protocol: MeasurementProtocol, run: PlannedRun, arm: Arm, station: Station | None
+) -> Iterator[tuple[float, str, str]]:
+    """(share of what is allowed, in words, what to do when it is above 1)."""
+    for i in range(6):
+        hold, limit = abs(run.hold_torque_Nm[i]), run.torque_limit_Nm[i]
+        what = f"joint {i + 1} holds {hold:.0f} Nm at {run.forces_N[-1]:g} N, allowed {limit:g} Nm"
+        yield hold / limit, what, "Lower the top force, or choose a pose with a shorter lever."
+    yield from _displacement_shares(protocol, run, arm, station)
+    if station is not None and station.dynamometer is not None:
+        sensor = station.dynamometer
+        many = sensor.channels == 8
+        rows = zip("xyz", sensor.axes_in_base, strict=True)
+        for axis, row in rows:
+            # Eight channels: two carry a shear force, four the normal one.
+            channels = (4 if axis == "z" else 2) if many else 1
+            allowed = getattr(sensor.full_scale_N, axis) * channels
+            force = abs(float(np.dot(row, run.unit_vector))) * run.forces_N[-1]
+            what = f"the dynamometer's {axis} carries {force:.4g} N, full scale {allowed:g} N"
+            yield force / allowed, what, "Set a larger range at the amplifier and in the station."
+
+
+def _displacement_shares(
+    protocol: MeasurementProtocol, run: PlannedRun, arm: Arm, station: Station | None
+) -> Iterator[tuple[float, str, str]]:
+    u = run.displacement_mm
+    limits = []
+    if station is not None and station.laser is not None:
+        limits.append(("the laser's range", station.laser.range_mm))
+    if protocol.limits.displacement_mm is not None:
+        limits.append(("limits.displacement_mm.max", protocol.limits.displacement_mm.max))
+    stiffer = 1 + 2 * float(np.max(arm.joint_stiffness_relative_sd))
+    for name, allowed in limits:
+        what = f"about {u:.2g} mm expected at {run.forces_N[-1]:g} N, {name} is {allowed:g} mm"
+        share = u / allowed
+        # Nominal springs are uncertain: only what even a much stiffer arm exceeds is an error.
+        if 1 < share <= stiffer:
+            share = 1.0
+        yield share, what, "Lower the top force, or give stop_at_displacement_mm."
+
+
+def _beyond_joints(protocol: MeasurementProtocol, arm: Arm) -> Iterator[tuple[Key, str]]:
+    for name, pose in protocol.poses.items():
+        q, low, high = (np.rad2deg(v) for v in (pose.q_rad, arm.q_min, arm.q_max))
+        for i in np.flatnonzero((q < low - 1e-6) | (q > high + 1e-6)):
+            allowed = f"allowed: {low[i]:g} to {high[i]:g} deg"
+            yield ("poses", name), f"joint {i + 1} at {q[i]:.2f} deg; {allowed}."
+
+
+def _time_warnings(protocol: MeasurementProtocol, runs: Sequence[PlannedRun]) -> Iterator[str]:
+    for run in runs:
+        if run.duration_s > QUASI_STATIC_S:
+            yield (
+                f"{_name(run)}: {run.duration_s:.0f} s between two resets of the charge "
+                f"amplifier; its drift stays a straight line for about {QUASI_STATIC_S:g} s. "
+                "Fewer steps or shorter holds."
+            )
+    unwatched = [
+        key for key in ("force_N", "displacement_mm")
+        if (limit := getattr(protocol.limits, key)) is None or limit.at != "stop"
+    ]  # fmt: skip
+    for key in unwatched:
+        yield f"limits.{key} does not stop the measurement."
+
+
+def _refuse(protocol: MeasurementProtocol, errors: Sequence[tuple[Key, str]]) -> None:
+    if errors:
+        document = read_document_text(protocol.text, str(protocol.path), ProtocolFile)
+        problems: list[Problem] = [document.problem(path, what) for path, what in errors]
+        refuse(str(protocol.path), problems)
+
+
+# --- text ----------------------------------------------------------------------------------------
+
+
+def _name(run: PlannedRun) -> str:
+    return f"pose {run.pose}, direction {run.direction}"
+
+
+def _time(seconds: float) -> str:
+    minutes = seconds / 60
+    if minutes < 2:
+        return f"{ceil(seconds)} s"
+    return f"{ceil(minutes)} min" if minutes < 120 else f"{minutes / 60:.1f} h"
+
+
+def _assumptions(
+    protocol: MeasurementProtocol, arm: Arm, mounts: int, emulated: bool
+) -> Iterator[str]:
+    if not emulated:
+        yield f"{MOUNT_S / 60:g} min to set up a pose or direction ({mounts} times)"
+    settle = protocol.settle
+    yield (
+        f"{SCREW_S:g} s of turning and {settle.window_s:g} s of settling (no longer than its "
+        f"window) a step, {_per_step(protocol)} samples"
+    )
+    yield f"{UNLOAD_S:g} s to unload, {TARE_S:g} s to tare, Reset and Operate once a repetition"
+    if np.max(arm.joint_stiffness_relative_sd) > 0:
+        percent = 100 * float(np.max(arm.joint_stiffness_relative_sd))
+        yield f"u and k expected from the nominal joint springs of {arm.name}, sd {percent:.0f} %"
+    yield "joint torque: held at the top force, weight of the links included, of what is allowed"
+
+
+def _table(runs: Sequence[PlannedRun]) -> list[str]:
+    head = ("run", "pose", "direction", "steps", "force N", "k N/mm", "u mm", "joint torque Nm",
+            "time each")  # fmt: skip
+    rows = [head]
+    for n, run in enumerate(runs, start=1):
+        j = run.worst_joint
+        hold, limit = abs(run.hold_torque_Nm[j]), run.torque_limit_Nm[j]
+        vector = ", ".join(f"{v:.4g}" for v in run.unit_vector)
+        rows.append((
+            f"{n}", run.pose, f"{run.direction} ({vector})", f"{run.steps}",
+            f"{run.forces_N[0]:g} to {run.forces_N[-1]:g}", f"{run.stiffness_N_per_mm:.1f}",
+            f"{run.displacement_mm:.2f}", f"{hold:.0f} of {limit:g} (joint {j + 1})",
+            _time(run.duration_s),
+        ))  # fmt: skip
+    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    left = (1, 2, 7)
+    return [
+        "  ".join(
+            cell.ljust(width) if i in left else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
