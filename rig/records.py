@@ -67,11 +67,12 @@ class Story:
             self.events.append({"sample": len(self._samples), **data})
             if data["kind"] == "discard":
                 self._discarded.append((int(data["first"]), int(data["last"])))
+            elif data["kind"] == "stopped":
+                self.stop_reason = str(data["text"])
         elif record.kind == "stop":
             self.complete = bool(data["complete"])
             self.stop_reason = str(data["reason"])
-            return
-        # whatever follows a stop record belongs to a resumed run, which has not ended yet
+        # Whatever follows a stop belongs to a resumed run, which has not ended yet.
         if record.kind in ("sample", "descriptor"):
             self.complete, self.stop_reason = False, "it was cut off"
 
