@@ -35,6 +35,9 @@ class Curve:
 
     gain_sd_force, gain_sd_displacement: relative standard uncertainties of the two gains, common
     to every point.
+    origin: force and displacement count from an unloaded state that was measured, so that a line
+    through (0, 0) is a statement of the data. held: the points are levels that were held; False:
+    bins of a continuous recording. notes: what was assumed on the way here, in sentences.
     """
 
     pose: str
@@ -43,3 +46,6 @@ class Curve:
     points: tuple[Point, ...]
     gain_sd_force: float
     gain_sd_displacement: float
+    origin: bool = True
+    held: bool = True
+    notes: tuple[str, ...] = ()

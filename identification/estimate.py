@@ -1,0 +1,108 @@
+"""One stiffness from levels, under a stated choice of weights and origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from identification.curve import Array
+from identification.fit import LineFit, weighted_line, york_line
+from identification.levels import Table
+
+Weighting = Literal["proportional", "1/s^2", "none", "errors-in-variables"]
+WEIGHTINGS: tuple[Weighting, ...] = ("proportional", "1/s^2", "none", "errors-in-variables")
+
+_WORDS = {
+    "proportional": "proportional (s grows with displacement)",
+    "1/s^2": "1/s^2 (scatter of the repetitions and stated uncertainty)",
+    "none": "none (every level counts alike)",
+    "errors-in-variables": "errors in variables (force and displacement uncertain)",
+}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How the line u = u0 + F / k is drawn through the levels."""
+
+    weighting: Weighting = "proportional"
+    intercept: bool = False
+
+    @property
+    def label(self) -> str:
+        """The choice in words, as it stands beside every k."""
+        place = "with intercept" if self.intercept else "through the origin"
+        return f"{_WORDS[self.weighting]}, {place}"
+
+
+def line(table: Table, choice: Choice) -> LineFit:
+    """The line u = u0 + c F through n levels; slope c in m/N, k = 1 / c.
+
+    Displacement is regressed on force, with s_i of the displacement:
+
+    - "proportional": s_i in proportion to u_i. Through the origin the least squares are
+      sum((1 - c F_i / u_i)^2), so k = sum(r_i^2) / sum(r_i) with the secants r_i = F_i / u_i. This
+      is the convention under which the published curves give the published values. The level's own
+      uncertainty is added to s_i in quadrature: far below u_i it changes nothing, and a level that
+      did not move gets no infinite weight.
+    - "1/s^2": s_i^2 = scatter of the repetitions squared + stated uncertainty squared (of the
+      displacement, and of the force through the compliance).
+    - "none": equal s_i.
+    - "errors-in-variables": York's line with the stated uncertainties of force and displacement,
+      the scatter of the repetitions added to the latter.
+
+    Raises ValueError when the levels determine no line.
+    """
+    force, displacement = table.force, table.displacement
+    if choice.weighting == "errors-in-variables":
+        s = _with_scatter(table)
+        return york_line(force, displacement, table.u_force, s, intercept=choice.intercept)
+    if choice.weighting == "proportional":
+        s = np.hypot(displacement, table.u_displacement)
+    elif choice.weighting == "1/s^2":
+        plain = weighted_line(force, displacement, _ones(table), intercept=choice.intercept)
+        s = np.hypot(_with_scatter(table), plain.slope * table.u_force)
+    else:
+        s = _ones(table)
+    return weighted_line(force, displacement, s, intercept=choice.intercept)
+
+
+def stiffness(table: Table, choice: Choice) -> float:
+    """k in N/m of `line`; ValueError where the displacement does not change with the force."""
+    slope = line(table, choice).slope
+    if slope == 0.0 or not np.isfinite(slope):
+        raise ValueError("the displacement does not change with the force")
+    return 1.0 / slope
+
+
+def stated_uncertainty(table: Table, choice: Choice) -> float:
+    """Standard uncertainty of k (N/m) from the stated uncertainties of the levels alone.
+
+    The larger of two readings of the stated uncertainty, which does not say how much of it the
+    levels share: every level errs by itself (effects added in quadrature), or all levels err by
+    the same amount, a wrong zero. Derivatives by central differences over one standard
+    uncertainty.
+    """
+    alone = sum(_effect(table, choice, step) for step in np.eye(table.size))
+    together = _effect(table, choice, np.ones(table.size))
+    return float(np.sqrt(max(alone, together)))
+
+
+def _effect(table: Table, choice: Choice, step: Array) -> float:
+    """Squared change of k when the levels err by `step` (n,) standard uncertainties."""
+    total = 0.0
+    for force, displacement in ((table.u_force, 0.0), (0.0, table.u_displacement)):
+        df, du = 0.5 * step * force, 0.5 * step * displacement
+        up = stiffness(table.shifted(df, du), choice)
+        down = stiffness(table.shifted(-df, -du), choice)
+        total += (up - down) ** 2
+    return total
+
+
+def _with_scatter(table: Table) -> Array:
+    return np.hypot(np.nan_to_num(table.scatter), table.u_displacement)
+
+
+def _ones(table: Table) -> Array:
+    return np.ones(table.size)

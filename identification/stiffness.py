@@ -1,0 +1,371 @@
+"""Stiffness of one pose and direction: k with its budget, pointwise k, knee, and ratios of two k.
+
+What is estimated. The default is the line u = F / k through the origin, deviations of u taken in
+proportion to u (`estimate.line`), over the loading levels before a knee: the convention that gives
+the published 95.94 and 57.42 N/mm from the published curves. For a curved line such a k is an
+average over the levels, and depends on weights and levels; so the choice is part of the result,
+and k under the other choices stands beside it. The intervals are about the same functional of the
+noise-free curve at the same levels.
+
+What is uncertain. Points of one run share their errors (mounting, zero line, friction), so the
+covariance of the fit is far too small, and is not used: type A is the scatter of k between
+repetitions (Student's t with n - 1 degrees of freedom), type B the two gains, which all
+repetitions share. With a single repetition the stated uncertainties of its levels stand in for
+the scatter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from identification.curve import Array, Curve, Point
+from identification.estimate import (
+    WEIGHTINGS,
+    Choice,
+    Weighting,
+    line,
+    stated_uncertainty,
+    stiffness,
+)
+from identification.knee import Kink, find_knee, locate
+from identification.levels import (
+    Grid,
+    Hysteresis,
+    Level,
+    PointwiseStiffness,
+    Table,
+    grid_of,
+    hysteresis,
+    pointwise,
+)
+from identification.uncertainty import Contribution, Quantity, combined
+
+Status = Literal["ok", "doubtful", "undefined"]
+STRAIGHT = 0.8  # share of the displacement's variance below which a line is a poor description
+SIGNIFICANT = 3.0  # slope over its standard deviation, where the force is within its noise
+
+
+@dataclass(frozen=True)
+class Options:
+    """weighting, intercept None: the default, which depends on the data (see `default_choice`).
+
+    keep_after_knee: steps after a knee count towards k.
+    """
+
+    weighting: Weighting | None = None
+    intercept: bool | None = None
+    keep_after_knee: bool = False
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """A loading step that does not count towards k, and why."""
+
+    step: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Knee:
+    """Where the arm gives way: force N and displacement m (means over the repetitions, the gains
+    in their uncertainty), slopes N/m just before and behind, evidence as difference of BIC."""
+
+    force: Quantity
+    displacement: Quantity
+    k_before: float
+    k_after: float
+    evidence: float
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """k under another choice, with its combined standard uncertainty (N/m)."""
+
+    choice: Choice
+    after_knee: bool
+    value: float
+    u: float
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Everything that one curve says. status "undefined": `k` is None and `sentence` says why.
+
+    k N/m; by_repetition: k of every repetition, (R,); intercept m: u0 of the line.
+    """
+
+    status: Status
+    sentence: str
+    choice: Choice
+    choice_reason: str
+    k: Quantity | None = None
+    intercept: float = 0.0
+    budget: tuple[Contribution, ...] = ()
+    by_repetition: tuple[float, ...] = ()
+    levels: tuple[Level, ...] = ()
+    pointwise: tuple[PointwiseStiffness, ...] = ()
+    excluded: tuple[Exclusion, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
+    knee: Knee | None = None
+    hysteresis: Hysteresis | None = None
+    notes: tuple[str, ...] = field(default=())
+
+
+def analyze_curve(curve: Curve, options: Options | None = None) -> Stiffness:
+    """Stiffness of a curve. Whatever the data are, the answer is a status, not an exception."""
+    options = options or Options()
+    choice, reason = default_choice(curve, options)
+    points, excluded = _usable(curve.points)
+    loading, unloading = grid_of(points, "loading"), grid_of(points, "unloading")
+    bare = Stiffness(
+        "undefined",
+        "",
+        choice,
+        reason,
+        levels=(*loading.levels(), *unloading.levels()),
+        excluded=excluded,
+        notes=curve.notes,
+    )
+    problem = _undefined(loading.mean(), curve.origin and not choice.intercept)
+    if problem:
+        return replace(bare, sentence=problem)
+    knee, behind = _knee(curve, loading)
+    used = loading
+    if knee is not None and not options.keep_after_knee:
+        used = loading.keep(s for s in loading.steps if s not in behind)
+        excluded = (*excluded, *(Exclusion(s, _why(knee)) for s in behind))
+    described = replace(
+        bare,
+        excluded=excluded,
+        knee=knee,
+        pointwise=pointwise(loading, origin=curve.origin),
+        hysteresis=hysteresis(curve, loading, unloading),
+    )
+    return _with_k(described, curve, loading, used)
+
+
+def default_choice(curve: Curve, options: Options) -> tuple[Choice, str]:
+    """The choice that holds, and why.
+
+    Unless asked otherwise: the published convention where an unloaded state was measured and levels
+    were held; else an intercept and equal weights, since nothing says where the origin lies, and
+    bins of a cycle through zero must not weigh more the smaller their displacement.
+    """
+    natural = curve.origin and curve.held
+    weighting = options.weighting or ("proportional" if natural else "none")
+    intercept = not natural if options.intercept is None else options.intercept
+    if options.weighting is not None or options.intercept is not None:
+        return Choice(weighting, intercept), "as asked for"
+    if natural:
+        return Choice(weighting, intercept), "the convention of the published values"
+    missing = "no unloaded state was measured" if not curve.origin else "no levels were held"
+    return Choice(weighting, intercept), f"{missing}, so the line is free to miss the origin"
+
+
+def ratio(a: Stiffness, b: Stiffness) -> Quantity | None:
+    """k_a / k_b. The gains, common to both, cancel; the scatter of the repetitions does not.
+
+    None where one of the two is undefined.
+    """
+    if a.k is None or b.k is None:
+        return None
+    value = a.k.value / b.k.value
+    budget = [
+        replace(part, u=abs(value / k.value) * part.u)
+        for k, parts in ((a.k, a.budget), (b.k, b.budget))
+        for part in parts
+        if part.counted and not part.common
+    ]
+    return combined(value, budget)
+
+
+def _with_k(described: Stiffness, curve: Curve, loading: Grid, used: Grid) -> Stiffness:
+    """Adds k, its budget and its rivals."""
+    choice = described.choice
+    try:
+        table = used.mean()
+        fit = line(table, choice)
+        k = stiffness(table, choice)
+        each = _by_repetition(used, choice)
+        budget = _budget(curve, used, choice, k, each)
+    except ValueError as error:
+        return replace(described, sentence=f"The stiffness is undefined: {error}.")
+    status, sentence = _judge(table, fit.residuals, k)
+    return replace(
+        described,
+        status=status,
+        sentence=sentence,
+        k=combined(k, budget),
+        intercept=fit.intercept,
+        budget=budget,
+        by_repetition=each,
+        alternatives=_alternatives(curve, loading, used, choice),
+    )
+
+
+def _usable(points: Sequence[Point]) -> tuple[list[Point], tuple[Exclusion, ...]]:
+    """Points with a force and a displacement; the steps that lost one are named."""
+    good, lost = [], []
+    for p in points:
+        if math.isfinite(p.force) and math.isfinite(p.displacement):
+            good.append(p)
+        elif p.branch == "loading":
+            reason = f"repetition {p.repetition}: no valid value of force or displacement"
+            lost.append(Exclusion(p.step, reason))
+    return good, tuple(lost)
+
+
+def _undefined(table: Table, through_origin: bool) -> str:
+    """Why these levels have no stiffness, as a sentence; empty if they have one."""
+    start = "The stiffness is undefined: "
+    if table.size == 0:
+        return start + "there are no loaded levels."
+    if table.size == 1 and not through_origin:
+        return start + "there is one level only, and no measured origin to draw a line from."
+    force = np.append(table.force, 0.0) if through_origin else table.force
+    displacement = np.append(table.displacement, 0.0) if through_origin else table.displacement
+    if np.ptp(force) == 0.0:
+        return start + f"the force is {force[0]:.4g} N throughout."
+    if np.ptp(displacement) == 0.0:
+        return start + "the displacement is the same at every force."
+    if np.ptp(force) <= 3.0 * float(np.median(table.u_force)) and not _related(force, displacement):
+        return (
+            start + f"the force varies by {np.ptp(force):.3g} N, within its uncertainty of "
+            f"{float(np.median(table.u_force)):.3g} N, and the displacement does not follow it."
+        )
+    return ""
+
+
+def _related(force: Array, displacement: Array) -> bool:
+    """Whether the slope of displacement over force is told from zero by the points' own scatter."""
+    if force.size < 4:
+        return False
+    r = float(np.corrcoef(force, displacement)[0, 1])
+    return abs(r) * math.sqrt((force.size - 2) / max(1e-300, 1.0 - r * r)) > SIGNIFICANT
+
+
+def _judge(table: Table, residuals: Array, k: float) -> tuple[Status, str]:
+    if k < 0:
+        return "doubtful", "The displacement falls while the force rises: k is negative."
+    if table.size > 2 and np.ptp(table.displacement) > 0:
+        spread = float(np.sum((table.displacement - table.displacement.mean()) ** 2))
+        explained = 1.0 - float(np.sum(residuals**2)) / spread
+        if explained < STRAIGHT:
+            return "doubtful", (
+                f"A line explains only {max(0.0, explained):.0%} of how the displacement varies: "
+                "k is an average over a curve that is not straight; look at the pointwise k."
+            )
+    return "ok", ""
+
+
+def _by_repetition(used: Grid, choice: Choice) -> tuple[float, ...]:
+    """k of every repetition that determines one."""
+    values = []
+    for row in range(len(used.repetitions)):
+        try:
+            values.append(stiffness(used.run(row), choice))
+        except ValueError:
+            continue
+    return tuple(values)
+
+
+def _budget(
+    curve: Curve, used: Grid, choice: Choice, k: float, each: tuple[float, ...]
+) -> tuple[Contribution, ...]:
+    """Type A and type B contributions to u(k), N/m."""
+    stated = stated_uncertainty(used.mean(), choice)
+    n = len(each)
+    if n >= 2:
+        scatter = float(np.std(each, ddof=1)) / math.sqrt(n)
+        parts = [
+            Contribution(f"scatter between {n} repetitions", "A", scatter, n - 1.0),
+            Contribution(
+                "stated noise and zero lines (in the scatter)", "B", stated / n**0.5, counted=False
+            ),
+        ]
+    else:
+        parts = [
+            Contribution("stated noise and zero line (run-to-run scatter unseen)", "B", stated)
+        ]
+    gains = (("force", curve.gain_sd_force), ("displacement", curve.gain_sd_displacement))
+    parts += [
+        Contribution(f"gain of the {name}", "B", abs(k) * sd, common=True) for name, sd in gains
+    ]
+    return tuple(parts)
+
+
+def _alternatives(
+    curve: Curve, loading: Grid, used: Grid, chosen: Choice
+) -> tuple[Alternative, ...]:
+    """k under every weighting, with and without intercept, before the knee and over all steps."""
+    rivals = []
+    grids = [(used, False)] + ([(loading, True)] if used.steps != loading.steps else [])
+    for grid, after_knee in grids:
+        for weighting in WEIGHTINGS:
+            for intercept in (False, True):
+                choice = Choice(weighting, intercept)
+                if choice == chosen and not after_knee:
+                    continue
+                try:
+                    k = stiffness(grid.mean(), choice)
+                    budget = _budget(curve, grid, choice, k, _by_repetition(grid, choice))
+                except ValueError:
+                    continue
+                rivals.append(Alternative(choice, after_knee, k, combined(k, budget).u))
+    return tuple(rivals)
+
+
+def _knee(curve: Curve, loading: Grid) -> tuple[Knee | None, tuple[int, ...]]:
+    """The knee of the mean curve, placed in every repetition, and the steps behind it."""
+    if not curve.held:
+        return None, ()
+    kink = find_knee(loading.mean().samples(curve.origin))
+    if kink is None:
+        return None, ()
+    found: list[Kink] = []
+    behind: set[int] = set()
+    for row in range(len(loading.repetitions)):
+        samples = loading.run(row).samples(curve.origin)
+        own = locate(samples, kink)
+        if own is not None:
+            found.append(own)
+        edge = own or kink
+        there = np.isfinite(loading.displacement[row])
+        steps = np.array(loading.steps)[there]
+        over = samples.displacement > edge.displacement + 2.0 * edge.u_displacement
+        behind.update(int(s) for s in steps[over])
+    found = found or [kink]
+    knee = Knee(
+        _over_repetitions([f.force for f in found], kink.u_force, curve.gain_sd_force),
+        _over_repetitions(
+            [f.displacement for f in found], kink.u_displacement, curve.gain_sd_displacement
+        ),
+        float(np.mean([f.k_before for f in found])),
+        float(np.mean([f.k_after for f in found])),
+        kink.evidence,
+    )
+    return knee, tuple(s for s in loading.steps if s in behind)
+
+
+def _over_repetitions(values: list[float], u_single: float, gain_sd: float) -> Quantity:
+    """Mean over the repetitions; scatter as type A, or the stated uncertainty of a single one."""
+    mean, n = float(np.mean(values)), len(values)
+    if n >= 2:
+        scatter = float(np.std(values, ddof=1)) / math.sqrt(n)
+        first = Contribution("scatter between repetitions", "A", scatter, n - 1.0)
+    else:
+        first = Contribution("stated uncertainty of the levels", "B", u_single)
+    return combined(mean, [first, Contribution("gain", "B", abs(mean) * gain_sd)])
+
+
+def _why(knee: Knee) -> str:
+    return (
+        f"after the knee at {knee.force.value:.1f} N, where the slope falls from "
+        f"{knee.k_before * 1e-3:.3g} to {knee.k_after * 1e-3:.3g} N/mm: "
+        "k describes the arm before it gives way"
+    )
