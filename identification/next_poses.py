@@ -1,0 +1,151 @@
+"""Which poses and directions would tell most about the joints that are still uncertain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arm import JOINTS, Arm, tool_transform
+from identification.joints import Gains, JointFit
+
+Array = NDArray[np.float64]
+
+_AXES = np.eye(3)
+_AXIS_NAMES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What the next measurement is like.
+
+    force N: at most, lowered where joint torques or the laser's range ask for it; u_force N and
+    u_displacement m: of one level; levels: force levels in all repetitions together; gains: of the
+    instruments; torque_share: of the joint torque limits, own weight included; range m: of the
+    laser; least_singular: smallest singular value of the Jacobian (lengths by 1 m) that still
+    counts as away from singularities; least_radius, lowest, highest m: where the tool may be.
+    """
+
+    force: float = 100.0
+    u_force: float = 0.1
+    u_displacement: float = 2e-6
+    levels: int = 30
+    gains: Gains = Gains(0.005, 0.003)  # noqa: RUF009 - frozen
+    tool: Array | None = None
+    torque_share: float = 0.8
+    range: float = 8e-3
+    least_singular: float = 0.08
+    least_radius: float = 0.35
+    lowest: float = 0.15
+    highest: float = 1.3
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """q (6,) rad, unit `direction` (3,), greatest force N; expected (6,): standard uncertainty of
+    ln c after this and all earlier proposals; why: in words."""
+
+    q: Array
+    direction: Array
+    axis: str
+    force: float
+    expected: Array
+    why: str
+
+
+def propose(
+    arm: Arm, fit: JointFit, plan: Plan, count: int = 6, seed: int = 0, candidates: int = 3000
+) -> list[Proposal]:
+    """Greedy choice among random poses in reach: each adds what lowers the summed relative
+    standard uncertainty of the six stiffnesses most (A-optimal in ln c).
+
+    The expected uncertainties count the gains of the new set-up as shared by all proposals.
+    Raises ValueError when no pose meets the plan's limits.
+    """
+    q, levers, force = _candidates(arm.with_stiffness(fit.stiffness), plan, seed, candidates)
+    gains = np.diag([plan.gains.force**2, plan.gains.displacement**2])
+    P = np.zeros((JOINTS + 2, JOINTS + 2))
+    P[:JOINTS, :JOINTS] = fit.covariance
+    P[JOINTS:, JOINTS:] = gains
+    h, u = _predictions(levers, force, fit.stiffness, plan)
+    out: list[Proposal] = []
+    for _ in range(count):
+        Ph = h @ P
+        gained = Ph / np.sqrt(u**2 + (Ph * h).sum(axis=-1))[:, None]
+        left = np.sqrt(np.maximum(np.diag(P) - gained**2, 0.0))[:, :JOINTS]
+        best = int(np.argmin(left.sum(axis=-1)))
+        before = np.sqrt(np.diag(P))[:JOINTS]
+        P = P - np.outer(gained[best], gained[best])
+        axis = best % 3
+        out.append(
+            Proposal(
+                q=q[best // 3],
+                direction=_AXES[axis],
+                axis=_AXIS_NAMES[axis],
+                force=float(force[best]),
+                expected=left[best],
+                why=_why(before, left[best]),
+            )
+        )
+    return out
+
+
+def expected_after(proposals: list[Proposal], fit: JointFit) -> Array:
+    """Relative standard uncertainties (6,) when all proposals have been measured."""
+    return proposals[-1].expected if proposals else fit.relative_sd
+
+
+def _predictions(levers: Array, force: Array, stiffness: Array, plan: Plan) -> tuple[Array, Array]:
+    """Derivatives (m, 8) of ln s by ln c and the gains, and the standard uncertainty (m,) of ln s.
+
+    A line through n evenly spaced levels up to F has the slope's variance 12 u^2 / (n F^2).
+    """
+    parts = levers**2 / stiffness
+    s = parts.sum(axis=-1)
+    h = np.concatenate([-parts / s[:, None], np.tile([-1.0, 1.0], (s.size, 1))], axis=-1)
+    one = np.hypot(plan.u_displacement, s * plan.u_force)
+    return h, np.sqrt(12 / plan.levels) * one / (s * force)
+
+
+def _candidates(arm: Arm, plan: Plan, seed: int, count: int) -> tuple[Array, Array, Array]:
+    """Poses (n, 6) that meet the limits; levers (3 n, 6) and forces (3 n,) along x, y, z."""
+    rng = np.random.default_rng(seed)
+    low, high = np.maximum(arm.q_min, -np.pi), np.minimum(arm.q_max, np.pi)
+    q = rng.uniform(low, high, (40 * count, JOINTS))
+    q = q[_allowed_places(arm, q, plan)]
+    J = arm.jacobian(q, plan.tool)
+    keep = np.linalg.svd(J, compute_uv=False)[:, -1] >= plan.least_singular
+    q, J = q[keep][:count], J[keep][:count]
+    if q.shape[0] == 0:
+        raise ValueError(f"no pose of {arm.name} meets the limits of the plan; widen them")
+    levers = J[:, :3, :].reshape(-1, JOINTS)
+    spare = plan.torque_share * arm.torque_limit - np.abs(arm.gravity_torques(q))
+    spare = np.repeat(np.maximum(spare, 0.0), 3, axis=0)
+    with np.errstate(divide="ignore"):
+        by_torque = np.min(spare / np.maximum(np.abs(levers), 1e-9), axis=-1)
+        by_range = plan.range / (levers**2 / arm.joint_stiffness).sum(axis=-1)
+    force = np.minimum(plan.force, np.minimum(by_torque, by_range))
+    # a pose that carries next to nothing tells nothing: leave a force that cannot divide by zero
+    return q, levers, np.maximum(force, 1e-3 * plan.force)
+
+
+def _allowed_places(arm: Arm, q: Array, plan: Plan) -> NDArray[np.bool_]:
+    """Tool, elbow and wrist above the table, the tool away from the arm's own column."""
+    frames = arm.frames(q)
+    flange = frames[:, JOINTS]
+    tool = flange if plan.tool is None else flange @ tool_transform(plan.tool)
+    height, radius = tool[:, 2, 3], np.hypot(tool[:, 0, 3], tool[:, 1, 3])
+    joints_up = (frames[:, 2:, 2, 3] > plan.lowest).all(axis=-1)
+    return np.asarray(
+        joints_up & (height > plan.lowest) & (height < plan.highest) & (radius > plan.least_radius)
+    )
+
+
+def _why(before: Array, after: Array) -> str:
+    joint = int(np.argmax(before - after))
+    return (
+        f"joint {joint + 1}: standard uncertainty {100 * before[joint]:.2g} % -> "
+        f"{100 * after[joint]:.2g} %; sum over the joints {100 * before.sum():.3g} % -> "
+        f"{100 * after.sum():.3g} %"
+    )
