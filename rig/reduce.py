@@ -1,0 +1,346 @@
+"""From second values to curves: where the assumptions of the evaluation sit.
+
+1. Discarded samples do not count. A sample that the procedure marked as unsettled counts only
+   where its level has no settled one. A table that does not say what is settled: the first half of
+   every hold is left out, because the arm creeps on after the screw has stopped.
+2. Zero lines. An amplifier drifts: between neighbouring zero-load plateaus of a run its zero is
+   taken as a straight line over time and subtracted; before the first and after the last plateau
+   it keeps its value. With a plateau on one side only, that one counts. The uncertainty of the
+   line is part of every level's. A run without plateaus is taken as it is, and said to be so.
+3. Datum. Displacement counts from the zero-load plateau before the run, whether the laser was
+   zeroed once (`datum: setup`) or before each run: what a run did not load is no deflection under
+   its load. How far the plateaus of the repetitions lie apart is noted. The plateau after the run
+   is not used for it: what remains there may be the arm's (a joint that gave way).
+4. A level's uncertainty is the scatter of its samples' mean and the stated uncertainty of a
+   sample, in quadrature: the stated one is common to a hold and does not average out.
+5. A recording that was not held at levels (no steps, or force running through half of its range
+   within one) is cut at its turning points into passes of rising (`loading`) and falling force
+   (`unloading`), and each pass into bins of equal width in force. If there is but one repetition,
+   the passes count as repetitions.
+
+No threshold here is absolute; all refer to ranges of the data or to stated uncertainties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.curve import Array, Curve, Point
+from rig.passes import binned, is_held, turning_points
+
+MM = 1e-3  # m
+
+
+class _ForceInstrument(Protocol):
+    @property
+    def standard_uncertainty_N(self) -> float: ...
+    @property
+    def gain_relative_sd(self) -> float: ...
+
+
+class _DisplacementInstrument(Protocol):
+    @property
+    def standard_uncertainty_mm(self) -> float: ...
+    @property
+    def gain_relative_sd(self) -> float: ...
+
+
+class _Instruments(Protocol):
+    @property
+    def force(self) -> _ForceInstrument: ...
+    @property
+    def displacement(self) -> _DisplacementInstrument: ...
+
+
+class _Meta(Protocol):
+    @property
+    def directions(self) -> Any: ...
+    @property
+    def instruments(self) -> _Instruments: ...
+    @property
+    def datum(self) -> str: ...
+
+
+class Measurements(Protocol):
+    """What is asked of a data set; `rig.dataset.Dataset` has it."""
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Name -> (n,)."""
+
+    @property
+    def meta(self) -> _Meta:
+        """Directions, instruments, datum."""
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Samples of one run in the order of measurement, (n,) each; displacement in m."""
+
+    repetition: int
+    time: Array
+    branch: NDArray[np.str_]
+    step: NDArray[np.int64]
+    force: Array
+    displacement: Array
+    settled: NDArray[np.bool_] | None
+
+
+@dataclass(frozen=True)
+class _Plateau:
+    """A zero-load hold: its middle in time, mean and standard uncertainty of the mean."""
+
+    time: float
+    force: float
+    displacement: float
+    u_force: float
+    u_displacement: float
+
+
+@dataclass(frozen=True)
+class _Stated:
+    """Standard uncertainty of one sample, N and m."""
+
+    force: float
+    displacement: float
+
+
+def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
+    """(pose, direction) -> curve, in the order of measurement; pose "" without an arm."""
+    stated = _Stated(
+        dataset.meta.instruments.force.standard_uncertainty_N,
+        dataset.meta.instruments.displacement.standard_uncertainty_mm * MM,
+    )
+    result: dict[tuple[str, str], Curve] = {}
+    for (pose, direction), runs in _setups(dataset.columns):
+        points: list[Point] = []
+        notes: list[str] = []
+        held = is_held([(r.branch, r.step, r.force) for r in runs])
+        zeros = [_plateaus(run, stated) for run in runs]
+        if held:
+            for run, plateaus in zip(runs, zeros, strict=True):
+                points += _levels(_zeroed(run, plateaus), run, plateaus, stated)
+        else:
+            points, note = _bins(runs, zeros, stated)
+            notes.append(note)
+        notes += _notes(runs, zeros, dataset.meta.datum)
+        result[pose, direction] = Curve(
+            pose,
+            direction,
+            tuple(dataset.meta.directions[direction]),
+            tuple(points),
+            dataset.meta.instruments.force.gain_relative_sd,
+            dataset.meta.instruments.displacement.gain_relative_sd,
+            origin=all(zeros),
+            held=held,
+            notes=tuple(notes),
+        )
+    return result
+
+
+def _setups(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[tuple[str, str], list[_Run]]]:
+    """Runs of each pose and direction. Rows may be interleaved; their order within a run stays."""
+    used = ~columns["discarded"] if "discarded" in columns else np.ones(_rows(columns), dtype=bool)
+    pose, direction, repetition = (columns[n] for n in ("pose", "direction", "repetition"))
+    change = np.ones(used.size, dtype=bool)
+    if used.size > 1:
+        change[1:] = np.logical_or.reduce([c[1:] != c[:-1] for c in (pose, direction, repetition)])
+    starts = np.flatnonzero(change)
+    pieces: dict[tuple[str, str], dict[int, list[int]]] = {}
+    for index, at in enumerate(starts):
+        setup = (str(pose[at]), str(direction[at]))
+        pieces.setdefault(setup, {}).setdefault(int(repetition[at]), []).append(index)
+    bounds = np.append(starts, used.size)
+    for setup, by_repetition in pieces.items():
+        runs = []
+        for number, indices in by_repetition.items():
+            rows = np.concatenate([np.arange(bounds[i], bounds[i + 1]) for i in indices])
+            rows = rows[used[rows]]
+            if rows.size:
+                runs.append(_run(columns, number, rows))
+        if runs:
+            yield setup, runs
+
+
+def _rows(columns: dict[str, NDArray[Any]]) -> int:
+    return len(columns["force_N"])
+
+
+def _run(columns: dict[str, NDArray[Any]], repetition: int, rows: NDArray[np.intp]) -> _Run:
+    time = columns["session_s"] if "session_s" in columns else columns["time_s"]
+    settled = columns["settled"][rows] != 0 if "settled" in columns else None
+    return _Run(
+        repetition,
+        np.asarray(time[rows], dtype=np.float64),
+        columns["branch"][rows],
+        np.asarray(columns["step"][rows], dtype=np.int64),
+        np.asarray(columns["force_N"][rows], dtype=np.float64),
+        np.asarray(columns["displacement_mm"][rows], dtype=np.float64) * MM,
+        settled,
+    )
+
+
+def _blocks(run: _Run) -> Iterator[slice]:
+    """Neighbouring samples of one branch and step."""
+    n = run.force.size
+    change = np.flatnonzero((run.branch[1:] != run.branch[:-1]) | (run.step[1:] != run.step[:-1]))
+    edges = [0, *(int(i) + 1 for i in change), n]
+    yield from (slice(a, b) for a, b in pairwise(edges))
+
+
+def _settled(run: _Run, block: slice) -> NDArray[np.intp]:
+    """Rows of a hold that count (assumption 1), those without a value left out."""
+    rows = np.arange(block.start, block.stop)
+    if run.settled is None:
+        rows = rows[rows.size // 2 :]
+    elif run.settled[rows].any():
+        rows = rows[run.settled[rows]]
+    valid = np.isfinite(run.force[rows]) & np.isfinite(run.displacement[rows])
+    return rows[valid]
+
+
+def _mean(values: Array, stated: float) -> tuple[float, float]:
+    """Mean, and the standard uncertainty of the mean from the scatter (one sample: as stated)."""
+    if values.size == 0:
+        return float("nan"), stated
+    if values.size == 1:
+        return float(values[0]), stated
+    return float(values.mean()), float(values.std(ddof=1) / np.sqrt(values.size))
+
+
+def _plateaus(run: _Run, stated: _Stated) -> list[_Plateau]:
+    """The run's zero-load holds; all their samples count, since nothing creeps there that the
+    load has moved before the run."""
+    found = []
+    for block in _blocks(run):
+        if run.branch[block.start] != "zero":
+            continue
+        rows = np.arange(block.start, block.stop)
+        rows = rows[np.isfinite(run.force[rows]) & np.isfinite(run.displacement[rows])]
+        if rows.size:
+            force, u_force = _mean(run.force[rows], stated.force)
+            displacement, u_displacement = _mean(run.displacement[rows], stated.displacement)
+            time = float(run.time[rows].mean())
+            found.append(_Plateau(time, force, displacement, u_force, u_displacement))
+    return found
+
+
+def _zeroed(run: _Run, plateaus: list[_Plateau]) -> _Run:
+    """Force from the zero line, displacement from the first plateau (assumptions 2, 3)."""
+    if not plateaus:
+        return run
+    line = np.interp(run.time, [p.time for p in plateaus], [p.force for p in plateaus])
+    first = plateaus[0].displacement
+    return replace(run, force=run.force - line, displacement=run.displacement - first)
+
+
+def _zero_uncertainty(plateaus: list[_Plateau], time: float) -> tuple[float, float]:
+    """Of the force's zero line at a time, and of the displacement's zero; N, m."""
+    if not plateaus:
+        return 0.0, 0.0
+    times = [p.time for p in plateaus]
+    shares = [np.interp(time, times, np.eye(len(times))[i]) for i in range(len(times))]
+    squares = sum((s * p.u_force) ** 2 for s, p in zip(shares, plateaus, strict=True))
+    return float(np.sqrt(squares)), plateaus[0].u_displacement
+
+
+def _levels(zeroed: _Run, run: _Run, plateaus: list[_Plateau], stated: _Stated) -> Iterator[Point]:
+    before = 0.0
+    for block in _blocks(run):
+        rows = _settled(run, block)
+        force, scatter_force = _mean(zeroed.force[rows], stated.force)
+        displacement, scatter_displacement = _mean(zeroed.displacement[rows], stated.displacement)
+        branch = str(run.branch[block.start])
+        if branch == "cycle":  # held, and not said in which sense
+            branch = "loading" if abs(force) >= abs(before) else "unloading"
+        before = force
+        time = float(run.time[block].mean())
+        zero_force, zero_displacement = _zero_uncertainty(plateaus, time)
+        yield Point(
+            run.repetition,
+            branch,
+            int(run.step[block.start]),
+            force,
+            displacement,
+            float(np.hypot(np.hypot(scatter_force, stated.force), zero_force)),
+            float(np.hypot(np.hypot(scatter_displacement, stated.displacement), zero_displacement)),
+            rows.size,
+        )
+
+
+def _bins(
+    runs: list[_Run], zeros: list[list[_Plateau]], stated: _Stated
+) -> tuple[list[Point], str]:
+    """Points of a continuous recording (assumption 5), and the sentence that says so."""
+    loaded = []
+    for run, plateaus in zip(runs, zeros, strict=True):
+        mask = (run.branch != "zero") & np.isfinite(run.force) & np.isfinite(run.displacement)
+        z = _zeroed(run, plateaus)
+        loaded.append((run.repetition, run.branch[mask], z.force[mask], z.displacement[mask]))
+    forces = np.concatenate([force for _, _, force, _ in loaded])
+    if forces.size == 0:
+        return [], "There are no loaded samples."
+    low, high = float(forces.min()), float(forces.max())
+    alone = len(runs) == 1
+    points: list[Point] = []
+    passes = 0
+    for repetition, branch, force, displacement in loaded:
+        for piece in _passes(branch, force, high - low):
+            passes += 1
+            name = (passes + 1) // 2 if alone else repetition
+            word = _sense(str(branch[piece.start]), force[piece])
+            for bin_, f, u, n in binned(force[piece], displacement[piece], low, high):
+                points.append(Point(name, word, bin_, f, u, stated.force, stated.displacement, n))
+    note = (
+        f"A continuous recording of {forces.size} samples: cut into {passes} "
+        f"pass{'es' if passes != 1 else ''} at its turning points and binned by force; rising "
+        "force counts as loading"
+    )
+    return points, note + (", every cycle as a repetition." if alone and passes > 1 else ".")
+
+
+def _passes(branch: NDArray[np.str_], force: Array, span: float) -> Iterator[slice]:
+    """Stretches of one branch; those called `cycle` are cut at their turning points."""
+    edges = [0, *(int(i) + 1 for i in np.flatnonzero(branch[1:] != branch[:-1])), force.size]
+    for a, b in pairwise(edges):
+        if branch[a] != "cycle":
+            yield slice(a, b)
+            continue
+        turns = [a, *(a + t for t in turning_points(force[a:b], span)), b]
+        yield from (slice(i, j) for i, j in pairwise(turns) if j > i)
+
+
+def _sense(branch: str, force: Array) -> str:
+    if branch != "cycle":
+        return branch
+    return "loading" if force[-1] >= force[0] else "unloading"
+
+
+def _notes(runs: list[_Run], zeros: list[list[_Plateau]], datum: str) -> list[str]:
+    """What the zero lines were made of, in sentences."""
+    without = [r.repetition for r, z in zip(runs, zeros, strict=True) if not z]
+    if without:
+        which = "no run" if len(without) == len(runs) else f"repetitions {without}"
+        text = "has a zero-load plateau" if which == "no run" else "have no zero-load plateau"
+        return [f"{which[0].upper()}{which[1:]} {text}: force and displacement as they are."]
+    single = sum(1 for z in zeros if len(z) == 1)
+    notes = []
+    if single:
+        notes.append(
+            f"{single} of {len(runs)} runs have one zero-load plateau: "
+            "a drift of the force within them can't be seen."
+        )
+    if datum == "setup" and len(zeros) > 1:
+        firsts = [z[0].displacement for z in zeros]
+        apart = (max(firsts) - min(firsts)) / MM
+        notes.append(
+            f"The unloaded positions before the repetitions lie {apart:.4g} mm apart; "
+            "each repetition counts from its own."
+        )
+    return notes
