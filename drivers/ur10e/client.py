@@ -10,7 +10,7 @@ from typing import Any
 
 from drivers.clock import Clock
 from drivers.errors import BadReply, CannotConnect, DeviceError, ReadTimeout, SafetyStop
-from drivers.readings import Reading, RobotState
+from drivers.readings import Reading, RobotState, Signal
 from drivers.stream import Block, Stream
 from drivers.ur10e.dashboard import Dashboard
 from drivers.ur10e.probe import Handshake, probe
@@ -39,7 +39,7 @@ class Ur10e:
     """
 
     name = "robot"
-    signals = SIGNALS
+    signals: Sequence[Signal] = SIGNALS
 
     def __init__(self, settings: Ur10eSettings, clock: Clock, emulated: bool = False) -> None:
         self._settings = settings
@@ -54,6 +54,7 @@ class Ur10e:
         self._baseline: int | None = None  # program state to be kept; None: whichever
         self._alarm: SafetyStop | None = None
         self._status: dict[str, Any] = {}
+        self._heard = 0.0  # when the child last said anything, time.monotonic()
         self._refused = ""
 
     # -- opening and closing
@@ -137,6 +138,7 @@ class Ur10e:
     # -- what the child says (its thread)
 
     def _on_message(self, message: dict[str, Any]) -> None:
+        self._heard = time.monotonic()
         if "block" in message:
             self._on_block(message["block"])
         elif "status" in message:
@@ -241,18 +243,23 @@ class Ur10e:
     def _stale(self) -> DeviceError:
         """Ends what has fallen silent: a process that hangs would hang for ever."""
         limit = self._settings.stale_after_s
-        if self._status.get("connected"):
-            what = (
-                f"keeps the connection open, but its timestamp stands still at "
-                f"{self._status['timestamp']:.3f} s for more than {limit:g} s"
-            )
+        if time.monotonic() - self._heard > max(0.3, limit / 2):
+            fault = f"the process of the client library does not answer for more than {limit:g} s"
+            error = ReadTimeout(self.name, fault, _UNPLUGGED)
         else:
-            what = f"has sent nothing for more than {limit:g} s"
-        error = self._silent(what)
+            error = self._silent(self._silence(limit))
         self._stream.fail(error)
         if self._process is not None:
             self._process.stop()
         return error
+
+    def _silence(self, limit: float) -> str:
+        if self._status.get("connected"):
+            return (
+                f"keeps the connection open, but its timestamp stands still at "
+                f"{self._status['timestamp']:.3f} s for more than {limit:g} s"
+            )
+        return f"has sent nothing for more than {limit:g} s"
 
     def _silent(self, what: str) -> ReadTimeout:
         return ReadTimeout(self.name, f"the controller {self._settings.host} {what}", _UNPLUGGED)

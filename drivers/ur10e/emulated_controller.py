@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -62,6 +63,7 @@ class Controller:
         self._frozen_s: float | None = None
         self.modes = _NORMAL
         self.loaded = HOLDING
+        self.commands: deque[str] = deque(maxlen=1000)  # what the Dashboard was told
 
     def fault(self, name: str) -> None:
         """Shows a fault of the arm from now on; others change nothing here."""

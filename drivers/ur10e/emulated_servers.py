@@ -57,6 +57,10 @@ class Listener:
         self._thread = threading.Thread(target=self._accept, name="ur10e listener", daemon=True)
         self._thread.start()
 
+    def await_refusal(self) -> None:
+        """Returns when the port is closed, after the line has been told to refuse."""
+        self._thread.join(2.0)
+
     def join(self) -> None:
         """Waits until listener and sessions have ended; they have been told to by `line`."""
         for thread in (self._thread, *self._threads):
@@ -183,6 +187,8 @@ class DashboardSession:
 
     def run(self) -> None:
         """Until the client leaves or the emulator ends."""
+        if self._line.broken():
+            return
         self._say(GREETING)
         rest = b""
         while not self._line.broken():
@@ -209,6 +215,7 @@ class DashboardSession:
 
     def _reply(self, command: str) -> str:
         controller = self._controller
+        controller.commands.append(command)
         word, _, argument = command.partition(" ")
         if word == "load":
             if controller.load(argument):

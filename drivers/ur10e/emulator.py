@@ -72,7 +72,13 @@ class Ur10eEmulator:
             Listener(rtde_socket, self._line, self._serve_rtde),
             Listener(dashboard_socket, self._line, self._serve_dashboard),
         ]
+        self._await_refusal()
         return host
+
+    def _await_refusal(self) -> None:
+        if "refuse" in self._line.faults:
+            for listener in self._listeners:
+                listener.await_refusal()
 
     def stop(self) -> None:
         """Ends every connection and thread; may be called twice."""
@@ -80,12 +86,18 @@ class Ur10eEmulator:
         for listener in self._listeners:
             listener.join()
 
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """What the Dashboard server was told so far, at most the last thousand lines."""
+        return tuple(self._controller.commands)
+
     def inject(self, fault: str) -> None:
         """Shows the fault from now on; ValueError for an unknown one."""
         if fault not in FAULTS:
             raise ValueError(f'no fault "{fault}"; known: {", ".join(sorted(FAULTS))}')
         self._controller.fault(fault)
         self._line.faults.add(fault)
+        self._await_refusal()
 
     def _serve_rtde(self, client: socket.socket) -> None:
         RtdeSession(

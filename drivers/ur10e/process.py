@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, Any
 
 _PROJECT = Path(__file__).resolve().parents[2]
-_END_WAIT_S = 1.0
+_END_WAIT_S = 0.5
 
 
 class ReceiveProcess:
