@@ -163,44 +163,27 @@ def export(
 
 def main() -> None:
     """Runs the command and turns every ending into its exit status; no traceback for users."""
-    sys.excepthook = _report_bug
-    from rig.intruders import refuse_intruders
-
-    sys.exit(_guarded(refuse_intruders) or _guarded(lambda: app(standalone_mode=False)))
-
-
-def _guarded(act: Any) -> int:
-    import click
-
     from drivers.errors import DeviceError, SafetyStop
     from rig.errors import InputError, MeasurementStopped
+    from rig.intruders import refuse_intruders
 
+    sys.excepthook = _report_bug
     try:
-        act()
-    except click.exceptions.Exit as ending:
-        return ending.exit_code
-    except click.ClickException as error:
-        error.show()
-        return 2
+        refuse_intruders()
+        app()  # ends the process itself: 0 done, 2 wrong arguments, 130 interrupted
     except InputError as error:
-        say(str(error))
-        return 2
+        _end(2, str(error))
     except SafetyStop as error:
-        say(f"Stopped for safety. {error}")
-        return 4
+        _end(4, f"Stopped for safety. {error}")
     except DeviceError as error:
-        say(str(error))
-        return 3
+        _end(3, str(error))
     except MeasurementStopped as error:
-        say(f"Stopped: {error}")
-        return 4
-    except (KeyboardInterrupt, click.Abort):
-        say("Interrupted.")
-        return 130
-    except BrokenPipeError:  # `rig ... | head`: nobody reads any more, which is no fault
-        sys.stderr.close()
-        return 0
-    return 0
+        _end(4, f"Stopped: {error}")
+
+
+def _end(status: int, message: str) -> None:
+    say(message)
+    sys.exit(status)
 
 
 def _report_bug(

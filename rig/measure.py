@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from drivers.errors import DeviceError, SafetyStop
+from drivers.errors import DeviceError
 from rig import dataset as datasets
 from rig.acquisition import open_devices
 from rig.emulation import EmulatedRig
@@ -170,7 +170,7 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     try:
         job.journal.append("descriptor", descriptor)
         say(SAFETY_NOTE)
-        with _ctrl_c(runner.interrupt):
+        with _signals(runner.interrupt, _end):
             runner.run()
         reason, complete = "all runs done", True
     except MeasurementStopped as stop:
@@ -182,10 +182,11 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
         rig.loader.notify(f"{reason} {UNLOAD}", "error")
         raise
     except KeyboardInterrupt:
-        reason = "interrupted by Ctrl-C"
+        reason = "interrupted"
+        say(f"Interrupted. {UNLOAD}")
         raise
     finally:
-        with _ctrl_c(lambda: say("writing the data set; this takes a moment")):
+        with _signals(_patience(say), _patience(say)):
             _finish(job, recorder, reason, complete=complete)
     return job.output
 
@@ -207,21 +208,24 @@ def _build(job: Job) -> None:
 
 
 @contextmanager
-def _ctrl_c(act: Callable[[], object]) -> Iterator[None]:
-    def handler(_number: int, _frame: FrameType | None) -> None:
-        act()
+def _signals(on_ctrl_c: Callable[[], object], on_end: Callable[[], object]) -> Iterator[None]:
+    """Ctrl-C and the wish to end (SIGTERM) for the time of the measurement."""
+    wishes = {signal.SIGINT: on_ctrl_c, signal.SIGTERM: on_end}
 
-    try:
-        earlier = signal.signal(signal.SIGINT, handler)
-    except ValueError:  # not the main thread, in tests: Ctrl-C goes elsewhere
-        yield
-        return
+    def handler(number: int, _frame: FrameType | None) -> None:
+        wishes[signal.Signals(number)]()
+
+    earlier = {number: signal.signal(number, handler) for number in wishes}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, earlier)
+        for number, was in earlier.items():
+            signal.signal(number, was)
 
 
-def exit_status(error: DeviceError) -> int:
-    """3 a device failed; 4 stopped for safety."""
-    return 4 if isinstance(error, SafetyStop) else 3
+def _patience(say: Say) -> Callable[[], None]:
+    return lambda: say("writing the data set; this takes a moment")
+
+
+def _end() -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,65 @@
+"""Each fault of each device in a whole measurement: message, exit status, kept data.
+
+The quick selection runs always; `-m slow` runs all. Set RIG_FAULT_TABLE to a file to collect the
+table of docs/faults.md (see docs/faults.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from drivers.ild2200.emulator import Ild2200Emulator
+from drivers.kistler.emulator import KistlerEmulator
+from drivers.ur10e.emulator import Ur10eEmulator
+from rig.dataset import load
+from tests.wire.short import run_rig, write_files
+
+DEVICES = {"robot": Ur10eEmulator, "dynamometer": KistlerEmulator, "laser": Ild2200Emulator}
+QUICK = {
+    ("robot", "frozen_timestamp", "mid-run"),
+    ("robot", "silence", "start"),
+    ("dynamometer", "unplugged", "mid-run"),
+    ("laser", "close", "mid-run"),
+    ("laser", "relative_zero", "start"),
+}
+# What a measurement survives: the fault is noticed and noted, and costs no more than values.
+HARMLESS: set[tuple[str, str, str]] = set()
+
+CASES = [
+    pytest.param(
+        device, fault, when,
+        marks=[] if (device, fault, when) in QUICK else [pytest.mark.slow],
+        id=f"{device}-{fault}-{when}",
+    )
+    for device, emulator in DEVICES.items()
+    for fault in emulator.faults
+    for when in ("start", "mid-run")
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("device", "fault", "when"), CASES)
+def test_fault(
+    tmp_path: Path, device: str, fault: str, when: str, fault_table: Callable[..., None]
+) -> None:
+    moment = "at: start" if when == "start" else "after_s: 45"
+    words = write_files(tmp_path, faults=f"[{{device: {device}, kind: {fault}, {moment}}}]")
+    outcome = run_rig(*words, cwd=tmp_path, timeout=60)
+    message = outcome.stderr.strip().splitlines()[-1] if outcome.stderr.strip() else ""
+    fault_table(device, fault, when, f"exit {outcome.status}", message)
+    assert "Traceback" not in outcome.stderr
+    assert "bug in rig" not in outcome.stderr
+    if (device, fault, when) in HARMLESS:
+        assert outcome.status == 0, outcome.stderr
+        return
+    assert outcome.status in (3, 4), outcome.stderr
+    assert device in message
+    assert len(message.split(". ")) >= 2, f"fault and remedy: {message}"
+    if when == "mid-run":
+        dataset = load(tmp_path / "run.h5")
+        assert not dataset.complete
+        assert dataset.rows > 0
+    else:
+        assert not (tmp_path / "run.h5.journal").exists() or load(tmp_path / "run.h5")

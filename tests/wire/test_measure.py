@@ -1,0 +1,158 @@
+"""`rig measure` as a user runs it: real client libraries, emulators, a data set at the end."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+
+from rig.dataset import Dataset, load
+from tests.wire.short import HOME, run_rig, write_files
+
+STEPS = [(rep, step) for rep in (1, 2) for step in (1, 2, 3)]
+
+
+def steps_of(dataset: Dataset) -> list[tuple[int, int]]:
+    """Steps with usable, settled rows, in order."""
+    c = dataset.columns
+    use = (c["discarded"] == 0) & (c["settled"] == 1) & (c["step"] > 0)
+    pairs = zip(c["repetition"][use], c["step"][use], strict=True)
+    return list(dict.fromkeys((int(r), int(s)) for r, s in pairs))
+
+
+def no_process_left(folder: Path) -> bool:
+    """Emulators and robot clients of a run in `folder` have ended, within some seconds."""
+    for _ in range(50):
+        mine = [p for p in psutil.process_iter(["cwd"]) if p.info["cwd"] == str(folder)]
+        if not mine:
+            return True
+        time.sleep(0.2)
+    return False
+
+
+def test_a_short_run_ends_complete_and_marked_as_emulated(tmp_path: Path) -> None:
+    outcome = run_rig(*write_files(tmp_path), cwd=tmp_path)
+    assert outcome.status == 0, outcome.stderr
+    assert "EMULATED" in outcome.stderr
+    dataset = load(tmp_path / "run.h5")
+    assert dataset.complete
+    assert dataset.origin == "emulated"
+    assert not (tmp_path / "run.h5.journal").exists()
+    assert steps_of(dataset) == STEPS
+    columns = dataset.columns
+    use = (columns["step"] == 3) & (columns["settled"] == 1)
+    assert columns["force_N"][use] == pytest.approx(60.0, abs=2.5)
+    assert np.all(columns["robot_count"] > 0)
+    assert np.all(columns["laser_count"] > 0)
+    for name in ("q1_rad", "temperature6_C", "laser_mm", "dynamometer1_V", "lateness_s"):
+        assert np.all(np.isfinite(columns[name])), name
+    assert dataset.devices["laser"]
+    assert no_process_left(tmp_path)
+
+
+def test_measurements_are_never_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "run.h5").write_bytes(b"precious")
+    outcome = run_rig(*write_files(tmp_path), cwd=tmp_path)
+    assert outcome.status == 2
+    assert "run.h5: exists already, and measurements are never overwritten" in outcome.stderr
+    assert (tmp_path / "run.h5").read_bytes() == b"precious"
+
+
+def started(folder: Path, words: list[str]) -> subprocess.Popen[str]:
+    """A measurement in the background, returned once it has recorded some rows."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rig", *words], cwd=folder, stderr=subprocess.PIPE, text=True,
+        stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(HOME)},
+    )  # fmt: skip
+    journal = folder / "run.h5.journal"
+    for _ in range(400):
+        if journal.exists() and journal.read_text(errors="replace").count('"sample"') >= 8:
+            return process
+        assert process.poll() is None, process.communicate()[1]
+        time.sleep(0.05)
+    process.kill()
+    pytest.fail("no rows within 20 s")
+
+
+def test_ctrl_c_asks_and_the_answer_stops_with_status_4(tmp_path: Path) -> None:
+    process = started(tmp_path, write_files(tmp_path))
+    process.send_signal(signal.SIGINT)  # the scripted operator answers: abort
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 4, errors
+    assert "Turn the screw back" in errors
+    assert "Traceback" not in errors
+    dataset = load(tmp_path / "run.h5")
+    assert not dataset.complete
+    assert dataset.rows >= 8
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM])
+def test_being_ended_writes_the_file(tmp_path: Path, number: int) -> None:
+    process = started(tmp_path, write_files(tmp_path))
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    assert not load(tmp_path / "run.h5").complete
+    assert no_process_left(tmp_path)
+
+
+def test_kill_then_resume_measures_the_same_steps(tmp_path: Path) -> None:
+    kill_and_resume(tmp_path, delay_s=0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("round_", range(100))
+def test_kill_at_random_moments(tmp_path: Path, round_: int) -> None:
+    delay = np.random.default_rng(round_).uniform(0.0, 2.5)
+    kill_and_resume(tmp_path, delay)
+
+
+def kill_and_resume(folder: Path, delay_s: float) -> None:
+    """kill -9 some time after the first rows; nothing acknowledged may be missing afterwards."""
+    process = started(folder, write_files(folder))
+    time.sleep(delay_s)
+    process.kill()
+    process.wait()
+    lines = (folder / "run.h5").exists(), (folder / "run.h5.journal").exists()
+    if not lines[1]:
+        assert load(folder / "run.h5").complete  # it was faster than the kill
+        return
+    acknowledged = _samples(folder / "run.h5.journal")
+    before = load(folder / "run.h5")
+    assert before.rows == len(acknowledged)
+    assert no_process_left(folder), "emulators must not outlive a killed measurement"
+    outcome = run_rig("measure", "--resume", "run.h5", cwd=folder)
+    assert outcome.status == 0, outcome.stderr
+    after = load(folder / "run.h5")
+    assert after.complete
+    assert steps_of(after) == STEPS
+    kept = after.columns["force_N"][: len(acknowledged)]
+    assert [row["values"]["force_N"] for row in acknowledged] == pytest.approx(list(kept))
+    counts = dict.fromkeys(STEPS, 0)
+    c = after.columns
+    use = (c["discarded"] == 0) & (c["settled"] == 1) & (c["step"] > 0)
+    for rep, step in zip(c["repetition"][use], c["step"][use], strict=True):
+        counts[int(rep), int(step)] += 1
+    assert set(counts.values()) == {3}, "every step has its samples once"
+
+
+def _samples(journal: Path) -> list[dict[str, object]]:
+    """Whole lines of the journal that are samples; a torn last line was never acknowledged."""
+    rows = []
+    for line in journal.read_bytes().splitlines():
+        try:
+            record = json.loads(line)
+        except ValueError:
+            continue
+        if record.get("kind") == "sample":
+            rows.append(record["data"])
+    return rows
