@@ -54,7 +54,7 @@ FAULTS: Mapping[str, str] = {
 class _Sensor:
     """What the sensor remembers between commands."""
 
-    averaging: int = 1
+    averaging: int
     averaging_type: int = 1  # moving
     output_on: bool = True
     laser_on: bool = True
@@ -87,6 +87,7 @@ class Ild2200Emulator:
         seed: int = 0,
         start_mm: float = 5.0,
         sign: int = 1,
+        averaging: int = 1,
         noise_um: float = 1.0,
         linearity_um: float = 0.3,
     ) -> None:
@@ -103,7 +104,8 @@ class Ild2200Emulator:
         self._sign = sign
         self._noise_mm = noise_um * 1e-3
         self._linearity_mm = linearity_um * 1e-3
-        self._sensor = _Sensor()
+        self._averaging = averaging
+        self._sensor = _Sensor(averaging)
         self._active: frozenset[str] = frozenset()
         self._ends: tuple[int, int] | None = None
         self._stop = threading.Event()
@@ -269,7 +271,7 @@ class Ild2200Emulator:
                 setattr(sensor, name, value)
                 return None
         if command == Command.RESET:
-            self._sensor = _Sensor()
+            self._sensor = _Sensor(self._averaging)
             return None
         return 1
 

@@ -14,6 +14,7 @@ GENTLE_TURN_MM = 0.1
 LONGEST_SEARCH_MM = 20.0  # free travel without contact after which turning makes no sense
 FIRST_GUESS_N_PER_MM = 150.0  # stiffer than the arm: first turns come out too small, not too large
 HAND_MM_PER_S = 1.0
+HANDS_OFF = ("idle", "mounting", "settling", "sampling", "paused")
 PATIENCE_S, PATIENCE_WALL_S = 5.0, 0.5
 
 
@@ -36,7 +37,7 @@ class Hand:
     Goes to a target from one side in a few turns that get smaller, by the stiffness that its own
     turns have shown; waits after each until the force stands; keeps turning in bounded steps when
     the arm gives way and the force stalls; loosens until the force no longer answers for a target
-    of zero. Never turns while sampling, paused, or when a value is stale.
+    of zero. Never turns while the arm settles, while sampling or paused, or when a value is stale.
     """
 
     def __init__(self) -> None:
@@ -51,14 +52,22 @@ class Hand:
         self._free_force_N = 0.0
         self._gap_mm = 0.0  # loosened beyond the last contact
         self._searched_mm = 0.0
+        self._net_mm = self._contact_mm = 0.0  # turned since the set-up: now, and at contact
         self._last = (0.0, 0.0)  # advance mm and change of force N of the last turn
         self._target_N: float | None = None
         self._sense = 0.0
         self._loading = 1.0
 
+    @property
+    def released(self) -> bool:
+        """Whether the screw is known not to touch the arm."""
+        return self._released
+
     def decide(self, view: LiveView, now_s: float) -> float | None:
         """The advance to turn now, mm (negative loosens), or None. `now_s`: the clock's."""
-        if view.stale or view.phase in ("sampling", "paused") or not math.isfinite(view.force_N):
+        if view.stale or view.phase in HANDS_OFF:
+            return None
+        if not (math.isfinite(view.force_N) and math.isfinite(view.target_N)):
             return None
         if not self._at_rest(view, now_s):
             return None
@@ -70,8 +79,21 @@ class Hand:
         advance = max(-LARGEST_TURN_MM, min(LARGEST_TURN_MM, advance))
         free = self._is_free(view)
         expected = 0.0 if free else self._stiffness * advance
+        self._net_mm += advance
         self._turn = _Turn(advance, view.force_N, free, expected, now_s, time.monotonic())
         return advance
+
+    def turned_back(self, way_mm: float) -> None:
+        """Told that the screw was turned back by so much, to where it touches nothing.
+
+        The next contact is expected where the last one began, no earlier.
+        """
+        self._turn = None
+        self._target_N = 0.0
+        self._released = True
+        self._free_force_N = 0.0
+        self._net_mm -= way_mm
+        self._gap_mm = max(0.0, self._contact_mm - self._net_mm)
 
     def _at_rest(self, view: LiveView, now_s: float) -> bool:
         turn = self._turn
@@ -131,13 +153,15 @@ class Hand:
     def _approach(self, view: LiveView) -> float | None:
         need = view.target_N - view.force_N
         overshot = need * self._sense < 0
-        tolerated = view.band_N if overshot or view.phase == "settling" else 0.5 * view.band_N
+        tolerated = view.band_N if overshot else 0.5 * view.band_N
         if abs(need) <= tolerated:
             return None
         if overshot:
             return 0.7 * need / self._stiffest
         if self._is_free(view) and need * self._loading > 0:
             return self._search(view)
+        if self._searched_mm:
+            self._contact_mm = self._net_mm
         self._searched_mm = self._gap_mm = 0.0
         share = 0.85 if abs(need) > 3 * view.band_N else 1.0
         return share * need / self._stiffness

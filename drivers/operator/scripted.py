@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -9,9 +11,13 @@ from typing import Literal
 from drivers.clock import Clock
 from drivers.errors import BadReply, CannotConnect
 from drivers.interfaces import Command, LiveView, Prompt
-from drivers.operator.hand import Hand
+from drivers.operator.hand import HAND_MM_PER_S, Hand
 from drivers.operator.screw import ScrewClient
 from drivers.operator.settings import OperatorSettings
+
+UNLOAD_S, UNLOAD_WALL_S = 60.0, 5.0
+UNWATCHED_S = 0.5  # without a view for so long: nobody shows the force during the prompt
+CLEARANCE_MM = 0.1
 
 
 class ScriptedOperator:
@@ -19,7 +25,9 @@ class ScriptedOperator:
 
     Knows what a person at the screw would know: the views and what its own turns did. Answers
     prompts with their first answer, or with `answers[prompt.key]`; a prompt "mount" is carried
-    out in the emulated scene. `press` queues a command, as a key of the console would.
+    out in the emulated scene, a prompt "unload" by the views that come meanwhile, or, when none
+    come, by turning back what was turned since the set-up. `press` queues a command, as a key of
+    the console would. `guide` and `ask` may run in different threads.
     """
 
     name = "operator"
@@ -37,6 +45,9 @@ class ScriptedOperator:
         self._source = "emulated+scripted" if emulated else "scripted"
         self._client: ScrewClient | None = None
         self._hand = Hand()
+        self._net_mm = 0.0  # turned since the set-up
+        self._views = 0
+        self._lock = threading.Lock()
         self._commands: deque[Command] = deque()
         self.notices: deque[tuple[str, str]] = deque(maxlen=100)  # level, text
 
@@ -71,8 +82,9 @@ class ScriptedOperator:
 
     def ask(self, prompt: Prompt) -> str:
         """Answers at once; raises BadReply when the prepared answer is none of the prompt's."""
-        answer = self._answers.get(prompt.key, prompt.answers[0])
-        if answer not in prompt.answers:
+        offered = prompt.answers or ("said by the scripted operator",)
+        answer = self._answers.get(prompt.key, offered[0])
+        if prompt.answers and answer not in prompt.answers:
             raise BadReply(
                 self.name,
                 f"the prepared answer {answer!r} to {prompt.key!r} is none of "
@@ -81,13 +93,17 @@ class ScriptedOperator:
             )
         if prompt.key == "mount" and prompt.details is not None:
             self._mount(prompt.details)
+        if prompt.key == "unload":
+            self._unload()
         return answer
 
     def guide(self, view: LiveView) -> None:
         """Turns the screw a little when it is time to."""
-        advance_mm = self._hand.decide(view, self._clock.now())
-        if advance_mm is not None:
-            self._screw().turn(advance_mm * 1e-3)
+        with self._lock:
+            self._views += 1
+            advance_mm = self._hand.decide(view, self._clock.now())
+            if advance_mm is not None:
+                self._turn(advance_mm)
 
     def notify(self, text: str, level: Literal["info", "warning", "error"] = "info") -> None:
         """Kept in `notices`."""
@@ -110,8 +126,33 @@ class ScriptedOperator:
                 "Give the prompt details with direction and q_rad.",
             )
         joints = q_rad if isinstance(q_rad, Sequence) else None
-        self._screw().mount(direction, joints)
-        self._hand.reset()
+        with self._lock:
+            self._screw().mount(direction, joints)
+            self._hand.reset()
+            self._net_mm = 0.0
+
+    def _unload(self) -> None:
+        deadline = time.monotonic() + UNLOAD_WALL_S + UNLOAD_S / self._clock.speed
+        watched = time.monotonic()
+        views = self._views
+        while not self._hand.released:
+            if self._views != views:
+                views, watched = self._views, time.monotonic()
+            if time.monotonic() - watched > UNWATCHED_S or time.monotonic() > deadline:
+                self._turn_back()
+                return
+            time.sleep(0.005)
+
+    def _turn_back(self) -> None:
+        with self._lock:
+            way_mm = self._net_mm + CLEARANCE_MM
+            self._turn(-way_mm)
+            self._hand.turned_back(way_mm)
+        self._clock.sleep(abs(way_mm) / HAND_MM_PER_S + 1.0)
+
+    def _turn(self, advance_mm: float) -> None:
+        self._screw().turn(advance_mm * 1e-3)
+        self._net_mm += advance_mm
 
     def _screw(self) -> ScrewClient:
         if self._client is None:

@@ -179,20 +179,20 @@ def test_unloading_steps_are_approached_from_above() -> None:
         assert all(turn < 0 for turn in bench.turns[mark:])
 
 
-@pytest.mark.parametrize("phase", ["sampling", "paused"])
-def test_keeps_hands_off_while_sampling_and_paused(phase: str) -> None:
+@pytest.mark.parametrize("phase", ["mounting", "settling", "sampling", "paused"])
+def test_keeps_hands_off(phase: str) -> None:
     assert Hand().decide(view(10.0, 60.0, phase), 0.0) is None
 
 
 def test_does_not_turn_blind() -> None:
     assert Hand().decide(view(10.0, 60.0, stale=("dynamometer",)), 0.0) is None
     assert Hand().decide(view(float("nan"), 60.0), 0.0) is None
+    assert Hand().decide(view(10.0, float("nan")), 0.0) is None
 
 
-def test_while_settling_it_leaves_a_force_inside_the_band_alone() -> None:
-    assert Hand().decide(view(59.5, 60.0, "settling"), 0.0) is None
-    assert Hand().decide(view(59.5, 60.0, "step"), 0.0) is not None
-    assert Hand().decide(view(58.0, 60.0, "settling"), 0.0) is not None
+def test_leaves_a_force_in_the_middle_of_the_band_alone() -> None:
+    assert Hand().decide(view(59.8, 60.0), 0.0) is None
+    assert Hand().decide(view(59.5, 60.0), 0.0) is not None
 
 
 def test_waits_for_the_effect_of_a_turn() -> None:

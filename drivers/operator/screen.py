@@ -1,0 +1,208 @@
+"""What the operator's screen shows, as rich renderables; numbers in, picture out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from rich.align import Align
+from rich.console import Group, RenderableType
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from drivers.interfaces import LiveView, Prompt
+
+GLYPHS = {
+    "0": ("█▀█", "█ █", "█▄█"),
+    "1": ("▄█ ", " █ ", "▄█▄"),
+    "2": ("▀▀█", "█▀▀", "█▄▄"),
+    "3": ("▀▀█", " ▀█", "▄▄█"),
+    "4": ("█ █", "▀▀█", "  █"),
+    "5": ("█▀▀", "▀▀█", "▄▄█"),
+    "6": ("█▀▀", "█▀█", "█▄█"),
+    "7": ("▀▀█", "  █", "  █"),
+    "8": ("█▀█", "█▀█", "█▄█"),
+    "9": ("█▀█", "▀▀█", "▄▄█"),
+    "-": ("   ", "▀▀▀", "   "),
+    ".": (" ", " ", "▄"),
+    "N": ("█▄ █", "█ ▀█", "█  █"),
+    " ": (" ", " ", " "),
+}
+KEYS = "p pause   r redo step   R redo repetition   s skip   a abort"
+HANDS_OFF = {
+    "idle": "WAIT",
+    "mounting": "SET UP",
+    "taring": "HANDS OFF - force is being zeroed",
+    "settling": "HANDS OFF - the arm settles",
+    "sampling": "HANDS OFF - sampling",
+    "zero": "HANDS OFF - zero load",
+    "rest": "HANDS OFF - rest",
+    "paused": "PAUSED",
+}
+DIRECTION_COLOURS = {"TIGHTEN": "bold cyan", "LOOSEN": "bold magenta"}
+BAR_WIDTH = 61
+
+
+def large(text: str) -> list[str]:
+    """Three lines of block digits; characters without a glyph are left out."""
+    glyphs = [GLYPHS[c] for c in text if c in GLYPHS]
+    return [" ".join(glyph[row] for glyph in glyphs) for row in range(3)]
+
+
+def hint(view: LiveView, pitch_mm: float) -> tuple[str, str]:
+    """A word and how far: ("TIGHTEN", "about 0.4 turns"), ("HOLD", "in the band"), ...
+
+    How far follows from the stiffness of the last points and the screw's pitch; without a
+    stiffness no number is given.
+    """
+    if view.phase in HANDS_OFF:
+        return HANDS_OFF[view.phase], ""
+    if not (math.isfinite(view.force_N) and math.isfinite(view.target_N)):
+        return "WAIT", "no force to go by"
+    need = view.target_N - view.force_N
+    if abs(need) <= view.band_N:
+        return "HOLD", "in the band"
+    sense = math.copysign(1.0, view.target_N) if view.target_N else math.copysign(1.0, view.force_N)
+    word = "TIGHTEN" if need * sense > 0 else "LOOSEN"
+    if not view.stiffness_N_per_mm > 0:
+        return word, f"{abs(need):.1f} N to go"
+    turns = abs(need) / view.stiffness_N_per_mm / pitch_mm
+    return word, f"{abs(need):.1f} N to go, about {turns:.2f} turns"
+
+
+def bar(view: LiveView, width: int = BAR_WIDTH) -> Text:
+    """Where the force stands between zero and a quarter beyond the target, band marked."""
+    text = Text()
+    if not (math.isfinite(view.force_N) and math.isfinite(view.target_N)):
+        return Text("·" * width, style="dim")
+    top = 1.25 * max(abs(view.target_N), 4 * (view.band_N if view.band_N > 0 else 1.0), 1.0)
+    sense = -1.0 if view.target_N < 0 else 1.0
+    scale = (width - 1) / top
+    at = round(min(max(sense * view.force_N, 0.0), top) * scale)
+    low = round(max(sense * view.target_N - view.band_N, 0.0) * scale)
+    high = round(min(sense * view.target_N + view.band_N, top) * scale)
+    inside = abs(view.force_N - view.target_N) <= view.band_N
+    for column in range(width):
+        if column == at:
+            text.append("█", style="bold green" if inside else "bold yellow")
+        elif low <= column <= high:
+            text.append("▒", style="green")
+        else:
+            text.append("─" if column < at else "·", style="yellow" if column < at else "dim")
+    return text
+
+
+def number(value: float, form: str, unit: str) -> str:
+    """A value with its unit, or a dash when there is none."""
+    return f"{value:{form}} {unit}" if math.isfinite(value) else f"- {unit}"
+
+
+def screen(
+    view: LiveView | None,
+    *,
+    pitch_mm: float,
+    age_s: float,
+    stale_s: Mapping[str, float],
+    notices: Sequence[tuple[str, str]],
+    prompt: Prompt | None = None,
+    typed: str = "",
+    complaint: str = "",
+) -> RenderableType:
+    """The whole screen. `age_s`: of the view; `stale_s`: how long devices have been stale."""
+    parts: list[RenderableType] = []
+    if view is None:
+        parts.append(Text("waiting for the first values", style="dim"))
+    else:
+        parts += _live(view, pitch_mm, age_s, stale_s)
+    parts += [_notice(level, text) for level, text in notices]
+    if prompt is not None:
+        parts.append(_question(prompt, typed, complaint))
+    else:
+        parts.append(Text(KEYS, style="dim"))
+    return Panel(Group(*parts), title=_title(view), border_style="grey50")
+
+
+def _title(view: LiveView | None) -> str:
+    if view is None or not view.direction:
+        return "stiffness measurement"
+    return (
+        f"pose {view.pose}   direction {view.direction}   "
+        f"repetition {view.repetition} of {view.repetitions}   step {view.step} of {view.steps}"
+    )
+
+
+def _live(
+    view: LiveView, pitch_mm: float, age_s: float, stale_s: Mapping[str, float]
+) -> list[RenderableType]:
+    old = age_s > 1.0 or bool(stale_s)
+    style = "grey42" if old else "bold white"
+    force = f"{view.force_N:.1f} N" if math.isfinite(view.force_N) else "--- N"
+    word, far = ("STOP", "values are old") if old else hint(view, pitch_mm)
+    arrow = {"TIGHTEN": "▶▶ ", "LOOSEN": "◀◀ "}.get(word, "")
+    colour = DIRECTION_COLOURS.get(word, "bold green" if word == "HOLD" else "bold")
+    target = f"target {number(view.target_N, '.1f', 'N')} ± {number(view.band_N, '.2g', 'N')}"
+    parts: list[RenderableType] = [Text()]
+    parts += [Align.center(Text(line, style=style)) for line in large(force)]
+    parts += [
+        Text(),
+        Align.center(bar(view)),
+        Align.center(Text(target)),
+        Text(),
+        Align.center(Text(f"{arrow}{word}", style="bold red" if old else colour)),
+        Align.center(Text(far or " ")),
+        Text(),
+        _facts(view, style),
+    ]
+    for device, seconds in stale_s.items():
+        parts.append(Text(f"{device}: no fresh value for {seconds:.1f} s", style="bold red"))
+    if age_s > 1.0:
+        parts.append(Text(f"the picture is {age_s:.0f} s old", style="bold red"))
+    if view.message:
+        parts.append(Text(view.message, style="yellow"))
+    return parts
+
+
+def _facts(view: LiveView, style: str) -> Table:
+    table = Table.grid(padding=(0, 3), expand=True)
+    for _ in range(4):
+        table.add_column(justify="center")
+    settling = f"{view.settle_remaining_s:.0f} s" if view.phase == "settling" else "-"
+    table.add_row("displacement", "phase", "settling", "samples", style="dim")
+    table.add_row(
+        number(view.displacement_mm, ".3f", "mm"),
+        view.phase,
+        settling,
+        f"{view.samples} of {view.samples_wanted}",
+        style=style,
+    )
+    return table
+
+
+def _notice(level: str, text: str) -> Text:
+    colour = {"warning": "yellow", "error": "bold red"}.get(level, "dim")
+    return Text(text, style=colour)
+
+
+def _question(prompt: Prompt, typed: str, complaint: str) -> Panel:
+    text = Text(prompt.text + "\n", style="bold")
+    if prompt.answers:
+        text.append("Type " + " / ".join(prompt.answers), style="cyan")
+        text.append(" (or its beginning) and Enter: ", style="dim")
+    else:
+        text.append("Type and Enter: ", style="dim")
+    text.append(typed + "▏")
+    if complaint:
+        text.append(f"\n{complaint}", style="red")
+    return Panel(text, border_style="cyan")
+
+
+def plain(view: LiveView, pitch_mm: float) -> str:
+    """One line for outputs that are no terminal."""
+    word, far = hint(view, pitch_mm)
+    stale = f" STALE: {', '.join(view.stale)}" if view.stale else ""
+    return (
+        f"{view.direction} {view.repetition}/{view.repetitions} step {view.step}/{view.steps} "
+        f"{view.phase}: {number(view.force_N, '.1f', 'N')} of {number(view.target_N, '.1f', 'N')}, "
+        f"{number(view.displacement_mm, '.3f', 'mm')} - {word}{', ' + far if far else ''}{stale}"
+    )
