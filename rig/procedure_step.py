@@ -145,13 +145,16 @@ class StepProcedure:
                 taken += 1
 
     def zero_plateau(self, where: Where, seconds: float) -> None:
-        """Samples without load for so long."""
+        """Samples without load for so long, once the unloaded arm has settled."""
         zero = Step(0, "zero", 0.0)
         wanted = round(seconds * self._protocol.sampling.rate_Hz)
-        self._supervision.show(phase="zero", step=0, target_N=0.0, samples_wanted=wanted)
+        if wanted == 0:
+            return
+        self._supervision.show(step=0, target_N=0.0, samples=0, samples_wanted=wanted)
+        self._settle(where, zero, banded=False)
         taken = 0
         while taken < wanted:
-            self._supervision.show(samples=taken)
+            self._supervision.show(phase="zero", samples=taken)
             _, slot = self._supervision.tick()
             if slot is not None and self.record(slot, where, zero, settled=True):
                 taken += 1
