@@ -1,0 +1,295 @@
+"""`rig identify`: the six joint stiffnesses that data sets tell of, and what they do not tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arm import JOINTS, Arm, tool_offset
+from identification.curve import Curve
+from identification.estimate import stated_uncertainty
+from identification.joints import Gains, JointFit, Observation, Prior
+from identification.joints import identify as estimate
+from identification.levels import grid_of
+from identification.next_poses import Plan, Proposal, propose
+from identification.stiffness import Stiffness, analyze_curve
+from rig.dataset import Dataset, load
+from rig.errors import InputError
+from rig.model import load_robot
+from rig.reduce import curves
+
+Array = NDArray[np.float64]
+
+# What a joint reading may be off by from one load to another: the arm's stated repeatability,
+# 0.05 mm at 1.3 m. The readings' resolution is finer, their linearity is not published.
+ENCODER_U_RAD = 4e-5
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifyResult:
+    """Fit, the observations behind it, and the proposed next poses with their load."""
+
+    datasets: tuple[str, ...]
+    arm: Arm
+    fit: JointFit
+    observations: tuple[Observation, ...]
+    proposals: tuple[Proposal, ...]
+    tool_xyz: tuple[float, float, float]
+    notes: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """`rig.joints/1`, with further keys."""
+        fit, ci = self.fit, self.fit.ci95
+        return {
+            "schema": "rig.joints/1",
+            "datasets": list(self.datasets),
+            "joint_stiffness_Nm_per_rad": [
+                {
+                    "value": float(fit.stiffness[j]),
+                    "standard_uncertainty": float(fit.stiffness[j] * fit.relative_sd[j]),
+                    "ci95": [float(ci[j, 0]), float(ci[j, 1])],
+                }
+                for j in range(JOINTS)
+            ],
+            "rank": fit.rank,
+            "null_dimension": JOINTS - fit.rank,
+            "identified": [bool(i) for i in fit.identified],
+            "share_of_data": [float(s) for s in fit.data_share],
+            "lower_bound_Nm_per_rad": [float(b) for b in fit.lower_bound],
+            # infinite with a null space: JSON knows no such number
+            "condition_number": _finite(fit.condition_number),
+            "prior": {
+                "joint_stiffness_Nm_per_rad": [float(v) for v in fit.prior.stiffness],
+                "relative_sd": [float(v) for v in fit.prior.relative_sd],
+                "source": fit.prior.source,
+            },
+            "null_space": fit.null_space.T.tolist(),
+            "next_poses": [
+                {
+                    "q_rad": [float(v) for v in p.q],
+                    "direction": [float(v) for v in p.direction],
+                    "why": p.why,
+                    "force_N": p.force,
+                    "expected_relative_uncertainty": [float(v) for v in p.expected],
+                }
+                for p in self.proposals
+            ],
+            "notes": list(self.notes),
+        }
+
+    def to_text(self) -> str:
+        """Tables for a terminal."""
+        from rig.identify_text import text
+
+        return text(self)
+
+
+def identify(
+    paths: Sequence[str | Path],
+    *,
+    prior: Prior | None = None,
+    joint_readings: bool = True,
+    proposals: int = 6,
+    seed: int = 0,
+) -> IdentifyResult:
+    """Joint stiffnesses from one or many data sets.
+
+    prior: by default the robot file's stiffnesses and relative sd. joint_readings False: the laser
+    alone. proposals: how many next poses are looked for. Raises InputError.
+    """
+    if not paths:
+        raise InputError("rig identify: give at least one data set.")
+    datasets = [load(Path(p)) for p in paths]
+    names = [str(p) for p in paths]
+    arm = _arm(datasets, names)
+    prior = prior or Prior(
+        arm.joint_stiffness, arm.joint_stiffness_relative_sd, f"data/models/{arm.name}.yaml"
+    )
+    observations: list[Observation] = []
+    notes: list[str] = []
+    for setup, (dataset, name) in enumerate(zip(datasets, names, strict=True)):
+        found, said = _observations(dataset, name, setup, joint_readings)
+        observations += found
+        notes += said
+    gains = [_gains(d) for d in datasets]
+    try:
+        fit = estimate(arm, observations, gains, prior)
+        planned = _plan(datasets[0], gains[0])
+        next_poses = propose(arm, fit, planned, proposals, seed) if proposals else []
+    except ValueError as error:
+        raise InputError(f"{', '.join(names)}: {error}.") from error
+    notes += _blind_joints(arm, observations, fit)
+    first = next(iter(datasets[0].meta.poses.values()))
+    return IdentifyResult(
+        datasets=tuple(names),
+        arm=arm.with_stiffness(fit.stiffness, fit.relative_sd),
+        fit=fit,
+        observations=tuple(observations),
+        proposals=tuple(next_poses),
+        tool_xyz=first.tcp_xyz_mm,
+        notes=tuple(notes),
+    )
+
+
+def _arm(datasets: Sequence[Dataset], names: Sequence[str]) -> Arm:
+    robots = [d.meta.robot for d in datasets]
+    for name, robot in zip(names, robots, strict=True):
+        if robot == "none":
+            raise InputError(f"{name}: robot: none; joint stiffnesses need an arm.")
+        if robot != robots[0]:
+            raise InputError(
+                f"{name} is of a {robot}, {names[0]} of a {robots[0]}; "
+                "give data sets of one robot together."
+            )
+    return load_robot(robots[0])
+
+
+def _gains(dataset: Dataset) -> Gains:
+    instruments = dataset.meta.instruments
+    return Gains(instruments.force.gain_relative_sd, instruments.displacement.gain_relative_sd)
+
+
+def _plan(dataset: Dataset, gains: Gains) -> Plan:
+    """The next measurement with the same instruments and tool."""
+    instruments = dataset.meta.instruments
+    tcp = next(iter(dataset.meta.poses.values())).tcp_xyz_mm
+    return Plan(
+        u_force=instruments.force.standard_uncertainty_N,
+        u_displacement=instruments.displacement.standard_uncertainty_mm / 1e3,
+        gains=gains,
+        tool=tool_offset(np.array(tcp) / 1e3),
+    )
+
+
+def _observations(
+    dataset: Dataset, name: str, setup: int, joint_readings: bool
+) -> tuple[list[Observation], list[str]]:
+    """One observation a pose and direction that has a stiffness."""
+    found: list[tuple[Curve, Stiffness, float]] = []
+    notes: list[str] = []
+    for (pose, direction), curve in curves(dataset).items():
+        result = analyze_curve(curve)
+        label = f"{name}: pose {pose}, direction {direction}"
+        if result.k is None or not result.k.value > 0:
+            notes.append(f"{label} is left out: {result.sentence or 'no stiffness above 0'}")
+            continue
+        if result.excluded:
+            notes.append(f"{label}: {len(result.excluded)} steps do not count towards k.")
+        found.append((curve, result, _stated(curve, result)))
+    scale = _scale(found)
+    out = []
+    for curve, result, stated in found:
+        assert result.k is not None
+        stood = dataset.meta.poses[curve.pose]
+        k = result.k.value
+        joints, u_joints = _joint_readings(dataset, curve, result) if joint_readings else _NONE
+        out.append(
+            Observation(
+                q=np.array(stood.q_rad),
+                direction=np.array(curve.unit_vector),
+                tool=tool_offset(np.array(stood.tcp_xyz_mm) / 1e3),
+                compliance=1 / k,
+                u_compliance=scale * stated / k**2,
+                joints=joints,
+                u_joints=u_joints,
+                setup=setup,
+                label=f"{name}: pose {curve.pose}, direction {curve.direction}",
+            )
+        )
+    if not out:
+        raise InputError(f"{name}: no pose and direction has a stiffness. {' '.join(notes)}")
+    return out, notes
+
+
+_NONE: tuple[Array | None, Array | None] = (None, None)
+
+
+def _stated(curve: Curve, result: Stiffness) -> float:
+    """Standard uncertainty of k (N/m) from the levels' stated ones, repetitions averaged."""
+    dropped = {e.step for e in result.excluded}
+    loading = grid_of(curve.points, "loading")
+    used = loading.keep(s for s in loading.steps if s not in dropped)
+    table = used.mean()
+    u = stated_uncertainty(table, result.choice)
+    return float(u / np.sqrt(max(1, len(used.repetitions))))
+
+
+def _scale(found: Sequence[tuple[Curve, Stiffness, float]]) -> float:
+    """How much the repetitions scatter, over what was stated, pooled over all curves.
+
+    Few repetitions estimate their own scatter badly; all curves together do it well. Never below
+    one quarter, because a stated uncertainty also holds what repetitions share.
+    """
+    squares = dof = 0.0
+    for _, result, stated in found:
+        n = len(result.by_repetition)
+        if n > 1 and stated > 0:
+            squares += float(np.var(result.by_repetition, ddof=1)) / n / stated**2 * (n - 1)
+            dof += n - 1
+    return max(0.25, float(np.sqrt(squares / dof))) if dof else 1.0
+
+
+def _joint_readings(
+    dataset: Dataset, curve: Curve, result: Stiffness
+) -> tuple[Array | None, Array | None]:
+    """Slopes rad/N (6,) of the joint readings over force, and their standard uncertainties.
+
+    Least squares with one intercept a repetition, over the loading levels that count and the
+    unloaded ones. None where readings do not contain the deflection, or were not recorded.
+    """
+    columns = dataset.columns
+    names = [f"q{j}_rad" for j in range(1, JOINTS + 1)]
+    if dataset.meta.joint_encoder != "output" or not all(n in columns for n in names):
+        return _NONE
+    dropped = [e.step for e in result.excluded]
+    rows = (columns["pose"] == curve.pose) & (columns["direction"] == curve.direction)
+    rows &= ~columns["discarded"] & np.isin(columns["branch"], ["zero", "loading"])
+    rows &= ~np.isin(columns["step"], dropped) | (columns["branch"] == "zero")
+    force, repetition = columns["force_N"][rows], columns["repetition"][rows]
+    q = np.stack([columns[n][rows] for n in names], axis=-1).astype(float)
+    slopes, u = _slopes(np.asarray(force, dtype=float), np.asarray(repetition), q)
+    return slopes, u
+
+
+def _slopes(force: Array, repetition: NDArray[Any], q: Array) -> tuple[Array | None, Array | None]:
+    f, dq = force.copy(), q.copy()
+    for r in np.unique(repetition):
+        mine = repetition == r
+        f[mine] -= f[mine].mean()
+        dq[mine] -= dq[mine].mean(axis=0)
+    span, xx = float(np.ptp(force)) if force.size else 0.0, float(f @ f)
+    free = force.size - np.unique(repetition).size - 1
+    if span <= 0 or free < 1 or not np.isfinite(dq).all():
+        return _NONE
+    slopes = f @ dq / xx
+    scatter = ((dq - f[:, None] * slopes) ** 2).sum(axis=0) / free / xx
+    return slopes, np.sqrt(scatter + (ENCODER_U_RAD / span) ** 2)
+
+
+def _blind_joints(arm: Arm, observations: Sequence[Observation], fit: JointFit) -> list[str]:
+    levers = np.array([one.levers(arm) for one in observations])
+    notes = [
+        f"Joint {j + 1} has no lever in any of these poses and directions: it repeats the prior."
+        for j in range(JOINTS)
+        if np.abs(levers[:, j]).max() < 1e-6
+    ]
+    if np.abs(levers[:, 5]).max() < 1e-6:
+        notes.append(
+            "Joint 6 is seen only when the point of load lies beside axis 6: mount a tool that "
+            "is offset sideways (tcp_xyz_mm)."
+        )
+    if fit.birge > 1:
+        notes.append(
+            f"The six springs do not explain these data within their uncertainties; those were "
+            f"enlarged {fit.birge:.2g} times. rig diagnose looks for what is missing."
+        )
+    return notes
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

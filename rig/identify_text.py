@@ -1,0 +1,127 @@
+"""The result of `rig identify` in words, as a model file, and as the next protocol."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.errors import InputError
+
+if TYPE_CHECKING:
+    from rig.identify import IdentifyResult
+
+
+def text(result: IdentifyResult) -> str:
+    """Everything that a terminal shows."""
+    fit = result.fit
+    lines = [
+        f"Joint torsional stiffness of the {result.arm.name} from {len(result.observations)} "
+        f"poses and directions; rank {fit.rank}, null space of dimension {6 - fit.rank}, "
+        f"condition number {fit.condition_number:.3g}.",
+        "  joint   kNm/rad (standard uncertainty)   95 % interval        from data  at least",
+    ]
+    for j in range(6):
+        c, u = fit.stiffness[j] / 1e3, fit.stiffness[j] * fit.relative_sd[j] / 1e3
+        low, high = fit.ci95[j] / 1e3
+        bound = f"{fit.lower_bound[j] / 1e3:.2f}" if fit.lower_bound[j] > 1 else "-"
+        share = 100 * fit.data_share[j]
+        verdict = "identified" if fit.identified[j] else _not_identified(share)
+        lines.append(
+            f"  {j + 1}       {c:9.2f} ({u:.2g})".ljust(42)
+            + f"{low:8.2f} to {high:8.2f}   {share:6.1f} %  {bound:>10}   {verdict}"
+        )
+    lines.append(f"Prior: {fit.prior.source}, relative sd {_list(100 * fit.prior.relative_sd)} %.")
+    if result.proposals:
+        lines.append("Next poses that would tell most, in this order:")
+        for p in result.proposals:
+            lines.append(
+                f"  q = ({_list(np.rad2deg(p.q))}) deg, along {p.axis}, to {p.force:.0f} N: {p.why}"
+            )
+    lines += [f"Note: {note}" for note in result.notes]
+    return "\n".join(lines)
+
+
+def model_text(result: IdentifyResult) -> str:
+    """A model file that holds the identified stiffnesses, in the first measured pose."""
+    fit, q = result.fit, result.observations[0].q
+    x, y, z = (v / 1e3 for v in result.tool_xyz)
+    return (
+        f"# Identified from {', '.join(Path(d).name for d in result.datasets)}\n"
+        f"robot: {result.arm.name}\n"
+        f"pose: {{q_rad: [{_list(q, 9)}]}}\n"
+        f"tool: {{flange_T_tcp: [[1, 0, 0, {x:g}], [0, 1, 0, {y:g}], [0, 0, 1, {z:g}], "
+        "[0, 0, 0, 1]]}\n"
+        f"joint_stiffness_Nm_per_rad: [{_list(fit.stiffness, 7)}]\n"
+        f"joint_stiffness_sd: [{_list(fit.stiffness * fit.relative_sd, 4)}]\n"
+        "effects: []\n"
+    )
+
+
+def protocol_text(result: IdentifyResult, station: str = "ur10e_lab", levels: int = 10) -> str:
+    """A protocol file that measures the proposed poses and directions."""
+    if not result.proposals:
+        raise InputError("rig identify: no next poses were looked for; there is no protocol.")
+    poses, runs = [], []
+    for i, p in enumerate(result.proposals, 1):
+        poses.append(
+            f"  N{i}: {{q_rad: [{_list(p.q, 9)}], "
+            f"tcp_xyz_mm: [{_list(np.array(result.tool_xyz))}], program: null}}"
+        )
+        step = p.force / levels
+        runs.append(
+            f"  - {{pose: N{i}, direction: {p.axis}, "
+            f"steps_N: [{_list(step * np.arange(1, levels + 1), 5)}]}}"
+        )
+    greatest = max(p.force for p in result.proposals)
+    softest = max(
+        p.force * float((one**2 / result.fit.stiffness).sum())
+        for p, one in ((p, _levers(result, p.q, p.direction)) for p in result.proposals)
+    )
+    return (
+        "# Poses and directions that would tell most about the joints still uncertain.\n"
+        "schema: rig.protocol/1\n"
+        "title: Next poses for the joint stiffnesses\n"
+        f"station: {station}\n\nrobot: {result.arm.name}\nposes:\n" + "\n".join(poses) + "\n"
+        "move_arm: false\njoint_encoder: output\n\n"
+        "directions:\n  x: [1, 0, 0]\n  y: [0, 1, 0]\n  z: [0, 0, 1]\n\n"
+        "runs:\n" + "\n".join(runs) + "\nrepetitions: 3\nbranches: loading\norder: by_run\n\n"
+        "sampling: {rate_Hz: 1, samples_per_step: 5}\nhold_s: 0\n"
+        "force_band: {absolute_N: 0.5, relative: 0.01}\n"
+        "settle:\n  window_s: 4\n  force_slope_N_per_s: 0.05\n  force_spread_N: 0.3\n"
+        "  displacement_slope_mm_per_s: 0.002\n  displacement_spread_mm: 0.01\n"
+        "  deadline_s: 60\n  at_deadline: record\n"
+        "step_deadline_s: 300\nzero: {before_s: 6, after_s: 6}\nrest_s: 10\n"
+        "rated_load_N: null\n\nlimits:\n"
+        f"  force_N: {{max: {1.15 * greatest + 5:.0f}, at: stop}}\n"
+        f"  displacement_mm: {{max: {min(9.5, 2e3 * softest + 1):.1f}, at: stop}}\n"
+        "  joint_deviation_deg: {max: 5, at: stop}\n"
+        "  joint_temperature_C: {max: 60, at: stop}\n"
+    )
+
+
+def write_model(result: IdentifyResult, path: Path) -> None:
+    """Writes `model_text`; what rig couple, rig simulate and rig diagnose read."""
+    path.write_text(model_text(result), "utf-8")
+
+
+def write_protocol(result: IdentifyResult, path: Path, station: str = "ur10e_lab") -> None:
+    """Writes `protocol_text`; what rig measure runs."""
+    path.write_text(protocol_text(result, station), "utf-8")
+
+
+def _levers(result: IdentifyResult, q: object, direction: object) -> np.ndarray:
+    tool = result.observations[0].tool
+    J = result.arm.jacobian(np.asarray(q), tool)
+    return np.asarray(np.asarray(direction) @ J[:3])
+
+
+def _not_identified(share: float) -> str:
+    if share < 10:
+        return "repeats the prior"
+    return "measured, not to 5 %" if share >= 90 else "partly seen, not identified"
+
+
+def _list(values: object, digits: int = 4) -> str:
+    return ", ".join(f"{v:.{digits}g}" for v in np.asarray(values, dtype=float))
