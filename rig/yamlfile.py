@@ -25,7 +25,7 @@ from rig.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, re
 T = TypeVar("T")
 _UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = 250_000  # the longest files of this kind have a few thousand
 
 
 @dataclass
@@ -85,7 +85,7 @@ def read_text(path: Path) -> str:
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise InputError(
-                f"{path}: {size / 1e6:.1f} MB; these files have at most {MAX_BYTES / 1e6:.0f} MB. "
+                f"{path}: {size / 1e3:.0f} kB; these files have at most {MAX_BYTES / 1e3:.0f} kB. "
                 "Is it a YAML file?"
             )
         raw = path.read_bytes()
@@ -289,7 +289,7 @@ def _hint(value: object, nodes: Sequence[words.Schema]) -> str:
             return " Write the number alone; the unit stands in the key."
     if "boolean" in kinds and str(value).lower() in ("yes", "no", "on", "off", "y", "n"):
         return " This is text in YAML 1.2; write true or false."
-    if isinstance(value, int | float) and kinds & {"string"}:
+    if isinstance(value, int | float) and "string" in kinds and not _texts(nodes):
         return " Put it in quotes if it is a name."
     if isinstance(value, str):
         options = _texts(nodes)

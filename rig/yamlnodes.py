@@ -25,6 +25,7 @@ MAX_SHOWN = 30
 PLAIN_NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _PLAIN_INT = re.compile(r"[-+]?[0-9]+")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_TOO_DEEP = re.compile(r"(?:[\[{]\s*){100}")  # found at once; the parser needs seconds for it
 _NULLS = ("", "~", "null", "Null", "NULL")
 _BOOLS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
 _CORE_TAGS = frozenset(
@@ -75,6 +76,8 @@ def _address(name: str, problem: Problem) -> str:
 
 def compose(text: str, name: str) -> Node:
     """The node tree of one document; raises InputError for text that is no YAML."""
+    if _TOO_DEEP.search(text):
+        raise InputError(f"{name}: nested too deeply.")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
