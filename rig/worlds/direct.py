@@ -104,6 +104,8 @@ class _Session:
         self._run_start = 0.0
         self._setup: tuple[str, str] | None = None
         self._drift = np.zeros(3)
+        # The rest between two runs is short or long: the controller uses its second half.
+        world.controller_waits_s = SETTLE_S + procedure.zero.after_s + 0.5 * procedure.rest_s
 
     def rows(self) -> Iterator[_Row]:
         """Samples in the order of measurement."""

@@ -15,8 +15,8 @@ figure; levers (m) are those of the reference pose, tool length 0:
 - y: joint 1 makes up for what joints 2 and 3 take: 36.84 kNm/rad gives the published
   57.42 N/mm over 7.5 ... 75 N (secants fall from 57.46 to 57.38).
 - Knee at 75.0 N: joint 1 yields at 0.75 m * 75.0 N = 56.25 Nm; hardening of 705 Nm/rad leaves a
-  slope of 1.25 N/mm and u(82 N) = 7.01 mm. Unloaded, the deflection remains until the controller
-  takes the joint back.
+  slope of 1.23 N/mm and u(82 N) = 7.01 mm (published 7.01). Unloaded, the deflection remains until
+  the controller takes the joint back.
 """
 
 from __future__ import annotations

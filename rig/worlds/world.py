@@ -26,9 +26,11 @@ from rig.worlds.balance import root
 from rig.worlds.laws import Law
 
 HOME_GAP_M = 0.3e-3  # air between screw and arm after the set-up
-HAND_SPEED_M_PER_S = 0.3e-3  # a fine thread, about half a turn a second
+HAND_SPEED_M_PER_S = 0.4e-3  # a fine thread, most of a turn in a second
 SCREW_STIFFNESS_N_PER_M = 5.0e6  # screw and dynamometer
-CONTROLLER_WAITS_S = 12.0  # unloaded so long, the controller takes the joints back
+LOOSENING_M_PER_S = 2.0e-3  # backwards without touching the arm
+ZERO_PLATEAU_S = 6.0  # after a run, unless told otherwise
+CONTROLLER_WAITS_S = 14.0  # after the zero plateau, before it takes yielded joints back
 NEW_CONTACT_AFTER_S = 1.0  # without touching, before the fixture seats itself anew
 SEATING_FORCE_N = 5.0  # at which half of a contact's seating scatter has shown
 
@@ -85,6 +87,8 @@ class World:
 
     `force_gain` and `displacement_gain` are the true gains of the two chains, drawn once from
     their stated relative standard deviations; whoever senses the world applies them.
+    `controller_waits_s`: unloaded so long, the controller takes yielded joints back; longer than
+    the zero plateau after a run, shorter than the pause before the next.
     `torques_per_N` (6): what a newton along the mounted direction puts on the joints, Nm.
     """
 
@@ -102,6 +106,7 @@ class World:
         self.seed = seed
         self.force_gain = float(1.0 + force_gain_sd * gains.standard_normal())
         self.displacement_gain = float(1.0 + displacement_gain_sd * gains.standard_normal())
+        self.controller_waits_s = ZERO_PLATEAU_S + CONTROLLER_WAITS_S
         self._elements = design.elements()
         self.direction = np.array([1.0, 0.0, 0.0])
         self.move(design.q_rad, design.tcp_m)
@@ -156,8 +161,9 @@ class World:
 
     def step(self, dt: float) -> State:
         """Goes on by `dt` seconds: turns the screw at the hand's speed, finds the force."""
-        most = HAND_SPEED_M_PER_S * dt
         left = self.target_m - self.advance_m
+        free = left < 0 and self.state.force_N == 0
+        most = (LOOSENING_M_PER_S if free else HAND_SPEED_M_PER_S) * dt
         self.advance_m = (
             self.target_m if abs(left) <= most else self.advance_m + math.copysign(most, left)
         )
@@ -175,6 +181,10 @@ class World:
         reach = state.displacement_m + force_N / SCREW_STIFFNESS_N_PER_M
         self.advance_m = self.target_m = HOME_GAP_M + reach - clearance
         return state
+
+    def expect_zero_plateau(self, seconds: float) -> None:
+        """The zero plateau after each run lasts so long: till then yielded joints stay."""
+        self.controller_waits_s = seconds + CONTROLLER_WAITS_S
 
     def true_curve(self, direction: Sequence[float], forces_N: Sequence[float]) -> Array:
         """(n,) m: the tool's displacement along `direction` in the present pose, first loading
@@ -196,7 +206,7 @@ class World:
                 self._compliance = max(moved / rise, 0.0) + 1.0 / SCREW_STIFFNESS_N_PER_M
         else:
             self._unloaded_s += dt
-            if self._unloaded_s > CONTROLLER_WAITS_S:
+            if self._unloaded_s > self.controller_waits_s:
                 self._return_joints(dt)
         return self.state
 
