@@ -16,7 +16,7 @@ FaultTable = Callable[[str, str, str, str, str], None]
 def fault_table() -> FaultTable:
     """Records what became of an injected fault: (device, fault, when, outcome, message).
 
-    `when` is "at start" or "in mid-run", `outcome` the name of the error class. Appends one JSON
+    `when` is "start" or "mid-run", `outcome` the name of the error class. Appends one JSON
     line to the file that the environment variable RIG_FAULT_TABLE names; without it, nothing.
     """
     target = os.environ.get("RIG_FAULT_TABLE")

@@ -85,9 +85,9 @@ def test_every_column_arrives_in_its_place(rig: Rig) -> None:
     assert reading.problems == ()
     for n in range(6):
         assert got[f"q{n + 1}_rad"] == pytest.approx(n / 10 + 0.05, abs=1e-4)
-        assert got[f"target_q{n + 1}_rad"] == n / 10
+        assert got[f"target_q{n + 1}_rad"] == pytest.approx(n / 10, abs=1e-12)
         assert got[f"current{n + 1}_A"] == pytest.approx(scene.current[n], abs=0.1)
-        assert got[f"target_current{n + 1}_A"] == scene.current[n]
+        assert got[f"target_current{n + 1}_A"] == pytest.approx(scene.current[n], abs=1e-12)
         assert got[f"temperature{n + 1}_C"] == pytest.approx(scene.temperatures_C[n], abs=1e-9)
     places = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
     for name, wanted in zip(places, scene.pose, strict=True):
@@ -276,6 +276,16 @@ def test_a_move_by_hand_is_accepted_only_when_said_so(rig: Rig) -> None:
 
 # -- nothing is left behind
 
+
+def test_the_client_process_leaves_by_itself_when_its_input_closes(rig: Rig) -> None:
+    _, _, robot = rig()
+    robot.open()
+    process = robot._process
+    assert process is not None
+    robot.close()
+    assert process._process.returncode == 0  # not killed
+
+
 _OPEN_AND_WAIT = """
 import json, sys, time
 from drivers.clock import Clock
@@ -339,6 +349,27 @@ def test_the_watchdog_ends_a_constructor_that_hangs(rig: Rig) -> None:
             assert child.wait(20) == 1
         finally:
             child.kill()
+
+
+def test_what_the_library_prints_does_not_mix_with_the_messages(tmp_path: Path) -> None:
+    talkative = "import os\nclass RTDEReceiveInterface:\n    def __init__(self, *_):\n"
+    talkative += "        os.write(1, b'chatter')\n        raise RuntimeError('out of order')\n"
+    (tmp_path / "rtde_receive.py").write_text(talkative)
+    options = {"host": "", "frequency_Hz": 125, "connect_s": 9, "block_s": 0.1, "poll_s": 0.004}
+    child = subprocess.Popen(
+        [sys.executable, "-m", "drivers.ur10e.child", json.dumps(options)],
+        stdin=subprocess.PIPE,  # stays open: closing it would end the child
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=PROJECT,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )
+    with child:
+        assert child.wait(20) == 3
+        assert child.stdout is not None
+        assert child.stderr is not None
+        assert json.loads(child.stdout.read()) == {"error": "out of order"}
+        assert child.stderr.read() == b"chatter"
 
 
 def test_a_mean_of_attitudes_is_an_attitude(rig: Rig) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -99,7 +100,7 @@ def test_at_start(rig: Rig, fault_table: FaultTable, fault: str) -> None:
         robot.open()
     assert type(caught.value) is kind
     assert_explained(caught.value, words)
-    fault_table("robot", fault, "at start", kind.__name__, str(caught.value))
+    fault_table("robot", fault, "start", kind.__name__, str(caught.value))
 
 
 IN_MID_RUN: dict[str, tuple[type[DeviceError], tuple[str, ...]]] = {
@@ -130,15 +131,15 @@ def test_in_mid_run(rig: Rig, fault_table: FaultTable, fault: str) -> None:
         robot.latest()
     with pytest.raises(kind):
         robot.state()
-    fault_table("robot", fault, "in mid-run", kind.__name__, str(caught.value))
+    fault_table("robot", fault, "mid-run", kind.__name__, str(caught.value))
 
 
 @pytest.mark.parametrize(
     ("fault", "when"),
     [
-        ("program_stopped", "at start"),
-        ("wrong_version", "in mid-run"),
-        ("slow_start", "in mid-run"),
+        ("program_stopped", "start"),
+        ("wrong_version", "mid-run"),
+        ("slow_start", "mid-run"),
     ],
 )
 def test_what_cannot_be_seen_changes_nothing(
@@ -146,7 +147,7 @@ def test_what_cannot_be_seen_changes_nothing(
 ) -> None:
     """An arm without a program is a normal one; a handshake that is over cannot fail."""
     emulator, robot = rig(15.0)
-    if when == "at start":
+    if when == "start":
         emulator.inject(fault)
     robot.open()
     emulator.inject(fault)
@@ -193,7 +194,7 @@ def test_the_client_process_is_killed(rig: Rig, fault_table: FaultTable) -> None
     with pytest.raises(ReadTimeout) as caught:
         fail_in_mid_run(robot)
     assert_explained(caught.value, ("died of signal SIGKILL",))
-    fault_table("robot", "client killed", "in mid-run", "ReadTimeout", str(caught.value))
+    fault_table("robot", "client killed", "mid-run", "ReadTimeout", str(caught.value))
 
 
 def test_the_client_process_hangs(rig: Rig, fault_table: FaultTable) -> None:
@@ -206,7 +207,7 @@ def test_the_client_process_hangs(rig: Rig, fault_table: FaultTable) -> None:
         fail_in_mid_run(robot)
     assert_explained(caught.value, ("client library does not answer", "more than 1 s"))
     assert not psutil.pid_exists(pid)
-    fault_table("robot", "client hangs", "in mid-run", "ReadTimeout", str(caught.value))
+    fault_table("robot", "client hangs", "mid-run", "ReadTimeout", str(caught.value))
 
 
 def test_the_controller_falls_mute_after_the_handshake(
@@ -226,6 +227,38 @@ def test_the_controller_falls_mute_after_the_handshake(
     with pytest.raises(CannotConnect) as caught:
         robot.open()
     assert_explained(caught.value, ("delivered no values", "although the handshake worked"))
+
+
+@pytest.mark.parametrize("peek", ["latest", "state"])
+def test_peeking_alone_finds_out_that_the_values_are_old(rig: Rig, peek: str) -> None:
+    emulator, robot = rig(15.0)
+    robot.open()
+    emulator.inject("silence")
+    deadline = time.monotonic() + 30
+    with pytest.raises(ReadTimeout, match="more than 1 s"):
+        peek_until(robot, peek, deadline)
+
+
+def peek_until(robot: Ur10e, peek: str, deadline: float) -> None:
+    while time.monotonic() < deadline:
+        assert getattr(robot, peek)().age_s < 30
+        time.sleep(0.02)
+
+
+def test_a_name_service_that_stays_mute(monkeypatch: pytest.MonkeyPatch) -> None:
+    released = threading.Event()
+
+    def mute(*_: object) -> list[object]:
+        released.wait(50)
+        raise OSError
+
+    monkeypatch.setattr("socket.getaddrinfo", mute)
+    settings = Ur10eSettings(driver="ur10e", host="robot.lab", connect_deadline_s=0.3)
+    try:
+        with pytest.raises(CannotConnect, match=r"robot\.lab:30004 did not answer within 0\.\d s"):
+            Ur10e(settings, Clock()).open()
+    finally:
+        released.set()
 
 
 def test_a_host_name_that_nobody_knows() -> None:
