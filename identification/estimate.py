@@ -89,6 +89,26 @@ def stated_uncertainty(table: Table, choice: Choice) -> float:
     return float(np.sqrt(max(alone, together)))
 
 
+def gain_effect(table: Table, choice: Choice, gain_sd: float) -> float:
+    """Standard uncertainty of k (N/m) from the gain of the force.
+
+    Where the force reads g times too high, u at the stated force is off by F du/dF (g - 1): on a
+    straight line k changes by the factor g, on a softening one by more, because the levels moved
+    too. The slope du/dF comes from a parabola through the levels.
+    """
+    degrees = [1] if table.size < 3 else [1, 2]
+    if choice.intercept and table.size > 3:
+        degrees = [0, *degrees]
+    scale = float(np.max(np.abs(table.force)))
+    x = table.force / scale
+    design = np.column_stack([x**d for d in degrees])
+    parameters = np.linalg.lstsq(design, table.displacement, rcond=None)[0]
+    run = design @ (parameters * np.array(degrees))  # F du/dF
+    up = stiffness(table.shifted(0.0, 0.5 * gain_sd * run), choice)
+    down = stiffness(table.shifted(0.0, -0.5 * gain_sd * run), choice)
+    return abs(up - down)
+
+
 def _effect(table: Table, choice: Choice, step: Array) -> float:
     """Squared change of k when the levels err by `step` (n,) standard uncertainties."""
     total = 0.0

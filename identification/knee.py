@@ -3,8 +3,8 @@
 The curve is described as force over displacement, because a screw imposes the displacement and the
 force may stall. Rivals are compared by the Bayesian information criterion: straight and curved
 lines that have no kink (polynomials either way round, two saturating laws) against a straight or
-curved line that continues with another slope behind a kink. A kink is a knee only when the slope
-falls to half or less, and only when the best kinked line beats the best smooth one by
+curved line that goes on straight, with another slope, behind a kink. A kink is a knee only when
+the slope falls to half or less, and only when the best kinked line beats the best smooth one by
 `EVIDENCE`: softening by a factor of three without a kink is no knee.
 """
 
@@ -40,9 +40,10 @@ class Samples:
 
 @dataclass(frozen=True)
 class Kink:
-    """A fitted kinked line. force N, displacement m of the kink; slopes N/m just before and behind;
-    u_force, u_displacement: standard uncertainties from the samples' stated ones; order: degree of
-    the part before the kink; evidence: BIC of the best smooth rival minus its own."""
+    """A fitted kinked line, straight behind the kink. force N, displacement m of the kink; slopes
+    N/m just before and behind; u_force, u_displacement: standard uncertainties from the samples'
+    stated ones; order: degree of the part before the kink; evidence: BIC of the best smooth rival
+    minus its own."""
 
     force: float
     displacement: float
@@ -64,7 +65,7 @@ def find_knee(samples: Samples) -> Kink | None:
     if not kinks:
         return None
     smooth = min(_smooth_bics(samples, sigma))
-    # a bend before the kink can hide in it the first level behind: only when the data ask for one
+    # a bend before the kink can swallow the first level behind it: only when the data ask for one
     bic, kink = min(kinks, key=lambda pair: pair[0] + EVIDENCE * (pair[1].order - 1))
     if smooth - bic < EVIDENCE or not kink.k_after <= SLOPE_RATIO * kink.k_before:
         return None
@@ -150,20 +151,21 @@ def _best_kink(
         return None
 
     def design(at: float) -> Array:
-        return np.column_stack([*_powers(u, order, samples.origin), np.maximum(u - at, 0.0)])
+        before = _powers(np.minimum(u, at), order, samples.origin)
+        return np.column_stack([*before, np.maximum(u - at, 0.0)])
 
     at = _minimum(lambda x: _fit(design(x), f, sigma)[1], low, high)
     p, chi2 = _fit(design(at), f, sigma)
-    smooth = np.concatenate([np.zeros(1 - free), p[:-1]])  # coefficients of u^0, u^1, ...
-    before = float(np.polyval(np.polyder(smooth[::-1]), at))
-    force = float(np.polyval(smooth[::-1], at))
+    curve = np.concatenate([np.zeros(1 - free), p[:-1]])[::-1]  # of u^order, ..., u^0
+    before, after = float(np.polyval(np.polyder(curve), at)), float(p[-1])
+    force = float(np.polyval(curve, at))
     # derivatives by the parameters and, last, by the place of the kink
-    jacobian = np.column_stack([design(at), -p[-1] * (u > at)]) / sigma[:, None]
+    jacobian = np.column_stack([design(at), (before - after) * (u > at)]) / sigma[:, None]
     covariance = np.linalg.pinv(jacobian.T @ jacobian)
     by_parameter = np.concatenate([[at**i for i in range(1 - free, order + 1)], [0.0, before]])
     u_force = float(np.sqrt(max(0.0, by_parameter @ covariance @ by_parameter)))
     u_at = float(np.sqrt(max(0.0, covariance[-1, -1])))
-    kink = Kink(force, at, before, before + float(p[-1]), u_force, u_at, order)
+    kink = Kink(force, at, before, after, u_force, u_at, order)
     return _bic(chi2, f.size, parameters), kink
 
 

@@ -10,8 +10,8 @@ noise-free curve at the same levels.
 What is uncertain. Points of one run share their errors (mounting, zero line, friction), so the
 covariance of the fit is far too small, and is not used: type A is the scatter of k between
 repetitions (Student's t with n - 1 degrees of freedom), type B the two gains, which all
-repetitions share. With a single repetition the stated uncertainties of its levels stand in for
-the scatter.
+repetitions share; the force's gain also moves the levels at which a curved line is averaged. With
+a single repetition the stated uncertainties of its levels stand in for the scatter.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from identification.estimate import (
     WEIGHTINGS,
     Choice,
     Weighting,
+    gain_effect,
     line,
     stated_uncertainty,
     stiffness,
@@ -168,20 +169,23 @@ def default_choice(curve: Curve, options: Options) -> tuple[Choice, str]:
 
 
 def ratio(a: Stiffness, b: Stiffness) -> Quantity | None:
-    """k_a / k_b. The gains, common to both, cancel; the scatter of the repetitions does not.
+    """k_a / k_b. The scatter of the repetitions adds up; what both have in common cancels: a gain
+    counts with the difference of its relative effects, which is zero for straight curves.
 
     None where one of the two is undefined.
     """
     if a.k is None or b.k is None:
         return None
     value = a.k.value / b.k.value
-    budget = [
-        replace(part, u=abs(value / k.value) * part.u)
+    relative = [
+        {p.name: replace(p, u=p.u / abs(k.value)) for p in parts if p.counted}
         for k, parts in ((a.k, a.budget), (b.k, b.budget))
-        for part in parts
-        if part.counted and not part.common
     ]
-    return combined(value, budget)
+    budget = [p for side in relative for p in side.values() if not p.common]
+    for name, p in relative[0].items():
+        if p.common and name in relative[1]:
+            budget.append(replace(p, u=abs(p.u - relative[1][name].u)))
+    return combined(value, [replace(p, u=abs(value) * p.u) for p in budget])
 
 
 def _with_k(described: Stiffness, curve: Curve, loading: Grid, used: Grid) -> Stiffness:
@@ -192,7 +196,11 @@ def _with_k(described: Stiffness, curve: Curve, loading: Grid, used: Grid) -> St
         fit = line(table, choice)
         k = stiffness(table, choice)
         each = _by_repetition(used, choice)
-        budget = _budget(curve, used, choice, k, each)
+        budget = _budget(curve, table, choice, k, each)
+        if len(each) >= 2:
+            stated = stated_uncertainty(table, choice) / math.sqrt(len(each))
+            name = "stated noise and zero lines, within the scatter"
+            budget += (Contribution(name, "B", stated, counted=False),)
     except ValueError as error:
         return replace(described, sentence=f"The stiffness is undefined: {error}.")
     status, sentence = _judge(table, fit.residuals, k)
@@ -275,28 +283,23 @@ def _by_repetition(used: Grid, choice: Choice) -> tuple[float, ...]:
 
 
 def _budget(
-    curve: Curve, used: Grid, choice: Choice, k: float, each: tuple[float, ...]
+    curve: Curve, table: Table, choice: Choice, k: float, each: tuple[float, ...]
 ) -> tuple[Contribution, ...]:
     """Type A and type B contributions to u(k), N/m."""
-    stated = stated_uncertainty(used.mean(), choice)
     n = len(each)
     if n >= 2:
         scatter = float(np.std(each, ddof=1)) / math.sqrt(n)
-        parts = [
-            Contribution(f"scatter between {n} repetitions", "A", scatter, n - 1.0),
-            Contribution(
-                "stated noise and zero lines (in the scatter)", "B", stated / n**0.5, counted=False
-            ),
-        ]
+        own = Contribution(f"scatter between {n} repetitions", "A", scatter, n - 1.0)
     else:
-        parts = [
-            Contribution("stated noise and zero line (run-to-run scatter unseen)", "B", stated)
-        ]
-    gains = (("force", curve.gain_sd_force), ("displacement", curve.gain_sd_displacement))
-    parts += [
-        Contribution(f"gain of the {name}", "B", abs(k) * sd, common=True) for name, sd in gains
-    ]
-    return tuple(parts)
+        stated = stated_uncertainty(table, choice)
+        own = Contribution("stated noise and zero line; scatter between runs unseen", "B", stated)
+    force = gain_effect(table, choice, curve.gain_sd_force)
+    displacement = abs(k) * curve.gain_sd_displacement
+    return (
+        own,
+        Contribution("gain of the force", "B", force, common=True),
+        Contribution("gain of the displacement", "B", displacement, common=True),
+    )
 
 
 def _alternatives(
@@ -306,14 +309,15 @@ def _alternatives(
     rivals = []
     grids = [(used, False)] + ([(loading, True)] if used.steps != loading.steps else [])
     for grid, after_knee in grids:
+        table = grid.mean()
         for weighting in WEIGHTINGS:
             for intercept in (False, True):
                 choice = Choice(weighting, intercept)
                 if choice == chosen and not after_knee:
                     continue
                 try:
-                    k = stiffness(grid.mean(), choice)
-                    budget = _budget(curve, grid, choice, k, _by_repetition(grid, choice))
+                    k = stiffness(table, choice)
+                    budget = _budget(curve, table, choice, k, _by_repetition(grid, choice))
                 except ValueError:
                     continue
                 rivals.append(Alternative(choice, after_knee, k, combined(k, budget).u))

@@ -1,0 +1,257 @@
+"""What a data set says of stiffness: curves, k, pointwise k, knee, anisotropy; as JSON and text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, Literal, Protocol
+
+from identification import stiffness as st
+from identification.estimate import WEIGHTINGS, Weighting
+from identification.uncertainty import Contribution, Quantity
+from rig.errors import InputError, did_you_mean
+from rig.reduce import Measurements, curves
+
+SCHEMA = "rig.analysis/1"
+N_PER_MM = 1e-3  # one N/m in N/mm
+MM = 1e3  # one m in mm
+AUTO: Literal["auto"] = "auto"
+
+
+@dataclass(frozen=True)
+class Options:
+    """weighting "auto": what suits the data (`identification.stiffness.default_choice`);
+    intercept None: likewise. errors_in_variables goes with weighting "auto" only."""
+
+    weighting: Weighting | Literal["auto"] = AUTO
+    intercept: bool | None = None
+    errors_in_variables: bool = False
+    keep_after_knee: bool = False
+
+    def estimator(self) -> st.Options:
+        """The same for the identification; InputError where two wishes contradict each other."""
+        weighting = None if self.weighting == AUTO else self.weighting
+        if self.errors_in_variables:
+            if weighting not in (None, "errors-in-variables"):
+                raise InputError(
+                    f"--weighting {weighting} and --errors-in-variables exclude each other: "
+                    "errors in variables weight by the uncertainties of force and displacement. "
+                    "Leave one of the two out."
+                )
+            weighting = "errors-in-variables"
+        return st.Options(weighting, self.intercept, self.keep_after_knee)
+
+
+def weighting(word: str) -> Weighting | Literal["auto"]:
+    """The weighting that a word of the command line names; InputError for an unknown one."""
+    if word == AUTO:
+        return AUTO
+    for known in WEIGHTINGS:
+        if word == known:
+            return known
+    allowed = ", ".join((AUTO, *WEIGHTINGS))
+    raise InputError(
+        f'--weighting: "{word}" is not known.{did_you_mean(word, (AUTO, *WEIGHTINGS))} '
+        f"Allowed: {allowed}."
+    )
+
+
+class Source(Measurements, Protocol):
+    """What is asked of a data set; `rig.dataset.Dataset` has it."""
+
+    @property
+    def uuid(self) -> str:
+        """Of the data set."""
+
+    @property
+    def path(self) -> Any:
+        """Where it lies, or None."""
+
+    @property
+    def origin(self) -> str:
+        """measured, emulated or imported."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the measurement reached its end."""
+
+    def banners(self) -> tuple[str, ...]:
+        """What has to be said before anything else."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """One pose and direction; pose "" without an arm."""
+
+    pose: str
+    direction: str
+    result: st.Stiffness
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """directions: by the direction's name, or `pose/direction` where several poses have it.
+    anisotropy: `a/b` of two such names within a pose -> ratio of their k."""
+
+    uuid: str
+    name: str
+    origin: str
+    complete: bool
+    banners: tuple[str, ...]
+    directions: dict[str, Direction]
+    anisotropy: dict[str, Quantity]
+
+    def to_json(self) -> dict[str, Any]:
+        """Schema rig.analysis/1: units in the keys, null for what is not defined."""
+        return {
+            "schema": SCHEMA,
+            "dataset": self.uuid,
+            "origin": self.origin,
+            "complete": self.complete,
+            "directions": {key: _direction(d) for key, d in self.directions.items()},
+            "anisotropy": {key: quantity(q) for key, q in self.anisotropy.items()},
+        }
+
+    def to_text(self) -> str:
+        """Banners, the answer in one sentence, then tables."""
+        from rig.analyze_text import text
+
+        return text(self)
+
+
+def analyze(dataset: Source, options: Options | None = None) -> Analysis:
+    """Everything at once. Data that define no stiffness give a status, not an error."""
+    estimator = (options or Options()).estimator()
+    found = {
+        setup: Direction(*setup, st.analyze_curve(curve, estimator))
+        for setup, curve in curves(dataset).items()
+    }
+    keys = _keys(list(found))
+    directions = {keys[setup]: d for setup, d in found.items()}
+    anisotropy = {}
+    for (key_a, a), (key_b, b) in combinations(directions.items(), 2):
+        if a.pose == b.pose:
+            ratio = st.ratio(a.result, b.result)
+            if ratio is not None:
+                anisotropy[f"{key_a}/{key_b}"] = ratio
+    name = dataset.path.name if dataset.path is not None else dataset.uuid
+    return Analysis(
+        dataset.uuid,
+        name,
+        dataset.origin,
+        dataset.complete,
+        dataset.banners(),
+        directions,
+        anisotropy,
+    )
+
+
+def _keys(setups: Sequence[tuple[str, str]]) -> dict[tuple[str, str], str]:
+    """The direction's name where it occurs in a single pose, else `pose/direction`."""
+    names = [direction for _, direction in setups]
+    return {
+        (pose, direction): direction if names.count(direction) == 1 else f"{pose}/{direction}"
+        for pose, direction in setups
+    }
+
+
+def quantity(q: Quantity | None, scale: float = 1.0) -> dict[str, Any]:
+    """`{"value", "standard_uncertainty", "ci95"}`; nulls for what is undefined."""
+    if q is None:
+        return {"value": None, "standard_uncertainty": None, "ci95": [None, None]}
+    return {
+        "value": _number(q.value * scale),
+        "standard_uncertainty": _number(q.u * scale),
+        "ci95": [_number(edge * scale) for edge in q.interval],
+        "degrees_of_freedom": _number(q.dof),
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _direction(d: Direction) -> dict[str, Any]:
+    r = d.result
+    return {
+        "pose": d.pose or None,
+        "direction": d.direction,
+        "status": r.status,
+        "status_text": r.sentence,
+        "stiffness_N_per_mm": quantity(r.k, N_PER_MM),
+        "weighting": r.choice.label,
+        "weighting_reason": r.choice_reason,
+        "intercept_mm": _number(r.intercept * MM),
+        "by_repetition_N_per_mm": [_number(k * N_PER_MM) for k in r.by_repetition],
+        "curve": [
+            {
+                "force_N": _number(p.force),
+                "displacement_mm": _number(p.displacement * MM),
+                "sd_mm": _number(p.sd * MM),
+                "n": p.n,
+                "branch": p.branch,
+                "step": p.step,
+            }
+            for p in r.levels
+        ],
+        "pointwise": [
+            {
+                "force_N": _number(p.force),
+                "stiffness_N_per_mm": _number(p.stiffness * N_PER_MM),
+                "sd_N_per_mm": _number(p.sd * N_PER_MM),
+                "n": p.n,
+            }
+            for p in r.pointwise
+        ],
+        "excluded": [{"step": e.step, "reason": e.reason} for e in r.excluded],
+        "knee": _knee(r.knee),
+        "hysteresis": _hysteresis(r),
+        "budget": [_contribution(c) for c in r.budget],
+        "alternatives": [
+            {
+                "weighting": a.choice.label,
+                "steps": "all, also after the knee" if a.after_knee else "as counted",
+                "stiffness_N_per_mm": _number(a.value * N_PER_MM),
+                "standard_uncertainty_N_per_mm": _number(a.u * N_PER_MM),
+            }
+            for a in r.alternatives
+        ],
+        "notes": list(r.notes),
+    }
+
+
+def _knee(knee: st.Knee | None) -> dict[str, Any] | None:
+    if knee is None:
+        return None
+    return {
+        "force_N": quantity(knee.force),
+        "displacement_mm": quantity(knee.displacement, MM),
+        "slope_before_N_per_mm": _number(knee.k_before * N_PER_MM),
+        "slope_after_N_per_mm": _number(knee.k_after * N_PER_MM),
+        "evidence_bic": _number(knee.evidence),
+    }
+
+
+def _hysteresis(r: st.Stiffness) -> dict[str, Any] | None:
+    loop = r.hysteresis
+    if loop is None:
+        return None
+    return {
+        "area_N_mm": _number(loop.area * MM),
+        "sd_N_mm": _number(loop.sd * MM),
+        "share_of_work": _number(loop.relative),
+        "remaining_mm": _number(loop.remaining * MM),
+        "n": loop.n,
+    }
+
+
+def _contribution(c: Contribution) -> dict[str, Any]:
+    return {
+        "name": c.name,
+        "type": c.kind,
+        "standard_uncertainty_N_per_mm": _number(c.u * N_PER_MM),
+        "degrees_of_freedom": _number(c.dof),
+        "counted": c.counted,
+    }

@@ -1,0 +1,179 @@
+"""The text of an analysis: plain tables that survive a pipe and a mail."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from textwrap import wrap
+
+from identification.stiffness import Exclusion, Stiffness
+from identification.uncertainty import Quantity
+from rig.analyze import MM, N_PER_MM, Analysis, Direction
+
+WIDTH = 100
+
+
+def text(analysis: Analysis) -> str:
+    """Banners, the answer in one sentence, then what it rests on, direction by direction."""
+    lines = [*analysis.banners]
+    if lines:
+        lines.append("")
+    lines += wrap(f"{analysis.name}: {answer(analysis)}", WIDTH)
+    for key, direction in analysis.directions.items():
+        lines += ["", *_direction(key, direction)]
+    return "\n".join(lines)
+
+
+def answer(analysis: Analysis) -> str:
+    """The first sentence: every k with its interval, and how they compare."""
+    if not analysis.directions:
+        return "there are no samples to analyze."
+    parts = []
+    for key, direction in analysis.directions.items():
+        k = direction.result.k
+        if k is None:
+            parts.append(f"k in {key} is undefined")
+        else:
+            parts.append(f"k in {key} is {_with_interval(k, N_PER_MM)} N/mm")
+    for key, ratio in analysis.anisotropy.items():
+        a, b = _names(key)
+        parts.append(f"{a} is {_with_interval(ratio)} times as stiff as {b}")
+    return "; ".join(parts) + " (in brackets: 95 % intervals)."
+
+
+def _names(key: str) -> tuple[str, str]:
+    """The two directions of `a/b` or `P/a/P/b`."""
+    parts = key.split("/")
+    half = len(parts) // 2
+    return "/".join(parts[:half]), "/".join(parts[half:])
+
+
+def number(value: float, digits: int = 4) -> str:
+    """`digits` significant digits, without exponent where that stays readable; `-` for nan."""
+    if not math.isfinite(value):
+        return "inf" if math.isinf(value) else "-"
+    if value == 0.0:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e7:
+        return f"{value:.{digits - 1}e}"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{decimals}f}"
+
+
+def _with_interval(q: Quantity, scale: float = 1.0) -> str:
+    low, high = (number(edge * scale) for edge in q.interval)
+    return f"{number(q.value * scale)} [{low}, {high}]"
+
+
+def _direction(key: str, direction: Direction) -> Iterator[str]:
+    r = direction.result
+    pose = direction.pose
+    title = f"Direction {key}"
+    if pose and not key.startswith(f"{pose}/"):
+        title += f", pose {pose}"
+    yield title
+    yield "-" * len(title)
+    if r.sentence:
+        yield from wrap(r.sentence, WIDTH)
+    if r.k is not None:
+        yield from _stiffness(r, r.k)
+    if r.knee is not None:
+        yield (
+            f"Knee at {_with_interval(r.knee.force)} N, {_with_interval(r.knee.displacement, MM)} "
+            f"mm: the slope falls from {number(r.knee.k_before * N_PER_MM)} to "
+            f"{number(r.knee.k_after * N_PER_MM)} N/mm."
+        )
+    yield from _excluded(r.excluded)
+    if r.hysteresis is not None:
+        loop = r.hysteresis
+        yield (
+            f"Loop between loading and unloading: {number(loop.area * MM)} N mm, "
+            f"{loop.relative:.1%} of the work of loading; k is that of loading."
+        )
+    for note in r.notes:
+        yield from wrap(note, WIDTH)
+    yield from _tables(r)
+
+
+def _stiffness(r: Stiffness, k: Quantity) -> Iterator[str]:
+    yield (
+        f"k = {number(k.value * N_PER_MM)} N/mm, standard uncertainty "
+        f"{number(k.u * N_PER_MM, 2)} N/mm, 95 % from {number(k.interval[0] * N_PER_MM)} to "
+        f"{number(k.interval[1] * N_PER_MM)} N/mm"
+    )
+    yield from wrap(f"Line: {r.choice.label}; {r.choice_reason}.", WIDTH)
+    if r.choice.intercept:
+        yield f"Intercept: {number(r.intercept * MM)} mm"
+    if len(r.by_repetition) > 1:
+        shown = ", ".join(number(v * N_PER_MM) for v in r.by_repetition[:8])
+        more = ", ..." if len(r.by_repetition) > 8 else ""
+        yield f"{len(r.by_repetition)} repetitions: {shown}{more} N/mm"
+
+
+def _excluded(excluded: Sequence[Exclusion]) -> Iterator[str]:
+    by_reason: dict[str, list[int]] = {}
+    for e in excluded:
+        by_reason.setdefault(e.reason, []).append(e.step)
+    for reason, steps in by_reason.items():
+        word = "step" if len(steps) == 1 else "steps"
+        line = f"Not counted: {word} {', '.join(map(str, steps))}: {reason}."
+        yield from wrap(line, WIDTH)
+
+
+def _tables(r: Stiffness) -> Iterator[str]:
+    levels = [
+        (p.branch, str(p.step), number(p.force), number(p.displacement * MM),
+         number(p.sd * MM, 2), str(p.n))
+        for p in r.levels
+    ]  # fmt: skip
+    yield from _table(
+        "Curve (means over the repetitions)",
+        ("branch", "step", "force N", "displacement mm", "sd mm", "n"),
+        levels,
+        words=1,
+    )
+    pointwise = [
+        (number(p.force), number(p.stiffness * N_PER_MM), number(p.sd * N_PER_MM, 2), str(p.n))
+        for p in r.pointwise
+    ]
+    yield from _table(
+        "Pointwise stiffness between neighbouring levels",
+        ("force N", "k N/mm", "sd N/mm", "n"),
+        pointwise,
+        words=0,
+    )
+    budget = [
+        (c.name if c.counted else f"({c.name})", c.kind, number(c.u * N_PER_MM, 3),
+         "-" if math.isinf(c.dof) else number(c.dof, 1))
+        for c in r.budget
+    ]  # fmt: skip
+    yield from _table(
+        "Uncertainty of k (in brackets: contained in another line)",
+        ("contribution", "type", "u N/mm", "degrees of freedom"),
+        budget,
+        words=2,
+    )
+    rivals = [
+        (a.choice.label, "all" if a.after_knee else "as above",
+         number(a.value * N_PER_MM), number(a.u * N_PER_MM, 2))
+        for a in r.alternatives
+    ]  # fmt: skip
+    header = ("weighting and origin", "steps", "k N/mm", "u N/mm")
+    yield from _table("k under other choices", header, rivals, words=2)
+
+
+def _table(
+    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], words: int
+) -> Iterator[str]:
+    """The first `words` columns to the left, numbers to the right; nothing without rows."""
+    if not rows:
+        return
+    widths = [max(len(line[i]) for line in (header, *rows)) for i in range(len(header))]
+    yield ""
+    yield title
+    for line in (header, *rows):
+        cells = [
+            cell.ljust(width) if i < words else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ]
+        yield "  " + "  ".join(cells).rstrip()
