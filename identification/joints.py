@@ -272,11 +272,11 @@ def _lower_bounds(arm: Arm, observations: Sequence[Observation], gains: Sequence
 def _check_agreement(arm: Arm, observations: Sequence[Observation], gains: Sequence[Gains]) -> None:
     """Observations with the same levers must have the same compliance (six standard
     uncertainties, gains of different set-ups counted)."""
-    levers = [one.levers(arm) for one in observations]
+    levers = np.abs([one.levers(arm) for one in observations])
+    same = np.abs(levers[:, None] - levers[None]).max(axis=-1) <= 1e-3
     for i, first in enumerate(observations):
-        for k, second in enumerate(observations[:i]):
-            if np.abs(np.abs(levers[i]) - np.abs(levers[k])).max() > 1e-3:
-                continue
+        for k in np.flatnonzero(same[i, :i]).tolist():
+            second = observations[k]
             u = np.hypot(first.u_compliance, second.u_compliance)
             if first.setup != second.setup:
                 for one in (first, second):
