@@ -102,9 +102,19 @@ def emulate(station: Annotated[str, typer.Argument(metavar="STATION.yaml")] = "e
 def analyze(
     dataset: DatasetArgument,
     weighting: Annotated[
-        str, typer.Option(help="proportional, 1/s^2 or none: how the points are weighted.")
-    ] = "proportional",
-    intercept: Annotated[bool, typer.Option(help="Fit an intercept too.")] = False,
+        str,
+        typer.Option(
+            help="proportional, 1/s^2 or none: how the points are weighted; "
+            "auto: proportional where levels were held and a zero was measured."
+        ),
+    ] = "auto",
+    intercept: Annotated[
+        bool | None,
+        typer.Option(
+            "--intercept/--through-origin",
+            help="Let the line miss the origin, or not; left out: as the data allow.",
+        ),
+    ] = None,
     errors_in_variables: Annotated[
         bool, typer.Option(help="Count the force's uncertainty as well as the displacement's.")
     ] = False,
