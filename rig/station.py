@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from math import acos, degrees, hypot
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -21,7 +20,6 @@ from rig.yamlnodes import Key
 
 STATIONS = Path(rig.__file__).resolve().parent.parent / "protocols" / "stations"
 EMULATED = "emulated"
-AXES_TOLERANCE = 1e-3  # directions are written with a few digits
 # Where the address of each device stands; "emulated" there takes what the emulator offers.
 ENDPOINTS: tuple[tuple[str, str], ...] = (
     ("robot", "host"),
@@ -145,30 +143,11 @@ def _check(written: StationFile) -> list[tuple[Key, str]]:
                 continue
             what = f'{endpoint or "null"}: with an emulation: section it must be "emulated".'
             found.append(((device, key), what))
-    if written.dynamometer is not None:
-        found += _axes(written.dynamometer)
     found += _operator(written)
     found += _faults(written)
     if not (written.robot or written.dynamometer or written.laser):
         found.append(((), "robot, dynamometer and laser are missing; a station has one at least."))
     return found
-
-
-def _axes(sensor: KistlerSettings) -> list[tuple[Key, str]]:
-    """Rows of `axes_in_base` are unit vectors at right angles."""
-    path: Key = ("dynamometer", "axes_in_base")
-    rows = sensor.axes_in_base
-    for i, row in enumerate(rows):
-        length = hypot(*row)
-        if abs(length - 1) > AXES_TOLERANCE:
-            what = f"has length {length:.6g}; each row is a unit vector in the robot's base frame."
-            return [((*path, i), what)]
-    for i, j in ((0, 1), (0, 2), (1, 2)):
-        cosine = sum(a * b for a, b in zip(rows[i], rows[j], strict=True))
-        if abs(cosine) > AXES_TOLERANCE:
-            angle = degrees(acos(max(-1.0, min(1.0, cosine))))
-            return [(path, f"rows {i} and {j} stand at {angle:.1f} deg; allowed: right angles.")]
-    return []
 
 
 def _operator(written: StationFile) -> list[tuple[Key, str]]:

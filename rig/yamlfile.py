@@ -218,6 +218,7 @@ class _Judge:
             self._unknown_key(path)
         elif kind in ("value_error", "assertion_error"):
             what = str(error.get("ctx", {}).get("error", error["msg"]))
+            what = what if what.endswith((".", "?")) else f"{what}."
             reader.complain(path, reader.places[path], what)
         else:
             self._value_problem(path, self._at(path))
