@@ -3,8 +3,8 @@
 The piezo crystals of a 9257B stand at the four corners, at x = +-a and y = +-b. Its connector
 carries eight charges, of which the shear pairs are already joined:
 fx12, fx34, fy14, fy23, fz1, fz2, fz3, fz4. Amplifiers that sum give Fx, Fy, Fz instead.
-All linear, so one matrix holds the whole calibration. Sums and lever arms: Kistler, instruction
-manual of the 9257B, "force and moment calculation".
+All linear, so one matrix holds the whole calibration. Sums and lever arms: Kistler's instruction
+manual of the 9257B.
 """
 
 from __future__ import annotations

@@ -49,6 +49,8 @@ class KistlerEmulator:
         "wrong_server": "the port answers in another protocol",
         "garbage": "replies are bytes that cannot be decoded",
         "nonsense": "replies have the right form and impossible values",
+        "short_reply": "reads give fewer samples than asked",
+        "long_reply": "reads give more samples than asked",
         "unplugged": "error -201003: the device is not accessible",
         "unknown_device": "error -200220: there is no such device",
         "aborted": "error -50405: the transfer was aborted, as by replugging",
@@ -172,8 +174,13 @@ class KistlerEmulator:
     def _serialize(self, reply: Any) -> bytes:
         if self._fault == "garbage":
             return b"\xff\xff\xff\xff garbage"
-        if self._fault == "nonsense" and isinstance(reply, messages.ReadAnalogF64Response):
-            reply.read_array[:] = [1e30] * len(reply.read_array)
+        if isinstance(reply, messages.ReadAnalogF64Response):
+            if self._fault == "nonsense":
+                reply.read_array[:] = [1e30] * len(reply.read_array)
+            elif self._fault == "short_reply":
+                reply.samps_per_chan_read -= 1
+            elif self._fault == "long_reply":
+                reply.read_array.append(0.0)
         data: bytes = reply.SerializeToString()
         return data
 

@@ -37,7 +37,7 @@ _BY_NI_CODE = {
     -200220: Trouble(
         ReadTimeout,
         'there is no DAQ device named "{device}"',
-        "Correct `device` in the station file; NI MAX or `nidaqmxconfig` shows the names.",
+        "Correct `device` in the station file; NI MAX or `nilsdev` (Linux) lists the names.",
     ),
     -200170: Trouble(
         BadReply,

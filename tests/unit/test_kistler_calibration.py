@@ -202,13 +202,16 @@ class Chain:
 
 
 def test_reset_takes_the_charge_away() -> None:
-    rig = Chain(lambda t: np.where(t < 20, 100.0, 130.0))
-    rig.chain.switch(5.0, operate=False)
-    in_reset = rig.mean_force(6.0)
-    rig.chain.switch(10.0, operate=True)
-    after, later = rig.mean_force(11.0), rig.mean_force(21.0)
-    assert abs(in_reset[0]) < 0.2
-    assert abs(after[0]) < 1.0  # the jump; the 100 N from before are gone
+    rig = Chain(lambda t: np.where(t < 5020, 100.0, 130.0))
+    before = rig.mean_force(5000.0)
+    rig.chain.switch(5005.0, operate=False)
+    in_reset = rig.mean_force(5006.0)
+    rig.chain.switch(5010.0, operate=True)
+    after, later = rig.mean_force(5011.0), rig.mean_force(5021.0)
+    jump = np.array([2 * 2 / 7.5, 2 * 2 / 7.5, 4 * 2 / 3.7])  # 2 pC a channel, summed
+    assert (np.abs(before[:3]) > jump).any()  # what has drifted in since the start
+    assert (np.abs(in_reset[:3]) < 0.5).all()
+    assert (np.abs(after[:3]) < jump + 0.1).all()  # drift and the 100 N from before are gone
     assert later[0] - after[0] == pytest.approx(30, abs=0.2)
 
 

@@ -306,6 +306,8 @@ AT_START = {
     "wrong_server": (CannotConnect, "no gRPC device server answers", "grpc_server"),
     "garbage": (BadReply, "make no sense", "grpc_server"),
     "nonsense": (BadReply, "1e+30 V", "restart"),
+    "short_reply": (BadReply, "samples per channel came instead of 1000", "restart"),
+    "long_reply": (BadReply, "more than 1000 samples per channel came", "restart"),
     "unplugged": (CannotConnect, '"Dev1" is not accessible', "cable"),
     "unknown_device": (CannotConnect, 'no DAQ device named "Dev1"', "`device`"),
     "aborted": (CannotConnect, "aborted", "Replug"),
@@ -367,7 +369,15 @@ def test_fault_at_start(rig: Rig, fault: str, fault_table: FaultTable) -> None:
         rig.device.open()
     fault_table("dynamometer", fault, "at start", type(caught.value).__name__, str(caught.value))
     check(caught.value, AT_START[fault])
-    rig.device.close()
+
+
+def test_failed_open_releases_the_device(rig: Rig) -> None:
+    """Tasks left behind would keep the channels reserved on the server."""
+    rig.build().emulator.inject("overwritten")
+    with pytest.raises(CannotConnect):
+        rig.device.open()
+    assert rig.emulator.calls.count("CreateTask") == 2
+    assert rig.emulator.tasks.all() == []
 
 
 @pytest.mark.parametrize("fault", IN_MID_RUN)
