@@ -46,7 +46,7 @@ class EmulatedRig:
 
     `poses`: joint angles (6) rad by name, the arm stands in the first; `programs`: joint angles
     by the name of the program on the controller; `tools_mm`: loaded point in the flange frame (3)
-    by pose, the flange itself where there is none.
+    by pose, the flange itself where there is none; `zero_after_s`: the zero plateau after a run.
     """
 
     def __init__(
@@ -55,14 +55,18 @@ class EmulatedRig:
         poses: Poses | None = None,
         programs: Poses | None = None,
         tools_mm: Poses | None = None,
+        zero_after_s: float = 6.0,
     ) -> None:
         self._station = station
         tools = tools_mm or {}
-        self._poses = [
-            (list(q), [1e-3 * mm for mm in tools.get(name, (0.0, 0.0, 0.0))])
-            for name, q in (poses or {}).items()
-        ]
-        self._programs = {name: list(q) for name, q in (programs or {}).items()}
+        self._procedure = {
+            "poses": [
+                (list(q), [1e-3 * mm for mm in tools.get(name, (0.0, 0.0, 0.0))])
+                for name, q in (poses or {}).items()
+            ],
+            "programs": {name: list(q) for name, q in (programs or {}).items()},
+            "zero_after_s": zero_after_s,
+        }
         self._child: subprocess.Popen[bytes] | None = None
         self._lines: _Lines | None = None
         self._log: IO[bytes] | None = None
@@ -79,8 +83,7 @@ class EmulatedRig:
         self._spawn()
         settings = {
             "station": TypeAdapter(StationType).dump_python(self._station, mode="json"),
-            "poses": self._poses,
-            "programs": self._programs,
+            "procedure": self._procedure,
         }
         try:
             endpoints = self._ask(settings, deadline_s)["endpoints"]
@@ -287,12 +290,17 @@ def _settings_of_files(names: Sequence[str]) -> dict[str, Any]:
     from rig.station import load_station
 
     station = load_station(names[0])
-    poses = dict(load_protocol(Path(names[1])).poses) if len(names) > 1 else {}
-    return {
-        "station": TypeAdapter(StationType).dump_python(station, mode="json"),
-        "poses": [(p.q_rad, [1e-3 * mm for mm in p.tcp_xyz_mm]) for p in poses.values()],
-        "programs": {p.program: p.q_rad for p in poses.values() if p.program},
-    }
+    procedure: dict[str, Any] = {}
+    if len(names) > 1:
+        protocol = load_protocol(Path(names[1]))
+        poses = protocol.poses.values()
+        procedure = {
+            "poses": [(p.q_rad, [1e-3 * mm for mm in p.tcp_xyz_mm]) for p in poses],
+            "programs": {p.program: p.q_rad for p in poses if p.program},
+            "zero_after_s": protocol.zero.after_s,
+        }
+    station_values = TypeAdapter(StationType).dump_python(station, mode="json")
+    return {"station": station_values, "procedure": procedure}
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -58,7 +58,7 @@ class Child:
 
         try:
             station = _station(settings)
-            self._host = EmulationHost(station, settings["poses"], settings["programs"])
+            self._host = EmulationHost(station, **settings["procedure"])
             self._reply({"endpoints": self._host.start(_leave)})
         except InputError as error:
             self._reply({"error": str(error), "input": True})

@@ -10,6 +10,7 @@ from drivers.emulation import Emulator
 from rig.errors import InputError, did_you_mean
 from rig.worlds import make_world
 from rig.worlds.scene import WorldScene
+from rig.worlds.world import ZERO_PLATEAU_S
 
 if TYPE_CHECKING:
     from drivers.operator.screw import ScrewServer
@@ -24,7 +25,7 @@ class EmulationHost:
 
     `poses`: joint angles (rad) and tool (m, flange frame) of each pose of the procedure, the
     first one where the arm stands; empty: the world's own. `programs`: what the robot's Dashboard
-    can play. InputError for an unknown world or a scheduled fault that no emulator has.
+    can play; `zero_after_s`: the zero plateau after each run. InputError for an unknown world or a scheduled fault that no emulator has.
     """
 
     def __init__(
@@ -32,6 +33,7 @@ class EmulationHost:
         station: Station,
         poses: Sequence[tuple[Sequence[float], Sequence[float]]] = (),
         programs: Mapping[str, Sequence[float]] | None = None,
+        zero_after_s: float = ZERO_PLATEAU_S,
     ) -> None:
         emulation = station.emulation
         if emulation is None:
@@ -40,7 +42,7 @@ class EmulationHost:
                 "for its devices. Use the station emulated, or add the section."
             )
         self.station, self.emulation = station, emulation
-        self.scene = _scene(station, poses)
+        self.scene = _scene(station, poses, zero_after_s)
         self.emulators = _emulators(station, self.scene, programs or {})
         self._check_schedule(emulation.faults)
         self._screw: ScrewServer | None = None
@@ -140,7 +142,7 @@ def _scene(
         gains["displacement_gain_sd"] = station.laser.gain_relative_sd
     seed = station.emulation.seed
     world = make_world(station.emulation.world, seed, **gains)
-    return WorldScene(world, station.emulation.speed, seed, poses)
+    return WorldScene(world, station.emulation.speed, seed, poses, zero_plateau_s=zero_after_s)
 
 
 def _emulators(

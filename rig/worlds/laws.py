@@ -71,12 +71,12 @@ class Yield:
     """Gives way above `threshold` and hardens on with `hardening` (load per deflection).
 
     Kinematic hardening: the elastic range of width `2 threshold` moves along with the remaining
-    deflection, which unloading does not undo. Only the controller does, within about `return_s`.
+    deflection, which unloading does not undo. Only the controller does, by `return_per_s` a second.
     """
 
     threshold: float
     hardening: float
-    return_s: float = 0.3
+    return_per_s: float = 2.0e-3
     _remaining: float = field(default=0.0, init=False)
 
     def respond(self, load: float, dt: float) -> float:  # noqa: ARG002 (rate does not matter)
@@ -94,5 +94,6 @@ class Yield:
         return self._remaining
 
     def retake(self, dt: float) -> None:
-        """What remains decays."""
-        self._remaining *= math.exp(-dt / self.return_s)
+        """What remains shrinks at a steady rate."""
+        left = max(0.0, abs(self._remaining) - self.return_per_s * dt)
+        self._remaining = math.copysign(left, self._remaining)

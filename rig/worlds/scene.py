@@ -16,11 +16,12 @@ from drivers.clock import Clock
 from drivers.scene import ArmSignals
 from rig.worlds.arm import Array, tool_poses
 from rig.worlds.history import History
-from rig.worlds.world import World
+from rig.worlds.world import CONTROLLER_WAITS_S, ZERO_PLATEAU_S, World
 
 TICK_S = 0.05  # while the screw turns
 IDLE_TICKS = 4  # otherwise
 KEPT_S, KEPT_WALL_S = 30.0, 4.0  # of the scene, and more where it runs fast
+REACTION_WALL_S = 0.3  # about, for all between the end of one run and the start of the next
 COMMAND_S = 1e-6  # that a new set-up or pose takes to show
 FUTURE_TOLERANCE_S = 1e-6
 
@@ -41,7 +42,8 @@ class WorldScene:
 
     `poses`: joint angles (6) rad and tool (3) m in the flange frame of every pose the procedure
     knows; the arm stands in the first, and takes the tool of the one it is moved to.
-    Asking for an instant after now() raises ValueError.
+    `zero_plateau_s` follows each run; till then what has given way stays. Asking for an instant
+    after now() raises ValueError.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class WorldScene:
         seed: int,
         poses: Sequence[tuple[Sequence[float], Sequence[float]]] = (),
         now: Callable[[], float] | None = None,
+        zero_plateau_s: float = ZERO_PLATEAU_S,
     ) -> None:
         self.speed = speed
         self.world = world
@@ -61,6 +64,8 @@ class WorldScene:
         self._warm_C = random.uniform(24.0, 27.0, 6)
         self._rise_C = random.uniform(3.0, 8.0, 6)
         self._friction = random.uniform(0.7, 1.4, 6)
+        # The procedure's reactions take wall time, which is more of the scene's where it runs fast.
+        world.controller_waits_s = zero_plateau_s + CONTROLLER_WAITS_S + REACTION_WALL_S * speed
         if poses:
             world.move(*poses[0])
         self._first_command_s: float | None = None

@@ -28,9 +28,9 @@ from rig.worlds.laws import Law
 HOME_GAP_M = 0.3e-3  # air between screw and arm after the set-up
 HAND_SPEED_M_PER_S = 0.4e-3  # a fine thread, most of a turn in a second
 SCREW_STIFFNESS_N_PER_M = 5.0e6  # screw and dynamometer
-LOOSENING_M_PER_S = 2.0e-3  # backwards without touching the arm
+LOOSENING_M_PER_S = 1.0e-3  # backwards
 ZERO_PLATEAU_S = 6.0  # after a run, unless told otherwise
-CONTROLLER_WAITS_S = 14.0  # after the zero plateau, before it takes yielded joints back
+CONTROLLER_WAITS_S = 14.0  # after that, before the controller takes yielded joints back
 NEW_CONTACT_AFTER_S = 1.0  # without touching, before the fixture seats itself anew
 SEATING_FORCE_N = 5.0  # at which half of a contact's seating scatter has shown
 
@@ -162,8 +162,7 @@ class World:
     def step(self, dt: float) -> State:
         """Goes on by `dt` seconds: turns the screw at the hand's speed, finds the force."""
         left = self.target_m - self.advance_m
-        free = left < 0 and self.state.force_N == 0
-        most = (LOOSENING_M_PER_S if free else HAND_SPEED_M_PER_S) * dt
+        most = (LOOSENING_M_PER_S if left < 0 else HAND_SPEED_M_PER_S) * dt
         self.advance_m = (
             self.target_m if abs(left) <= most else self.advance_m + math.copysign(most, left)
         )
@@ -181,10 +180,6 @@ class World:
         reach = state.displacement_m + force_N / SCREW_STIFFNESS_N_PER_M
         self.advance_m = self.target_m = HOME_GAP_M + reach - clearance
         return state
-
-    def expect_zero_plateau(self, seconds: float) -> None:
-        """The zero plateau after each run lasts so long: till then yielded joints stay."""
-        self.controller_waits_s = seconds + CONTROLLER_WAITS_S
 
     def true_curve(self, direction: Sequence[float], forces_N: Sequence[float]) -> Array:
         """(n,) m: the tool's displacement along `direction` in the present pose, first loading
@@ -211,13 +206,14 @@ class World:
         return self.state
 
     def _return_joints(self, dt: float) -> None:
-        """The controller brings the arm back, and the hand keeps the screw off it."""
+        """The controller brings the arm back, and the hand keeps the screw off its way."""
         before = self._displacement(0.0, 0.0)
         self._retake(dt)
-        back = before - self._displacement(0.0, 0.0)
-        if back > 0:
-            self.advance_m -= back
-            self.target_m -= back
+        after = self._displacement(0.0, 0.0)
+        away = min(before - after, self.advance_m - after)
+        if away > 0:
+            self.advance_m -= away
+            self.target_m -= away
 
     def _retake(self, dt: float) -> None:
         for element in self._elements:

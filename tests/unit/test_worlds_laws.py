@@ -40,7 +40,7 @@ def test_settling_does_not_depend_on_the_step() -> None:
 
 
 def test_yield_remains_until_the_controller_takes_it_back() -> None:
-    law = Yield(threshold=56.0, hardening=700.0, return_s=0.3)
+    law = Yield(threshold=56.0, hardening=700.0, return_per_s=0.002)
     assert law.take(56.0, 1.0) == 0.0
     assert law.take(63.0, 1.0) == pytest.approx(0.01)
     assert law.take(0.0, 1.0) == pytest.approx(0.01)
@@ -49,8 +49,8 @@ def test_yield_remains_until_the_controller_takes_it_back() -> None:
     # the elastic range has moved along: 70 - 2 * 56 = -42
     assert law.take(-42.0, 1.0) == pytest.approx(0.02)
     assert law.take(-49.0, 1.0) == pytest.approx(0.01)
-    law.retake(0.3)
-    assert law.take(0.0, 1.0) == pytest.approx(0.01 / math.e)
+    law.retake(1.5)
+    assert law.take(0.0, 1.0) == pytest.approx(0.007)
     law.retake(EVER)
     assert law.take(0.0, 1.0) == 0.0
 
