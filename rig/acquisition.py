@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
-from dataclasses import dataclass
 
 from drivers.clock import Clock
-from drivers.errors import DeviceError
-from drivers.interfaces import Device, DisplacementSensor, Dynamometer, Robot
 from drivers.readings import Reading
+from rig.devices import Devices
 from rig.limits import Live
 from rig.recorder import Slot
 
@@ -18,35 +15,13 @@ TICK_S = 0.1
 TICK_WALL_S = 0.005
 
 
-@dataclass(frozen=True)
-class Devices:
-    """The three devices of a station."""
-
-    robot: Robot
-    dynamometer: Dynamometer
-    laser: DisplacementSensor
-
-    def all(self) -> tuple[Device, ...]:
-        """In the order in which they are opened."""
-        return (self.robot, self.dynamometer, self.laser)
-
-
-def open_devices(devices: Devices, stack: ExitStack, say: Callable[[str], None]) -> None:
-    """Opens every device; whatever happens later, `stack` closes those that were opened."""
-    for device in devices.all():
-        stack.callback(device.close)
-        device.open()
-        identity = ", ".join(f"{k} {v}" for k, v in device.identity().items())
-        say(f"{device.name}: ready ({identity})")
-
-
 class Acquisition:
     """Waits for ticks and slots, and collects the devices; the only place that reads them."""
 
     def __init__(
         self, devices: Devices, clock: Clock, rate_Hz: float, session_offset_s: float = 0.0
     ) -> None:
-        self._devices = devices
+        self.devices = devices
         self._clock = clock
         self._period = 1.0 / rate_Hz
         self._tick = max(TICK_S, TICK_WALL_S * clock.speed)
@@ -81,9 +56,9 @@ class Acquisition:
             session_s=now - self._origin,
             lateness_s=lateness,
             missed=missed,
-            robot=self._devices.robot.collect(),
-            dynamometer=self._devices.dynamometer.collect(),
-            laser=self._devices.laser.collect(),
+            robot=self.devices.robot.collect(),
+            dynamometer=self.devices.dynamometer.collect(),
+            laser=self.devices.laser.collect(),
         )
 
     def average(self, seconds: float) -> tuple[Reading, Reading, Reading]:
@@ -91,26 +66,21 @@ class Acquisition:
 
         Blocks that began before the call are discarded, so that nothing older gets in.
         """
-        for device in self._devices.all():
+        for device in self.devices.all():
             device.collect()
         self._clock.sleep(seconds)
-        devices = self._devices
+        devices = self.devices
         return devices.robot.collect(), devices.dynamometer.collect(), devices.laser.collect()
 
     def live(self, displacement_mm: Callable[[float], float]) -> Live:
         """The newest values of all devices; raises the error of one that has none."""
-        force = self._devices.dynamometer.latest()
-        laser = self._devices.laser.latest()
+        force = self.devices.dynamometer.latest()
+        laser = self.devices.laser.latest()
         x, y, z = force.values[:3]
         return Live(
             # the laser and the DAQ block in parallel; the older of the two dates the pair
             t=min(force.end, laser.end) - self._origin,
             force_N=(x, y, z),
             displacement_mm=displacement_mm(laser.values[0]),
-            robot=self._devices.robot.state(),
+            robot=self.devices.robot.state(),
         )
-
-
-def explain(error: DeviceError, hands: str) -> str:
-    """One message: device, fault, remedy, and what to do with the hands."""
-    return f"{error} {hands}"

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.errors import DeviceError
+from rig.devices import make_devices, station_clock
 from rig.emulation import EmulatedRig
 from rig.measure import SAFETY_NOTE, poses_and_programs
 from rig.plan import Plan, plan
 from rig.protocol import load_protocol
 from rig.station import load_station
-from rig.station_devices import make_devices, station_clock
 
 
 @dataclass(frozen=True)

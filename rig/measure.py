@@ -6,26 +6,28 @@ import signal
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
+from drivers.clock import Clock
 from drivers.errors import DeviceError
+from drivers.interfaces import Loader
 from rig import dataset as datasets
-from rig.acquisition import open_devices
+from rig.acquisition import Acquisition
+from rig.devices import Devices, make_devices, make_loader, open_devices, station_clock
 from rig.emulation import EmulatedRig
 from rig.errors import InputError, MeasurementStopped
 from rig.journal import Journal, journal_path, replay
 from rig.limits import UNLOAD
 from rig.measured_meta import measured_meta
 from rig.progress import Progress, read_progress
+from rig.progress_bar import LoaderWithBar
 from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
 from rig.recorder import Recorder
 from rig.runner import Runner
 from rig.station import Station, load_station, parse_station
-from rig.station_devices import make_devices, make_loader, station_clock
 
 SAFETY_NOTE = (
     "Software monitoring is no safety function: keep the emergency stop within reach, "
@@ -67,7 +69,7 @@ def measure(protocol_file: Path, station_name: str | None, output: Path | None, 
         "meta": measured_meta(protocol, station).model_dump_json(indent=2, exclude_none=True),
     }
     # The devices come first: a run that never began leaves no file behind.
-    with _opened(protocol, station, say) as rig:
+    with _opened(protocol, station, Progress(), say) as rig:
         journal = Journal.create(journal_path(path), start)
         return _carry_out(Job(path, protocol, station, journal, Progress()), rig, say)
 
@@ -84,9 +86,9 @@ def resume(path: Path, say: Say) -> Path:
     start = records[0].data
     protocol = parse_protocol(start["protocol"], path)
     station = parse_station(start["station"], path)
-    with _opened(protocol, station, say) as rig:
+    progress = read_progress(records)
+    with _opened(protocol, station, progress, say) as rig:
         journal = Journal.reopen(journal_file)
-        progress = read_progress(journal.records)
         journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
         say(f"resuming after {progress.rows} rows")
         return _carry_out(Job(path, protocol, station, journal, progress), rig, say)
@@ -112,13 +114,15 @@ class _Rig:
     """Open devices and operator, as a station made them."""
 
     station: Station
-    devices: Any
-    loader: Any
-    clock: Any
+    devices: Devices
+    loader: Loader
+    clock: Clock
 
 
 @contextmanager
-def _opened(protocol: MeasurementProtocol, station: Station, say: Say) -> Iterator[_Rig]:
+def _opened(
+    protocol: MeasurementProtocol, station: Station, progress: Progress, say: Say
+) -> Iterator[_Rig]:
     """Everything that the procedure talks to; closed again in any case."""
     with ExitStack() as stack:
         if station.emulation is not None:
@@ -129,6 +133,8 @@ def _opened(protocol: MeasurementProtocol, station: Station, say: Say) -> Iterat
         devices = make_devices(station, clock)
         open_devices(devices, stack, say)
         loader = make_loader(station, clock)
+        if station.operator.driver == "scripted":
+            loader = LoaderWithBar(loader, protocol, len(progress.steps))
         stack.callback(loader.close)
         loader.open()
         yield _Rig(station, devices, loader, clock)
@@ -144,31 +150,14 @@ def poses_and_programs(
 
 
 def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
-    devices = {device.name: device for device in rig.devices.all()}
-    signals = {name: device.signals for name, device in devices.items()}
-    descriptor = {
-        "devices": {n: dict(d.identity()) for n, d in devices.items()}
-        | {"operator": dict(rig.loader.identity())},
-        "signals": [
-            {"name": s.name, "unit": s.unit, "long_name": s.long_name}
-            for columns in signals.values()
-            for s in columns
-        ],
-    }
-    assert rig.station.laser is not None
-    recorder = Recorder(job.journal, signals, rig.station.laser.sign, job.progress.rows)
-    runner = Runner(
-        job.protocol,
-        rig.devices,
-        rig.loader,
-        rig.clock,
-        recorder,
-        job.progress,
-        lambda: _build(job),
-    )
+    rate_Hz, progress = job.protocol.sampling.rate_Hz, job.progress
+    acquisition = Acquisition(rig.devices, rig.clock, rate_Hz, progress.session_s)
+    sign = rig.station.laser.sign if rig.station.laser else 1
+    recorder = Recorder(job.journal, rig.devices, acquisition.now, sign, progress.rows)
+    runner = Runner(job.protocol, acquisition, rig.loader, recorder, progress, lambda: _build(job))
     reason, complete = "a bug", False
     try:
-        job.journal.append("descriptor", descriptor)
+        job.journal.append("descriptor", _descriptor(rig))
         say(SAFETY_NOTE)
         with _signals(runner.interrupt, _end):
             runner.run()
@@ -189,6 +178,14 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
         with _signals(_patience(say), _patience(say)):
             _finish(job, recorder, reason, complete=complete)
     return job.output
+
+
+def _descriptor(rig: _Rig) -> dict[str, object]:
+    """Who measures what: identities, and the columns that the devices deliver."""
+    devices = {device.name: dict(device.identity()) for device in rig.devices.all()}
+    columns = [asdict(signal) for device in rig.devices.all() for signal in device.signals]
+    operator = {rig.loader.name: dict(rig.loader.identity())}
+    return {"devices": devices | operator, "signals": columns}
 
 
 def _finish(job: Job, recorder: Recorder, reason: str, *, complete: bool) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import nan, sqrt
 from pathlib import Path
 from typing import Any
 
-from drivers.readings import Reading, Signal
+from drivers.readings import Reading
+from rig.devices import Devices
 from rig.journal import Journal
 
 Vector = tuple[float, float, float]
@@ -27,10 +28,13 @@ class Slot:
     dynamometer: Reading
     laser: Reading
 
+    def readings(self) -> dict[str, Reading]:
+        """By the name of the device."""
+        return {"robot": self.robot, "dynamometer": self.dynamometer, "laser": self.laser}
+
     def without_value(self) -> list[str]:
         """Devices that delivered no valid value in this slot."""
-        readings = {"robot": self.robot, "dynamometer": self.dynamometer, "laser": self.laser}
-        return [name for name, reading in readings.items() if reading.count == 0]
+        return [name for name, reading in self.readings().items() if reading.count == 0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +57,11 @@ class Recorder:
     """Writes rows and events to the journal; counts rows, so that they can be discarded later."""
 
     def __init__(
-        self, journal: Journal, signals: Mapping[str, Sequence[Signal]], sign: int, rows: int = 0
+        self, journal: Journal, devices: Devices, now: Callable[[], float], sign: int, rows: int = 0
     ) -> None:
         self._journal = journal
-        self._signals = signals
+        self._devices = devices
+        self._now = now
         self._sign = sign
         self.rows = rows
         self.datum_mm = nan
@@ -69,10 +74,11 @@ class Recorder:
         """One row; when this returns, it is on disk."""
         values: dict[str, float] = {}
         sd: dict[str, float] = {}
-        devices = {"robot": slot.robot, "dynamometer": slot.dynamometer, "laser": slot.laser}
-        for device, reading in devices.items():
+        readings = slot.readings()
+        for device in self._devices.all():
+            reading = readings[device.name]
             for signal, value, spread in zip(
-                self._signals[device], reading.values, reading.sd, strict=True
+                device.signals, reading.values, reading.sd, strict=True
             ):
                 values[signal.name] = value
                 sd[signal.name] = spread
@@ -98,16 +104,17 @@ class Recorder:
                 "segment": place.segment,
                 "values": values,
                 "sd": sd,
-                "count": {name: r.count for name, r in devices.items()},
-                "invalid": {name: r.invalid for name, r in devices.items()},
-                "age_s": {name: round(r.age_s, 4) for name, r in devices.items()},
+                "count": {name: r.count for name, r in readings.items()},
+                "invalid": {name: r.invalid for name, r in readings.items()},
+                "age_s": {name: round(r.age_s, 4) for name, r in readings.items()},
             },
         )
         self.rows += 1
 
     def event(self, kind: str, text: str, **data: Any) -> None:
         """Something that happened, in words, with what a program needs to know of it."""
-        self._journal.append("event", {"kind": kind, "text": text, **data})
+        when = {"session_s": round(self._now(), 3)}
+        self._journal.append("event", {"kind": kind, "text": text, **when, **data})
 
     def discard(self, first: int, reason: str) -> None:
         """Rows from `first` to the newest stay in the file, marked as not to be used."""

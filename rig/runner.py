@@ -8,9 +8,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import degrees, isnan, nan, radians
 
-from drivers.clock import Clock
 from drivers.interfaces import Loader, Prompt
-from rig.acquisition import Acquisition, Devices
+from rig.acquisition import Acquisition
 from rig.errors import MeasurementStopped
 from rig.limits import Watch
 from rig.procedure_step import StepProcedure, TopReached, Where
@@ -34,24 +33,22 @@ class Runner:
     def __init__(
         self,
         protocol: MeasurementProtocol,
-        devices: Devices,
+        acquisition: Acquisition,
         loader: Loader,
-        clock: Clock,
         recorder: Recorder,
         progress: Progress,
         checkpoint: Callable[[], None],
     ) -> None:
         self._protocol = protocol
-        self._devices = devices
+        self._devices = acquisition.devices
+        self._acquisition = acquisition
         self._loader = loader
         self._recorder = recorder
         self._progress = progress
         self._checkpoint = checkpoint
-        rate_Hz = protocol.sampling.rate_Hz
-        self._acquisition = Acquisition(devices, clock, rate_Hz, progress.session_s)
         self._watch = Watch(protocol.limits)
         self._supervision = Supervision(
-            self._acquisition, loader, recorder, self._watch, checkpoint, protocol.repetitions
+            acquisition, loader, recorder, self._watch, checkpoint, protocol.repetitions
         )
         self._steps = StepProcedure(protocol, self._supervision, recorder, loader)
         self._mounted: tuple[str, str] | None = None

@@ -88,8 +88,8 @@ class Supervision:
         self.show(force_N=force, displacement_mm=live.displacement_mm)
         for breach in self._watch.breaches(live):
             self._on_breach(breach)
+        self._loader.guide(self.view)  # during prompts too: unloading is done by the live force
         if not self._prompts:
-            self._loader.guide(self.view)
             self._hear()
         return live, slot
 

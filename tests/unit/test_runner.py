@@ -10,7 +10,8 @@ import pytest
 
 from drivers.errors import ReadTimeout
 from drivers.interfaces import LiveView
-from rig.acquisition import Devices
+from rig.acquisition import Acquisition
+from rig.devices import Devices
 from rig.errors import MeasurementStopped
 from rig.journal import Journal, Record, replay
 from rig.progress import Progress, read_progress
@@ -75,10 +76,10 @@ class Bench:
             progress = read_progress(journal.records)
         else:
             journal, progress = Journal.create(self.path, {}), Progress()
-        signals = {d.name: d.signals for d in self.devices.all()}
-        recorder = Recorder(journal, signals, 1, progress.rows)
+        acquisition = Acquisition(self.devices, self.clock, 1.0, progress.session_s)
+        recorder = Recorder(journal, self.devices, acquisition.now, 1, progress.rows)
         self.runner = Runner(
-            self.protocol, self.devices, self.loader, self.clock, recorder, progress, self.check
+            self.protocol, acquisition, self.loader, recorder, progress, self.check
         )
         try:
             self.runner.run()

@@ -1,12 +1,37 @@
-"""From the settings of a station to its devices; the only place that knows the drivers' names."""
+"""The devices of a station; the only place that knows the drivers' names."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+
 from drivers.clock import Clock
-from drivers.interfaces import Loader
-from rig.acquisition import Devices
+from drivers.interfaces import Device, DisplacementSensor, Dynamometer, Loader, Robot
 from rig.errors import InputError
 from rig.station import Station
+
+
+@dataclass(frozen=True)
+class Devices:
+    """The three devices of a station."""
+
+    robot: Robot
+    dynamometer: Dynamometer
+    laser: DisplacementSensor
+
+    def all(self) -> tuple[Device, ...]:
+        """In the order in which they are opened."""
+        return (self.robot, self.dynamometer, self.laser)
+
+
+def open_devices(devices: Devices, stack: ExitStack, say: Callable[[str], None]) -> None:
+    """Opens every device; whatever happens later, `stack` closes those that were opened."""
+    for device in devices.all():
+        stack.callback(device.close)
+        device.open()
+        identity = ", ".join(f"{k} {v}" for k, v in device.identity().items())
+        say(f"{device.name}: ready ({identity})")
 
 
 def station_clock(station: Station) -> Clock:
