@@ -50,8 +50,8 @@ class Robot(Device, Protocol):
         """Loads and plays a program taught on the pendant, and verifies the arrival by reading."""
 
     def accept_present_state(self) -> None:
-        """The arm was moved on purpose, by hand or pendant: mode and program changes up to now are
-        no fault, and the present ones are to be kept. Raises where the arm does not stand safely."""
+        """The arm was moved on purpose, by hand or pendant: mode and program changes up to now
+        are no fault, and the present ones are to be kept. Raises where it does not stand safely."""
 
 
 class Dynamometer(Device, Protocol):
