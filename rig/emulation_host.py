@@ -25,7 +25,8 @@ class EmulationHost:
 
     `poses`: joint angles (rad) and tool (m, flange frame) of each pose of the procedure, the
     first one where the arm stands; empty: the world's own. `programs`: what the robot's Dashboard
-    can play; `zero_after_s`: the zero plateau after each run. InputError for an unknown world or a scheduled fault that no emulator has.
+    can play; `zero_after_s`: the zero plateau after each run. InputError for an unknown world or a
+    scheduled fault that no emulator has.
     """
 
     def __init__(
@@ -111,7 +112,7 @@ class EmulationHost:
     def _fault_by_message(self, message: object) -> object:
         """As the screw's port wants it: a ValueError becomes the reply."""
         if not isinstance(message, Mapping):
-            raise ValueError('a fault is given as {"device": ..., "kind": ...}')
+            raise ValueError('a fault is given as {"device": ..., "kind": ...}')  # noqa: TRY004
         try:
             self.inject(str(message.get("device")), str(message.get("kind")))
         except InputError as error:
@@ -132,7 +133,9 @@ class EmulationHost:
 
 
 def _scene(
-    station: Station, poses: Sequence[tuple[Sequence[float], Sequence[float]]]
+    station: Station,
+    poses: Sequence[tuple[Sequence[float], Sequence[float]]],
+    zero_after_s: float,
 ) -> WorldScene:
     assert station.emulation is not None
     gains: dict[str, float] = {}
