@@ -115,17 +115,33 @@ def _smooth_bics(samples: Samples, sigma: Array) -> Iterator[float]:
         if degree + free <= n // 2:
             chi2 = _fit(np.column_stack(_powers(u, degree, samples.origin)), f, sigma)[1]
             yield _bic(chi2, n, degree + free)
-    slope = np.clip(np.gradient(f, u), np.ptp(f) * 1e-3, None)  # du = dF / slope
     for degree in (2, 3):
         if degree + free <= n // 2:
-            design = np.column_stack(_powers(f / f[-1], degree, samples.origin))
-            yield _bic(_fit(design, u, sigma / slope)[1], n, degree + free)
+            chi2 = _inverse_chi2(f / f[-1], u, sigma / f[-1], degree, samples.origin)
+            yield _bic(chi2, n, degree + free)
     for shape in (_hyperbola, _relaxation):
         chi2 = min(
             _fit(np.column_stack([*_powers(u, 1, samples.origin), shape(u, c)]), f, sigma)[1]
             for c in np.geomspace(0.03, 10.0, 16)
         )
         yield _bic(chi2, n, 3 + free)
+
+
+def _inverse_chi2(f: Array, u: Array, sigma: Array, degree: int, origin: bool) -> float:
+    """Misfit of a polynomial u(F), judged in the force direction like all the others.
+
+    The fit is made in the displacement direction; its weights follow the slope of the fit.
+    """
+    line = np.linspace(0.0, 3.0, 601)
+    slope = np.full(f.size, 1.0)
+    parameters = np.zeros(degree + int(not origin))
+    for _ in range(3):
+        design = np.column_stack(_powers(f, degree, origin))
+        parameters = _fit(design, u, sigma / slope)[0]
+        path = np.column_stack(_powers(line, degree, origin)) @ parameters
+        slope = 1.0 / np.maximum(np.interp(f, line, np.gradient(path, line)), 1e-3)
+    rising = np.maximum.accumulate(path) + 1e-12 * line
+    return float(np.sum(((f - np.interp(u, rising, line)) / sigma) ** 2))
 
 
 def _hyperbola(u: Array, c: float) -> Array:
