@@ -178,7 +178,8 @@ class EmulatedRig:
             code = "unknown"
         self._log.seek(0)
         last = self._log.read().decode(errors="replace").strip().splitlines()[-1:]
-        return f"the process of the emulators has ended, status {code} {': '.join(['', *last])}"
+        words = "".join(f": {line.rstrip('.')}" for line in last)
+        return f"the process of the emulators has ended, status {code}{words}"
 
 
 class _Lines:
