@@ -12,7 +12,10 @@ LARGEST_TURN_MM = 0.3
 SMALLEST_TURN_MM = 0.001
 GENTLE_TURN_MM = 0.1
 LONGEST_SEARCH_MM = 20.0  # free travel without contact after which turning makes no sense
+LARGEST_LOOSENING_MM = 0.5  # to zero load nothing can be overshot
 FIRST_GUESS_N_PER_MM = 150.0  # stiffer than the arm: first turns come out too small, not too large
+SEARCH_GUESS_N_PER_MM = 100.0
+GAVE_WAY = 0.3  # of the stiffest: below it the arm gives way, above it it is merely soft
 HAND_MM_PER_S = 1.0
 HANDS_OFF = ("idle", "mounting", "settling", "sampling", "paused")
 PATIENCE_S, PATIENCE_WALL_S = 5.0, 0.5
@@ -76,7 +79,8 @@ class Hand:
         advance = self._release(view) if view.target_N == 0 else self._approach(view)
         if advance is None or abs(advance) < SMALLEST_TURN_MM:
             return None
-        advance = max(-LARGEST_TURN_MM, min(LARGEST_TURN_MM, advance))
+        largest = LARGEST_TURN_MM if view.target_N else LARGEST_LOOSENING_MM
+        advance = max(-largest, min(largest, advance))
         free = self._is_free(view)
         expected = 0.0 if free else self._stiffness * advance
         self._net_mm += advance
@@ -138,9 +142,13 @@ class Hand:
             self._stiffness = self._stiffest = shown
 
     def _new_target(self, view: LiveView) -> None:
-        # Where the arm gave way it may stand firm again: every step begins with a moderate turn.
-        self._stiffness = self._stiffest
-        self._sense = math.copysign(1.0, view.target_N - view.force_N)
+        sense = math.copysign(1.0, view.target_N - view.force_N)
+        # Where the arm gave way it may stand firm again, and after a turn of the tide it does.
+        if sense != self._sense or self._stiffness < GAVE_WAY * self._stiffest:
+            self._stiffness = self._stiffest
+        self._sense = sense
+        if self._released:
+            self._free_force_N = view.force_N  # taring has moved it
         self._target_N = view.target_N
         self._last = (0.0, 0.0)
         if view.target_N != 0:
@@ -163,13 +171,14 @@ class Hand:
         if self._searched_mm:
             self._contact_mm = self._net_mm
         self._searched_mm = self._gap_mm = 0.0
-        share = 0.85 if abs(need) > 3 * view.band_N else 1.0
+        share = 0.9 if abs(need) > 3 * view.band_N else 1.0
         return share * need / self._stiffness
 
     def _search(self, view: LiveView) -> float | None:
         if self._searched_mm > LONGEST_SEARCH_MM:
             return None
-        step = min(GENTLE_TURN_MM, 0.5 * abs(view.target_N) / self._stiffest)
+        stiffness = self._stiffest if self._known else SEARCH_GUESS_N_PER_MM
+        step = min(GENTLE_TURN_MM, 0.6 * abs(view.target_N) / stiffness)
         if self._gap_mm > 0:
             step = max(step, min(0.8 * self._gap_mm, LARGEST_TURN_MM))
         self._gap_mm = max(0.0, self._gap_mm - step)
@@ -198,7 +207,7 @@ class Hand:
             self._gap_mm = 0.0
         if abs(change) < _noise_N(view) and last:
             return -self._loading * GENTLE_TURN_MM
-        loosen = abs(view.force_N) / self._stiffness + 0.03
+        loosen = abs(view.force_N) / self._stiffest + 0.03
         return -self._loading * max(GENTLE_TURN_MM, loosen)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -46,7 +47,7 @@ class ScriptedOperator:
         self._client: ScrewClient | None = None
         self._hand = Hand()
         self._net_mm = 0.0  # turned since the set-up
-        self._views = 0
+        self._views = 0  # that showed a force
         self._lock = threading.Lock()
         self._commands: deque[Command] = deque()
         self.notices: deque[tuple[str, str]] = deque(maxlen=100)  # level, text
@@ -100,7 +101,7 @@ class ScriptedOperator:
     def guide(self, view: LiveView) -> None:
         """Turns the screw a little when it is time to."""
         with self._lock:
-            self._views += 1
+            self._views += math.isfinite(view.force_N)
             advance_mm = self._hand.decide(view, self._clock.now())
             if advance_mm is not None:
                 self._turn(advance_mm)
@@ -129,6 +130,7 @@ class ScriptedOperator:
         with self._lock:
             self._screw().mount(direction, joints)
             self._hand.reset()
+            self._hand.turned_back(0.0)  # set up means: not touching
             self._net_mm = 0.0
 
     def _unload(self) -> None:

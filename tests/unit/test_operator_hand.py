@@ -170,6 +170,18 @@ def test_after_unloading_it_finds_contact_again_and_repeats_the_first_target() -
         bench.highest_N = 0.0
 
 
+def test_taring_between_two_runs_does_not_make_play_look_like_stiffness() -> None:
+    bench, hand = Bench(linear(96.0), offset_N=-1.5), Hand()
+    for offset_N in (-1.5, 0.0, 2.0):
+        bench.offset_N = offset_N
+        for _ in range(100):
+            bench.wanted_mm += hand.decide(view(bench.step(), 0.0, "zero"), bench.now) or 0.0
+        for target in (20.0, 40.0, 60.0):
+            bench.highest_N = 0.0
+            bench.run(hand, target)
+            assert bench.highest_N < target + 2.1
+
+
 def test_unloading_steps_are_approached_from_above() -> None:
     bench, hand = Bench(linear(57.0)), Hand()
     bench.run(hand, 80.0)
