@@ -49,18 +49,18 @@ def turning_points(force: Array, span: float) -> list[int]:
         return turns
     values = force.tolist()
     high = low = 0
-    rising: bool | None = None
+    rising: bool | None = None  # until the force has left its beginning, whose noise is no turn
     for i, value in enumerate(values):
         if value > values[high]:
             high = i
         if value < values[low]:
             low = i
         if rising is not False and values[high] - value > back:
-            if rising or high > 0:
+            if rising:
                 turns.append(high)
             rising, low = False, i
         elif rising is not True and value - values[low] > back:
-            if rising is False or low > 0:
+            if rising is False:
                 turns.append(low)
             rising, high = True, i
     return turns

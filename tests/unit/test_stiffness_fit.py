@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.fit import weighted_line, york_line
@@ -70,6 +70,7 @@ def test_york_is_the_same_with_the_axes_exchanged() -> None:
     assert turned.slope == pytest.approx(1.0 / fit.slope, rel=1e-9)
 
 
+@settings(deadline=None)
 @given(factor=st.floats(1e-6, 1e6), scale=st.floats(1e-9, 1e9))
 def test_a_common_factor_of_the_weights_changes_nothing_but_the_uncertainty(
     factor: float, scale: float
