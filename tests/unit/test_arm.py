@@ -172,7 +172,9 @@ def test_stiffness_is_the_inverse_of_compliance(arm: Arm) -> None:
 def test_compliance_scales_with_the_springs(q: Array, factor: float) -> None:
     arm = load_robot_once()
     stiffer = arm.with_stiffness(arm.joint_stiffness * factor)
-    np.testing.assert_allclose(stiffer.compliance(q) * factor, arm.compliance(q), rtol=1e-12)
+    np.testing.assert_allclose(
+        stiffer.compliance(q) * factor, arm.compliance(q), rtol=1e-12, atol=1e-18
+    )
 
 
 @given(pose, angle)
@@ -274,6 +276,14 @@ def test_singular_poses_come_back_too(ur10e: Arm, q: Array) -> None:
     T = ur10e.fk(q)
     back = ur10e.fk(nearest(ur10e, T, q))
     np.testing.assert_allclose(back, T, atol=1e-9)
+
+
+def test_axis_six_is_free_in_a_wrist_singularity(ur10e: Arm) -> None:
+    T = ur10e.fk([0.3, -1.0, 1.2, 0.4, 0.0, 0.2])
+    found = ur10e.inverse(T, q6=0.7)
+    singular = np.abs(np.sin(found[:, 4])) < 1e-9
+    assert singular.any()
+    np.testing.assert_allclose(found[singular, 5], 0.7)
 
 
 def test_out_of_reach(ur10e: Arm) -> None:

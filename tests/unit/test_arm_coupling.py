@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -96,6 +96,7 @@ def test_rigid_coupling_is_the_sum_of_both_stiffnesses(q: Array, c: list[float],
     C = compliance(q, c)
     S = mirror(b)
     K = np.linalg.inv(C)
+    assume(np.linalg.cond(C) < 1e8)  # the plain inverse loses its digits beside a singularity
     np.testing.assert_allclose(coupled(C, b) @ (K + S @ K @ S), np.eye(6), atol=1e-5)
     np.testing.assert_allclose(coupled(C, b), parallel(C, mirrored(C, b)), rtol=1e-6, atol=1e-14)
 
