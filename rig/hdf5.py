@@ -12,6 +12,10 @@ Text columns are strings of variable length, which every reader shows as text; b
 UTF-8 bytes of fixed length, which take 30 bytes less a cell (xarray on h5netcdf then shows bytes).
 Flags are stored as 0 and 1: netCDF has no truth values. Objects that the manifest does not name are
 ignored: results of other programs may be put beside.
+
+Behind the end of the HDF5 data stands one line with the SHA-256 of all bytes before it. The HDF5
+library ignores it, but must be kept from damaged files: some flipped bytes send it into an endless
+loop. A program that changes the file cuts the line off; then the manifest alone decides.
 """
 
 from __future__ import annotations
@@ -33,6 +37,7 @@ SCHEMA = "rig.dataset"
 SCHEMA_VERSION = 1
 SAMPLES = "entry/samples"
 MANIFEST = "entry/manifest"
+SEAL = b"\n# rig.dataset sha256 "
 _CHUNK_ROWS = 65_536
 _LONGEST_FIXED_TEXT = 64
 _MOST_STRINGS = 200_000
@@ -43,14 +48,13 @@ _LIBRARY_ATTRIBUTES = {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME", "_Ne
 def write_file(dataset: Dataset, path: Path) -> None:
     """See `rig.dataset.write`."""
     _check_lengths(dataset)
-    with (
-        in_place_of(path) as temporary,
-        h5py.File(temporary, "w", libver=("earliest", "v110")) as file,
-    ):
-        _write_root(file, dataset)
-        _write_samples(file.create_group(SAMPLES), dataset)
-        _write_texts(file, dataset)
-        _write_manifest(file)
+    with in_place_of(path) as temporary:
+        with h5py.File(temporary, "w", libver=("earliest", "v110")) as file:
+            _write_root(file, dataset)
+            _write_samples(file.create_group(SAMPLES), dataset)
+            _write_texts(file, dataset)
+            _write_manifest(file)
+        _write_seal(temporary)
 
 
 def _check_lengths(dataset: Dataset) -> None:
@@ -197,6 +201,12 @@ def _write_manifest(file: h5py.File) -> None:
     text = json.dumps(digests)
     _put_text(file["entry"], "manifest", text)
     file[MANIFEST].attrs["sha256"] = hashlib.sha256(text.encode()).hexdigest()
+
+
+def _write_seal(path: Path) -> None:
+    with path.open("rb+") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.write(SEAL + digest.encode() + b"\n")
 
 
 def content_of(node: Any) -> Values | None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
@@ -14,10 +15,11 @@ import numpy as np
 from rig.columns import Values
 from rig.dataset import ORIGINS, Dataset
 from rig.errors import InputError
-from rig.hdf5 import MANIFEST, SAMPLES, SCHEMA, SCHEMA_VERSION, content_of, digest_of
+from rig.hdf5 import MANIFEST, SAMPLES, SCHEMA, SCHEMA_VERSION, SEAL, content_of, digest_of
 from rig.meta import Meta
 from rig.yamlfile import load_yaml_text
 
+_MAGIC = b"\x89HDF\r\n\x1a\n"
 # What h5py raises on files that are damaged in one way or another.
 _BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError,
            OverflowError, MemoryError, RecursionError)  # fmt: skip
@@ -25,28 +27,31 @@ _BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeErro
 
 def read_uuid(path: Path) -> str:
     """UUID of the file, "" if there is none or it cannot be read."""
-    with suppress(*_BROKEN), h5py.File(path, "r") as file:
-        return str(file.attrs["uuid"])
+    with suppress(InputError, *_BROKEN):
+        _check_bytes(path)
+        with h5py.File(path, "r") as file:
+            return str(file.attrs["uuid"])
     return ""
 
 
 def holds_import(path: Path) -> bool:
     """True for a data set that was imported from a table, and so can be made anew."""
-    with suppress(*_BROKEN), h5py.File(path, "r") as file:
-        return file.attrs["schema"] == SCHEMA and "entry/texts/comments" in file
+    with suppress(InputError, *_BROKEN):
+        _check_bytes(path)
+        with h5py.File(path, "r") as file:
+            return file.attrs["schema"] == SCHEMA and "entry/texts/comments" in file
     return False
 
 
 def read_file(path: Path) -> Dataset:
     """The data set of an HDF5 file, checked whole. InputError for anything wrong."""
-    _check_magic(path)
+    _check_bytes(path)
     try:
         with h5py.File(path, "r") as file:
             return _Reading(file, path).dataset()
     except _BROKEN as error:
         words = _first_line(error)
-        cut = " It is shorter than it was: cut off while copying?" if "truncated" in words else ""
-        raise _damaged(path, f"the HDF5 library says: {words}.{cut}") from error
+        raise _damaged(path, f"the HDF5 library says: {words}.") from error
 
 
 def _first_line(error: BaseException) -> str:
@@ -59,17 +64,47 @@ def _damaged(path: Path, what: str) -> InputError:
     )
 
 
-def _check_magic(path: Path) -> None:
+def _check_bytes(path: Path) -> None:
+    """Magic number and seal, before the HDF5 library sees the file."""
     try:
         with path.open("rb") as file:
-            head = file.read(8)
+            head = file.read(len(_MAGIC))
+            if head == _MAGIC and (wrong := _check_seal(file)):
+                raise _damaged(path, wrong)
     except OSError as error:
         reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
         raise InputError(f"{path}: cannot be read: {reason}.") from error
-    if head != b"\x89HDF\r\n\x1a\n":
+    if head != _MAGIC:
         found = "an empty file" if not head else "no HDF5 file"
         hint = " A table comes in with `rig import`." if path.suffix in (".csv", ".txt") else ""
         raise InputError(f"{path}: {found}; a data set (.h5) is wanted.{hint}")
+
+
+def _check_seal(file: BinaryIO) -> str:
+    """What is wrong with the bytes, "" for nothing.
+
+    The file knows where its HDF5 data end (layout of the superblock: HDF5 File Format
+    Specification, II.A, version 0, which `write_file` asks for). Behind there stands the seal, or
+    nothing if another program has changed the file.
+    """
+    file.seek(0)
+    head = file.read(48)
+    size = file.seek(0, os.SEEK_END)
+    if len(head) < 48 or head[8] != 0:  # another version of the superblock: another program's file
+        return ""
+    end = int.from_bytes(head[40:48], "little")
+    if size < end:
+        return f"{size} bytes are left of {end}: cut off while copying?"
+    file.seek(0)
+    sha = hashlib.sha256()
+    rest = end
+    while rest and (piece := file.read(min(rest, 1 << 20))):
+        sha.update(piece)
+        rest -= len(piece)
+    seal = SEAL + sha.hexdigest().encode() + b"\n"
+    if size == end or file.read(len(seal) + 1) == seal:
+        return ""
+    return "its bytes have changed since it was written."
 
 
 class _Reading:
