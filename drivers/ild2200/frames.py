@@ -34,7 +34,8 @@ def error_name(raw: int) -> str:
 def to_mm(raw: Integers, range_mm: float) -> Floats:
     """Distance in the measuring range, mm, of raw values up to `LARGEST_MEASUREMENT`.
 
-    The sensor's straight line: 643 is the start of the range, 64876 (rounded) its end.
+    The straight line through the manual's points (643 is the start of the range, 32760 its middle,
+    64876 its end), which it meets within two digits, 0.003 % of the range.
     """
     return np.asarray((raw * (1.02 / 65520) - 0.01) * range_mm, dtype=np.float64)
 

@@ -114,7 +114,8 @@ def screen(
     if view is None:
         parts.append(Text("waiting for the first values", style="dim"))
     else:
-        parts += _live(view, pitch_mm, age_s, stale_s)
+        asked = prompt.key if prompt is not None else None
+        parts += _live(view, pitch_mm, age_s, stale_s, asked)
     parts += [_notice(level, text) for level, text in notices]
     if prompt is not None:
         parts.append(_question(prompt, typed, complaint))
@@ -133,12 +134,22 @@ def _title(view: LiveView | None) -> str:
 
 
 def _live(
-    view: LiveView, pitch_mm: float, age_s: float, stale_s: Mapping[str, float]
+    view: LiveView,
+    pitch_mm: float,
+    age_s: float,
+    stale_s: Mapping[str, float],
+    asked: str | None,
 ) -> list[RenderableType]:
     old = age_s > 1.0 or bool(stale_s)
     style = "grey42" if old else "bold white"
     force = f"{view.force_N:.1f} N" if math.isfinite(view.force_N) else "--- N"
-    word, far = ("STOP", "values are old") if old else hint(view, pitch_mm)
+    word, far = hint(view, pitch_mm)
+    if old:
+        word, far = "STOP", "values are old"
+    elif asked == "unload":
+        word, far = "LOOSEN", "until the force no longer answers"
+    elif asked is not None:
+        word, far = "HANDS OFF", "the question below first"
     arrow = {"TIGHTEN": "▶▶ ", "LOOSEN": "◀◀ "}.get(word, "")
     colour = DIRECTION_COLOURS.get(word, "bold green" if word == "HOLD" else "bold")
     target = f"target {number(view.target_N, '.1f', 'N')} ± {number(view.band_N, '.2g', 'N')}"
