@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.errors import DeviceError
-from rig.devices import make_devices, station_clock
+from rig.devices import in_short, make_devices, station_clock
 from rig.emulation import EmulatedRig
 from rig.measure import SAFETY_NOTE, poses_and_programs
 from rig.plan import Plan, plan
@@ -27,8 +27,7 @@ class DeviceState:
         """One line for the operator."""
         if self.error is not None:
             return f"  {self.name:12} NOT READY  {self.error.fault}. {self.error.remedy}"
-        details = ", ".join(f"{k} {v}" for k, v in self.identity.items())
-        return f"  {self.name:12} ready      {details}"
+        return f"  {self.name:12} ready      {in_short(self.identity)}"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -30,8 +30,21 @@ def open_devices(devices: Devices, stack: ExitStack, say: Callable[[str], None])
     for device in devices.all():
         stack.callback(device.close)
         device.open()
-        identity = ", ".join(f"{k} {v}" for k, v in device.identity().items())
-        say(f"{device.name}: ready ({identity})")
+        say(f"{device.name}: ready ({in_short(device.identity())})")
+
+
+# What an operator wants to see of a device on one line; the data set keeps everything.
+_TELLING = (
+    "model", "device", "serial_number", "controller_version", "robot_mode", "safety_status",
+    "daq_product_type", "range_mm", "output_rate_Hz", "averaging", "channels", "source",
+)  # fmt: skip
+
+
+def in_short(identity: Mapping[str, str]) -> str:
+    """One line about a device: which one it is, and in which state."""
+    return ", ".join(
+        f"{key.replace('_', ' ')} {identity[key]}" for key in _TELLING if key in identity
+    )
 
 
 def station_clock(station: Station) -> Clock:
