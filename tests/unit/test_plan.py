@@ -109,6 +109,29 @@ def test_eight_channels_share_the_force(paper: MeasurementProtocol, lab: Station
     assert plan(paper, dataclasses.replace(lab, dynamometer=sensor)).warnings == ()
 
 
+def test_the_sensors_own_axes_carry_the_force(paper: MeasurementProtocol, lab: Station) -> None:
+    assert lab.dynamometer is not None
+    turned = dataclasses.replace(
+        lab.dynamometer,
+        channels=3,
+        full_scale_N=PerAxis(x=100, y=250, z=1),
+        axes_in_base=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    )
+    assert plan(paper, dataclasses.replace(lab, dynamometer=turned)).warnings == (
+        "pose P1, direction x: the dynamometer's y carries 220 N, full scale 250 N: 12 % to spare.",
+        "pose P1, direction y: the dynamometer's x carries 82 N, full scale 100 N: 18 % to spare.",
+    )
+
+
+def test_a_tool_lengthens_the_lever(paper: MeasurementProtocol) -> None:
+    # The tool points down; 220 N along x, 100 mm lower, are 22 Nm more about the level axes.
+    poses = {"P1": dataclasses.replace(paper.poses["P1"], tcp_xyz_mm=(0.0, 0.0, 100.0))}
+    short, long = plan(paper).runs[0], plan(dataclasses.replace(paper, poses=poses)).runs[0]
+    for joint in (1, 2, 3):
+        change = long.load_torque_Nm[joint] - short.load_torque_Nm[joint]
+        assert abs(change) == pytest.approx(22 * np.cos(np.deg2rad(13.43)), abs=0.05)
+
+
 def test_long_cycles_and_missing_limits_are_warned_of(paper: MeasurementProtocol) -> None:
     limits = dataclasses.replace(paper.limits, displacement_mm=None)
     slow = dataclasses.replace(paper, hold_s=100.0, limits=limits, runs=paper.runs[:1])

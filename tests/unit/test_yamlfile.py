@@ -285,6 +285,7 @@ def test_any_text_ends_in_a_value_or_one_message(text: str) -> None:
         (("temperature1_C",), "deg C"),
         (("joint_stiffness_Nm_per_rad",), "Nm/rad"),
         (("sensitivity_pC_per_N",), "pC/N"),
+        (("band_N", "rate_Hz"), "Hz"),
         (("name",), ""),
         (("N",), ""),
         (("gain_relative_sd",), ""),
