@@ -93,7 +93,7 @@ class Direction:
 @dataclass(frozen=True)
 class Analysis:
     """directions: by the direction's name, or `pose/direction` where several poses have it.
-    anisotropy: `a/b` of two such names within a pose -> ratio of their k."""
+    anisotropy: (a, b), two such names within a pose -> ratio of their k."""
 
     uuid: str
     name: str
@@ -101,7 +101,7 @@ class Analysis:
     complete: bool
     banners: tuple[str, ...]
     directions: dict[str, Direction]
-    anisotropy: dict[str, Quantity]
+    anisotropy: dict[tuple[str, str], Quantity]
 
     def to_json(self) -> dict[str, Any]:
         """Schema rig.analysis/1: units in the keys, null for what is not defined."""
@@ -111,7 +111,7 @@ class Analysis:
             "origin": self.origin,
             "complete": self.complete,
             "directions": {key: _direction(d) for key, d in self.directions.items()},
-            "anisotropy": {key: quantity(q) for key, q in self.anisotropy.items()},
+            "anisotropy": {f"{a}/{b}": quantity(q) for (a, b), q in self.anisotropy.items()},
         }
 
     def to_text(self) -> str:
@@ -135,7 +135,7 @@ def analyze(dataset: Source, options: Options | None = None) -> Analysis:
         if a.pose == b.pose:
             ratio = st.ratio(a.result, b.result)
             if ratio is not None:
-                anisotropy[f"{key_a}/{key_b}"] = ratio
+                anisotropy[key_a, key_b] = ratio
     name = dataset.path.name if dataset.path is not None else dataset.uuid
     return Analysis(
         dataset.uuid,

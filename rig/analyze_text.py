@@ -35,17 +35,9 @@ def answer(analysis: Analysis) -> str:
             parts.append(f"k in {key} is undefined")
         else:
             parts.append(f"k in {key} is {_with_interval(k, N_PER_MM)} N/mm")
-    for key, ratio in analysis.anisotropy.items():
-        a, b = _names(key)
+    for (a, b), ratio in analysis.anisotropy.items():
         parts.append(f"{a} is {_with_interval(ratio)} times as stiff as {b}")
     return "; ".join(parts) + " (in brackets: 95 % intervals)."
-
-
-def _names(key: str) -> tuple[str, str]:
-    """The two directions of `a/b` or `P/a/P/b`."""
-    parts = key.split("/")
-    half = len(parts) // 2
-    return "/".join(parts[:half]), "/".join(parts[half:])
 
 
 def number(value: float, digits: int = 4) -> str:
