@@ -80,6 +80,32 @@ def test_root_of_a_curve_that_gives_way() -> None:
     assert root(excess, 10.0, 1e-5, 1e4) == pytest.approx(63.0 / 0.81, abs=1e-6)
 
 
+@pytest.mark.parametrize("guess", [0.0, 70.0, 5000.0])
+@pytest.mark.parametrize("compliance", [2e-7, 1e-3], ids=["thought stiff", "thought soft"])
+def test_root_takes_few_trials(guess: float, compliance: float) -> None:
+    trials = []
+
+    def excess(force: float) -> float:
+        trials.append(force)
+        return 1e-5 * force + 8e-4 * max(0.0, force - 75.0) + 1e-8 * force**2 - 3e-3
+
+    force = root(excess, guess, compliance, 1e4)
+    assert abs(excess(force)) < 2e-11
+    assert len(trials) < 22
+
+
+def test_root_takes_few_trials_where_contact_stiffens() -> None:
+    trials = []
+
+    def excess(force: float) -> float:
+        trials.append(force)
+        return 1e-3 * (1.0 - math.exp(-force / 2.0)) + 2e-7 * force - 0.9e-3
+
+    assert abs(excess(root(excess, 0.0, 1e-3, 4500.0))) < 2e-11
+    assert abs(excess(root(excess, 400.0, 1e-5, 4500.0))) < 2e-11
+    assert len(trials) < 44
+
+
 def test_root_closes_in_on_a_jump() -> None:
     def excess(force: float) -> float:
         return 1e-6 * force + (1e-3 if force > 20.0 else 0.0) - 5e-4

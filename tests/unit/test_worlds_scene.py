@@ -213,6 +213,17 @@ def test_several_threads_may_ask_and_turn() -> None:
     assert world.target_m == pytest.approx(1e-3)
 
 
+def test_a_reader_waits_while_the_world_is_being_changed() -> None:
+    scene, _ = scene_at_will()
+    reader = threading.Thread(target=scene.force_N, args=(np.array([0.0]),))
+    with scene._lock:
+        reader.start()
+        reader.join(0.1)
+        assert reader.is_alive()
+    reader.join(10)
+    assert not reader.is_alive()
+
+
 def test_history_reads_between_rows_and_forgets_the_oldest() -> None:
     history = History(2, span_s=10.0, shortest_step_s=1.0)
     for second in range(100):
