@@ -13,6 +13,7 @@ from identification.joints import Gains, JointFit
 Array = NDArray[np.float64]
 
 _AXES = np.eye(3)
+_LEAST_SHARE = 0.05  # a pose that may carry less of the plan's force is not worth mounting
 _AXIS_NAMES = ("x", "y", "z")
 
 
@@ -69,6 +70,10 @@ def propose(
     P[:JOINTS, :JOINTS] = fit.covariance
     P[JOINTS:, JOINTS:] = gains
     h, u = _predictions(levers, force, fit.stiffness, plan)
+    usable = force >= _LEAST_SHARE * plan.force
+    if not usable.any():
+        raise ValueError(f"no pose of {arm.name} may carry a load within the plan's limits")
+    u[~usable] = np.inf
     out: list[Proposal] = []
     for _ in range(count):
         Ph = h @ P
@@ -105,7 +110,8 @@ def _predictions(levers: Array, force: Array, stiffness: Array, plan: Plan) -> t
     s = parts.sum(axis=-1)
     h = np.concatenate([-parts / s[:, None], np.tile([-1.0, 1.0], (s.size, 1))], axis=-1)
     one = np.hypot(plan.u_displacement, s * plan.u_force)
-    return h, np.sqrt(12 / plan.levels) * one / (s * force)
+    with np.errstate(divide="ignore"):
+        return h, np.sqrt(12 / plan.levels) * one / (s * force)
 
 
 def _candidates(arm: Arm, plan: Plan, seed: int, count: int) -> tuple[Array, Array, Array]:
@@ -126,8 +132,7 @@ def _candidates(arm: Arm, plan: Plan, seed: int, count: int) -> tuple[Array, Arr
         by_torque = np.min(spare / np.maximum(np.abs(levers), 1e-9), axis=-1)
         by_range = plan.range / (levers**2 / arm.joint_stiffness).sum(axis=-1)
     force = np.minimum(plan.force, np.minimum(by_torque, by_range))
-    # a pose that carries next to nothing tells nothing: leave a force that cannot divide by zero
-    return q, levers, np.maximum(force, 1e-3 * plan.force)
+    return q, levers, force
 
 
 def _allowed_places(arm: Arm, q: Array, plan: Plan) -> NDArray[np.bool_]:
