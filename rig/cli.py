@@ -173,22 +173,31 @@ def export(
 
 def main() -> None:
     """Runs the command and turns every ending into its exit status; no traceback for users."""
-    from drivers.errors import DeviceError, SafetyStop
     from rig.errors import InputError, MeasurementStopped
     from rig.intruders import refuse_intruders
 
     sys.excepthook = _report_bug
     try:
         refuse_intruders()
-        app()  # ends the process itself: 0 done, 2 wrong arguments, 130 interrupted
+        _run()
     except InputError as error:
         _end(2, str(error))
+    except MeasurementStopped as error:
+        _end(4, f"Stopped: {error}")
+
+
+def _run() -> None:
+    # Only now: another distribution's `drivers` would fail here before it could be named.
+    from drivers.errors import DeviceError, SafetyStop
+
+    try:
+        # Ends the process itself: 0 done, 2 wrong arguments, 130 interrupted. Calling `app`
+        # would put typer's hook, which prints tracebacks, in place of ours.
+        typer.main.get_command(app)()
     except SafetyStop as error:
         _end(4, f"Stopped for safety. {error}")
     except DeviceError as error:
         _end(3, str(error))
-    except MeasurementStopped as error:
-        _end(4, f"Stopped: {error}")
 
 
 def _end(status: int, message: str) -> None:

@@ -41,7 +41,7 @@ class Record:
 
 def journal_path(dataset: Path) -> Path:
     """The journal lies beside its data set."""
-    return dataset.with_name(dataset.name + ".journal")
+    return dataset.parent / f"{dataset.name}.journal"  # a folder has no name to replace
 
 
 class Journal:
@@ -194,7 +194,7 @@ def _plain(value: object) -> object:
         return [_plain(v) for v in value]
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
-    raise TypeError(f"a journal record cannot hold a {type(value).__name__}")
+    raise TypeError(f"a journal record cannot hold {type(value).__name__}")
 
 
 def _parse(content: bytes, path: Path) -> tuple[list[Record], int]:

@@ -1,0 +1,207 @@
+"""The command line: statuses, one message for wrong input, nothing heavy at start."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rig import cli
+from tests.unit.test_runner import PROTOCOL
+
+HOME = Path(__file__).parents[2]
+META = """\
+robot: none
+directions: {x: [1, 0, 0]}
+instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
+simulation: {stiffness_N_per_mm: {x: 95.0}, stiffness_relative_sd: 0.1}
+"""
+TABLE = "time_s,repetition,branch,step,force_N,displacement_mm\n" + "".join(
+    f"{10 * r + s},{r},{'zero' if s == 0 else 'loading'},{s},{20 * s},{0.2 * s + 0.001 * r}\n"
+    for r in (1, 2, 3)
+    for s in range(6)
+)
+
+Rig = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def rig(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Rig:
+    """Runs `rig WORDS` in this process, in a folder of its own: status, stdout, stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["rig", *words])
+        with pytest.raises(SystemExit) as ending:
+            cli.main()
+        monkeypatch.setattr(sys, "excepthook", sys.__excepthook__)
+        out, err = capsys.readouterr()
+        code = ending.value.code
+        return (code if isinstance(code, int) else 0), out, err
+
+    return run
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    (tmp_path / "m.yaml").write_text(META)
+    (tmp_path / "t.csv").write_text(TABLE)
+    (tmp_path / "p.yaml").write_text(PROTOCOL)
+    return tmp_path
+
+
+def test_import_analyze_export(rig: Rig, files: Path) -> None:
+    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+    status, out, _ = rig("analyze", "d.h5", "--json", "-")
+    assert status == 0
+    result = json.loads(out)
+    assert result["schema"] == "rig.analysis/1"
+    k = result["directions"]["x"]["stiffness_N_per_mm"]
+    assert k["ci95"][0] < 100 < k["ci95"][1]
+    assert k["value"] == pytest.approx(100, rel=0.02)
+    status, out, _ = rig("analyze", "d.h5", "--json", "r.json", "--figures", "figs")
+    assert status == 0
+    assert "N/mm" in out
+    assert json.loads((files / "r.json").read_text()) == result
+    assert sorted(p.name for p in (files / "figs").glob("*.png")) == ["curve.png", "pointwise.png"]
+    assert rig("export", "d.h5", "-o", "d.csv")[0] == 0
+    assert "force_N" in (files / "d.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["measure"], "give a PROTOCOL.yaml, or --resume DATASET.h5"),
+        (["measure", "p.yaml", "--resume", "d.h5"], "give a PROTOCOL.yaml, or --resume"),
+        (["measure", "none.yaml"], "none.yaml"),
+        (["measure", "p.yaml", "--station", "emulate"], 'Did you mean "emulated"?'),
+        (["measure", "p.yaml", "--station", "emulated", "-o", "no/such/run.h5"], "does not exist"),
+        (["measure", "--resume", "never.h5"], "there is nothing to resume"),
+        (["check", "m.yaml"], "m.yaml"),
+        (["analyze", "t.csv"], "t.csv"),
+        (["analyze", "missing.h5"], "missing.h5"),
+        (["analyze", "."], "."),
+        (["import", "t.csv", "t.csv", "-o", "x.h5"], "t.csv"),
+        (["import", "m.yaml", "m.yaml", "-o", "x.h5"], "m.yaml"),
+        (["import", "t.csv", "m.yaml", "-o", "no/such/x.h5"], "no/such"),
+        (["export", "missing.h5", "-o", "x.csv"], "missing.h5"),
+        (["emulate", "nowhere.yaml"], "nowhere.yaml"),
+    ],
+)
+def test_bad_input_is_status_2_and_one_message(
+    rig: Rig, files: Path, words: list[str], says: str
+) -> None:
+    status, out, err = rig(*words)
+    assert status == 2
+    assert says in err
+    assert out == ""
+    assert "Traceback" not in err
+    assert not list(files.glob("*.journal"))
+
+
+@pytest.mark.parametrize("words", [["frobnicate"], ["measure", "--stations", "x"], ["analyze"]])
+def test_wrong_words_are_status_2(rig: Rig, words: list[str]) -> None:
+    status, _, err = rig(*words)
+    assert status == 2
+    assert "Traceback" not in err
+
+
+def test_an_unknown_weighting_names_the_known_ones(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    status, _, err = rig("analyze", "d.h5", "--weighting", "propotional")
+    assert status == 2
+    assert "proportional" in err
+
+
+def _damaged(raw: bytes, rng: random.Random) -> bytes:
+    kind = rng.randrange(4)
+    if kind == 0:
+        return raw[: rng.randrange(len(raw))]
+    if kind == 1:
+        at = rng.randrange(len(raw))
+        return raw[:at] + rng.randbytes(rng.randint(1, 40)) + raw[at:]
+    if kind == 2:
+        lines = raw.splitlines(keepends=True)
+        del lines[rng.randrange(len(lines))]
+        return b"".join(lines)
+    flipped = bytearray(raw)
+    for _ in range(rng.randint(1, 20)):
+        flipped[rng.randrange(len(raw))] ^= 1 << rng.randrange(8)
+    return bytes(flipped)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_damaged_files_end_with_0_or_2_and_never_a_traceback(
+    rig: Rig, files: Path, seed: int
+) -> None:
+    rng = random.Random(seed)
+    if seed % 3 == 2:
+        rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    name, words = {
+        0: ("t.csv", ["import", "t.csv", "m.yaml", "-o", "x.h5"]),
+        1: ("m.yaml", ["import", "t.csv", "m.yaml", "-o", "x.h5"]),
+        2: ("d.h5", ["analyze", "d.h5"]),
+    }[seed % 3]
+    path = files / name
+    path.write_bytes(_damaged(path.read_bytes(), rng))
+    status, _, err = rig(*words)
+    assert status in (0, 2)
+    assert "Traceback" not in err
+    if status == 2:
+        assert name in err
+    elif name == "d.h5":
+        pytest.fail("a damaged HDF5 file was read as if it were whole")
+
+
+def test_a_bug_is_status_1_and_a_file_for_the_report(tmp_path: Path) -> None:
+    code = (
+        "import rig.check, sys\n"
+        "def boom(*_): raise RuntimeError('unforeseen')\n"
+        "rig.check.check = boom\n"
+        "sys.argv = ['rig', 'check', 'p.yaml']\n"
+        "from rig.cli import main; main()\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False,
+        env={"PYTHONPATH": str(HOME), "TMPDIR": str(tmp_path)},
+    )  # fmt: skip
+    assert result.returncode == 1
+    assert "Traceback" not in result.stderr
+    assert "This is a bug in rig (RuntimeError: unforeseen)" in result.stderr
+    reports = list(tmp_path.glob("rig-bug-*.txt"))
+    assert len(reports) == 1
+    assert "unforeseen" in reports[0].read_text()
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; sys.argv = ['rig', '--help']\n"
+        "from rig.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'pandas', 'h5py', 'scipy', 'matplotlib', 'pydantic', 'nidaqmx'}\n"
+        "print('HEAVY', sorted(heavy & set(sys.modules)))\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=HOME, capture_output=True, text=True, check=True
+    )
+    assert "HEAVY []" in result.stdout
+    for command in ("measure", "check", "analyze", "import", "export", "emulate"):
+        assert command in result.stdout
+
+
+def test_packages_of_other_distributions_are_noticed(tmp_path: Path) -> None:
+    (tmp_path / "drivers").mkdir()
+    (tmp_path / "drivers" / "__init__.py").write_text("")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.path.insert(1, {str(HOME)!r})\n"
+    code += "sys.argv = ['rig', 'check', 'x']\nfrom rig.cli import main; main()\n"
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 2, result.stderr
+    assert "the package drivers comes from" in result.stderr
