@@ -20,6 +20,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import textwrap
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -260,26 +261,33 @@ def _typed_faults(host: EmulationHost) -> None:
 def _table(host: EmulationHost, endpoints: Mapping[str, str]) -> str:
     emulation, design = host.emulation, host.scene.world.design
     lines = [
-        f"EMULATED station {host.station.name}: world {design.name} ({design.title}), "
+        f"EMULATED station {host.station.name}: world {design.name} ({design.title}),",
         f"seed {emulation.seed}, {emulation.speed:g} times real time",
+        *_wrapped("  does not simulate: ", host.scene.does_not_simulate),
         "",
     ]
     for device, emulator in host.emulators.items():
         lines += [
             f"{device:12} {endpoints[device]}",
-            f"  does not simulate: {emulator.does_not_simulate}",
+            *_wrapped("  does not simulate: ", emulator.does_not_simulate),
             "  faults:",
-            *(f"    {kind:20} {text}" for kind, text in emulator.faults.items()),
-            "",
         ]
+        for kind, text in emulator.faults.items():
+            lines += _wrapped(f"    {kind:20} ", text)
+        lines.append("")
     message = '{"fault": {"device": "laser", "kind": "silence"}}'
     lines += [
         f'{"screw":12} {endpoints["operator"]}   one JSON object a line, e.g. {{"turn_mm": 0.1}}',
         "",
-        f"To inject a fault type its device and name here (laser silence), or send {message}",
-        "to the screw's port. Ctrl-C ends the emulators.",
+        "To inject a fault type its device and name here (laser silence), or send",
+        f"{message} to the screw's port. Ctrl-C ends the emulators.",
     ]
     return "\n".join(lines)
+
+
+def _wrapped(head: str, text: str) -> list[str]:
+    """Lines of at most 100 characters, the later ones indented as far as `head` is long."""
+    return textwrap.wrap(text, 100, initial_indent=head, subsequent_indent=" " * len(head))
 
 
 def _settings_of_files(names: Sequence[str]) -> dict[str, Any]:

@@ -46,6 +46,12 @@ class WorldScene:
     after now() raises ValueError.
     """
 
+    does_not_simulate = (
+        "inertia and free vibration, motion of the commanded joints, bending of links and base, "
+        "change of leverage by the deflection, load beside the mounted direction, friction of the "
+        "screw, thermal growth"
+    )
+
     def __init__(
         self,
         world: World,
