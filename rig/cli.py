@@ -145,6 +145,65 @@ def analyze(
             say(f"figure: {path}")
 
 
+@app.command()
+def identify(
+    datasets: Annotated[list[Path], typer.Argument(metavar="DATASET.h5 ...")],
+    joint_readings: Annotated[
+        bool, typer.Option(help="Use the joint readings where they see the deflection.")
+    ] = True,
+    proposals: Annotated[int, typer.Option(help="How many next poses to look for.", min=0)] = 6,
+    write_model: Annotated[
+        Path | None, typer.Option(metavar="MODEL.yaml", help="Write the arm as a model file.")
+    ] = None,
+    write_protocol: Annotated[
+        Path | None, typer.Option(metavar="PROTOCOL.yaml", help="Write the next measurement.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Joint torsional stiffnesses, and what the data can and cannot tell about them."""
+    from rig import identify_text
+    from rig.identify import identify as run_identify
+
+    result = run_identify(datasets, joint_readings=joint_readings, proposals=proposals)
+    give(result, json_file)
+    if write_model is not None:
+        identify_text.write_model(result, write_model)
+        say(f"{write_model}: written")
+    if write_protocol is not None:
+        identify_text.write_protocol(result, write_protocol)
+        say(f"{write_protocol}: written")
+
+
+@app.command()
+def couple(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.yaml")],
+    path: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH.csv", help="When to couple along a path with requirements."),
+    ] = None,
+    dead_band: Annotated[
+        float, typer.Option(help="Relative dead band against chatter along the path.", min=0)
+    ] = 0.0,
+    samples: Annotated[
+        int, typer.Option(help="Samples of the Monte Carlo workspace.", min=1000)
+    ] = 1_000_000,
+    json_file: JsonOption = None,
+) -> None:
+    """Coupled state of two arms: workspace, compound stiffness, when to couple."""
+    from rig.couple import couple as run_couple
+    from rig.terminal import terminal_progress
+
+    with terminal_progress() as progress:
+        result = run_couple(
+            model,
+            samples=samples,
+            path=path,
+            dead_band=dead_band,
+            progress=lambda share: progress("sampling the workspace", share),
+        )
+    give(result, json_file)
+
+
 @app.command("import")
 def import_(
     table: Annotated[Path, typer.Argument(metavar="TABLE.csv")],
@@ -153,8 +212,10 @@ def import_(
 ) -> None:
     """Bring in measurements that were taken with other software."""
     from rig.tables import import_table
+    from rig.terminal import terminal_progress
 
-    result = import_table(table, meta, output)
+    with terminal_progress() as progress:
+        result = import_table(table, meta, output, progress)
     say(f"{output}: {len(result.columns['force_N'])} rows. Next: rig analyze {output}")
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 import uuid
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,12 +18,11 @@ from rig.errors import InputError, did_you_mean
 from rig.files import in_place_of
 from rig.journal import journal_path
 from rig.meta import Meta
+from rig.terminal import Progress, silent
 from rig.yamlfile import read_document
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Progress = Callable[[str, float], None]  # what is being done, and how much of it is: 0 to 1
 
 _EMULATED_MARK = "# EMULATED:"
 _INCOMPLETE_MARK = "# INCOMPLETE:"
@@ -46,35 +43,13 @@ def import_table(
     if out is not None:
         _check_target(out)
     table = _Table(csv, document.value, str(meta_yaml))
-    columns = table.read(progress or _silent)
+    columns = table.read(progress or silent)
     dataset = _dataset(csv, table, columns, document.value, document.text)
     if out is not None:
-        (progress or _silent)("writing", 0.0)
+        (progress or silent)("writing", 0.0)
         write(dataset, out)
-        (progress or _silent)("writing", 1.0)
+        (progress or silent)("writing", 1.0)
     return dataset
-
-
-def _silent(_: str, __: float) -> None:
-    """Progress that nobody looks at."""
-
-
-@contextmanager
-def terminal_progress() -> Iterator[Progress]:
-    """A progress bar on standard error while that is a terminal; otherwise silence."""
-    if not sys.stderr.isatty():
-        yield _silent
-        return
-    from rich.console import Console
-    from rich.progress import Progress as Bars
-
-    with Bars(console=Console(stderr=True), transient=True) as bars:
-        tasks = {"": bars.add_task("", total=1.0)}
-
-        def show(what: str, fraction: float) -> None:
-            bars.update(tasks[""], description=what, completed=fraction)
-
-        yield show
 
 
 def _check_target(out: Path) -> None:
@@ -294,7 +269,7 @@ def export_table(dataset: Dataset, out: Path, progress: Progress | None = None) 
     What `import_table` reads back gives the same samples, bit for bit. InputError for another
     ending, a missing library, or a folder that refuses.
     """
-    progress = progress or _silent
+    progress = progress or silent
     if out.suffix == ".csv":
         with in_place_of(out) as temporary:
             _write_csv(dataset, temporary, progress)
