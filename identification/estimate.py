@@ -14,6 +14,8 @@ from identification.levels import Table
 Weighting = Literal["proportional", "1/s^2", "none", "errors-in-variables"]
 WEIGHTINGS: tuple[Weighting, ...] = ("proportional", "1/s^2", "none", "errors-in-variables")
 
+MANY = 200  # levels
+
 _WORDS = {
     "proportional": "proportional (s grows with displacement)",
     "1/s^2": "1/s^2 (scatter of the repetitions and stated uncertainty)",
@@ -55,17 +57,23 @@ def line(table: Table, choice: Choice) -> LineFit:
     Raises ValueError when the levels determine no line.
     """
     force, displacement = table.force, table.displacement
+    s = _deviations(table, choice)
     if choice.weighting == "errors-in-variables":
-        s = _with_scatter(table)
         return york_line(force, displacement, table.u_force, s, intercept=choice.intercept)
-    if choice.weighting == "proportional":
-        s = np.hypot(displacement, table.u_displacement)
-    elif choice.weighting == "1/s^2":
-        plain = weighted_line(force, displacement, _ones(table), intercept=choice.intercept)
-        s = np.hypot(_with_scatter(table), plain.slope * table.u_force)
-    else:
-        s = _ones(table)
     return weighted_line(force, displacement, s, intercept=choice.intercept)
+
+
+def _deviations(table: Table, choice: Choice) -> Array:
+    """(n,) m: standard deviations of the displacement that the weighting gives the levels."""
+    if choice.weighting == "errors-in-variables":
+        return _with_scatter(table)
+    if choice.weighting == "proportional":
+        return np.hypot(table.displacement, table.u_displacement)
+    ones = np.ones(table.size)
+    if choice.weighting == "none":
+        return ones
+    plain = weighted_line(table.force, table.displacement, ones, intercept=choice.intercept)
+    return np.hypot(_with_scatter(table), plain.slope * table.u_force)
 
 
 def stiffness(table: Table, choice: Choice) -> float:
@@ -82,11 +90,25 @@ def stated_uncertainty(table: Table, choice: Choice) -> float:
     The larger of two readings of the stated uncertainty, which does not say how much of it the
     levels share: every level errs by itself (effects added in quadrature), or all levels err by
     the same amount, a wrong zero. Derivatives by central differences over one standard
-    uncertainty.
+    uncertainty; beyond `MANY` levels those of single levels with the weights held, in closed form.
     """
-    alone = sum(_effect(table, choice, step) for step in np.eye(table.size))
+    if table.size > MANY:
+        alone = _alone_with_weights_held(table, choice)
+    else:
+        alone = sum(_effect(table, choice, step) for step in np.eye(table.size))
     together = _effect(table, choice, np.ones(table.size))
     return float(np.sqrt(max(alone, together)))
+
+
+def _alone_with_weights_held(table: Table, choice: Choice) -> float:
+    """Variance of k from independent errors of the levels: k^4 sum(g_i^2 (u_u^2 + c^2 u_F^2)),
+    g the weights of the displacements in the slope c."""
+    w = _deviations(table, choice) ** -2.0
+    x = table.force - (w @ table.force / w.sum() if choice.intercept else 0.0)
+    g = w * x / (w @ x**2)
+    c = 1.0 / stiffness(table, choice)
+    variance = np.sum(g**2 * (table.u_displacement**2 + (c * table.u_force) ** 2))
+    return float(variance / c**4)
 
 
 def gain_effect(table: Table, choice: Choice, gain_sd: float) -> float:
@@ -122,7 +144,3 @@ def _effect(table: Table, choice: Choice, step: Array) -> float:
 
 def _with_scatter(table: Table) -> Array:
     return np.hypot(np.nan_to_num(table.scatter), table.u_displacement)
-
-
-def _ones(table: Table) -> Array:
-    return np.ones(table.size)

@@ -25,6 +25,7 @@ import numpy as np
 
 from identification.curve import Array, Curve, Point
 from identification.estimate import (
+    MANY,
     WEIGHTINGS,
     Choice,
     Weighting,
@@ -325,8 +326,12 @@ def _alternatives(
 
 
 def _knee(curve: Curve, loading: Grid) -> tuple[Knee | None, tuple[int, ...]]:
-    """The knee of the mean curve, placed in every repetition, and the steps behind it."""
-    if not curve.held:
+    """The knee of the mean curve, placed in every repetition, and the steps behind it.
+
+    Not looked for in a continuous recording, nor among more than `MANY` levels: a knee is told
+    from a bend by what held levels leave open.
+    """
+    if not curve.held or len(loading.steps) > MANY:
         return None, ()
     kink = find_knee(loading.mean().samples(curve.origin))
     if kink is None:

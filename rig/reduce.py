@@ -16,7 +16,8 @@
 5. A recording that was not held at levels (no steps, or force running through half of its range
    within one) is cut at its turning points into passes of rising (`loading`) and falling force
    (`unloading`), and each pass into bins of equal width in force. If there is but one repetition,
-   the passes count as repetitions.
+   the cycles count as repetitions, neighbouring ones taken together where there are many: their
+   errors are not independent.
 
 No threshold here is absolute; all refer to ranges of the data or to stated uncertainties.
 """
@@ -35,6 +36,7 @@ from identification.curve import Array, Curve, Point
 from rig.passes import binned, is_held, turning_points
 
 MM = 1e-3  # m
+MOST_REPETITIONS = 50  # into which the cycles of a recording are gathered
 
 
 class _ForceInstrument(Protocol):
@@ -287,22 +289,35 @@ def _bins(
     if forces.size == 0:
         return [], "There are no loaded samples."
     low, high = float(forces.min()), float(forces.max())
-    alone = len(runs) == 1
-    points: list[Point] = []
-    passes = 0
-    for repetition, branch, force, displacement in loaded:
-        for piece in _passes(branch, force, high - low):
-            passes += 1
-            name = (passes + 1) // 2 if alone else repetition
-            word = _sense(str(branch[piece.start]), force[piece])
-            for bin_, f, u, n in binned(force[piece], displacement[piece], low, high):
-                points.append(Point(name, word, bin_, f, u, stated.force, stated.displacement, n))
+    pieces = [
+        (repetition, _sense(str(branch[piece.start]), force[piece]), force[piece], moved[piece])
+        for repetition, branch, force, moved in loaded
+        for piece in _passes(branch, force, high - low)
+    ]
+    together = -(-len(pieces) // (2 * MOST_REPETITIONS))  # cycles in a repetition
+    points = [
+        Point(
+            i // (2 * together) + 1 if len(runs) == 1 else repetition,
+            word,
+            number,
+            f,
+            u,
+            stated.force,
+            stated.displacement,
+            n,
+        )
+        for i, (repetition, word, force, moved) in enumerate(pieces)
+        for number, f, u, n in binned(force, moved, low, high)
+    ]
     note = (
-        f"A continuous recording of {forces.size} samples: cut into {passes} "
-        f"pass{'es' if passes != 1 else ''} at its turning points and binned by force; rising "
-        "force counts as loading"
+        f"A continuous recording of {forces.size} samples: cut into {len(pieces)} "
+        f"pass{'es' if len(pieces) != 1 else ''} at its turning points and binned by force; "
+        "rising force counts as loading"
     )
-    return points, note + (", every cycle as a repetition." if alone and passes > 1 else ".")
+    if len(runs) > 1 or len(pieces) == 1:
+        return points, note + "."
+    many = "every cycle" if together == 1 else f"every {together} cycles"
+    return points, f"{note}, {many} as a repetition."
 
 
 def _passes(branch: NDArray[np.str_], force: Array, span: float) -> Iterator[slice]:

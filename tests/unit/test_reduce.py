@@ -226,4 +226,6 @@ def test_a_force_that_is_zero_throughout_is_undefined() -> None:
 def test_a_million_samples_of_thousands_of_cycles() -> None:
     curve = only(cycle(1_000_000, periods=2000.0))
     assert "cut into 4001 passes" in curve.notes[0]
+    assert "every 41 cycles as a repetition" in curve.notes[0]
+    assert {p.repetition for p in curve.points} == set(range(1, 50))
     assert sum(p.n for p in curve.points) == 1_000_000

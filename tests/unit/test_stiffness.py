@@ -102,6 +102,17 @@ def test_the_stated_uncertainty_of_one_level_is_that_of_its_secant() -> None:
     assert stated_uncertainty(one, Choice()) == pytest.approx(expected, rel=1e-4)
 
 
+def test_the_stated_uncertainty_of_many_levels_agrees_with_that_of_few() -> None:
+    """Straight line, equal weights: the closed form beyond 200 levels and the differences below."""
+
+    def stated(n: int) -> float:
+        force = np.linspace(10.0, 100.0, n)
+        many = Table(force, force / 1e5, np.full(n, 0.1), np.full(n, 1e-6), np.full(n, np.nan))
+        return stated_uncertainty(many, Choice("none", intercept=True)) * math.sqrt(n)
+
+    assert stated(201) == pytest.approx(stated(200), rel=0.005)
+
+
 def test_a_gain_moves_the_levels_of_a_curved_line() -> None:
     """u = c F^2: k at a level goes as 1 / F, so a gain counts twice: once itself, once there."""
     force = np.array([20.0, 40.0, 60.0])
