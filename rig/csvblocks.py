@@ -7,6 +7,7 @@ exact line numbers for messages. Knows nothing of what the columns mean.
 from __future__ import annotations
 
 import csv
+import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -90,7 +91,7 @@ class CsvFile:
             if head.startswith(magic):
                 raise InputError(f"{self.path}: {what}.")
         self._file.seek(3 if head[:3] == b"\xef\xbb\xbf" else 0)
-        while raw := self._read(lambda: self._file.readline(1_000_000)):
+        while raw := self._read(self._first_line):
             text = self._text(raw, self._line + 1).rstrip("\r\n")
             self._line += 1
             if text.lstrip().startswith("#"):
@@ -102,6 +103,15 @@ class CsvFile:
             f"{self.path}: {what}; wanted: a first row with the names of the columns, "
             f"{_COLUMNS_WANTED}."
         )
+
+    def _first_line(self) -> bytes:
+        """The next line; line ends of old Macs (a lone CR) are known here, too."""
+        raw = self._file.readline(1_000_000)
+        cut = raw.find(b"\r") + 1
+        if 0 < cut < len(raw) and raw[cut : cut + 1] != b"\n":
+            self._file.seek(cut - len(raw), os.SEEK_CUR)
+            raw = raw[:cut]
+        return raw
 
     def _names(self, text: str) -> list[str]:
         if "," not in text:
@@ -200,7 +210,7 @@ class CsvFile:
 
     def _wrong_count(self, text: str, cells: Sequence[str]) -> str:
         wanted = len(self.names)
-        what = f"{len(cells)} cells, but the header names {wanted} columns"
+        what = f"{len(cells)} cell{'s' * (len(cells) != 1)}, but the header names {wanted} columns"
         if len(cells) < wanted:
             missing = ", ".join(self.names[len(cells) :][:4])
             hint = f"nothing for {missing}. Was the file cut off? Complete or remove the row."

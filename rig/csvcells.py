@@ -23,6 +23,7 @@ MISSING = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "null", "NULL", 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _INFINITE = {"inf", "+inf", "-inf", "infinity", "+infinity", "-infinity"}
 _SPACE_AT_END = re.compile(rb"[ \t]+(?=[,\n])")
+_TRUTH = re.compile(rb"\b(true|false)\b", re.IGNORECASE)
 _QUOTED = 80
 
 
@@ -62,7 +63,7 @@ def _parse_fast(
         frame = pd.read_csv(
             BytesIO(raw), header=None, names=names, index_col=False, dtype=dtype, engine="c",
             na_values={i: list(MISSING) for i in numbers}, keep_default_na=False,
-            float_precision="round_trip", skipinitialspace=True, low_memory=False,
+            skipinitialspace=True, low_memory=False, **_exact_floats(pd.__version__),
         )  # fmt: skip
     except (ValueError, OverflowError, TypeError):
         return None
@@ -75,7 +76,15 @@ def _parse_fast(
             columns[name] = np.array(categories, dtype=str)[frame[i].cat.codes.to_numpy()]
         else:
             columns[name] = frame[i].to_numpy(dtype=np.float64)
+            if _TRUTH.search(raw) and np.isin(columns[name], (0.0, 1.0)).all():
+                return None  # "true" may have become 1
     return columns
+
+
+def _exact_floats(pandas_version: str) -> dict[str, Any]:
+    """From 3.1 on pandas reads every number exactly; before, it had to be asked to."""
+    major, minor = (int(part) for part in pandas_version.split(".")[:2])
+    return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
 
 
 def _parse_plain(file: CsvFile, block: Block, readings: Mapping[str, Reading]) -> dict[str, Values]:

@@ -1,0 +1,496 @@
+"""Tables: what comes in, what is refused and in which words, and that export gives it back."""
+
+from __future__ import annotations
+
+import random
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rig import csvblocks, csvcells
+from rig.dataset import Dataset, equal, load, write
+from rig.errors import InputError
+from rig.tables import export_table, import_table
+from tests.unit import example_data as example
+
+SHARED = Path(__file__).parents[3] / "shared"
+TABLE = """time_s,session_s,pose,direction,repetition,branch,step,force_N,displacement_mm,q1_rad
+0.5,1.5,P1,x,1,zero,0,0.02,0,0.1
+1.5,2.5,P1,x,1,loading,1,10.1,0.1,0.1001
+2.5,3.5,P1,x,1,unloading,1,9.9,0.11,
+0.5,60.5,P1,y,2,cycle,,-5e-7,-1e-7,nan
+"""
+
+
+def bring(folder: Path, table: str | bytes, meta: str = example.META, **kw: Any) -> Dataset:
+    raw = table if isinstance(table, bytes) else table.encode()
+    (folder / "t.csv").write_bytes(raw)
+    (folder / "META.yaml").write_text(meta)
+    return import_table(folder / "t.csv", folder / "META.yaml", **kw)
+
+
+# ------------------------------------------------------------------ what comes in
+
+
+def test_every_column_of_the_format(tmp_path: Path) -> None:
+    data = bring(tmp_path, TABLE)
+    got = {name: values.tolist() for name, values in data.columns.items() if name != "q1_rad"}
+    assert got == {
+        "time_s": [0.5, 1.5, 2.5, 0.5],
+        "session_s": [1.5, 2.5, 3.5, 60.5],
+        "pose": ["P1"] * 4,
+        "direction": ["x", "x", "x", "y"],
+        "repetition": [1, 1, 1, 2],
+        "branch": ["zero", "loading", "unloading", "cycle"],
+        "step": [0, 1, 1, -1],
+        "force_N": [0.02, 10.1, 9.9, -5e-7],
+        "displacement_mm": [0, 0.1, 0.11, -1e-7],
+        "discarded": [False] * 4,
+    }
+    np.testing.assert_array_equal(data.columns["q1_rad"], [0.1, 0.1001, np.nan, np.nan])
+    assert (data.origin, data.complete, data.units["q1_rad"]) == ("imported", True, "rad")
+    assert data.texts["meta"] == example.META
+
+
+def test_what_is_left_out_gets_its_default(tmp_path: Path) -> None:
+    meta = example.META.replace("{x: [1, 0, 0], y: [0, 1, 0]}", "{up: [0, 0, 1]}")
+    data = bring(tmp_path, "displacement_mm,force_N\n0.5,1\n0.75,2\n", meta)
+    got = {name: values.tolist() for name, values in data.columns.items()}
+    assert got == {
+        "time_s": [0, 1],
+        "pose": ["P1", "P1"],
+        "direction": ["up", "up"],
+        "repetition": [1, 1],
+        "branch": ["cycle", "cycle"],
+        "step": [-1, -1],
+        "force_N": [1, 2],
+        "displacement_mm": [0.5, 0.75],
+        "discarded": [False, False],
+    }
+
+
+def test_a_rig_without_an_arm(tmp_path: Path) -> None:
+    data = bring(tmp_path, "force_N,displacement_mm\n1,2\n", example.META_SPECIMEN)
+    assert data.meta.robot == "none"
+    assert data.columns["pose"].tolist() == [""]
+    assert data.meta.simulation is not None
+    assert data.meta.simulation.stiffness_N_per_mm == {"x": 95.0}
+
+
+def test_extreme_scales_and_a_force_of_zero(tmp_path: Path) -> None:
+    rows = "".join(f"0,{d!r}\n" for d in (1e-7, 1.00000000001e-7, -3e-9, 1e4))
+    data = bring(tmp_path, "force_N,displacement_mm\n" + rows, example.META_SPECIMEN)
+    assert data.columns["displacement_mm"].tolist() == [1e-7, 1.00000000001e-7, -3e-9, 1e4]
+    rows = "1e-6,0\n5e4,1\n-50000.00000001,2\n"
+    data = bring(tmp_path, "force_N,displacement_mm\n" + rows, example.META_SPECIMEN)
+    assert data.columns["force_N"].tolist() == [1e-6, 5e4, -50000.00000001]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda t: "\ufeff" + t,
+        lambda t: t.replace("\n", "\r\n"),
+        lambda t: t.replace("\n", "\r"),
+        lambda t: t.rstrip("\n"),
+        lambda t: "# Prüfstand: °\n\n# a,b\n" + t.replace("\n2.5,", "\n\n# pause, 5\n  # x\n2.5,"),
+        lambda t: t.replace(",", " , "),
+        lambda t: t.replace(",", ",\t"),
+        lambda t: t.replace("x", '"x"').replace("0.11", '"0.11"'),
+        lambda t: t.replace("unloading,1", 'unloading,"1.0"'),
+        lambda t: t.replace("9.9", "+9.90e0"),
+    ],
+)  # fmt: skip
+def test_spellings_of_one_table(tmp_path: Path, change: Any) -> None:
+    plain, other = bring(tmp_path, TABLE), bring(tmp_path, change(TABLE))
+    assert plain.columns.keys() == other.columns.keys()
+    for name, values in plain.columns.items():
+        assert example.same_values(values, other.columns[name]), name
+
+
+def test_further_columns_are_kept(tmp_path: Path) -> None:
+    table = "note,force_N,displacement_mm,speed mm/s,mixed\n"
+    rows = ['"slow, #1",1,2,0.5,1', ",1,3,,2", "Größe,1,4,inf,drei"]
+    data = bring(tmp_path, table + "\n".join(rows), example.META_SPECIMEN)
+    assert data.columns["note"].tolist() == ["slow, #1", "", "Größe"]
+    np.testing.assert_array_equal(data.columns["speed mm/s"], [0.5, np.nan, np.inf])
+    assert data.columns["mixed"].tolist() == ["1", "2", "drei"]
+
+
+def test_a_column_that_turns_to_text_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(csvblocks, "BLOCK_BYTES", 64)
+    rows = "".join(f"{i},{i / 7!r},{i if i != 90 else 'stop'}\n" for i in range(100))
+    data = bring(tmp_path, "force_N,displacement_mm,state\n" + rows, example.META_SPECIMEN)
+    assert data.columns["force_N"].tolist() == list(range(100))
+    assert data.columns["displacement_mm"].tolist() == [i / 7 for i in range(100)]
+    assert data.columns["state"].tolist() == [str(i) if i != 90 else "stop" for i in range(100)]
+
+
+def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
+    table = TABLE.replace("repetition", "repitition").replace("2.5,3.5", "0.1,0.2")
+    notes = [e["text"] for e in bring(tmp_path, table).events if e["kind"] == "note"]
+    assert notes == [
+        'column "repitition" is kept and ignored; is "repetition" meant?',
+        "time_s goes back 1 times, first at sample 3",
+        "session_s goes back, first at sample 3",
+    ]
+
+
+def test_progress_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(csvblocks, "BLOCK_BYTES", 100)
+    seen: list[tuple[str, float]] = []
+    bring(tmp_path, TABLE, out=tmp_path / "o.h5", progress=lambda *a: seen.append(a))
+    assert len(seen) > 3
+    assert seen[-3:] == [("reading", 1.0), ("writing", 0.0), ("writing", 1.0)]
+    read = [fraction for what, fraction in seen if what == "reading"]
+    assert read == sorted(read)
+
+
+# ------------------------------------------------------------------ what is refused, word for word
+
+HEAD = "time_s,direction,repetition,branch,step,force_N,displacement_mm\n"
+GOOD = "0,x,1,zero,0,0,0\n"
+REFUSED: list[tuple[str | bytes, str]] = [
+    ("", ": empty; wanted: a first row with the names of the columns, force_N and "
+     "displacement_mm at least."),
+    ("# only a comment\n", ": no header row; wanted: a first row with the names of the columns, "
+     "force_N and displacement_mm at least."),
+    ("0,1.5,2\n1,2,3\n", ":1: no header row: the first row holds numbers (0, 1.5, 2 ...); wanted: "
+     "the names of the columns, force_N and displacement_mm at least."),
+    (HEAD, ": no samples; there is nothing below the header."),
+    ("force_N;displacement_mm\n1,5;2,5\n", ":1: the columns are separated by semicolons; wanted: "
+     "commas between the columns and a point as decimal mark. Save the table so, or replace the "
+     "characters."),
+    ("force_N\tdisplacement_mm\n1\t2\n", ":1: the columns are separated by tabs; wanted: commas "
+     "between the columns and a point as decimal mark. Save the table so, or replace the "
+     "characters."),
+    ("force_N,displacement_mm\n1,5,2,5\n", ":2: 4 cells, but the header names 2 columns. If the "
+     "numbers have decimal commas, write points instead."),
+    ("force_N,displacement_mm\n1;5\n", ":2: 1 cell, but the header names 2 columns; wanted: "
+     "commas between the cells, not semicolons."),
+    ("force_n,displacement_mm\n1,5\n", ': the column force_N is missing; the header has force_n, '
+     'displacement_mm. Is it "force_n"? Rename it.'),
+    ("force_N,time_s\n1,5\n", ": the column displacement_mm is missing; the header has force_N, "
+     "time_s."),
+    ("force_N,displacement_mm,force_N\n1,5,1\n", ':1: the column "force_N" is there twice (columns '
+     "1 and 3); rename or remove one."),
+    ("force_N,displacement_mm,\n1,5,\n", ":1: column 3 has no name (a comma too many?); name it."),
+    (HEAD + GOOD + "1,x,1,loading,1,10\n", ":3: 6 cells, but the header names 7 columns; nothing "
+     "for displacement_mm. Was the file cut off? Complete or remove the row."),
+    (HEAD + GOOD + "1,x,1,loading,1,10,a note,1\n", ":3: 8 cells, but the header names 7 columns. "
+     "Remove what is too much, or name it in the header."),
+    (HEAD + GOOD + "\n# pause\n1,x,1,loading,1,ten,1\n", ':5: column force_N: "ten" is not a '
+     "number; wanted: a number in N, with a point as decimal mark."),
+    (HEAD + GOOD + '1,x,1,loading,1,"10,5",1\n', ':3: column force_N: "10,5" is not a number; '
+     'wanted: a number in N, with a point as decimal mark. Write "10.5".'),
+    (HEAD + GOOD + "1,x,1,loading,1,10.5 N,1\n", ':3: column force_N: "10.5 N" is not a number; '
+     'wanted: a number in N, with a point as decimal mark. Write "10.5"; the unit stands in the '
+     "column's name."),
+    (HEAD + GOOD + "1,x,1,loading,1,1_0,1\n", ':3: column force_N: "1_0" is not a number; wanted: '
+     "a number in N, with a point as decimal mark."),
+    (HEAD + GOOD + "1,x,1,loading,1,,1\n", ":3: column force_N: an empty cell is not allowed; "
+     "every row needs a finite value."),
+    (HEAD + GOOD + "1,x,1,loading,1,5,nan\n", ':3: column displacement_mm: "nan" (mm) is not '
+     "allowed; every row needs a finite value."),
+    (HEAD + GOOD + "1,x,1,loading,1,-inf,0\n", ':3: column force_N: "-inf" (N) is not allowed; '
+     "every row needs a finite value."),
+    (HEAD + GOOD + "1,x,1,loading,1,1e999,0\n", ':3: column force_N: "1e999" (N) is not allowed; '
+     "every row needs a finite value."),
+    (HEAD + GOOD + ",x,1,loading,1,5,0\n", ":3: column time_s: an empty cell is not allowed; "
+     "every row needs a finite value."),
+    (HEAD + GOOD + "1,x,1,laoding,1,5,0\n", ':3: column branch: "laoding" is not allowed; allowed: '
+     'zero, loading, unloading, cycle. Did you mean "loading"?'),
+    (HEAD + GOOD + "1,x,1,,1,5,0\n", ":3: column branch: an empty cell is not allowed; allowed: "
+     "zero, loading, unloading, cycle."),
+    (HEAD + GOOD + "1,z,1,loading,1,5,0\n", ':3: column direction: "z" is not allowed; META.yaml '
+     "does not define it. Known: x, y."),
+    (HEAD + GOOD + "1,x,0,loading,1,5,0\n", ':3: column repetition: "0" is not allowed; wanted: a '
+     "whole number, 1, 2, 3 ...."),
+    (HEAD + GOOD + "1,x,1.5,loading,1,5,0\n", ':3: column repetition: "1.5" is not allowed; '
+     "wanted: a whole number, 1, 2, 3 ...."),
+    (HEAD + GOOD + "1,x,1,loading,-2,5,0\n", ':3: column step: "-2" is not allowed; wanted: a '
+     "whole number from 0, or nothing (continuous)."),
+    (HEAD + GOOD + "1,x,1,loading,1e40,5,0\n", ':3: column step: "1e40" is not allowed; wanted: a '
+     "whole number from 0, or nothing (continuous)."),
+    (HEAD + GOOD + '1,x,"1,loading,1,5,0\n', ":3: quotes that do not match (unexpected end of "
+     "data); a cell in quotes must end in its line."),
+    (HEAD.replace("step", "pose") + "1,x,1,zero,P1,5,0\n1,x,1,zero,P2,5,0\n", ':3: column pose: '
+     '"P2" is not allowed; META.yaml does not define it. Known: P1.'),
+    (HEAD.replace("direction", "name") + GOOD, ": the column direction is missing, and META.yaml "
+     "defines 2: x, y. Add the column, or leave one in META."),
+    (HEAD.encode() + b"0,x,1,zero,0,0,0\n\n0,x,1,\xe4,0,0,0\n", ":4: the byte 0xE4 is no UTF-8 "
+     "text; save the file as UTF-8."),
+    (HEAD.encode() + b"0,x,1,zero,0,0,0\n0,x,\x00,", ":3: binary data; a text file is wanted."),
+    (HEAD.encode("utf-16"), ": UTF-16 text; save it as CSV UTF-8."),
+    (b"PK\x03\x04\x14\x00", ": an Excel or zip file; save the sheet as CSV (UTF-8)."),
+    (HEAD.replace("step", "discarded") + "0,x,1,zero,2,0,0\n", ':2: column discarded: "2" is not '
+     "allowed; wanted: 0 or 1."),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("table", "message"), REFUSED)
+def test_refused_tables(tmp_path: Path, table: str | bytes, message: str) -> None:
+    with pytest.raises(InputError) as told:
+        bring(tmp_path, table)
+    text = str(told.value).replace(str(tmp_path / "META.yaml"), "META.yaml")
+    assert text == f"{tmp_path / 't.csv'}{message}"
+
+
+def test_lines_are_counted_through_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(csvblocks, "BLOCK_BYTES", 50)
+    rows = ("# c\n\n" + GOOD) * 30
+    table = "# head\n" + HEAD + rows + GOOD.replace("zero", "zeor") + GOOD
+    with pytest.raises(InputError, match=r"t\.csv:93: column branch: \"zeor\""):
+        bring(tmp_path, table)
+    table = "# head\n" + HEAD + rows + GOOD.replace("0,0,0", "0,x,0") + GOOD
+    with pytest.raises(InputError, match=r"t\.csv:93: column force_N: \"x\""):
+        bring(tmp_path, table)
+
+
+def test_a_pose_column_without_an_arm(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r'pose: "P1" is not allowed; robot: none in .* no poses'):
+        bring(tmp_path, "pose,force_N,displacement_mm\nP1,1,2\n", example.META_SPECIMEN)
+
+
+def test_missing_files(tmp_path: Path) -> None:
+    (tmp_path / "META.yaml").write_text(example.META)
+    with pytest.raises(InputError, match=r"none\.csv: cannot be read: No such file"):
+        import_table(tmp_path / "none.csv", tmp_path / "META.yaml")
+    with pytest.raises(InputError, match=r"none\.yaml: no such file"):
+        import_table(tmp_path / "none.csv", tmp_path / "none.yaml")
+    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+        import_table(tmp_path, tmp_path / "META.yaml")
+
+
+def test_measurements_are_never_written_over(tmp_path: Path) -> None:
+    out = tmp_path / "run.h5"
+    write(example.dataset(), out)
+    before = out.read_bytes()
+    with pytest.raises(InputError, match="exists and is no imported data set"):
+        bring(tmp_path, TABLE, out=out)
+    assert out.read_bytes() == before
+    example.write_journal(tmp_path / "busy.h5", 1)
+    with pytest.raises(InputError, match="a measurement is under way there"):
+        bring(tmp_path, TABLE, out=tmp_path / "busy.h5")
+    first = bring(tmp_path, TABLE, out=tmp_path / "new.h5")
+    again = bring(tmp_path, TABLE, out=tmp_path / "new.h5")
+    assert load(tmp_path / "new.h5").uuid == again.uuid != first.uuid
+
+
+# ------------------------------------------------------------------ the two readers agree
+
+NUMBERS = st.one_of(
+    st.floats().map(repr),
+    st.integers(-(10**25), 10**25).map(str),
+    st.from_regex(r"[-+]?[0-9]{0,3}[.,]?[0-9]{0,3}([eE][-+]?[0-9]{0,4})?", fullmatch=True),
+    st.sampled_from([*csvcells.MISSING, "inf", "-Infinity", "1_0", "0x1p3", "1e", "--1", "1 2", "x",
+                     "True", "1.5N", "٣", "1d5", "1f", "½", "- 1", "1e+", "+.5", "."]),
+)  # fmt: skip
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(cells=st.lists(st.tuples(NUMBERS, st.text("xyzäNA10 ", max_size=4)), min_size=1, max_size=3))
+def test_fast_and_plain_reader_agree(
+    tmp_path_factory: pytest.TempPathFactory, cells: list[tuple[str, str]]
+) -> None:
+    path = tmp_path_factory.mktemp("agree") / "t.csv"
+    rows = "".join(f'"{a}","{b}",1\n' for a, b in cells)
+    path.write_text("a_N,word,c\n" + rows)
+    readings: dict[str, csvcells.Reading] = {"a_N": "number", "word": "word", "c": "further"}
+    with csvblocks.CsvFile(path) as file:
+        (block,) = file.blocks()
+        fast = csvcells._parse_fast(file, block, readings)
+        try:
+            plain = csvcells._parse_plain(file, block, readings)
+        except InputError:
+            assert fast is None
+            return
+    if fast is not None:
+        for name, values in plain.items():
+            assert example.same_values(values, fast[name]), name
+
+
+# ------------------------------------------------------------------ and out again
+
+
+def there_and_back(data: Dataset, folder: Path) -> Dataset:
+    export_table(data, folder / "e.csv")
+    (folder / "E.yaml").write_text(data.texts["meta"])
+    return import_table(folder / "e.csv", folder / "E.yaml")
+
+
+def test_export_gives_a_measurement_back(tmp_path: Path) -> None:
+    data = example.dataset(4)
+    data.columns["discarded"][2] = True
+    back = there_and_back(data, tmp_path)
+    assert set(back.columns) == set(data.columns)
+    for name, values in data.columns.items():
+        assert np.array_equal(values, back.columns[name], equal_nan=values.dtype.kind == "f"), name
+
+
+def test_marks_survive_the_table(tmp_path: Path) -> None:
+    data = example.dataset(2)
+    text = (tmp_path / "e.csv", there_and_back(data, tmp_path))
+    assert text[0].read_text().startswith("# EMULATED: these values come from simulated devices")
+    assert text[1].origin == "emulated"
+    cut = there_and_back(replace(data, complete=False, stop_reason="a, b\nc"), tmp_path)
+    assert not cut.complete
+    clean = there_and_back(replace(data, origin="measured"), tmp_path)
+    assert (clean.origin, clean.complete) == ("imported", True)
+    write(text[1], tmp_path / "e.h5")
+    assert load(tmp_path / "e.h5").origin == "emulated"
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    rows=st.lists(
+        st.tuples(finite, finite, st.floats(allow_infinity=False), st.integers(-1, 2**40),
+                  st.sampled_from(["x", "y"]), st.sampled_from(["zero", "loading", "cycle"]),
+                  st.booleans(), st.text("aä,;\"'# é|", max_size=5).map(str.strip)),
+        min_size=1, max_size=20,
+    )
+)  # fmt: skip
+def test_round_trip_is_exact(
+    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[Any, ...]]
+) -> None:
+    force, displacement, q, step, direction, branch, discarded, note = zip(*rows, strict=True)
+    folder = tmp_path_factory.mktemp("trip")
+    data = bring(folder, "direction,force_N,displacement_mm\n" + "x,0,0\n" * len(rows))
+    columns = data.columns | {
+        "force_N": np.array(force), "displacement_mm": np.array(displacement),
+        "q1_rad": np.array(q), "step": np.array(step), "direction": np.array(direction),
+        "branch": np.array(branch), "discarded": np.array(discarded),
+        "note": np.array([f"n{text}" for text in note]),
+    }  # fmt: skip
+    back = there_and_back(replace(data, columns=columns), folder)
+    for name, values in columns.items():
+        assert example.same_values(values, back.columns[name]), name
+
+
+def test_parquet(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    data = example.dataset(4)
+    export_table(data, tmp_path / "e.parquet")
+    table = parquet.read_table(tmp_path / "e.parquet")
+    assert table["force_N"].to_pylist() == [0, 10, 20, 30]
+    assert table.schema.field("force_N").metadata == {b"units": b"N"}
+    assert table.schema.metadata[b"rig.origin"] == b"emulated"
+    assert table.schema.metadata[b"rig.banner"].startswith(b"EMULATED:")
+    frame = table.to_pandas()
+    assert frame["branch"].tolist() == data.columns["branch"].tolist()
+
+
+def test_parquet_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(InputError, match=r"pip install \"stiffness-rig\[parquet\]\""):
+        export_table(example.dataset(), tmp_path / "e.parquet")
+
+
+def test_other_endings_are_refused(tmp_path: Path) -> None:
+    for name in ("e.xlsx", "e", "run.h5"):
+        with pytest.raises(InputError, match=r"is not known; allowed: \.csv, \.parquet"):
+            export_table(example.dataset(), tmp_path / name)
+
+
+# ------------------------------------------------------------------ broken ones, and real ones
+
+
+def _broken_table(text: str, seed: int) -> bytes:
+    rng = random.Random(seed)
+    lines = text.splitlines(keepends=True)
+    row = rng.randrange(len(lines))
+    cells = lines[row].rstrip("\n").split(",")
+    cell = rng.randrange(len(cells))
+    match seed % 10:
+        case 0:
+            del cells[cell]
+        case 1:
+            cells.insert(cell, "7")
+        case 2:
+            cells[cell] = rng.choice(["", "nan", "x", "1,5", "1;5", "-", '"', "0x10", "é", "1e999"])
+        case 3:
+            lines = [",".join(c for i, c in enumerate(x.split(",")) if i != 7) for x in lines]
+        case 4:
+            lines = [x.replace(",", rng.choice([";", "\t", "|", ", ,"])) for x in lines]
+        case 5:
+            raw = bytearray(text.encode())
+            for _ in range(3):
+                raw[rng.randrange(len(raw))] = rng.randrange(256)
+            return bytes(raw)
+        case 6:
+            return text.encode()[: rng.randrange(len(text))]
+        case 7:
+            return text.encode("utf-16") if seed % 20 == 7 else rng.randbytes(300)
+        case 8:
+            lines[0] = lines[0].replace(rng.choice(lines[0].strip().split(",")), "time_s", 1)
+        case _:
+            return (text + text).encode()
+    if seed % 10 < 3:
+        lines[row] = ",".join(cells) + "\n"
+    return "".join(lines).encode()
+
+
+def test_200_broken_tables_are_refused_by_name(tmp_path: Path) -> None:
+    passed = 0
+    (tmp_path / "META.yaml").write_text(example.META)
+    for seed in range(200):
+        (tmp_path / "t.csv").write_bytes(_broken_table(TABLE, seed))
+        told = _message(tmp_path / "t.csv", tmp_path / "META.yaml")
+        assert told == "" or told.startswith(str(tmp_path / "t.csv")), seed
+        passed += not told  # a digit for a digit, a row less: no table can tell
+    assert passed < 60
+
+
+def test_200_broken_metas_are_refused_by_name(tmp_path: Path) -> None:
+    passed = 0
+    for seed in range(200):
+        rng = random.Random(seed)
+        raw = bytearray(example.META.encode())
+        at = rng.randrange(len(raw))
+        if seed % 4 == 0:
+            del raw[at : at + rng.randrange(1, 40)]
+        elif seed % 4 == 1:
+            raw[at] = rng.randrange(256)
+        elif seed % 4 == 2:
+            del raw[at:]
+        else:
+            raw[at:at] = rng.choice([b"\t", b": ", b"- ", b"-", b"\x00", b".nan", b"{", b"&a"])
+        (tmp_path / "t.csv").write_text(TABLE)
+        (tmp_path / "META.yaml").write_bytes(raw)
+        told = _message(tmp_path / "t.csv", tmp_path / "META.yaml")
+        assert told == "" or str(tmp_path) in told, seed
+        passed += not told
+    assert passed < 60
+
+
+def _message(table: Path, meta: Path) -> str:
+    try:
+        import_table(table, meta)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+SHARED_TABLES = sorted(p.parent for p in SHARED.glob("*/*/meta.yaml"))
+
+
+@pytest.mark.skipif(not SHARED_TABLES, reason="no tables beside the project")
+def test_tables_beside_the_project_come_in_and_go_out(tmp_path: Path) -> None:
+    for folder in SHARED_TABLES:
+        table = folder / "samples.csv"
+        data = import_table(table, folder / "meta.yaml", tmp_path / "i.h5")
+        assert data.rows == len(table.read_text().splitlines()) - 1
+        assert [e["kind"] for e in data.events] == ["import"], folder
+        assert equal(load(tmp_path / "i.h5"), data), folder
+    export_table(data, tmp_path / "o.csv")
+    back = import_table(tmp_path / "o.csv", folder / "meta.yaml")
+    assert all(example.same_values(v, back.columns[n]) for n, v in data.columns.items())
