@@ -256,6 +256,25 @@ def test_a_jump_of_the_target_is_named_and_measured_on(bench: Bench) -> None:
     assert laser.latest().values[0] == pytest.approx(6.0, abs=5e-3)
 
 
+def test_a_target_set_up_anew_out_of_sight_is_no_jump(bench: Bench) -> None:
+    emulator, port = bench.emulator()
+    laser = bench.client(port, stale_after_s=5.0)
+    laser.open()
+    emulator.inject("no_object")
+    assert until(lambda: laser.latest().count == 0)
+    bench.scene.displacement = 2.0e-3
+    emulator.clear()
+    problems: list[str] = []
+
+    def arrived() -> bool:
+        problems.extend(laser.collect().problems)
+        return abs(laser.latest().values[0] - 7.0) < 5e-3
+
+    assert until(arrived)
+    assert "no object (65522)" in problems
+    assert not [p for p in problems if "jumped" in p]
+
+
 @pytest.mark.parametrize("fault", ["no_object", "silence"])
 def test_measures_again_when_a_fault_has_passed(bench: Bench, fault: str) -> None:
     emulator, port = bench.emulator()
