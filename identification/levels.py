@@ -148,7 +148,7 @@ def grid_of(points: Iterable[Point], branch: str) -> Grid:
     """The points of one branch. A level met twice in a run counts with the mean of both."""
     chosen = [p for p in points if p.branch == branch]
     repetitions = tuple(dict.fromkeys(p.repetition for p in chosen))
-    steps = tuple(dict.fromkeys(p.step for p in chosen))
+    steps = _merged([[p.step for p in chosen if p.repetition == r] for r in repetitions])
     row = {r: i for i, r in enumerate(repetitions)}
     column = {s: i for i, s in enumerate(steps)}
     sums = np.zeros((4, len(repetitions), len(steps)))
@@ -160,6 +160,27 @@ def grid_of(points: Iterable[Point], branch: str) -> Grid:
     with np.errstate(invalid="ignore"):
         means = sums / np.where(count, count, np.nan)
     return Grid(branch, repetitions, steps, *means)
+
+
+def _merged(sequences: Iterable[list[int]]) -> tuple[int, ...]:
+    """Steps in an order that agrees with every run's: one that the first run lacks comes behind
+    the one that precedes it where it was met."""
+    order: list[int] = []
+    known: set[int] = set()
+    for sequence in sequences:
+        if not known:
+            order = list(dict.fromkeys(sequence))
+        elif not known.issuperset(sequence):
+            at = 0
+            for step in sequence:
+                if step in known:
+                    at = order.index(step) + 1
+                elif step not in order[:at]:
+                    order.insert(at, step)
+                    known.add(step)
+                    at += 1
+        known.update(sequence)
+    return tuple(order)
 
 
 def pointwise(grid: Grid, *, origin: bool) -> tuple[PointwiseStiffness, ...]:
@@ -180,7 +201,8 @@ def pointwise(grid: Grid, *, origin: bool) -> tuple[PointwiseStiffness, ...]:
 class Hysteresis:
     """What loading and unloading enclose, mean over the repetitions that have both.
 
-    area J, sd J (n - 1; nan for n = 1); relative: to the work of loading; remaining m: mean
+    area J, sd J (n - 1; nan for n = 1); relative: to the work of loading from the measured zero,
+    nan for a cycle without one; remaining m: mean
     displacement of the zero-load plateau after the run, nan without one.
     """
 
@@ -213,7 +235,7 @@ def hysteresis(curve: Curve, loading: Grid, unloading: Grid) -> Hysteresis | Non
     sd = float(np.std(areas, ddof=1)) if len(areas) > 1 else float("nan")
     work = float(np.mean(np.abs(works)))
     remaining = float(np.mean(list(after.values()))) if after else float("nan")
-    relative = float(np.mean(areas)) / work if work > 0 else float("nan")
+    relative = float(np.mean(areas)) / work if work > 0 and curve.origin else float("nan")
     return Hysteresis(float(np.mean(areas)), sd, relative, remaining, len(areas))
 
 

@@ -78,9 +78,10 @@ def _direction(key: str, direction: Direction) -> Iterator[str]:
     yield from _excluded(r.excluded)
     if r.hysteresis is not None:
         loop = r.hysteresis
+        share = "" if math.isnan(loop.relative) else f", {loop.relative:.1%} of the work of loading"
         yield (
-            f"Loop between loading and unloading: {number(loop.area * MM)} N mm, "
-            f"{loop.relative:.1%} of the work of loading; k is that of loading."
+            f"Loop between loading and unloading: {number(loop.area * MM)} N mm{share}; "
+            "k is that of loading."
         )
     for note in r.notes:
         yield from wrap(note, WIDTH)

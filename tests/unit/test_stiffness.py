@@ -280,3 +280,20 @@ def test_scales_from_micronewtons_to_meganewtons(force: float, displacement: flo
     assert k_of(other) == pytest.approx(k_of(one) * force / displacement, rel=1e-9)
     assert other.status == one.status
     assert (other.knee is None) == (one.knee is None)
+
+
+def test_a_level_that_the_first_run_skipped_stands_where_it_belongs() -> None:
+    whole = curve()
+    gap = [p for p in whole.points if not (p.repetition == 1 and p.step in (1, 3))]
+    result = analyze_curve(replace(whole, points=tuple(gap)))
+    assert [p.step for p in result.levels] == [1, 2, 3, 4, 5]
+    assert [p.n for p in result.levels] == [2, 3, 2, 3, 3]
+    assert [p.force for p in result.pointwise] == pytest.approx([10.0, 30.0, 50.0, 70.0, 90.0])
+
+
+def test_the_loop_of_a_cycle_without_zero_has_an_area_and_no_share() -> None:
+    loop = unloading(curve(factors=(1.0, 1.0, 1.0)), lambda f: f / 1e5 + 1e-4, 1e-4)
+    result = analyze_curve(replace(loop, origin=False))
+    assert result.hysteresis is not None
+    assert result.hysteresis.area == pytest.approx(80.0 * 1e-4, rel=1e-6)
+    assert math.isnan(result.hysteresis.relative)
