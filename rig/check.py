@@ -8,8 +8,7 @@ from pathlib import Path
 
 from drivers.errors import DeviceError
 from rig.devices import in_short, make_devices, station_clock
-from rig.emulation import EmulatedRig
-from rig.measure import SAFETY_NOTE, poses_and_programs
+from rig.measure import SAFETY_NOTE, emulated_rig
 from rig.plan import Plan, plan
 from rig.protocol import load_protocol
 from rig.station import load_station
@@ -75,8 +74,7 @@ def check(protocol_file: Path, station_name: str | None) -> Check:
     states: list[DeviceState] = []
     with ExitStack() as stack:
         if emulated:
-            rig = EmulatedRig(station, *poses_and_programs(protocol))
-            station = stack.enter_context(rig)
+            station = stack.enter_context(emulated_rig(station, protocol))
         for device in make_devices(station, station_clock(station)).all():
             stack.callback(device.close)
             try:

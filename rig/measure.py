@@ -127,8 +127,7 @@ def _opened(
     with ExitStack() as stack:
         if station.emulation is not None:
             say("EMULATED station: whatever is measured here is no measurement of a real arm.")
-            emulated = EmulatedRig(station, *poses_and_programs(protocol))
-            station = stack.enter_context(emulated)
+            station = stack.enter_context(emulated_rig(station, protocol))
         clock = station_clock(station)
         devices = make_devices(station, clock)
         open_devices(devices, stack, say)
@@ -140,13 +139,12 @@ def _opened(
         yield _Rig(station, devices, loader, clock)
 
 
-def poses_and_programs(
-    protocol: MeasurementProtocol,
-) -> tuple[dict[str, tuple[float, ...]], dict[str, tuple[float, ...]]]:
-    """Joint angles (rad) by pose name, and by the name of the program that leads there."""
+def emulated_rig(station: Station, protocol: MeasurementProtocol) -> EmulatedRig:
+    """The emulators of a station, prepared for a protocol: its poses, programs and tools."""
     poses = {name: tuple(pose.q_rad) for name, pose in protocol.poses.items()}
     programs = {p.program: tuple(p.q_rad) for p in protocol.poses.values() if p.program}
-    return poses, programs
+    tools_mm = {name: tuple(pose.tcp_xyz_mm) for name, pose in protocol.poses.items()}
+    return EmulatedRig(station, poses, programs, tools_mm, protocol.zero.after_s)
 
 
 def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
