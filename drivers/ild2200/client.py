@@ -257,7 +257,7 @@ class _Reader:
         health.last_byte = time.monotonic()
         raw, lost = self._decoder.feed(data)
         self._rate_count += len(raw)
-        measured = raw[raw <= frames.LARGEST_MEASUREMENT]
+        measured = frames.measurements(raw)
         causes: Counter[str] = Counter()
         if lost:
             causes["bytes that are no values"] = lost

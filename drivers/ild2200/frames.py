@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]
+Bytes = NDArray[np.uint8]
 
 LARGEST_MEASUREMENT = 65519  # raw values above it are error values
-BITS = 18  # 16 of value, two flags; error values of related sensors use all of them
+_TAGS = np.array([0x00, 0x40, 0x80], dtype=np.uint8)
 
 ERROR_NAMES = {
     65522: "no object",
@@ -31,13 +32,22 @@ def error_name(raw: int) -> str:
     return f"{name} ({raw})"
 
 
+def measurements(raw: Integers) -> Integers:
+    """The raw values that are no error values."""
+    if len(raw) == 0 or int(raw.max()) <= LARGEST_MEASUREMENT:
+        return raw
+    return raw[raw <= LARGEST_MEASUREMENT]
+
+
 def to_mm(raw: Integers, range_mm: float) -> Floats:
     """Distance in the measuring range, mm, of raw values up to `LARGEST_MEASUREMENT`.
 
     The straight line through the manual's points (643 is the start of the range, 32760 its middle,
     64876 its end), which it meets within two digits, 0.003 % of the range.
     """
-    return np.asarray((raw * (1.02 / 65520) - 0.01) * range_mm, dtype=np.float64)
+    distance = np.multiply(raw, 1.02 / 65520 * range_mm, dtype=np.float64)
+    distance -= 0.01 * range_mm
+    return distance
 
 
 def to_raw(distance_mm: Floats, range_mm: float) -> Integers:
@@ -68,15 +78,26 @@ class FrameDecoder:
 
     def feed(self, data: bytes) -> tuple[Integers, int]:
         """Raw values (n,) that `data` completes, and the number of values lost."""
-        stream = np.frombuffer(self._rest + data, dtype=np.uint8)
-        tags = np.right_shift(stream, 6, dtype=np.uint8)
+        data = self._rest + data
+        whole = len(data) - len(data) % 3
+        stream = np.frombuffer(data, dtype=np.uint8)
+        if self._joined and not self._skipped and whole:
+            # Nothing is broken almost always, and then nothing need be searched.
+            table = stream[:whole].reshape(-1, 3)
+            rest = len(data) - whole
+            if ((table & 0xC0) == _TAGS).all() and _unfinished(_tags(stream[whole:])) == rest:
+                self._rest = data[whole:]
+                return _assemble(table[:, 0], table[:, 1], table[:, 2]), 0
+        return self._search(stream)
+
+    def _search(self, stream: Bytes) -> tuple[Integers, int]:
+        tags = _tags(stream)
         at = np.flatnonzero((tags[:-2] == 0) & (tags[1:-1] == 1) & (tags[2:] == 2))
         end = int(at[-1]) + 3 if len(at) else 0
         keep = _unfinished(tags[end:])
         lost = self._count_lost(at, len(stream) - keep - end)
         self._rest = stream[len(stream) - keep :].tobytes()
-        words = stream.astype(np.int32) & 0x3F
-        return words[at] | words[at + 1] << 6 | words[at + 2] << 12, lost
+        return _assemble(stream[at], stream[at + 1], stream[at + 2]), lost
 
     def _count_lost(self, at: NDArray[np.intp], trailing: int) -> int:
         lost = 0
@@ -96,7 +117,20 @@ class FrameDecoder:
         return lost
 
 
-def _unfinished(tags: NDArray[np.uint8]) -> int:
+def _tags(stream: Bytes) -> Bytes:
+    return np.right_shift(stream, 6, dtype=np.uint8)
+
+
+def _assemble(low: Bytes, middle: Bytes, high: Bytes) -> Integers:
+    raw = high.astype(np.int32) & 0x3F
+    raw <<= 6
+    raw |= middle & 0x3F
+    raw <<= 6
+    raw |= low & 0x3F
+    return raw
+
+
+def _unfinished(tags: Bytes) -> int:
     """How many of the last bytes may be the beginning of a frame: 0, 1 or 2."""
     if len(tags) >= 2 and tags[-2] == 0 and tags[-1] == 1:
         return 2
@@ -133,11 +167,15 @@ class StepFilter:
             return np.empty(0), 0, 0.0
         candidates = x[self._judged : len(x) - reach]
         accepted = candidates
-        if float(np.ptp(x)) > self._max_step_mm:
+        quiet = float(x.max() - x.min()) <= self._max_step_mm
+        if not quiet:
             accepted = candidates[self._plausible(x)]
         self._held = x[len(x) - 2 * reach :]
         self._judged = reach
-        return accepted, len(candidates) - len(accepted), self._jump(accepted)
+        jump = self._jump(accepted[:1] if quiet else accepted)
+        if len(accepted):
+            self._last = float(accepted[-1])
+        return accepted, len(candidates) - len(accepted), jump
 
     def _plausible(self, x: Floats) -> NDArray[np.bool_]:
         windows = np.lib.stride_tricks.sliding_window_view(x, 2 * self.REACH + 1)
@@ -151,6 +189,5 @@ class StepFilter:
             return 0.0
         before = accepted[0] if self._last is None else self._last
         steps = np.diff(accepted, prepend=before)
-        self._last = float(accepted[-1])
         largest = float(steps[np.argmax(np.abs(steps))])
         return largest if abs(largest) > self._max_step_mm else 0.0
