@@ -20,7 +20,10 @@ class Device(Protocol):
     """
 
     name: str
-    signals: Sequence[Signal]
+
+    @property
+    def signals(self) -> Sequence[Signal]:
+        """The columns that readings deliver, in their order."""
 
     def open(self) -> None:
         """Connects, identifies, starts; returns with the first values, or raises DeviceError."""
@@ -56,7 +59,8 @@ class Robot(Device, Protocol):
 
 class Dynamometer(Device, Protocol):
     """A force sensor. `values` of its readings are tared; the first three signals are
-    force_x_N, force_y_N, force_z_N on the robot in its base frame, then moments, then raw channels."""
+    force_x_N, force_y_N, force_z_N on the robot in its base frame, then moments and raw channels.
+    """
 
     def reset(self) -> None:
         """Holds the charge amplifier in Reset (force meaningless) for its settle time."""

@@ -158,7 +158,7 @@ class Runner:
         words += f" Set up screw, dynamometer and laser along {run.direction} ({axis}), "
         words += f"not touching. {self._protocol.prompts.get('before_run', '')}"
         rig = {"q_rad": list(pose.q_rad), "direction": list(where.unit_vector)}
-        self._supervision.ask(Prompt("mount", words.strip(), ("ok",), rig))
+        self._supervision.ask(Prompt("mount", words.strip(), ("ok",), rig), watching=False)
         self._verify_pose(run.pose, pose.q_rad)
         self._mounted = (run.pose, run.direction)
         self._recorder.datum_mm = nan
@@ -176,6 +176,7 @@ class Runner:
 
     def _verify_pose(self, name: str, q_rad: tuple[float, ...]) -> None:
         while True:
+            self._devices.robot.accept_present_state()
             q = self._devices.robot.state().q
             off = [degrees(abs(a - b)) for a, b in zip(q, q_rad, strict=True)]
             worst = max(range(len(off)), key=off.__getitem__)
@@ -185,7 +186,8 @@ class Runner:
                 f"Joint {worst + 1} is {off[worst]:.2f} deg away from pose {name} "
                 f"(allowed {POSE_TOLERANCE_DEG:g} deg). Correct the pose, then check again."
             )
-            answer = self._supervision.ask(Prompt("pose", text, ("check again", "accept", "abort")))
+            prompt = Prompt("pose", text, ("check again", "accept", "abort"))
+            answer = self._supervision.ask(prompt, watching=False)
             if answer == "accept":
                 self._recorder.event("pose_accepted", text)
                 return

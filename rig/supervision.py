@@ -93,8 +93,12 @@ class Supervision:
             self._hear()
         return live, slot
 
-    def ask(self, prompt: Prompt) -> str:
-        """Asks without looking away: limits and devices are watched until the answer comes."""
+    def ask(self, prompt: Prompt, *, watching: bool = True) -> str:
+        """Asks without looking away: limits and devices are watched until the answer comes.
+
+        watching False is for work on the unloaded rig, which looks like any fault: the arm is led
+        to its pose, cables are touched, the amplifier is in Reset.
+        """
         answers: list[str] = []
         failures: list[DeviceError] = []
 
@@ -109,7 +113,10 @@ class Supervision:
         thread.start()
         try:
             while thread.is_alive():
-                self.tick()
+                if watching:
+                    self.tick()
+                else:
+                    thread.join(0.05)
         finally:
             self._prompts -= 1
         if failures:

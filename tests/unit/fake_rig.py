@@ -86,6 +86,9 @@ class FakeRobot(FakeDevice):
     def values(self) -> tuple[float, ...]:
         return self.arm.q
 
+    def accept_present_state(self) -> None:
+        self.arm.broken.pop("robot", None)
+
     def state(self) -> RobotState:
         return RobotState(self.arm.q, self.arm.q, (30.0,) * 6, 7, 1, 1, 2, 0.0, 0.0)
 

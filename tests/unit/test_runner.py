@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from drivers.errors import ReadTimeout
+from drivers.errors import ReadTimeout, SafetyStop
 from drivers.interfaces import LiveView
 from rig.acquisition import Acquisition
 from rig.devices import Devices
@@ -409,3 +410,18 @@ def test_an_arm_that_does_not_settle(bench: Bench, at_deadline: str, outcome: st
     else:
         bench.run()
         assert all(outcome in e["outcome"] for e in bench.events("step_done"))
+
+
+def test_leading_the_arm_to_its_pose_is_no_fault(bench: Bench) -> None:
+    """Play, freedrive and stop on the pendant change the controller's state while mounting."""
+    ask = bench.loader.ask
+
+    def asked(prompt: Any) -> str:
+        if prompt.key == "mount":
+            bench.arm.broken["robot"] = SafetyStop("robot", "the program state changed", "Look.")
+            time.sleep(0.2)
+        return ask(prompt)
+
+    bench.loader.ask = asked  # type: ignore[method-assign]
+    bench.run()
+    assert bench.steps() == ALL
