@@ -40,7 +40,8 @@ emulator.stop()
 
 def plain_loop(chunks: list[bytes], max_step_mm: float) -> list[float]:
     """Byte by byte with a state, then a median of nine around every value."""
-    values, held = [], []
+    values: list[float] = []
+    held: list[int] = []
     for chunk in chunks:
         for byte in chunk:
             tag = byte >> 6
