@@ -23,7 +23,7 @@ MISSING = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "null", "NULL", 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _INFINITE = {"inf", "+inf", "-inf", "infinity", "+infinity", "-infinity"}
 _SPACE_AT_END = re.compile(rb"[ \t]+(?=[,\n])")
-_TRUTH = re.compile(rb"\b(true|false)\b", re.IGNORECASE)
+_TRUTHS = (b"true", b"True", b"TRUE", b"false", b"False", b"FALSE")
 _QUOTED = 80
 
 
@@ -57,7 +57,8 @@ def _parse_fast(
         raw = _SPACE_AT_END.sub(b"", raw)
     names = [str(i) for i in range(len(file.names))]
     words = {i for i, name in zip(names, file.names, strict=True) if readings[name] == "word"}
-    dtype: Any = {i: "category" if i in words else "float64" for i in names}
+    # not "category": that takes 00 and 0 for one word
+    dtype: Any = {i: "str" if i in words else "float64" for i in names}
     numbers = [i for i in names if i not in words]
     try:
         frame = pd.read_csv(
@@ -69,14 +70,17 @@ def _parse_fast(
         return None
     if len(frame) != len(block.lines):
         return None
+    truths = any(word in raw for word in _TRUTHS)
     columns: dict[str, Values] = {}
     for i, name in zip(names, file.names, strict=True):
         if i in words:
-            categories = [str(c).strip() for c in frame[i].cat.categories]
-            columns[name] = np.array(categories, dtype=str)[frame[i].cat.codes.to_numpy()]
+            codes, texts = pd.factorize(frame[i])
+            if codes.min() < 0:  # taken for missing
+                return None
+            columns[name] = np.array([str(t).strip() for t in texts], dtype=str)[codes]
         else:
             columns[name] = frame[i].to_numpy(dtype=np.float64)
-            if _TRUTH.search(raw) and np.isin(columns[name], (0.0, 1.0)).all():
+            if truths and np.isin(columns[name], (0.0, 1.0)).all():
                 return None  # "true" may have become 1
     return columns
 

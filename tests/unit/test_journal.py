@@ -7,6 +7,7 @@ import os
 import random
 import select
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -79,6 +80,21 @@ def test_is_on_disk_before_append_returns(path: Path, monkeypatch: pytest.Monkey
     assert replay(path)[-1].data["text"] == "long enough for several writes"
 
 
+def test_its_name_is_on_disk_when_it_is_created(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[bool] = []
+    real_sync = os.fsync
+
+    def sync(fd: int) -> None:
+        synced.append(stat.S_ISDIR(os.fstat(fd).st_mode))
+        real_sync(fd)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    Journal.create(tmp_path / "j", start()).close()
+    assert synced == [False, True]  # the start record, then the folder
+
+
 def test_the_last_record_torn_anywhere_is_passed_over(path: Path) -> None:
     content = path.read_bytes()
     begin = content.rstrip(b"\n").rfind(b"\n") + 1
@@ -100,6 +116,7 @@ def test_goes_on_after_a_torn_record(path: Path) -> None:
         records = replay(path)
         assert [r.number for r in records] == list(range(found + 1))
         assert records[-1].data["text"] == "resumed"
+        assert path.read_bytes().endswith(b"}\n")  # nothing of the torn one is left
         assert found == (6 if cut == len(content) - 1 else 5)
 
 

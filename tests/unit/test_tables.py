@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -56,6 +57,13 @@ def test_every_column_of_the_format(tmp_path: Path) -> None:
     np.testing.assert_array_equal(data.columns["q1_rad"], [0.1, 0.1001, np.nan, np.nan])
     assert (data.origin, data.complete, data.units["q1_rad"]) == ("imported", True, "rad")
     assert data.texts["meta"] == example.META
+
+
+def test_an_imported_clock_has_no_date(tmp_path: Path) -> None:
+    bring(tmp_path, TABLE, out=tmp_path / "o.h5")
+    with h5py.File(tmp_path / "o.h5") as file:
+        time = file["entry/samples/time"]
+        assert (time.attrs["units"], time[:].tolist()) == ("s", [1.5, 2.5, 3.5, 60.5])
 
 
 def test_what_is_left_out_gets_its_default(tmp_path: Path) -> None:
@@ -116,11 +124,11 @@ def test_spellings_of_one_table(tmp_path: Path, change: Any) -> None:
 
 def test_further_columns_are_kept(tmp_path: Path) -> None:
     table = "note,force_N,displacement_mm,speed mm/s,mixed\n"
-    rows = ['"slow, #1",1,2,0.5,1', ",1,3,,2", "Größe,1,4,inf,drei"]
+    rows = ['"slow, #1",1,2,0.5,01', ",1,3,,1", "Größe,1,4,inf,drei"]
     data = bring(tmp_path, table + "\n".join(rows), example.META_SPECIMEN)
     assert data.columns["note"].tolist() == ["slow, #1", "", "Größe"]
     np.testing.assert_array_equal(data.columns["speed mm/s"], [0.5, np.nan, np.inf])
-    assert data.columns["mixed"].tolist() == ["1", "2", "drei"]
+    assert data.columns["mixed"].tolist() == ["01", "1", "drei"]
 
 
 def test_a_column_that_turns_to_text_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
