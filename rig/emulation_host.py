@@ -176,5 +176,6 @@ def _emulators(
             seed=seed + 3,
             start_mm=near if laser.sign > 0 else laser.range_mm - near,
             sign=laser.sign,
+            averaging=laser.averaging,
         )
     return emulators

@@ -174,7 +174,7 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
         raise
     finally:
         with _signals(_patience(say), _patience(say)):
-            _finish(job, recorder, reason, complete=complete)
+            _finish(job, recorder, reason, say, complete=complete)
     return job.output
 
 
@@ -186,14 +186,16 @@ def _descriptor(rig: _Rig) -> dict[str, object]:
     return {"devices": devices | operator, "signals": columns}
 
 
-def _finish(job: Job, recorder: Recorder, reason: str, *, complete: bool) -> None:
+def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bool) -> None:
     """Stop record and data set; the journal goes when that is complete and has been read back."""
     if complete:
         recorder.stop(reason, complete=True)
     else:
         recorder.event("stopped", reason)
     job.journal.close()
-    datasets.finish(job.output)
+    stored = datasets.finish(job.output)
+    if not complete:
+        say(f"{stored.rows} rows are kept. To go on: rig measure --resume {job.output}")
 
 
 def _build(job: Job) -> None:

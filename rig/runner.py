@@ -186,7 +186,7 @@ class Runner:
                 f"Joint {worst + 1} is {off[worst]:.2f} deg away from pose {name} "
                 f"(allowed {POSE_TOLERANCE_DEG:g} deg). Correct the pose, then check again."
             )
-            prompt = Prompt("pose", text, ("check again", "accept", "abort"))
+            prompt = Prompt("pose", text, ("abort", "check again", "accept"))
             answer = self._supervision.ask(prompt, watching=False)
             if answer == "accept":
                 self._recorder.event("pose_accepted", text)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from math import nan
 from typing import Any
 
-from drivers.errors import DeviceError
 from drivers.interfaces import Command, LiveView, Loader, Prompt
 from rig.acquisition import Acquisition
 from rig.errors import MeasurementStopped
@@ -99,14 +99,13 @@ class Supervision:
         watching False is for work on the unloaded rig, which looks like any fault: the arm is led
         to its pose, cables are touched, the amplifier is in Reset.
         """
-        answers: list[str] = []
-        failures: list[DeviceError] = []
+        answer: Future[str] = Future()
 
         def wait_for_answer() -> None:
             try:
-                answers.append(self._loader.ask(prompt))
-            except DeviceError as error:
-                failures.append(error)
+                answer.set_result(self._loader.ask(prompt))
+            except BaseException as error:  # noqa: BLE001 - raised again by result()
+                answer.set_exception(error)
 
         thread = threading.Thread(target=wait_for_answer, name="prompt", daemon=True)
         self._prompts += 1
@@ -119,10 +118,8 @@ class Supervision:
                     thread.join(0.05)
         finally:
             self._prompts -= 1
-        if failures:
-            raise failures[0]
-        self._recorder.event("prompt", prompt.text, key=prompt.key, answer=answers[0])
-        return answers[0]
+        self._recorder.event("prompt", prompt.text, key=prompt.key, answer=answer.result())
+        return answer.result()
 
     def obey(self, answer: str) -> None:
         """Turns an answer or a command into what it asks for; others do nothing."""
@@ -150,8 +147,11 @@ class Supervision:
 
     def _pause(self, text: str) -> None:
         self._recorder.event("pause", text)
+        phase = self.view.phase
+        self.show(phase="paused")
         self._checkpoint()
         answer = self.ask(Prompt("paused", text, PAUSE_ANSWERS))
+        self.show(phase=phase)
         self._recorder.event("resume", f"after the pause: {answer}")
         # What was under way before a pause of unknown length is measured again from its start.
         self.obey("redo_step" if answer == "continue" and self.view.step else answer)
