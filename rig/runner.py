@@ -191,7 +191,8 @@ class Runner:
             if answer == "accept":
                 self._recorder.event("pose_accepted", text)
                 return
-            self._supervision.obey(answer)
+            if answer == "abort":
+                raise MeasurementStopped(text)
 
     def _unload(self) -> None:
         text = "Turn the screw back until it no longer touches the arm, then confirm."

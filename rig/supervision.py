@@ -124,7 +124,7 @@ class Supervision:
     def obey(self, answer: str) -> None:
         """Turns an answer or a command into what it asks for; others do nothing."""
         if answer == "abort":
-            raise MeasurementStopped(f"stopped by the operator. {UNLOAD}")
+            raise MeasurementStopped(f"the operator ended the measurement. {UNLOAD}")
         if answer == "redo_step":
             raise Wish("redo_step")
         if answer == "redo_repetition":

@@ -185,7 +185,7 @@ def test_skip_asks_for_the_reason_and_goes_on(bench: Bench) -> None:
 
 def test_abort_keeps_rows_and_says_what_to_do_with_the_hands(bench: Bench) -> None:
     at(bench, 2, lambda: bench.loader.commands.append("abort"))
-    with pytest.raises(MeasurementStopped, match=r"stopped by the operator\. Turn the screw back"):
+    with pytest.raises(MeasurementStopped, match=r"the operator ended the measurement\. Turn the screw back"):
         bench.run()
     assert bench.steps()[:1] == ALL[:1]
 
@@ -216,7 +216,7 @@ def test_a_limit_may_pause_instead(bench: Bench) -> None:
 
     at(bench, 2, drift)
     bench.loader.answers["paused"] = ["abort"]
-    with pytest.raises(MeasurementStopped, match="stopped by the operator"):
+    with pytest.raises(MeasurementStopped, match="the operator ended"):
         bench.run()
     assert bench.events("limit")[0]["text"] == ("displacement 6.5 mm is above the limit of 5 mm")
 
@@ -291,7 +291,7 @@ def test_a_wrong_pose_is_noticed(bench: Bench) -> None:
 
     bench.loader.ask = asked  # type: ignore[method-assign]
     bench.loader.answers["pose"] = ["abort"]
-    with pytest.raises(MeasurementStopped):
+    with pytest.raises(MeasurementStopped, match="deg away from pose P1"):
         bench.run()
     prompt = next(p for p in bench.loader.asked if p.key == "pose")
     assert "deg away from pose P1 (allowed 0.5 deg)" in prompt.text

@@ -39,8 +39,13 @@ HARMLESS = {
     ("laser", "bit_flips", "mid-run"): "implausible values are counted as invalid",
 }
 NOTED = {"lost_bytes", "bit_flips"}
-# Found by the limits of the protocol, which name the quantity.
-BY_LIMIT = {"joint_deviation": "joint deviation 10 deg", "hot_joint": "joint temperature 85 deg C"}
+# Found by what the protocol says (pose, limits), which names the quantity instead of the device.
+NAMED = {
+    ("joint_deviation", "start"): "deg away from pose P1 (allowed 0.5 deg)",
+    ("joint_deviation", "mid-run"): "deg is above the limit of 5 deg",
+    ("hot_joint", "start"): "joint temperature 85 deg C is above the limit of 60 deg C",
+    ("hot_joint", "mid-run"): "joint temperature 85 deg C is above the limit of 60 deg C",
+}
 
 CASES = [
     pytest.param(
@@ -73,7 +78,7 @@ def test_fault(
         assert fault not in NOTED or dataset.columns["laser_invalid"].sum() > 0
         return
     assert outcome.status in (3, 4), outcome.stderr
-    assert BY_LIMIT.get(fault, f"{device}: ") in message
+    assert NAMED.get((fault, when), f"{device}: ") in message
     assert len(message.split(". ")) >= 2, f"fault and remedy: {message}"
     if when == "mid-run":
         dataset = load(tmp_path / "run.h5")
