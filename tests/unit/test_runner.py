@@ -185,7 +185,8 @@ def test_skip_asks_for_the_reason_and_goes_on(bench: Bench) -> None:
 
 def test_abort_keeps_rows_and_says_what_to_do_with_the_hands(bench: Bench) -> None:
     at(bench, 2, lambda: bench.loader.commands.append("abort"))
-    with pytest.raises(MeasurementStopped, match=r"the operator ended the measurement\. Turn the screw back"):
+    message = r"the operator ended the measurement\. Turn the screw back"
+    with pytest.raises(MeasurementStopped, match=message):
         bench.run()
     assert bench.steps()[:1] == ALL[:1]
 
