@@ -1,0 +1,135 @@
+"""What every hypothesis contains: springs, gains, datum, scatter of runs, offsets, cross-talk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.noise import ENCODER_OFFSET_RAD
+
+CROSSTALK = 0.005  # of a piezoelectric dynamometer, relative; data sheets allow 2 % at most
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """Columns (size, k) with prior standard deviations (k,), and names of what they are."""
+
+    columns: Array
+    sd: Array
+    names: tuple[str, ...]
+
+    def index(self, prefix: str) -> list[int]:
+        """Columns whose name begins so."""
+        return [i for i, name in enumerate(self.names) if name.startswith(prefix)]
+
+
+def prediction(bench: Bench) -> Array:
+    """Stacked: what springs of `bench.compliance` predict."""
+    if bench.rows.simulated is not None:
+        return bench.stacked(bench.rows.simulated)
+    return bench.stacked(bench.slope * bench.load, bench.elastic)
+
+
+def base_columns(bench: Bench) -> Base:
+    """The columns common to all hypotheses."""
+    parts: list[tuple[str, Array, float]] = []
+    parts += _springs(bench)
+    parts += _gains(bench)
+    parts += _datums(bench)
+    parts += _offsets(bench)
+    parts += _crosstalk(bench)
+    kept = [(n, c, s) for n, c, s in parts if s > 0 and np.any(c)]
+    return Base(
+        np.column_stack([c for _, c, _ in kept]),
+        np.array([s for _, _, s in kept]),
+        tuple(n for n, _, _ in kept),
+    )
+
+
+def _springs(bench: Bench) -> list[tuple[str, Array, float]]:
+    """Relative change of a joint's compliance; the prior stays that of the simulation."""
+    data = bench.data
+    scale = data.compliance / bench.compliance
+    out = []
+    for j in range(data.joints):
+        column = bench.joint_column(j, bench.elastic[:, j])
+        out.append((f"spring{j + 1}", column, float(data.compliance_relative_sd[j] * scale[j])))
+    return out
+
+
+def _gains(bench: Bench) -> list[tuple[str, Array, float]]:
+    meter = bench.data.instruments
+    line = bench.slope * bench.load
+    if bench.imposed:  # only the ratio of the two gains shows
+        both = float(np.hypot(meter.force_gain, meter.displacement_gain))
+        return [("gain force", bench.stacked(line), both)]
+    force = bench.force_column(-bench.load)
+    return [
+        ("gain force", force, meter.force_gain),
+        ("gain displacement", bench.stacked(line), meter.displacement_gain),
+    ]
+
+
+def _datums(bench: Bench) -> list[tuple[str, Array, float]]:
+    """Laser datum of a setup (free) and scatter of whole runs within it; tare of the force."""
+    rows = bench.rows
+    per_run = bench.data.datum == "repetition"
+    wide = bench.reach
+    out = []
+    for s in range(len(bench.data.setups)):
+        mine = rows.setup == s
+        runs = list(dict.fromkeys(rows.run[mine].tolist()))
+        if not per_run:
+            out.append((f"datum {s}", bench.stacked(mine.astype(float)), wide))
+        for r in runs:
+            if per_run or len(runs) > 1:
+                column = bench.stacked((rows.run == r).astype(float))
+                name = "datum run" if per_run else "scatter run"
+                out.append((f"{name} {r}", column, wide if per_run else bench.noise.run))
+    if not bench.imposed:
+        out += _tares(bench)
+    return out
+
+
+def _tares(bench: Bench) -> list[tuple[str, Array, float]]:
+    """The force's zero, taken from a few samples: acts on every force after it."""
+    rows = bench.rows
+    groups = np.unique(rows.run) if bench.data.tare == "run" else np.array([-1])
+    out = []
+    for g in groups:
+        mine = np.ones(rows.n) if g < 0 else (rows.run == g).astype(float)
+        column = bench.force_column(-mine) + bench.stacked(zero_force=mine)
+        out.append((f"tare {g}", column, bench.noise.force))
+    return out
+
+
+def _offsets(bench: Bench) -> list[tuple[str, Array, float]]:
+    """Joint readings against the commanded pose, per pose and joint."""
+    if not bench.has_q:
+        return []
+    rows, out = bench.rows, []
+    poses = [s.pose for s in bench.data.setups]
+    for pose in dict.fromkeys(poses):
+        mine = np.array([p == pose for p in poses])[rows.setup]
+        for j in range(bench.data.joints):
+            q = np.zeros((rows.n, bench.data.joints))
+            q[mine, j] = 1.0
+            out.append((f"offset {pose} {j + 1}", bench.stacked(q=q), ENCODER_OFFSET_RAD))
+    return out
+
+
+def _crosstalk(bench: Bench) -> list[tuple[str, Array, float]]:
+    rows = bench.rows
+    if rows.tangential is None:
+        return []
+    out = []
+    for s in range(len(bench.data.setups)):
+        for k in range(2):
+            t = np.zeros((rows.n, 2))
+            mine = rows.setup == s
+            t[mine, k] = rows.force[mine]
+            out.append((f"crosstalk {s} {k}", bench.stacked(tangential=t), CROSSTALK))
+    return out

@@ -1,0 +1,189 @@
+"""The observation model of one data set: stacked channels, their noise, and a pool of columns.
+
+Channels, one below the other: response (displacement along the direction; where the displacement
+is imposed, force over simulated stiffness), joint readings, tangential force, force at zero load.
+Every effect adds columns: what one unit of a coefficient does to all channels at once. The
+observation is `y = prior simulation + base columns + effect columns + imperfection + noise`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.gap.data import Array, GapData
+from identification.gap.history import rests
+from identification.gap.noise import Noise, estimate_noise
+from identification.gap.rows import Rows, reduce_rows
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where the channels lie in a stacked vector of `size`; empty slices for what is missing."""
+
+    n: int
+    joints: int
+    q: slice
+    tangential: slice
+    zero_force: slice
+    size: int
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """Rows, layout, noise, and what effects are built from.
+
+    load (n,) N: what drives the rig, as a force. torque (n, m): torque of each joint under it.
+    lever (n, m). elastic (n, m) rad: deflection of each simulated joint. slope (n,) m/N: simulated
+    compliance along the direction. sense: +1 where the force is imposed and the effect adds
+    displacement; -1 where the displacement is imposed and the same effect takes force away.
+    reach m: largest simulated or measured response, the natural unit of what has no other.
+    columns: the pool, filled by the effects.
+    """
+
+    data: GapData
+    rows: Rows
+    layout: Layout
+    noise: Noise
+    imposed: bool
+    sense: float
+    compliance: Array
+    load: Array
+    response: Array
+    torque: Array
+    lever: Array
+    elastic: Array
+    slope: Array
+    reach: float
+    observed: Array
+    columns: list[Array] = field(default_factory=list)
+
+    @property
+    def has_q(self) -> bool:
+        """Joint readings are there and contain the joints' deflection."""
+        q = self.layout.q
+        return q.stop > q.start
+
+    @property
+    def session_span(self) -> float:
+        """Length of the session, s; never 0."""
+        return float(np.ptp(self.rows.session)) or 1.0
+
+    def add(self, column: Array) -> int:
+        """Puts a stacked column into the pool; its index."""
+        self.columns.append(column)
+        return len(self.columns) - 1
+
+    def stacked(
+        self,
+        response: Array | None = None,
+        q: Array | None = None,
+        tangential: Array | None = None,
+        zero_force: Array | None = None,
+    ) -> Array:
+        """A stacked column of response (n,), q (n, m), tangential (n, 2), zero_force (n,)."""
+        out = np.zeros(self.layout.size)
+        if response is not None:
+            out[: self.layout.n] = response
+        if q is not None and self.has_q:
+            out[self.layout.q] = q.T.reshape(-1)
+        if tangential is not None and self.rows.tangential is not None:
+            out[self.layout.tangential] = tangential.T.reshape(-1)
+        if zero_force is not None:
+            out[self.layout.zero_force] = zero_force[self.rows.zero]
+        return out
+
+    def joint_column(self, joint: int, deflection: Array) -> Array:
+        """What a deflection (n,) rad of one joint does: the laser and that joint's reading see it."""
+        q = np.zeros((self.rows.n, self.data.joints))
+        q[:, joint] = deflection
+        return self.stacked(self.lever[:, joint] * deflection, q)
+
+    def add_joint(self, joint: int, deflection: Array) -> int:
+        """Puts the column of a joint's deflection (n,) rad into the pool; its index."""
+        return self.add(self.joint_column(joint, deflection))
+
+    def force_column(self, force: Array) -> Array:
+        """What an additional force (n,) N along the direction does."""
+        return self.stacked(self.slope * force, self._unit_elastic() * force[:, None])
+
+    def _unit_elastic(self) -> Array:
+        return self.lever * self.compliance
+
+    def moving_joints(self) -> list[int]:
+        """Joints whose compliance carries at least a hundredth of the deflection in some setup."""
+        part = np.abs(self.lever * self.elastic)
+        total = part.sum(axis=1).max() or 1.0
+        return [j for j in range(self.data.joints) if part[:, j].max() > 0.01 * total]
+
+
+def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None = None) -> Bench:
+    """The bench of a data set. compliance (m,): point about which springs are linearised."""
+    rows = rows or reduce_rows(data)
+    c = data.compliance if compliance is None else compliance
+    lever = np.stack([s.lever for s in data.setups])[rows.setup]
+    slope = lever**2 @ c
+    stated = lever**2 @ data.compliance
+    imposed = displacement_imposed(data)
+    if imposed:
+        load, response = rows.displacement / stated, rows.force * stated
+    else:
+        load, response = rows.force, rows.displacement
+    torque = lever * load[:, None]
+    layout = _layout(data, rows)
+    observed = np.zeros(layout.size)
+    observed[: rows.n] = response
+    if layout.q.stop > layout.q.start and rows.q is not None:
+        observed[layout.q] = rows.q.T.reshape(-1)
+    if rows.tangential is not None:
+        observed[layout.tangential] = rows.tangential.T.reshape(-1)
+    observed[layout.zero_force] = rows.force[rows.zero]
+    reach = max(float(np.ptp(slope * load)), float(np.ptp(response)), 1e-15)
+    return Bench(
+        data=data, rows=rows, layout=layout, noise=estimate_noise(data, rows, stated, imposed),
+        imposed=imposed, sense=-1.0 if imposed else 1.0, compliance=c, load=load, response=response,
+        torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, observed=observed,
+    )  # fmt: skip
+
+
+def _layout(data: GapData, rows: Rows) -> Layout:
+    n, m = rows.n, data.joints
+    q = n * m if data.q is not None and data.output_encoder else 0
+    t = 0 if rows.tangential is None else 2 * n
+    z = 0 if displacement_imposed(data) else int(rows.zero.sum())
+    return Layout(n, m, slice(n, n + q), slice(n + q, n + q + t),
+                  slice(n + q + t, n + q + t + z), n + q + t + z)  # fmt: skip
+
+
+def displacement_imposed(data: GapData) -> bool:
+    """Whether the rig drove the displacement: as stated, else as the data show.
+
+    What is driven moves evenly; what answers does not. On a friction plateau the force stands while
+    the displacement runs: then the share of the path of displacement that happens while the force
+    moves by less than its noise is large, and the force can't have driven it. A rig that rests at
+    levels, or an arm, is loaded through its screw and read at rest: force.
+    """
+    if data.imposed is not None:
+        return data.imposed == "displacement"
+    if data.arm or len(data.force) < 20 or not np.ptp(data.displacement) > 0:
+        return False
+    from identification.gap.rows import hold_ids, is_continuous
+
+    if not is_continuous(data, hold_ids(data)):
+        return False
+    return _unevenness(data.force) > 1.5 * _unevenness(data.displacement)
+
+
+def _unevenness(values: Array) -> float:
+    """Spread of the speed of a signal over its moving parts: 0 for a triangle, large for steps."""
+    width = max(1, len(values) // 400)
+    smooth = np.add.reduceat(values, np.arange(0, len(values), width))[:-1] / width
+    speed = np.abs(np.diff(smooth))
+    mean = speed.mean() if speed.size else 0.0
+    return float(speed.std() / mean) if mean > 0 else np.inf
+
+
+def rest_rows(bench: Bench) -> Array:
+    """Rows before which the load went back to zero."""
+    return rests(bench.rows).astype(float)

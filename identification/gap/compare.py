@@ -1,0 +1,164 @@
+"""Evidence of all variants over all levels, and what follows for the words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.data import Array
+from identification.gap.evidence import Engine, Level
+from identification.gap.variants import Variant
+
+IMPERFECTION = 0.03  # of an effect's size: how well a family of shapes meets a real mechanism
+_SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """log evidence of a variant, with the scale and level that contribute most."""
+
+    variant: Variant
+    log_evidence: float
+    scale: float
+    level: int
+
+
+def score(
+    engine: Engine, levels: list[Level], variants: list[Variant], already: float = 0.0
+) -> list[Scored]:
+    """Evidence of every variant on top of `levels` (base, or base and an effect already chosen).
+
+    already: whitened energy of that effect: it brings imperfection of its own.
+    """
+    out: list[Scored | None] = [None] * len(variants)
+    by_size: dict[tuple[int, int], list[int]] = {}
+    for i, v in enumerate(variants):
+        by_size.setdefault((len(v.columns), len(v.scales)), []).append(i)
+    for members in by_size.values():
+        batch = [variants[i] for i in members]
+        for i, s in zip(members, _score_batch(engine, levels, batch, already), strict=True):
+            out[i] = s
+    return [s for s in out if s is not None]
+
+
+def _score_batch(
+    engine: Engine, levels: list[Level], batch: list[Variant], already: float
+) -> list[Scored]:
+    columns = np.array([v.columns for v in batch])  # (v, k)
+    root = np.stack([v.root for v in batch])
+    scales = np.array([v.scales for v in batch])  # (v, s)
+    plain = _rotate(levels[0].gram, columns, root)
+    logs = np.empty((len(levels), *scales.shape))
+    etas = np.array([level.eta for level in levels])
+    for i, level in enumerate(levels):
+        gram = _rotate(level.gram, columns, root)
+        moment = np.einsum("vji,vj->vi", root, level.moment[columns])
+        values, vectors = np.linalg.eigh(gram)
+        values = np.maximum(values, 0.0)
+        beta = np.einsum("vji,vj->vi", vectors, moment)
+        s2 = scales[:, :, None] ** 2  # (v, s, 1)
+        gain = 1 + s2 * values[:, None, :]
+        mean = s2 * beta[:, None, :] / gain
+        fit = 0.5 * np.sum(mean * beta[:, None, :], axis=2) - 0.5 * np.log(gain).sum(axis=2)
+        fit += _sign(batch, vectors, mean, s2 / gain)
+        turned = np.einsum("vij,vsj->vsi", vectors, mean)
+        energy = np.einsum("vsi,vij,vsj->vs", turned, plain, turned)
+        logs[i] = level.log_base + fit + _log_level(engine, etas, i, energy + already)
+    flat = logs.transpose(1, 0, 2).reshape(len(batch), -1)
+    best = flat.argmax(axis=1)
+    total = _logsumexp(flat) - np.log(scales.shape[1])
+    number = scales.shape[1]
+    return [
+        Scored(v, float(t) + float(np.log(v.prior)), v.scales[b % number], int(b // number))
+        for v, t, b in zip(batch, total, best, strict=True)
+    ]
+
+
+def _rotate(gram: Array, columns: Array, root: Array) -> Array:
+    part = gram[columns[:, :, None], columns[:, None, :]]
+    return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
+
+
+def _sign(batch: list[Variant], vectors: Array, mean: Array, variance: Array) -> Array:
+    """log of P(sum of coefficients > 0 | data) / P(... | prior), (v, s); 0 where signs are free."""
+    from scipy.special import log_ndtr
+
+    out = np.zeros(mean.shape[:2])
+    want = np.array([v.positive is not None for v in batch])
+    if not want.any():
+        return out
+    k = mean.shape[2]
+    functional = np.stack(
+        [v.root.T @ (v.positive if v.positive is not None else np.zeros(k)) for v in batch]
+    )
+    turned = np.einsum("vji,vj->vi", vectors, functional)
+    centre = np.einsum("vi,vsi->vs", turned, mean)
+    spread = np.sqrt(np.einsum("vi,vsi->vs", turned**2, variance)) + 1e-300
+    factor = log_ndtr(centre / spread) - np.log(0.5)
+    return np.where(want[:, None], factor, 0.0)
+
+
+def effect_rms(engine: Engine, energy: Array) -> Array:
+    """Size of an effect, m rms, from its whitened energy beyond the base."""
+    n = engine.bench.rows.n
+    total = float(np.sum(1 / engine.sigma[:n] ** 2))
+    return np.asarray(np.sqrt(np.maximum(energy, 0.0) / total))
+
+
+def _log_level(engine: Engine, etas: Array, i: int, energy: Array) -> Array:
+    """log prior of level i for effects of that energy: log-normal about IMPERFECTION x size.
+
+    Levels are bins of log eta; the lowest takes all below.
+    """
+    from scipy.special import ndtr
+
+    centre = np.log(IMPERFECTION * effect_rms(engine, energy) + 1e-300)
+    with np.errstate(divide="ignore"):
+        upper = np.inf if i == len(etas) - 1 else np.log(_edge(etas, i))
+        lower = -np.inf if i == 0 else np.log(_edge(etas, i - 1))
+    p = ndtr((upper - centre) / _SPREAD) - ndtr((lower - centre) / _SPREAD)
+    return np.asarray(np.log(np.maximum(p, 1e-12)))
+
+
+def _edge(etas: Array, i: int) -> float:
+    return float(np.sqrt(max(etas[i], etas[i + 1] / 2) * etas[i + 1]))
+
+
+def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float) -> Level:
+    """The level with an effect of fixed scale integrated out as well."""
+    c = np.array(columns)
+    T = scale * root
+    inner = np.eye(len(c)) + T.T @ level.gram[np.ix_(c, c)] @ T
+    factor = np.linalg.cholesky(inner)
+    cross = np.linalg.solve(factor, T.T @ level.gram[c])
+    left = np.linalg.solve(factor, T.T @ level.moment[c])
+    return Level(
+        level.eta,
+        level.gram - cross.T @ cross,
+        level.moment - cross.T @ left,
+        level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum()),
+    )
+
+
+def energy_of(engine: Engine, level: int, scored: Scored) -> float:
+    """Whitened energy of a variant's most probable coefficients."""
+    c = np.array(scored.variant.columns)
+    lvl = engine.levels[level]
+    T = scored.scale * scored.variant.root
+    inner = np.eye(len(c)) + T.T @ lvl.gram[np.ix_(c, c)] @ T
+    w = T @ np.linalg.solve(inner, T.T @ lvl.moment[c])
+    return float(w @ engine.levels[0].gram[np.ix_(c, c)] @ w)
+
+
+def _logsumexp(values: Array) -> Array:
+    top = values.max(axis=-1, keepdims=True)
+    return np.asarray(top[..., 0] + np.log(np.exp(values - top).sum(axis=-1)))
+
+
+def log_mean(values: list[float], weights: list[float] | None = None) -> float:
+    """log of the (weighted) mean of exp(values)."""
+    v = np.array(values)
+    w = np.ones(len(v)) if weights is None else np.array(weights)
+    top = v.max()
+    return float(top + np.log(np.sum(w * np.exp(v - top)) / w.sum()))

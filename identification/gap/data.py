@@ -1,0 +1,102 @@
+"""What a measurement is to the diagnosis: samples, springs and levers, all SI.
+
+An arm and a bench without an arm look alike: elastic elements ("joints": six of the arm, or one
+spring a direction) that a unit force loads with `lever` and whose deflection moves the target by
+the same `lever` (virtual work). For an arm `lever = J^T n`; for a bench it is 1 for the direction's
+own spring, 0 for the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+ZERO, LOADING, UNLOADING, CYCLE = 0, 1, 2, 3
+BRANCH_NAMES = ("zero", "loading", "unloading", "cycle")
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """One pose and direction. Per newton along the direction, m = number of joints:
+
+    lever (m,) m (1 for a bench): torque of each joint, and motion of the target per its deflection.
+    tangents (2, 3): unit vectors across the direction; tangent_lever (2, m): torques of a newton
+    along them. offset_lever (m, 3): change of lever per metre of tool offset in the base frame.
+    turned_lever (m, m): change of lever i per radian of joint j. moment (3,) m: moment about the
+    base origin of a newton along the direction. links (l,) m/N: compliance along the direction of
+    each nominal link. gravity (m,) Nm: torques of the arm's own weight.
+    """
+
+    pose: str
+    direction: str
+    unit_vector: Array
+    lever: Array
+    tangents: Array
+    tangent_lever: Array
+    offset_lever: Array
+    turned_lever: Array
+    moment: Array
+    links: Array
+    gravity: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Instruments:
+    """Standard uncertainties of one sample, N and m, and relative ones of the gains."""
+
+    force: float
+    displacement: float
+    force_gain: float
+    displacement_gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class GapData:
+    """n samples in the order of measurement.
+
+    time s within the run; session s, or None; run, setup, repetition, branch, step (n,) ints
+    (step -1: none). force N, displacement m along the direction. tangential (n, 2) N or None: force
+    across it. q (n, m) rad or None: joint readings minus commanded pose. temperature (n, m) degC.
+    compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
+    simulated (n,) m or None: displacement that another simulator predicts for every sample.
+    """
+
+    arm: bool
+    setups: tuple[Setup, ...]
+    time: Array
+    session: Array | None
+    run: Ints
+    setup: Ints
+    repetition: Ints
+    branch: Ints
+    step: Ints
+    force: Array
+    displacement: Array
+    compliance: Array
+    compliance_relative_sd: Array
+    instruments: Instruments
+    tangential: Array | None = None
+    q: Array | None = None
+    temperature: Array | None = None
+    output_encoder: bool = True
+    datum: Literal["setup", "repetition"] = "setup"
+    tare: Literal["session", "run"] = "session"
+    imposed: Literal["force", "displacement"] | None = None
+    simulated: Array | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def joints(self) -> int:
+        """Number of elastic elements."""
+        return len(self.compliance)
+
+    def setup_compliance(self) -> Array:
+        """Simulated compliance along each setup's direction, (setups,) m/N."""
+        return np.array([np.sum(s.lever**2 * self.compliance) for s in self.setups])

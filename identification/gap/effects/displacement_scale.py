@@ -1,0 +1,18 @@
+"""Gain of the laser is off (tilt, wrong range): every direction by one factor, encoders disagree.
+
+A target tilted by 20 degrees reads 6 % off; a wrong range 20 %.
+"""
+
+from __future__ import annotations
+
+from identification.gap.bench import Bench
+from identification.gap.variants import Variant, variant
+
+WORD = "displacement_scale"
+SCALES = (0.03, 0.08, 0.2)
+
+
+def variants(bench: Bench) -> list[Variant]:
+    """One coefficient: the gain of the displacement minus one."""
+    column = bench.add(bench.stacked(bench.sense * bench.slope * bench.load))
+    return [variant(WORD, "gain", [column], SCALES, positive=False)]

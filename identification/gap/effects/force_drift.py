@@ -1,0 +1,58 @@
+"""The charge amplifier drifts: force at zero load moves with the session clock.
+
+Measured = true + d(t): the joints feel d less than simulated, the zero plateaus show d itself.
+With a taring before each run only what drifts within a run is left. Up to 0.4 to 4 N/min.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.effects.drift import PIECES, free_path, path_root, warm_ups
+from identification.gap.variants import Variant, variant
+
+WORD = "force_drift"
+SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
+
+
+def variants(bench: Bench) -> list[Variant]:
+    """Warm-up paths, each alone, and a free smooth path."""
+    if bench.imposed:
+        return _imposed(bench)
+    top = float(np.abs(bench.rows.force).max())
+    scales = tuple(s * top for s in SHARES)
+    if not top > 0:
+        return []
+
+    def column(path: Array) -> int:
+        d = _tared(bench, path)
+        return bench.add(bench.force_column(-d) + bench.stacked(zero_force=d))
+
+    out = [
+        variant(WORD, label, [column(path)], scales, positive=False, path=label)
+        for label, path in warm_ups(bench).items()
+    ]
+    hats = free_path(bench)
+    columns = [column(hats[:, k]) for k in range(PIECES)]
+    out.append(variant(WORD, "free path", columns, scales, path_root(), positive=False, prior=2.0,
+                       path="free"))  # fmt: skip
+    return out
+
+
+def _imposed(bench: Bench) -> list[Variant]:
+    """Force is the answer: its drift adds to it."""
+    scales = tuple(s * bench.reach for s in SHARES)
+    return [
+        variant(WORD, label, [bench.add(bench.stacked(_tared(bench, path)))], scales,
+                positive=False, path=label)
+        for label, path in warm_ups(bench).items()
+    ]  # fmt: skip
+
+
+def _tared(bench: Bench, path: Array) -> Array:
+    if bench.data.tare == "session":
+        return path - path[0]
+    starts = np.flatnonzero(bench.rows.starts)
+    return np.asarray(path - path[starts][np.cumsum(bench.rows.starts) - 1])

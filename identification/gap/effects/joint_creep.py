@@ -1,0 +1,48 @@
+"""Deflection that grows while the load is held (or force that relaxes), and recovers after it.
+
+Kelvin-Voigt elements behind a joint's spring: `T z' = tau - z`; any linear creep compliance is a
+spectrum of retardation times (Prony series, power and log laws included; Findley 1976). The
+coefficients are compliances in units of the joint's own: polymers, grease and gears 1 to 50 %.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.history import rests, retarded
+from identification.gap.variants import Variant, smooth_root, variant
+
+WORD = "joint_creep"
+SCALES = (0.02, 0.06, 0.2, 0.6)
+
+
+def times(bench: Bench) -> np.ndarray:
+    """Retardation times s: from one sample to a third of the session, by factors of three."""
+    inner = np.diff(bench.rows.time)
+    step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 1.0
+    longest = min(bench.session_span / 3, 1000.0 * max(step, 1.0))
+    first = max(step, 1e-6) if not bench.rows.continuous else max(step * 3, 1e-6)
+    count = max(2, int(np.ceil(np.log(max(longest / first, 3.0)) / np.log(3))))
+    return np.asarray(first * 3.0 ** np.arange(count))
+
+
+def variants(bench: Bench) -> list[Variant]:
+    """Per joint: single times with their neighbour, and the whole spectrum."""
+    rest, spectrum = rests(bench.rows), times(bench)
+    out = []
+    for j in bench.moving_joints():
+        load = np.tile(bench.torque[:, j][:, None], (1, len(spectrum)))
+        z = retarded(load, spectrum, bench.rows, rest)
+        c = bench.compliance[j]
+        columns = [bench.add_joint(j, bench.sense * c * z[:, k]) for k in range(len(spectrum))]
+        out.append(
+            variant(WORD, f"joint {j + 1} spectrum", columns, SCALES,
+                    smooth_root(len(columns), 0.5), prior=0.5, joint=j, times_s=spectrum)
+        )  # fmt: skip
+        for k in range(len(columns) - 1):
+            out.append(
+                variant(WORD, f"joint {j + 1} T {spectrum[k]:.3g} s", columns[k : k + 2], SCALES,
+                        prior=0.5 / (len(columns) - 1), joint=j, times_s=spectrum[k : k + 2])
+            )  # fmt: skip
+    return out

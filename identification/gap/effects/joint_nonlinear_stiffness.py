@@ -1,0 +1,48 @@
+"""Elastic, reversible, curved: gears harden with torque (K1 < K2 < K3), other parts soften.
+
+The deflection beyond the linear spring is a smooth curve of the torque (with the arm's own weight:
+of the net torque): hinges `max(|tau| - b, 0) sgn(tau)` over the range and a cubic; coefficients in
+units of the joint's compliance. Gear catalogues: K3/K1 = 1.5 to 1.85.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.variants import Variant, smooth_root, variant
+
+WORD = "joint_nonlinear_stiffness"
+HINGES = (0.12, 0.25, 0.4, 0.55, 0.7, 0.85)
+SCALES = (0.05, 0.15, 0.4, 1.0)
+
+
+def variants(bench: Bench) -> list[Variant]:
+    """Per joint: a smooth curve of several hinges, one quadratic, one cubic, one corner."""
+    out = []
+    for j in bench.moving_joints():
+        torque = bench.torque[:, j]
+        top = float(np.abs(torque).max())
+        if not top > 0:
+            continue
+        x, c = torque / top, bench.compliance[j] * top
+        columns = [
+            bench.add_joint(j, c * np.sign(x) * np.maximum(np.abs(x) - b, 0)) for b in HINGES
+        ]
+        info = {"joint": j, "torque": top, "hinges": HINGES}
+        out.append(
+            variant(WORD, f"joint {j + 1} curve", columns, SCALES, smooth_root(len(HINGES), 0.5),
+                    positive=False, prior=0.5, **info)
+        )  # fmt: skip
+        for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
+            column = bench.add_joint(j, c * shape)
+            out.append(
+                variant(WORD, f"joint {j + 1} {name}", [column], SCALES, positive=False,
+                        prior=0.1, **info)
+            )  # fmt: skip
+        for k in range(len(HINGES) - 1):
+            out.append(
+                variant(WORD, f"joint {j + 1} bend {HINGES[k]}", columns[k : k + 2], SCALES,
+                        positive=False, prior=0.2 / (len(HINGES) - 1), **info)
+            )  # fmt: skip
+    return out

@@ -1,0 +1,36 @@
+"""The structure is right, its numbers are not: springs beyond what META allows them.
+
+Same columns as the six springs of the base, with a wide prior: a joint may be half or twice as
+stiff; a bench's spring may be off by ten.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.variants import Variant, variant
+
+WORD = "joint_stiffness_error"
+SCALES = (0.3, 0.8)
+
+
+def variants(bench: Bench) -> list[Variant]:
+    """Each joint alone, and all of them."""
+    relative = bench.data.compliance_relative_sd
+    out, columns = [], []
+    for j in bench.moving_joints():
+        column = bench.add_joint(j, bench.elastic[:, j])
+        columns.append(column)
+        beyond = max(2 * float(relative[j]), 0.2)
+        scales = tuple(beyond * f for f in (1.0, 3.0)) + (() if bench.data.arm else (3.0, 9.0))
+        out.append(
+            variant(WORD, f"joint {j + 1}", [column], scales, positive=False, joint=j, joints=[j])
+        )
+    if len(columns) > 1:
+        scales = (max(2 * float(relative.max()), 0.2),)
+        out.append(
+            variant(WORD, "all joints", columns, scales, positive=False,
+                    joints=bench.moving_joints())
+        )  # fmt: skip
+    return out

@@ -1,0 +1,47 @@
+"""Displacement moves with time or temperature, not with the load; encoders do not see it.
+
+A path on the session clock, one coefficient per direction (the drift is a vector): warm-up with one
+time constant, a line, a free smooth path, or the recorded temperatures. 10 to 400 um over hours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.effects.drift import PIECES, free_path, path_root, warm_ups
+from identification.gap.variants import Variant, variant
+
+WORD = "thermal_drift"
+SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the deflection
+
+
+def variants(bench: Bench) -> list[Variant]:
+    """Paths times directions."""
+    scales = tuple(s * bench.reach for s in SHARES)
+    names = [s.direction for s in bench.data.setups]
+    masks = [
+        np.array([n == name for n in names])[bench.rows.setup].astype(float)
+        for name in dict.fromkeys(names)
+    ]
+    out = []
+    for label, path in {**warm_ups(bench), **_temperatures(bench)}.items():
+        columns = [bench.add(bench.stacked(m * path)) for m in masks]
+        out.append(variant(WORD, label, columns, scales, positive=False, path=label))
+    hats = free_path(bench)
+    columns = [bench.add(bench.stacked(m * hats[:, k])) for m in masks for k in range(PIECES)]
+    root = np.kron(np.eye(len(masks)), path_root())
+    out.append(variant(WORD, "free path", columns, scales, root, positive=False, prior=2.0,
+                       path="free"))  # fmt: skip
+    return out
+
+
+def _temperatures(bench: Bench) -> dict[str, Array]:
+    """Mean rise of the recorded temperatures, and each joint's; normalised to their range."""
+    t = bench.rows.temperature
+    if t is None:
+        return {}
+    candidates = {"mean temperature": t.mean(axis=1)}
+    candidates |= {f"temperature {j + 1}": t[:, j] for j in range(t.shape[1])}
+    return {k: (v - v[0]) / np.ptp(v) for k, v in candidates.items() if np.ptp(v) > 0}

@@ -1,0 +1,34 @@
+"""The laser's datum jumps between repetitions: whole runs offset; encoders do not see it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.variants import Variant, variant
+
+WORD = "zero_shift"
+SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the deflection
+
+
+def variants(bench: Bench) -> list[Variant]:
+    """One lasting jump before any run but the first of its setup, and free shifts of all."""
+    rows = bench.rows
+    if bench.data.datum == "repetition":
+        return []
+    scales = tuple(s * bench.reach for s in SHARES)
+    out, shifts = [], []
+    for s in range(len(bench.data.setups)):
+        mine = rows.setup == s
+        runs = list(dict.fromkeys(rows.run[mine].tolist()))
+        for r in runs[1:]:
+            jump = bench.add(bench.stacked((mine & (rows.run >= r)).astype(float)))
+            shifts.append(bench.add(bench.stacked((rows.run == r).astype(float))))
+            out.append(variant(WORD, f"jump before run {r + 1}", [jump], scales, positive=False,
+                               runs=[r]))  # fmt: skip
+    if len(shifts) > 1:
+        out.append(
+            variant(WORD, "every run", shifts, scales, positive=False, prior=float(len(out)),
+                    runs=[])
+        )  # fmt: skip
+    return out

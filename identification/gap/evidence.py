@@ -1,0 +1,180 @@
+"""Exact evidence of linear Gaussian models, for a whole library at once.
+
+Data whitened by their noise, `y = B beta + E w + imperfection + noise`, all Gaussian. The
+imperfection of a model (no formula is the rig) has a size eta on a grid of levels:
+- repeatable: an unknown smooth function of setup, branch and force step, standard deviation eta;
+- per hold: each hold off by 0.6 eta; within holds: every row off by 0.3 eta more than its noise;
+- joint readings: each hold off by eta over the joint's lever.
+For every level the base (with the repeatable part) is integrated out of the Gram matrices of the
+pool; then the evidence of any set of columns with prior covariance `s^2 T T^T` costs one small
+eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.base import Base
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+
+HOLD_PART, ROW_PART = 0.6, 0.3
+_NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
+_LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Pool and data with the base integrated out, for one size of imperfection eta (m).
+
+    gram (p, p), moment (p,): of the pool; log_base: evidence of the base alone, nats.
+    """
+
+    eta: float
+    gram: Array
+    moment: Array
+    log_base: float
+
+
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """Rows divided by their noise; mean: orthonormal hold means, amplification (h,) of an offset
+    common to a hold, in whitened units per metre (or radian), split by channel."""
+
+    full: Array  # gram of all columns [y, base, pool], contrasts of response excluded from means
+    contrast_rows: Array
+    contrast_noise: Array
+    means: Array
+    amplitude: Array
+    is_response: Array
+
+
+class Engine:
+    """Evidence for the pool of one bench; `levels[i].eta` ascending, the first is 0."""
+
+    def __init__(self, bench: Bench, base: Base, target: Array, etas: Array) -> None:
+        """target: stacked observation minus the simulation's prediction."""
+        self.bench, self.base, self.target = bench, base, target
+        self.pool = (
+            np.column_stack(bench.columns) if bench.columns else np.zeros((bench.layout.size, 0))
+        )
+        self.sigma = row_noise(bench)
+        self._split()
+        self.levels = [self._level(float(eta)) for eta in etas]
+
+    def _split(self) -> None:
+        """Whitens [target, base, levels, pool] and separates hold means from contrasts."""
+        bench, n = self.bench, self.bench.rows.n
+        everything = np.column_stack(
+            [self.target, self.base.columns, _level_columns(bench), self.pool]
+        )
+        white = everything / self.sigma[:, None]
+        inverse = 1 / self.sigma
+        edges = np.flatnonzero(bench.rows.hold_starts)
+        means, lengths = [], []
+        response = white[:n]
+        for block in range(0, bench.layout.q.stop, n):
+            a = inverse[block : block + n]
+            length = np.sqrt(np.add.reduceat(a**2, edges))
+            part = np.add.reduceat(white[block : block + n] * a[:, None], edges, axis=0)
+            means.append(part / length[:, None])
+            lengths.append(length)
+        self._mean_u, self._length_u = means[0], lengths[0]
+        self._mean_q = np.vstack(means[1:]) if len(means) > 1 else np.zeros((0, white.shape[1]))
+        self._length_q = np.concatenate(lengths[1:]) if len(lengths) > 1 else np.zeros(0)
+        rest = white[n:]
+        self._fixed = rest.T @ rest - self._mean_q.T @ self._mean_q
+        hold = np.repeat(np.arange(len(edges)), np.diff(np.append(edges, n)))
+        direction = inverse[:n] / lengths[0][hold]
+        contrast = response - direction[:, None] * means[0][hold]
+        alone = np.diff(np.append(edges, n))[hold] == 1
+        self._contrast = contrast[~alone]
+        self._contrast_noise = self.sigma[:n][~alone]
+        self._freedom = n - len(edges)
+
+    def _level(self, eta: float) -> Level:
+        noise = self.bench.noise
+        hold = noise.hold**2 + (HOLD_PART * eta) ** 2
+        extra_u = 1 + hold * self._length_u**2
+        extra_q = 1 + (eta / _LEVER_M) ** 2 * self._length_q**2 if self.bench.data.arm else 1.0
+        factor = 1 + (ROW_PART * eta / self._contrast_noise) ** 2
+        gram = self._fixed + self._mean_u.T @ (self._mean_u / extra_u[:, None])
+        if self._length_q.size:
+            gram = gram + self._mean_q.T @ (self._mean_q / np.asarray(extra_q)[:, None])
+        gram = gram + self._contrast.T @ (self._contrast / factor[:, None])
+        share = self._freedom / max(len(factor), 1)
+        log_noise = 0.5 * (np.log(extra_u).sum() + np.log(extra_q).sum() * bool(self._length_q.size))
+        log_noise += 0.5 * share * np.log(factor).sum()
+        return self._integrate(eta, gram, float(log_noise))
+
+    def _integrate(self, eta: float, gram: Array, log_noise: float) -> Level:
+        """Takes base and repeatable imperfection out of [target, base, levels, pool]."""
+        kb = self.base.columns.shape[1]
+        covariance, count = _level_covariance(self.bench), 0
+        sd = self.base.sd
+        if eta > 0:
+            count = covariance.shape[0]
+        total = covariance.shape[0]
+        b = np.arange(1, 1 + kb + count)
+        p = np.arange(1 + kb + total, gram.shape[0])
+        root = np.zeros((kb + count, kb + count))
+        root[:kb, :kb] = np.diag(sd)
+        if count:
+            root[kb:, kb:] = eta * np.linalg.cholesky(covariance)
+        inner = np.eye(kb + count) + root.T @ gram[np.ix_(b, b)] @ root
+        factor = np.linalg.cholesky(inner)
+        cross = np.linalg.solve(factor, root.T @ gram[np.ix_(b, np.append(0, p))])
+        left, pool = cross[:, 0], cross[:, 1:]
+        log_base = -0.5 * (gram[0, 0] - left @ left) - np.log(np.diag(factor)).sum() - log_noise
+        return Level(
+            eta,
+            gram[np.ix_(p, p)] - pool.T @ pool,
+            gram[p, 0] - pool.T @ left,
+            float(log_base),
+        )
+
+
+def row_noise(bench: Bench) -> Array:
+    """Standard deviation of every stacked row."""
+    noise, rows, layout = bench.noise, bench.rows, bench.layout
+    out = np.empty(layout.size)
+    root = np.sqrt(rows.weight) if not rows.continuous else np.ones(rows.n)
+    out[: layout.n] = noise.response
+    if layout.q.stop > layout.q.start:
+        out[layout.q] = np.concatenate([s / root for s in noise.q])
+    if rows.tangential is not None:
+        out[layout.tangential] = np.tile(noise.force / root, 2)
+    out[layout.zero_force] = noise.force / root[rows.zero]
+    return out
+
+
+def _level_columns(bench: Bench) -> Array:
+    """Indicator of every level, response only, (size, levels)."""
+    rows = bench.rows
+    out = np.zeros((bench.layout.size, int(rows.level.max()) + 1))
+    out[np.arange(rows.n), rows.level] = 1.0
+    return out
+
+
+def _level_covariance(bench: Bench) -> Array:
+    """Imperfection of levels of one setup: alike for neighbouring forces, half so between branches.
+
+    Unit variance; `exp(-|dF| / a quarter of the range)`, a path that may have corners.
+    """
+    rows = bench.rows
+    count = int(rows.level.max()) + 1
+    sums = np.bincount(rows.level, minlength=count)
+    load = np.bincount(rows.level, weights=bench.load, minlength=count) / sums
+    first = np.unique(rows.level, return_index=True)[1]
+    setup, branch = rows.setup[first], rows.branch[first]
+    if rows.continuous:
+        branch = np.searchsorted(np.unique(rows.level), rows.level[first]) * 0 + (
+            np.gradient(bench.load)[first] >= 0
+        )
+    span = np.ptp(bench.load) or 1.0
+    near = np.exp(-np.abs(load[:, None] - load) / (_NEIGHBOUR * span))
+    same = setup[:, None] == setup
+    alike = np.where(branch[:, None] == branch, 1.0, 0.5)
+    return np.asarray(near * same * alike + 1e-9 * np.eye(count))

@@ -1,0 +1,171 @@
+"""Samples become rows: holds keep their first samples and geometric bins of the rest.
+
+A hold gives many nearly equal samples; creep, lag and drift need its beginning and its length, not
+every second of it. A continuous recording is cut at its turning points and binned evenly; a short
+one is kept as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.data import ZERO, Array, Flags, GapData, Ints
+
+CONTINUOUS_ROWS = 1500  # bins of a continuous recording; more tells no effect from another
+_RUNNING_SHARE = 0.5  # a "hold" through which the force runs by half its range is none
+_LEVELS = 12  # force classes of a continuous recording, per sense of motion
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """n rows. weight (n,): samples behind a row; hold, level, run, setup (n,): consecutive ids.
+
+    level: same setup, branch and step (or class of force and sense of motion): what repeats from
+    repetition to repetition shares a level. driver (n,) N: what drives the rig, as a force; response
+    (n,) m: what it answers, as a displacement. session (n,) s is always there: `clock` says whether
+    it was recorded. gap (n,) s: time since the row before.
+    """
+
+    time: Array
+    session: Array
+    clock: bool
+    run: Ints
+    setup: Ints
+    repetition: Ints
+    branch: Ints
+    step: Ints
+    hold: Ints
+    level: Ints
+    weight: Array
+    force: Array
+    displacement: Array
+    tangential: Array | None
+    q: Array | None
+    temperature: Array | None
+    simulated: Array | None
+    zero: Flags
+    continuous: bool
+    starts: Flags  # first row of a run
+    hold_starts: Flags
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return len(self.force)
+
+
+def reduce_rows(data: GapData) -> Rows:
+    """Rows of the data, in their order."""
+    hold = hold_ids(data)
+    continuous = is_continuous(data, hold)
+    edges = _continuous_edges(data) if continuous else _hold_edges(hold)
+    count = np.diff(np.append(edges, len(data.force)))
+
+    def mean(values: Array) -> Array:
+        sums = np.add.reduceat(values, edges, axis=0)
+        return np.asarray(sums / (count if values.ndim == 1 else count[:, None]))
+
+    def first(values: Ints) -> Ints:
+        return values[edges]
+
+    run, setup, branch, step = map(first, (data.run, data.setup, data.branch, data.step))
+    force = mean(data.force)
+    level = (
+        _continuous_levels(setup, run, force)
+        if continuous
+        else _ids(np.column_stack([setup, branch, step]))
+    )
+    holds = np.arange(len(edges), dtype=np.int64) if continuous else _consecutive(hold[edges])
+    zero = (branch == ZERO) & (step <= 0)
+    session = mean(_session(data))
+    return Rows(
+        time=mean(data.time), session=session, clock=data.session is not None, run=run, setup=setup,
+        repetition=first(data.repetition), branch=branch, step=step, hold=holds, level=level,
+        weight=count.astype(float), force=force, displacement=mean(data.displacement),
+        tangential=None if data.tangential is None else mean(data.tangential),
+        q=None if data.q is None else mean(data.q),
+        temperature=None if data.temperature is None else mean(data.temperature),
+        simulated=None if data.simulated is None else mean(data.simulated),
+        zero=zero, continuous=continuous, starts=_changes(run), hold_starts=_changes(holds),
+    )  # fmt: skip
+
+
+def hold_ids(data: GapData) -> Ints:
+    """(n,) number of the hold of every sample: same run, branch and step, without a pause."""
+    keys = np.column_stack([data.run, data.branch, data.step])
+    new = np.any(np.diff(keys, axis=0) != 0, axis=1)
+    return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
+
+
+def is_continuous(data: GapData, hold: Ints) -> bool:
+    """Whether the force runs instead of resting at levels."""
+    if np.any(data.step < 0):
+        return True
+    edges = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
+    count = np.diff(np.append(edges, len(hold)))
+    width = np.maximum.reduceat(data.force, edges) - np.minimum.reduceat(data.force, edges)
+    span = float(np.ptp(data.force))
+    return bool(np.any((count > 2) & (width > _RUNNING_SHARE * span) & (span > 0)))
+
+
+def _hold_edges(hold: Ints) -> Ints:
+    """Bins of 1, 1, 2, 4, 8 ... samples from the start of every hold."""
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
+    within = np.arange(len(hold)) - np.repeat(starts, np.diff(np.append(starts, len(hold))))
+    edge = (within <= 1) | ((within & (within - 1)) == 0)
+    return np.flatnonzero(edge).astype(np.int64)
+
+
+def _continuous_edges(data: GapData) -> Ints:
+    """Bins of equal path of force and displacement together, so that fast and slow parts count
+    alike and no bin straddles much of either; every run starts a bin."""
+    n = len(data.force)
+    if n <= CONTINUOUS_ROWS:
+        return np.arange(n, dtype=np.int64)
+    path = np.arange(n) / n
+    width = max(1, n // (4 * CONTINUOUS_ROWS))
+    for values in (data.force, data.displacement):
+        smooth = np.repeat(values[::width], width)[:n]  # steps of the noise are no path
+        step = np.abs(np.diff(smooth, prepend=smooth[0]))
+        total = step.sum()
+        path = path + (np.cumsum(step) / total if total > 0 else 0.0)
+    number = np.floor(path / path[-1] * CONTINUOUS_ROWS * (1 - 1e-12)).astype(np.int64)
+    new = (np.diff(number, prepend=-1) != 0) | (np.diff(data.run, prepend=-1) != 0)
+    return np.flatnonzero(new).astype(np.int64)
+
+
+def _continuous_levels(setup: Ints, run: Ints, force: Array) -> Ints:
+    rising = np.gradient(force) >= 0 if len(force) > 1 else np.zeros(len(force), dtype=bool)
+    span = np.ptp(force) or 1.0
+    number = np.minimum((force - force.min()) / span * _LEVELS, _LEVELS - 1).astype(np.int64)
+    return _ids(np.column_stack([setup, rising.astype(np.int64), number]))
+
+
+def _session(data: GapData) -> Array:
+    """The session clock, or the runs one after the other with minutes of rest between them."""
+    if data.session is not None:
+        return data.session
+    out = np.empty_like(data.time)
+    offset = 0.0
+    for run in np.unique(data.run):
+        rows = data.run == run
+        out[rows] = data.time[rows] - data.time[rows][0] + offset
+        offset = out[rows][-1] + REST_S
+    return out
+
+
+REST_S = 180.0  # between two runs the arm stands unloaded for minutes
+
+
+def _changes(ids: Ints) -> Flags:
+    return np.concatenate([[True], np.diff(ids) != 0])
+
+
+def _ids(keys: Ints) -> Ints:
+    return np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+
+def _consecutive(ids: Ints) -> Ints:
+    return (np.cumsum(_changes(ids)) - 1).astype(np.int64)

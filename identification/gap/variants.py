@@ -1,0 +1,59 @@
+"""A variant: one shape that an effect may take; columns of the pool with a prior."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from identification.gap.data import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """columns: k indices of the pool. root (k, k): prior covariance of the coefficients is
+    `s^2 root root^T` for s out of `scales`, all equally likely. positive: coefficients whose sum
+    physics wants positive (None: either sign). info: what the parameters are reported from.
+    """
+
+    word: str
+    label: str
+    columns: tuple[int, ...]
+    scales: tuple[float, ...]
+    root: Array
+    positive: Array | None = None
+    info: Mapping[str, Any] = field(default_factory=dict)
+    prior: float = 1.0
+
+
+def variant(
+    word: str,
+    label: str,
+    columns: list[int],
+    scales: tuple[float, ...],
+    root: Array | None = None,
+    positive: bool = True,
+    prior: float = 1.0,
+    **info: Any,
+) -> Variant:
+    """A variant with independent unit priors unless `root` says otherwise."""
+    k = len(columns)
+    return Variant(
+        word,
+        label,
+        tuple(columns),
+        scales,
+        np.eye(k) if root is None else root,
+        np.ones(k) if positive else None,
+        info,
+        prior,
+    )
+
+
+def smooth_root(k: int, alike: float = 0.7, common: float = 0.0) -> Array:
+    """Root (k, k) of a covariance in which neighbours correlate by `alike`, all by `common`."""
+    distance = np.abs(np.arange(k)[:, None] - np.arange(k))
+    covariance = (1 - common) * alike**distance + common
+    return np.linalg.cholesky(covariance + 1e-9 * np.eye(k))

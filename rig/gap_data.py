@@ -1,0 +1,190 @@
+"""From a data set to the numbers that the diagnosis of the sim-to-real gap works on (SI)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arm import Arm, tool_offset
+from identification.elastic import Beam
+from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
+from rig.dataset import Dataset
+from rig.errors import InputError
+from rig.model import load_robot
+
+MM = 1e-3
+_STEP_RAD = 1e-5  # central differences of levers: error below 1e-9
+
+
+def gap_data(dataset: Dataset) -> GapData:
+    """SI arrays of the samples in use. InputError where META lacks what a diagnosis needs."""
+    meta, where = dataset.meta, str(dataset.path or "data set")
+    if meta.simulation is None:
+        raise InputError(
+            f"{where}: META names no simulation, so there is no gap to diagnose. Add `simulation` "
+            "with the joint stiffnesses (or, without an arm, stiffness_N_per_mm) to META."
+        )
+    used = dataset.used & np.isfinite(dataset.columns["force_N"])
+    used &= np.isfinite(dataset.columns["displacement_mm"])
+    if not used.any():
+        raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
+    columns = {k: v[used] for k, v in dataset.columns.items()}
+    names = [str(d) for d in columns["direction"]]
+    poses = [str(p) for p in columns["pose"]]
+    keys = list(dict.fromkeys(zip(poses, names, strict=True)))
+    number = {key: i for i, key in enumerate(keys)}
+    setup = np.array([number[k] for k in zip(poses, names, strict=True)], dtype=np.int64)
+    arm = None if meta.robot == "none" else load_robot(meta.robot)
+    setups = tuple(_setup(dataset, arm, pose, name) for pose, name in keys)
+    compliance, relative = _springs(dataset)
+    meter = meta.instruments
+    return GapData(
+        arm=arm is not None,
+        setups=setups,
+        time=np.nan_to_num(columns["time_s"].astype(float)),
+        session=_optional(columns, ["session_s"], 1),
+        run=_runs(setup, columns["repetition"].astype(np.int64)),
+        setup=setup,
+        repetition=columns["repetition"].astype(np.int64),
+        branch=np.array([BRANCH_NAMES.index(str(b)) for b in columns["branch"]], dtype=np.int64),
+        step=columns["step"].astype(np.int64),
+        force=columns["force_N"].astype(float),
+        displacement=columns["displacement_mm"].astype(float) * MM,
+        compliance=compliance,
+        compliance_relative_sd=relative,
+        instruments=Instruments(
+            meter.force.standard_uncertainty_N,
+            meter.displacement.standard_uncertainty_mm * MM,
+            meter.force.gain_relative_sd,
+            meter.displacement.gain_relative_sd,
+        ),
+        tangential=_tangential(columns, setups, setup),
+        q=_readings(dataset, columns, poses),
+        temperature=_optional(columns, [f"temperature{j}_C" for j in range(1, 7)], 6),
+        output_encoder=meta.joint_encoder == "output",
+        datum=meta.datum,
+        tare=meta.tare,
+        imposed=meta.imposed,
+    )
+
+
+def _runs(setup: Ints, repetition: Ints) -> Ints:
+    """Consecutive numbers: a run is an unbroken stretch of one setup and repetition."""
+    new = (np.diff(setup, prepend=setup[0]) != 0) | (np.diff(repetition, prepend=repetition[0]) != 0)
+    return np.cumsum(new).astype(np.int64)
+
+
+def _springs(dataset: Dataset) -> tuple[Array, Array]:
+    simulation = dataset.meta.simulation
+    assert simulation is not None
+    if simulation.joint_stiffness_Nm_per_rad is not None:
+        k = np.array(simulation.joint_stiffness_Nm_per_rad, dtype=float)
+        return 1 / k, np.full(6, simulation.joint_stiffness_relative_sd)
+    assert simulation.stiffness_N_per_mm is not None
+    per_m = [simulation.stiffness_N_per_mm[d] / MM for d in dataset.meta.directions]
+    return 1 / np.array(per_m), np.full(len(per_m), simulation.stiffness_relative_sd)
+
+
+def _optional(columns: dict[str, NDArray[np.generic]], names: list[str], width: int) -> Array | None:
+    """(n,) or (n, width) where every column is there and finite throughout."""
+    if not all(n in columns for n in names):
+        return None
+    values = np.column_stack([columns[n].astype(float) for n in names])
+    if not np.isfinite(values).all():
+        return None
+    return values[:, 0] if width == 1 else values
+
+
+def _readings(
+    dataset: Dataset, columns: dict[str, NDArray[np.generic]], poses: list[str]
+) -> Array | None:
+    if dataset.meta.robot == "none":
+        return None
+    q = _optional(columns, [f"q{j}_rad" for j in range(1, 7)], 6)
+    if q is None:
+        return None
+    commanded = {name: np.array(p.q_rad) for name, p in dataset.meta.poses.items()}
+    return np.asarray(q - np.stack([commanded[p] for p in poses]))
+
+
+def _tangential(
+    columns: dict[str, NDArray[np.generic]], setups: tuple[Setup, ...], setup: Ints
+) -> Array | None:
+    vector = _optional(columns, [f"force_{a}_N" for a in "xyz"], 3)
+    if vector is None:
+        return None
+    return np.einsum("nij,nj->ni", np.stack([s.tangents for s in setups])[setup], vector)
+
+
+def _setup(dataset: Dataset, arm: Arm | None, pose: str, direction: str) -> Setup:
+    n = np.array(dataset.meta.directions[direction], dtype=float)
+    tangents = _tangents(n)
+    if arm is None:
+        return _bench_setup(dataset, direction, n, tangents)
+    where = dataset.meta.poses[pose]
+    q, tool = np.array(where.q_rad), tool_offset(np.array(where.tcp_xyz_mm) * MM)
+    J = arm.jacobian(q, tool)[:3]
+    point = arm.fk(q, tool)[:3, 3]
+    frames = arm.frames(q)
+    axes = frames[:6, :3, 2]
+    # lever = z x (p - o) . n, so a shift d of the tool changes it by z x d . n = d . (n x z)
+    offset = np.cross(n, axes)
+    return Setup(
+        pose=pose,
+        direction=direction,
+        unit_vector=n,
+        lever=J.T @ n,
+        tangents=tangents,
+        tangent_lever=tangents @ J,
+        offset_lever=offset,
+        turned_lever=_turned(arm, q, tool, n),
+        moment=np.cross(point, n),
+        links=np.array([_link(arm, link, q, tool, n) for link in arm.links]),
+        gravity=arm.gravity_torques(q),
+    )
+
+
+def _bench_setup(dataset: Dataset, direction: str, n: Array, tangents: Array) -> Setup:
+    names = list(dataset.meta.directions)
+    m = len(names)
+    lever = np.zeros(m)
+    lever[names.index(direction)] = 1.0
+    return Setup(
+        pose="",
+        direction=direction,
+        unit_vector=n,
+        lever=lever,
+        tangents=tangents,
+        tangent_lever=np.zeros((2, m)),
+        offset_lever=np.zeros((m, 3)),
+        turned_lever=np.zeros((m, m)),
+        moment=np.zeros(3),
+        links=np.zeros(0),
+        gravity=np.zeros(m),
+    )
+
+
+def _tangents(n: Array) -> Array:
+    """Two unit vectors (2, 3) across n: the base axes themselves where n is one of them."""
+    helper = np.eye(3)[np.argsort(np.abs(n), kind="stable")[:1]][0]
+    first = helper - (helper @ n) * n
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(n, first)])
+
+
+def _turned(arm: Arm, q: Array, tool: Array, n: Array) -> Array:
+    """(6, 6): change of lever i per radian of joint j."""
+    out = np.empty((6, 6))
+    for j in range(6):
+        step = np.zeros(6)
+        step[j] = _STEP_RAD
+        above, below = arm.jacobian(q + step, tool)[:3], arm.jacobian(q - step, tool)[:3]
+        out[:, j] = (above - below).T @ n / (2 * _STEP_RAD)
+    return out
+
+
+def _link(arm: Arm, link: Beam, q: Array, tool: Array, n: Array) -> float:
+    """Compliance of one nominal link along n, m/N."""
+    stiff = arm.with_stiffness(np.full(6, 1e30))
+    C = stiff.compliance(q, tool, links=[link])
+    return float(n @ C[:3, :3] @ n)
