@@ -77,6 +77,26 @@ def nearest(arm: Arm, T: ArrayLike, q: ArrayLike) -> Array:
     return np.asarray(found[np.nanargmin(distance)])
 
 
+def tool_pose(position: Array, direction: Array, turn: float = 0.0) -> Array:
+    """Tool pose (4, 4): z axis along the unit vector `direction`; x axis as near as possible to
+    the base's x axis (to its y axis where the tool points along x), then turned about z by `turn`.
+
+    Raises ValueError when `direction` is no unit vector.
+    """
+    from identification.arm import unit_vector
+
+    z = unit_vector(direction)
+    wish = np.eye(3)[1 if abs(z[0]) > 0.99 else 0]
+    x = wish - (wish @ z) * z
+    x /= np.linalg.norm(x)
+    y = np.cross(z, x)
+    T = np.eye(4)
+    c, s = np.cos(turn), np.sin(turn)
+    T[:3, :3] = np.column_stack([c * x + s * y, c * y - s * x, z])
+    T[:3, 3] = position
+    return T
+
+
 def _branch(arm: Arm, T: Array, q6: float, signs: Array) -> Array:
     """One branch, (..., 6); NaN where it does not exist."""
     shoulder, wrist, elbow = signs

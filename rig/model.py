@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from identification.arm import Arm, tool_offset, tool_transform, unit_vector
 from identification.elastic import MATERIALS, Beam, Section, cantilever, tube
-from identification.inverse import BRANCHES, solutions
+from identification.inverse import BRANCHES, solutions, tool_pose
 from rig.errors import InputError, did_you_mean
 from rig.model_schema import (
     BeamFile,
@@ -262,24 +262,6 @@ def _pose(document: Document[ModelFile], arm: Arm, tool: Array) -> Array:
         )
         document.refuse([document.problem(("pose", "position_mm"), what)])
     return found[pose.branch]
-
-
-def tool_pose(position: Array, direction: Array, turn: float = 0.0) -> Array:
-    """Tool pose (4, 4): z axis along the unit vector `direction`; x axis as near as possible to
-    the base's x axis (to its y axis where the tool points along x), then turned about z by `turn`.
-
-    Raises ValueError when `direction` is no unit vector.
-    """
-    z = unit_vector(direction)
-    wish = np.eye(3)[1 if abs(z[0]) > 0.99 else 0]
-    x = wish - (wish @ z) * z
-    x /= np.linalg.norm(x)
-    y = np.cross(z, x)
-    T = np.eye(4)
-    c, s = np.cos(turn), np.sin(turn)
-    T[:3, :3] = np.column_stack([c * x + s * y, c * y - s * x, z])
-    T[:3, 3] = position
-    return T
 
 
 def _within(document: Document[ModelFile], place: tuple[str, str], arm: Arm, q: Array) -> Array:
