@@ -379,6 +379,16 @@ def test_files_that_are_no_data_set(tmp_path: Path) -> None:
         load(table)
 
 
+def test_a_file_that_was_cut_off(path: Path) -> None:
+    raw = path.read_bytes()
+    path.write_bytes(raw[:5000])
+    with pytest.raises(InputError, match=r"damaged: 5000 bytes are left of \d+: cut off while"):
+        load(path)
+    path.write_bytes(raw + b"more")
+    with pytest.raises(InputError, match="damaged: its bytes have changed since it was written"):
+        load(path)
+
+
 def _broken(raw: bytes, seed: int) -> bytes:
     """Bits flipped, cut off, zeros or noise written over."""
     rng, data = random.Random(seed), bytearray(raw)

@@ -107,7 +107,7 @@ def test_extreme_scales_and_a_force_of_zero(tmp_path: Path) -> None:
         lambda t: t.replace("\n", "\r\n"),
         lambda t: t.replace("\n", "\r"),
         lambda t: t.rstrip("\n"),
-        lambda t: "# Prüfstand: °\n\n# a,b\n" + t.replace("\n2.5,", "\n\n# pause, 5\n  # x\n2.5,"),
+        lambda t: "# Prüfstand: °\n\n# a,b\n" + t.replace("\n2.5,", "\n\n#,,,,,,,,,\n  # x\n2.5,"),
         lambda t: t.replace(",", " , "),
         lambda t: t.replace(",", ",\t"),
         lambda t: t.replace("x", '"x"').replace("0.11", '"0.11"'),
@@ -123,18 +123,22 @@ def test_spellings_of_one_table(tmp_path: Path, change: Any) -> None:
 
 
 def test_further_columns_are_kept(tmp_path: Path) -> None:
-    table = "note,force_N,displacement_mm,speed mm/s,mixed\n"
+    table = "note,force_N,displacement_mm,housing_C,mixed\n"
     rows = ['"slow, #1",1,2,0.5,01', ",1,3,,1", "Größe,1,4,inf,drei"]
     data = bring(tmp_path, table + "\n".join(rows), example.META_SPECIMEN)
     assert data.columns["note"].tolist() == ["slow, #1", "", "Größe"]
-    np.testing.assert_array_equal(data.columns["speed mm/s"], [0.5, np.nan, np.inf])
+    np.testing.assert_array_equal(data.columns["housing_C"], [0.5, np.nan, np.inf])
     assert data.columns["mixed"].tolist() == ["01", "1", "drei"]
+    assert data.units["housing_C"] == "degC"
 
 
 def test_a_column_that_turns_to_text_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(csvblocks, "BLOCK_BYTES", 64)
-    rows = "".join(f"{i},{i / 7!r},{i if i != 90 else 'stop'}\n" for i in range(100))
-    data = bring(tmp_path, "force_N,displacement_mm,state\n" + rows, example.META_SPECIMEN)
+    rows = "".join(
+        f"{i},{i / 7!r},{i if i != 90 else 'stop'},{'go' if i == 50 else ''}\n" for i in range(100)
+    )
+    data = bring(tmp_path, "force_N,displacement_mm,state,word\n" + rows, example.META_SPECIMEN)
+    assert data.columns["word"].tolist() == ["go" if i == 50 else "" for i in range(100)]
     assert data.columns["force_N"].tolist() == list(range(100))
     assert data.columns["displacement_mm"].tolist() == [i / 7 for i in range(100)]
     assert data.columns["state"].tolist() == [str(i) if i != 90 else "stop" for i in range(100)]
@@ -202,6 +206,12 @@ REFUSED: list[tuple[str | bytes, str]] = [
      "column's name."),
     (HEAD + GOOD + "1,x,1,loading,1,1_0,1\n", ':3: column force_N: "1_0" is not a number; wanted: '
      "a number in N, with a point as decimal mark."),
+    (HEAD + GOOD + "1,x,1,loading,1,True,1\n", ':3: column force_N: "True" is not a number; '
+     "wanted: a number in N, with a point as decimal mark."),
+    (HEAD + "1,x,1,loading,1,true,1\n", ':2: column force_N: "true" is not a number; wanted: a '
+     "number in N, with a point as decimal mark."),
+    (HEAD + GOOD + '1,x,1,loading,"1,5",5\n', ":3: 6 cells, but the header names 7 columns; nothing for "
+     "displacement_mm. Was the file cut off? Complete or remove the row."),
     (HEAD + GOOD + "1,x,1,loading,1,,1\n", ":3: column force_N: an empty cell is not allowed; "
      "every row needs a finite value."),
     (HEAD + GOOD + "1,x,1,loading,1,5,nan\n", ':3: column displacement_mm: "nan" (mm) is not '
