@@ -204,6 +204,26 @@ def couple(
     give(result, json_file)
 
 
+@app.command()
+def simulate(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.yaml")],
+    protocol: ProtocolArgument,
+    csv: Annotated[
+        Path | None, typer.Option(metavar="CURVES.csv", help="Write the curves as a table.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """The curves that a model predicts for a procedure."""
+    from rig.simulate import simulate as run_simulate
+    from rig.simulate import write_csv
+
+    result = run_simulate(model, protocol)
+    give(result, json_file)
+    if csv is not None:
+        write_csv(result, csv)
+        say(f"{csv}: written")
+
+
 @app.command("import")
 def import_(
     table: Annotated[Path, typer.Argument(metavar="TABLE.csv")],
