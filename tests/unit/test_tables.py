@@ -210,8 +210,8 @@ REFUSED: list[tuple[str | bytes, str]] = [
      "wanted: a number in N, with a point as decimal mark."),
     (HEAD + "1,x,1,loading,1,true,1\n", ':2: column force_N: "true" is not a number; wanted: a '
      "number in N, with a point as decimal mark."),
-    (HEAD + GOOD + '1,x,1,loading,"1,5",5\n', ":3: 6 cells, but the header names 7 columns; nothing for "
-     "displacement_mm. Was the file cut off? Complete or remove the row."),
+    (HEAD + GOOD + '1,x,1,loading,"1,5",5\n', ":3: 6 cells, but the header names 7 columns; "
+     "nothing for displacement_mm. Was the file cut off? Complete or remove the row."),
     (HEAD + GOOD + "1,x,1,loading,1,,1\n", ":3: column force_N: an empty cell is not allowed; "
      "every row needs a finite value."),
     (HEAD + GOOD + "1,x,1,loading,1,5,nan\n", ':3: column displacement_mm: "nan" (mm) is not '
