@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 from dataclasses import replace
 from datetime import datetime
@@ -13,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 
-from rig import files, hdf5
+from rig import hdf5
 from rig.dataset import Dataset, equal, finish, from_records, load, write
 from rig.errors import InputError
 from rig.journal import Journal, journal_path
@@ -220,7 +221,7 @@ def test_a_failing_disk_leaves_the_older_file(path: Path, monkeypatch: pytest.Mo
     def refuse(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    for owner, name in ((hdf5, "_write_manifest"), (files.os, "fsync"), (Path, "replace")):
+    for owner, name in ((hdf5, "_write_manifest"), (os, "fsync"), (Path, "replace")):
         with monkeypatch.context() as patch:
             patch.setattr(owner, name, refuse)
             with pytest.raises(InputError, match=r"run\.h5: cannot be written: No space left"):
@@ -235,7 +236,7 @@ def test_the_new_file_is_on_disk_before_it_takes_its_place(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[str] = []
-    real_sync, real_replace = files.os.fsync, Path.replace
+    real_sync, real_replace = os.fsync, Path.replace
 
     def sync(fd: int) -> None:
         calls.append("fsync")
@@ -245,7 +246,7 @@ def test_the_new_file_is_on_disk_before_it_takes_its_place(
         calls.append("replace")
         return real_replace(self, target)
 
-    monkeypatch.setattr(files.os, "fsync", sync)
+    monkeypatch.setattr(os, "fsync", sync)
     monkeypatch.setattr(Path, "replace", put)
     write(example.dataset(), path)
     assert calls == ["fsync", "replace", "fsync"]  # contents, name, folder
