@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from identification.gap.data import Array, GapData
-from identification.gap.history import rests
+from identification.gap.data import Array, Flags, GapData
+from identification.gap.history import moves, play, rests
 from identification.gap.noise import Noise, estimate_noise
 from identification.gap.rows import Rows, reduce_rows
 
@@ -111,6 +111,22 @@ class Bench:
     def _unit_elastic(self) -> Array:
         return self.lever * self.compliance
 
+    def plays(self, load: Array, radius: Array, fresh: Flags | None = None) -> Array:
+        """Play states (n, k) of a load (n,) for radii (k,); fresh: where the memory is lost, by
+        default where the arm goes to another pose."""
+        tiled = np.tile(load[:, None], (1, len(radius)))
+        return play(tiled, radius, self.rest, self.moved if fresh is None else fresh)
+
+    @property
+    def rest(self) -> Flags:
+        """(n,) rows before which the load went back to zero."""
+        return rests(self.rows)
+
+    @property
+    def moved(self) -> Flags:
+        """(n,) first rows after the arm went to another pose."""
+        return moves(self.rows, [s.pose for s in self.data.setups])
+
     def moving_joints(self) -> list[int]:
         """Joints whose compliance carries at least a hundredth of the deflection in some setup."""
         part = np.abs(self.lever * self.elastic)
@@ -138,7 +154,7 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         observed[layout.q] = rows.q.T.reshape(-1)
     if rows.tangential is not None:
         observed[layout.tangential] = rows.tangential.T.reshape(-1)
-    observed[layout.zero_force] = rows.force[rows.zero]
+    observed[layout.zero_force] = rows.measured_force[rows.zero]
     reach = max(float(np.ptp(slope * load)), float(np.ptp(response)), 1e-15)
     return Bench(
         data=data, rows=rows, layout=layout, noise=estimate_noise(data, rows, stated, imposed),
@@ -184,6 +200,3 @@ def _unevenness(values: Array) -> float:
     return float(speed.std() / mean) if mean > 0 else np.inf
 
 
-def rest_rows(bench: Bench) -> Array:
-    """Rows before which the load went back to zero."""
-    return rests(bench.rows).astype(float)

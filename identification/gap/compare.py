@@ -106,6 +106,12 @@ def effect_rms(engine: Engine, energy: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(energy, 0.0) / total))
 
 
+def level_prior(engine: Engine, i: int, energy: float) -> float:
+    """log prior of level i for an explanation of that whitened energy."""
+    etas = np.array([level.eta for level in engine.levels])
+    return float(_log_level(engine, etas, i, np.array(energy)))
+
+
 def _log_level(engine: Engine, etas: Array, i: int, energy: Array) -> Array:
     """log prior of level i for effects of that energy: log-normal about IMPERFECTION x size.
 
@@ -122,7 +128,7 @@ def _log_level(engine: Engine, etas: Array, i: int, energy: Array) -> Array:
 
 
 def _edge(etas: Array, i: int) -> float:
-    return float(np.sqrt(max(etas[i], etas[i + 1] / 2) * etas[i + 1]))
+    return float(np.sqrt(max(etas[i], etas[i + 1] / 2.5) * etas[i + 1]))
 
 
 def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float) -> Level:
@@ -139,16 +145,6 @@ def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float)
         level.moment - cross.T @ left,
         level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum()),
     )
-
-
-def energy_of(engine: Engine, level: int, scored: Scored) -> float:
-    """Whitened energy of a variant's most probable coefficients."""
-    c = np.array(scored.variant.columns)
-    lvl = engine.levels[level]
-    T = scored.scale * scored.variant.root
-    inner = np.eye(len(c)) + T.T @ lvl.gram[np.ix_(c, c)] @ T
-    w = T @ np.linalg.solve(inner, T.T @ lvl.moment[c])
-    return float(w @ engine.levels[0].gram[np.ix_(c, c)] @ w)
 
 
 def _logsumexp(values: Array) -> Array:

@@ -90,20 +90,26 @@ class Engine:
         direction = inverse[:n] / lengths[0][hold]
         contrast = response - direction[:, None] * means[0][hold]
         alone = np.diff(np.append(edges, n))[hold] == 1
-        self._contrast = contrast[~alone]
+        contrast = contrast[~alone]
+        # most columns stand still within a hold: only the others need the product
+        size = np.abs(contrast).max(axis=0) if len(contrast) else np.zeros(contrast.shape[1])
+        self._varying = np.flatnonzero(size > 1e-9 * (1 + np.abs(response).max(axis=0)))
+        self._contrast = contrast[:, self._varying]
         self._contrast_noise = self.sigma[:n][~alone]
         self._freedom = n - len(edges)
 
     def _level(self, eta: float) -> Level:
         noise = self.bench.noise
-        hold = noise.hold**2 + (HOLD_PART * eta) ** 2
+        edges = np.flatnonzero(self.bench.rows.hold_starts)
+        hold = noise.hold[edges] ** 2 + (HOLD_PART * eta) ** 2
         extra_u = 1 + hold * self._length_u**2
         extra_q = 1 + (eta / _LEVER_M) ** 2 * self._length_q**2 if self.bench.data.arm else 1.0
         factor = 1 + (ROW_PART * eta / self._contrast_noise) ** 2
         gram = self._fixed + self._mean_u.T @ (self._mean_u / extra_u[:, None])
         if self._length_q.size:
             gram = gram + self._mean_q.T @ (self._mean_q / np.asarray(extra_q)[:, None])
-        gram = gram + self._contrast.T @ (self._contrast / factor[:, None])
+        weighted = self._contrast / factor[:, None]
+        gram[np.ix_(self._varying, self._varying)] += self._contrast.T @ weighted
         share = self._freedom / max(len(factor), 1)
         log_noise = 0.5 * (np.log(extra_u).sum() + np.log(extra_q).sum() * bool(self._length_q.size))
         log_noise += 0.5 * share * np.log(factor).sum()
@@ -134,6 +140,19 @@ class Engine:
             gram[p, 0] - pool.T @ left,
             float(log_base),
         )
+
+
+def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
+    """0, then sizes of imperfection by factors of about 2.5, from half the stated uncertainty to
+    the size of what the base leaves."""
+    n, sigma = bench.rows.n, row_noise(bench)
+    A = np.vstack([base.columns / sigma[:, None], np.diag(1 / base.sd)])
+    b = np.concatenate([target / sigma, np.zeros(len(base.sd))])
+    beta = np.linalg.lstsq(A, b, rcond=None)[0]
+    left = float(np.sqrt(np.mean((target - base.columns @ beta)[:n] ** 2)))
+    start = 0.5 * bench.noise.stated
+    count = max(3, int(np.ceil(np.log(max(1.5 * left / start, 1.0)) / np.log(2.5))) + 1)
+    return np.concatenate([[0.0], start * 2.5 ** np.arange(count)])
 
 
 def row_noise(bench: Bench) -> Array:

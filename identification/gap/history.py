@@ -24,18 +24,27 @@ def rests(rows: Rows) -> Flags:
     return out
 
 
-def play(load: Array, radius: Array, rest: Flags, reset: bool = False) -> Array:
+def moves(rows: Rows, poses: list[str]) -> Flags:
+    """(n,): first rows after the arm went to another pose. poses: of every setup."""
+    number = np.array([poses.index(p) for p in poses])[rows.setup]
+    return np.concatenate([[True], np.diff(number) != 0])
+
+
+def play(load: Array, radius: Array, rest: Flags, fresh: Flags) -> Array:
     """Play operator (backlash of half width `radius`), (n, k) for load (n, k), radius (k,).
 
     `p_i = max(x_i - r, min(x_i + r, p_{i-1}))`, p = 0 in the beginning (Krasnosel'skii, Pokrovskii
-    1989). reset: the state returns to zero before every run (a controller takes the joint back).
+    1989). rest: rows before which the load was zero. fresh: rows before which the state went back
+    to zero (the arm moved to another pose, or a controller took the joint back).
     """
     out = np.empty_like(load)
     state = np.zeros(load.shape[1])
     upper, lower = load + radius, load - radius
     for i in range(len(load)):
-        if rest[i]:
-            state = np.zeros_like(state) if reset else np.clip(state, -radius, radius)
+        if fresh[i]:
+            state = np.zeros_like(state)
+        elif rest[i]:
+            state = np.clip(state, -radius, radius)
         state = np.minimum(upper[i], np.maximum(lower[i], state))
         out[i] = state
     return out

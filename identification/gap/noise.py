@@ -21,12 +21,13 @@ _ENOUGH = 30  # second differences: then their scatter is known to about an eigh
 @dataclass(frozen=True, eq=False)
 class Noise:
     """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
-    already in `response`; hold, run: common to a hold, a run, m; force N of one sample; stated m."""
+    already in `response`; hold (n,), run: common to a hold, to a run, m; force N and stated m: of one
+    sample."""
 
     response: Array
     q: Array
     force: float
-    hold: float
+    hold: Array
     run: float
     stated: float
 
@@ -36,15 +37,12 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     meter = data.instruments
     fallback = np.hypot(meter.displacement, slope * meter.force)
     hold = hold_ids(data)
-    per_sample = fallback
-    if not rows.continuous:
-        typical = float(np.median(slope))
-        compensated = data.displacement - typical * data.force
-        measured = _scatter(compensated, hold)
-        if measured is not None:
-            # never less than digits and a third of what is stated: holds can't see everything
-            floor = 0.33 * meter.displacement
-            per_sample = np.full(rows.n, max(measured, floor))
+    common = np.where(rows.steady, slope * meter.force / np.sqrt(rows.hold_weight), 0.0)
+    if rows.continuous:
+        per_sample, common = fallback, np.zeros(rows.n)
+    else:
+        alone = np.where(rows.steady, meter.displacement, fallback)
+        per_sample = _white(data, rows, alone, slope, hold)
     weight = np.ones(rows.n) if rows.continuous else rows.weight
     q = np.full(data.joints, ENCODER_RAD)
     if data.q is not None and not rows.continuous:
@@ -54,8 +52,21 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     stated = float(np.median(fallback)) if imposed else meter.displacement
     return Noise(
         response=per_sample / np.sqrt(weight), q=q, force=meter.force,
-        hold=HOLD_SHARE * stated, run=RUN_SHARE * stated, stated=stated,
+        hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
     )  # fmt: skip
+
+
+def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Array) -> Array:
+    """Noise of one sample in every row (n,): measured where holds are long enough, else `alone`."""
+    if float(rows.weight @ rows.steady) < 0.5 * float(rows.weight.sum()):
+        measured = _scatter(data.displacement - float(np.median(slope)) * data.force, hold)
+        return alone if measured is None else np.full(rows.n, measured)
+    measured = _scatter(data.displacement, hold)
+    if measured is None:
+        return alone
+    # never less than a third of what is stated: second differences can't see everything
+    white = max(measured, 0.33 * data.instruments.displacement)
+    return np.where(rows.steady, white, np.hypot(white, slope * data.instruments.force))
 
 
 def _scatter(values: Array, hold: Array) -> float | None:

@@ -23,9 +23,10 @@ class Rows:
     """n rows. weight (n,): samples behind a row; hold, level, run, setup (n,): consecutive ids.
 
     level: same setup, branch and step (or class of force and sense of motion): what repeats from
-    repetition to repetition shares a level. driver (n,) N: what drives the rig, as a force; response
-    (n,) m: what it answers, as a displacement. session (n,) s is always there: `clock` says whether
-    it was recorded. gap (n,) s: time since the row before.
+    repetition to repetition shares a level. session (n,) s is always there: `clock` says whether
+    it was recorded. force: of a hold whose samples scatter by no more than their noise, the mean
+    of the hold in all its rows (its noise would else pass for a small friction or a lag);
+    measured_force: as it is. steady (n,): such holds. hold_weight (n,): samples of the row's hold.
     """
 
     time: Array
@@ -40,12 +41,15 @@ class Rows:
     level: Ints
     weight: Array
     force: Array
+    measured_force: Array
     displacement: Array
     tangential: Array | None
     q: Array | None
     temperature: Array | None
     simulated: Array | None
     zero: Flags
+    steady: Flags
+    hold_weight: Array
     continuous: bool
     starts: Flags  # first row of a run
     hold_starts: Flags
@@ -79,17 +83,35 @@ def reduce_rows(data: GapData) -> Rows:
     )
     holds = np.arange(len(edges), dtype=np.int64) if continuous else _consecutive(hold[edges])
     zero = (branch == ZERO) & (step <= 0)
+    weight = count.astype(float)
+    steady, mean_force, hold_weight = _steady(holds, force, weight, data.instruments.force)
     session = mean(_session(data))
     return Rows(
         time=mean(data.time), session=session, clock=data.session is not None, run=run, setup=setup,
         repetition=first(data.repetition), branch=branch, step=step, hold=holds, level=level,
-        weight=count.astype(float), force=force, displacement=mean(data.displacement),
+        weight=weight, force=np.where(steady, mean_force, force), measured_force=force, steady=steady,
+        hold_weight=hold_weight, displacement=mean(data.displacement),
         tangential=None if data.tangential is None else mean(data.tangential),
         q=None if data.q is None else mean(data.q),
         temperature=None if data.temperature is None else mean(data.temperature),
         simulated=None if data.simulated is None else mean(data.simulated),
         zero=zero, continuous=continuous, starts=_changes(run), hold_starts=_changes(holds),
     )  # fmt: skip
+
+
+# Noise reaches this square sum in one hold of ten thousand (chi squared, 1 to 8 degrees of freedom);
+# what really moves (a lagging channel, a relaxing screw) goes far beyond it.
+_STEADY_PER_ROW, _STEADY_ONCE = 2.6, 12.5
+
+
+def _steady(hold: Ints, force: Array, weight: Array, sd: float) -> tuple[Flags, Array, Array]:
+    """Whether the force of a row's hold stands still within its noise, its mean, its samples."""
+    total = np.bincount(hold, weights=weight)
+    mean = np.bincount(hold, weights=weight * force) / total
+    rows = np.bincount(hold)
+    square = np.bincount(hold, weights=weight * (force - mean[hold]) ** 2) / sd**2
+    steady = square <= _STEADY_PER_ROW * rows + _STEADY_ONCE
+    return steady[hold], mean[hold], total[hold]
 
 
 def hold_ids(data: GapData) -> Ints:

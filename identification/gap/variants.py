@@ -34,7 +34,7 @@ def variant(
     columns: list[int],
     scales: tuple[float, ...],
     root: Array | None = None,
-    positive: bool = True,
+    positive: bool | Array = True,
     prior: float = 1.0,
     **info: Any,
 ) -> Variant:
@@ -46,7 +46,7 @@ def variant(
         tuple(columns),
         scales,
         np.eye(k) if root is None else root,
-        np.ones(k) if positive else None,
+        positive if isinstance(positive, np.ndarray) else (np.ones(k) if positive else None),
         info,
         prior,
     )

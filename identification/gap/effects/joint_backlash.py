@@ -2,7 +2,9 @@
 
 Net torque = load and, in an upright arm, its own weight. The joint lies at one side of its play w
 or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where it was pushed until
-the torque has turned: a play of radius `zone` on the torque, cut at the ends of the play.
+the torque has turned: a play of radius `zone` on the torque, cut at the ends of the play. Gears
+with play rub too: a stop operator of the zone's strength rides along. Without torque the joint
+lies anywhere in its play: a free place per setup for the zero load between two runs.
 Size: gears of ratio >= 80 about 1 arcmin (3e-4 rad).
 """
 
@@ -11,19 +13,18 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array
-from identification.gap.history import play, rests
+from identification.gap.data import Array, Flags
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
+FRICTION = 0.3  # deflection of the friction beside the play, against the play
 _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an arm
 
 
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: zone, with and without friction, crossing where weight and load balance."""
-    rest = rests(bench.rows)
     out = []
     weight = np.stack([s.gravity for s in bench.data.setups])[bench.rows.setup]
     scales = SCALES if bench.data.arm else tuple(s * bench.reach for s in _SHARES)
@@ -37,13 +38,20 @@ def variants(bench: Bench) -> list[Variant]:
         crossings = {"weight": net} if _crosses(net, torque) else {}
         if np.abs(g).max() < 0.5 * span:
             crossings["load"] = torque
+        places: dict[bytes, list[int]] = {}
         for name, x in crossings.items():
             for zone in ZONES:
                 info = {"joint": j, "zone_Nm": zone * span}
-                for kind, shape in _shapes(x, zone * span, rest).items():
-                    column = bench.add_joint(j, bench.sense * shape)
+                floating = _floating(bench, j, np.abs(x) < zone * span, places)
+                for kind, shape in _shapes(bench, x, zone * span).items():
+                    columns = [bench.add_joint(j, bench.sense * part) for part in shape[:2]]
+                    columns += floating
                     label = f"joint {j + 1} {name} {kind} zone {zone:g}"
-                    out.append(variant(WORD, label, [column], scales, **info))
+                    root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
+                    out.append(
+                        variant(WORD, label, columns, scales, root,
+                                positive=np.eye(len(columns))[0], **info)
+                    )  # fmt: skip
     return out
 
 
@@ -53,10 +61,26 @@ def _crosses(net: Array, torque: Array) -> bool:
     return bool(net.min() < margin and net.max() > -margin)
 
 
-def _shapes(x: Array, zone: float, rest: Array) -> dict[str, Array]:
-    state = play(x[:, None], np.array([zone]), rest)[:, 0]
+def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
+    """Per kind: the play itself, and the friction beside it."""
+    state = bench.plays(x, zone * np.array([1.0, 3.0]))
+    rub = -(x - state[:, 0]) / (2 * zone)
     return {
-        "free": np.tanh(x / zone) / 2,
-        "friction": np.clip(state / zone, -1, 1) / 2,
-        "friction 3": np.tanh(play(x[:, None], np.array([3 * zone]), rest)[:, 0] / zone) / 2,
+        "free": [np.tanh(x / zone) / 2, rub],
+        "friction": [np.clip(state[:, 0] / zone, -1, 1) / 2, rub],
+        "friction 3": [np.tanh(state[:, 1] / zone) / 2, rub],
     }
+
+
+def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[int]]) -> list[int]:
+    """Columns per setup that was unloaded again after its first run: rows in which the joint is
+    loose. Zones that agree on these rows share their columns."""
+    rows, key = bench.rows, loose.tobytes()
+    if key not in places:
+        places[key] = []
+        for s in range(len(bench.data.setups)):
+            mine = rows.setup == s
+            later = mine & (rows.run > rows.run[mine].min()) & loose
+            if later.any():
+                places[key].append(bench.add_joint(joint, later.astype(float)))
+    return places[key]

@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.history import play, rests
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_hysteresis"
@@ -22,7 +21,6 @@ SCALES = (0.05, 0.15, 0.5, 1.0)
 
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: each strength alone with its neighbour, and the whole spectrum."""
-    rest = rests(bench.rows)
     out = []
     for j in bench.moving_joints():
         torque = bench.torque[:, j]
@@ -30,7 +28,7 @@ def variants(bench: Bench) -> list[Variant]:
         if not span > 0:
             continue
         radius = span * np.array(RADII)
-        states = play(np.tile(torque[:, None], (1, len(radius))), radius, rest)
+        states = bench.plays(torque, radius)
         c = bench.compliance[j]
         columns = [
             bench.add_joint(j, -bench.sense * c * (torque - states[:, k]))

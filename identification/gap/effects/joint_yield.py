@@ -9,17 +9,20 @@ that takes the joint back resets it between runs. w in units of the joint's elas
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array
-from identification.gap.history import play, rests, retarded
-from identification.gap.variants import Variant, smooth_root, variant
+from identification.gap.data import Array, Flags
+from identification.gap.history import retarded
+from identification.gap.variants import Variant, variant
 
 WORD = "joint_yield"
-THRESHOLDS = (0.3, 0.38, 0.46, 0.53, 0.6, 0.66, 0.72, 0.77, 0.82, 0.86, 0.9, 0.94, 0.97)
+THRESHOLDS = (0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 SCALES = (0.3, 1.0, 4.0, 20.0)
-FLOW_S = (3.0, 15.0)
+FLOW_S = (5.0,)
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -35,40 +38,51 @@ def variants(bench: Bench) -> list[Variant]:
     return out
 
 
-def knee_variants(bench, load, column, word, name, info):  # type: ignore[no-untyped-def]
+def knee_variants(
+    bench: Bench,
+    load: Array,
+    column: Callable[[Array], int],
+    word: str,
+    name: str,
+    info: dict[str, Any],
+) -> list[Variant]:
     """Variants of a threshold on `load` (n,); `column` turns a state (n,) into a pool index."""
-    rest = rests(bench.rows)
     top = float(np.abs(load).max())
     if not top > 0:
         return []
     radius = top * np.array(THRESHOLDS)
-    tiled = np.tile(load[:, None], (1, len(radius)))
     out = []
-    several = np.sum(rest) > 1
-    for reset in (False, True) if several else (False,):
-        states = play(tiled, radius, rest, reset)
+    for memory, fresh in _memories(bench).items():
+        states = bench.plays(load, radius, fresh)
         for flow in (0.0, *(FLOW_S if not bench.rows.continuous else ())):
-            moved = _flow(bench, states, flow, rest, reset)
+            moved = _flow(bench, states, flow, fresh)
             columns = [column(moved[:, k]) for k in range(len(radius))]
-            kind = {**info, "reset": reset, "flow_s": flow}
-            label = f"{name}{' reset' if reset else ''}{f' flow {flow:g} s' if flow else ''}"
+            label = f"{name}{memory}{f' flow {flow:g} s' if flow else ''}"
             share = (0.7 if flow == 0 else 0.3 / len(FLOW_S)) / len(radius)
             for k in range(len(radius)):
-                last = min(k + 3, len(radius))
-                chosen = columns[k:last]
-                width = len(chosen)
-                root = np.diag(0.5 ** np.arange(width)) @ smooth_root(width, 0.0)
+                chosen = columns[k : k + 3]
+                root = np.diag(0.5 ** np.arange(len(chosen)))
                 out.append(
                     variant(word, f"{label} at {THRESHOLDS[k]:g}", chosen, SCALES, root,
-                            prior=share, radius=radius[k:last], **kind)
+                            prior=share, radius=radius[k : k + 3], memory=memory, flow_s=flow,
+                            **info)
                 )  # fmt: skip
     return out
 
 
-def _flow(bench: Bench, states: Array, flow: float, rest: Array, reset: bool) -> Array:
+def _memories(bench: Bench) -> dict[str, Flags]:
+    """When the joint gets back to where it was: never, when the arm moves, before every run."""
+    moved, first = bench.moved, np.zeros(bench.rows.n, dtype=bool)
+    out = {"": moved}
+    if np.sum(moved) > 1:
+        out[" lasting"] = first
+    if np.sum(bench.rest) > np.sum(moved):
+        out[" taken back"] = moved | bench.rest
+    return out
+
+
+def _flow(bench: Bench, states: Array, flow: float, fresh: Flags) -> Array:
     """The states reached with a first-order lag (viscoplastic flow of Perzyna's kind)."""
     if flow == 0:
         return states
-    never = np.zeros(len(rest), dtype=bool)
-    times = np.full(states.shape[1], flow)
-    return retarded(states, times, bench.rows, rest if reset else never)
+    return retarded(states, np.full(states.shape[1], flow), bench.rows, fresh)
