@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 _BLOCK = 5_000  # cells at once: eight branches of 6 x 6 each, a few MB
 # Smallest singular value of the Jacobian (lengths by 1 m) that still counts as away from
 # singularities: nearer, joints race, and joint springs alone promise a stiffness that links deny.
-LEAST_SINGULAR = 0.05
+LEAST_SINGULAR = 0.08
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +134,16 @@ def branches_at(arm: Arm, points: Array, stance: Stance) -> Array:
 
 def _compliance(arm: Arm, q: Array, stance: Stance) -> Array:
     return arm.compliance(q, stance.tool, links=stance.links, base=stance.mounting)
+
+
+def branch_of(arm: Arm, q: Array) -> str:
+    """The branch that q (6,) rad belongs to. Raises ValueError in poses where q6 is free."""
+    found = solve(arm, arm.fk(q))
+    apart = np.abs((found - q + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
+    apart = np.nan_to_num(apart, nan=np.inf)
+    if apart.min() > 1e-6:
+        raise ValueError("no branch gives the pose back: joint 6 is free in it (wrist stretched)")
+    return BRANCHES[int(np.argmin(apart))]
 
 
 # --- the best place ------------------------------------------------------------------------------

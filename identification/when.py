@@ -52,9 +52,11 @@ class Interval:
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """time (n,) s, single and coupled (n,) N/m along each row's direction, states of the rows."""
+    """time (n,) s; required, single and coupled (n,) N/m along each row's direction; states of the
+    rows."""
 
     time: Array
+    required: Array
     single: Array
     coupled: Array
     states: tuple[State, ...]
@@ -100,7 +102,7 @@ def schedule(
     single, pair = along(C, n), along(coupled(C, beta, kind, half), n)
     rule = CouplingRule(dead_band)
     states = tuple(_run(rule, need, single, pair))
-    return Schedule(t, single, pair, states)
+    return Schedule(t, need, single, pair, states)
 
 
 def _run(rule: CouplingRule, need: Array, single: Array, pair: Array) -> Sequence[State]:

@@ -76,6 +76,7 @@ class CouplingResult:
                 }
                 for d in self.decisions
             ],
+            "published": _published(self),
             "notes": list(self.notes),
         }
         # a rigid or point model states no beam: nothing compliant can be computed from it
@@ -243,6 +244,23 @@ def _notes(model: ArmModel, spec: CouplingSpec) -> list[str]:
     if spec.half is None:
         notes.append("No beam in the model: compliant coupling is not computed.")
     return notes
+
+
+def _published(result: CouplingResult) -> list[dict[str, Any]]:
+    from rig.couple_text import compare, is_published_setup
+
+    if not is_published_setup(result):
+        return []
+    return [
+        {
+            "quantity": row.quantity,
+            "unit": row.unit,
+            "stated": row.stated,
+            "follows": row.follows,
+            "model": row.model,
+        }
+        for row in compare(result)
+    ]
 
 
 def _volumes(w: Workspace) -> dict[str, Any]:

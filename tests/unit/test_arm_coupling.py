@@ -275,9 +275,34 @@ def test_couple_json(tmp_path: Path) -> None:
 
 
 def test_couple_text_shows_the_published_numbers() -> None:
-    text = couple(MODELS / "F1.yaml", samples=0).to_text()
-    for words in ("2950", "5940", "37.19", "51.4 times", "3.50", "30.23", "infeasible"):
-        assert words in text
+    result = couple(MODELS / "F2.yaml", samples=0)
+    rows = [line.split() for line in result.to_text().splitlines()]
+    for row in (
+        "single x, N/mm 95.94 96.37",
+        "coupled x, N/mm 212 212.0",
+        "gain x, % 200 121 120",
+        "single y, N/mm 57.42 56.05",
+        "coupled y, N/mm 2950 2950.0",
+        "gain y, % 5940 5038 5164",
+        "gain y, times 37.19 51.38 52.64",
+        "workspace single, m^3 3.5 4.60 4.60",
+        "workspace coupled, m^3 1.06 1.06",
+        "workspace ratio, % 30.23 30.29 23.06",
+    ):
+        assert row.split() in rows
+    table = {(r["quantity"], r["unit"]): r for r in result.to_json()["published"]}
+    assert table["gain y", "times"]["stated"] == 37.19
+    assert table["gain y", "times"]["follows"] == pytest.approx(2950 / 57.42)
+    assert table["workspace single", "m^3"]["model"] == pytest.approx(4.6014, rel=1e-4)
+    assert "infeasible" in couple(MODELS / "F1.yaml", samples=0).to_text()
+
+
+def test_other_set_ups_have_nothing_published(tmp_path: Path) -> None:
+    text = (MODELS / "F1.yaml").read_text().replace("1500", "1400")
+    (tmp_path / "m.yaml").write_text(text)
+    result = couple(tmp_path / "m.yaml", samples=0)
+    assert result.to_json()["published"] == []
+    assert "Published" not in result.to_text()
 
 
 def test_uncertainty_of_one_spring(f1: ArmModel) -> None:

@@ -1,0 +1,235 @@
+"""Figures of `rig couple`: stiffness beside the published one, maps, placement, schedule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.coupling import mirror_axes
+from identification.maps import Coupling, Stance, branch_of, stiffness_map
+from rig.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
+from rig.errors import InputError
+from rig.figures import COLOURS, STYLE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rig.couple import CouplingResult
+    from rig.coupling_task import TaskResult
+    from rig.model import ArmModel
+
+Array = NDArray[np.float64]
+_MAP_CELLS = 81
+_LABEL = "Stiffness in N/mm"
+
+
+def draw(result: CouplingResult, folder: Path, placement: TaskResult | None = None) -> list[Path]:
+    """Writes the figures as PNG and SVG into `folder`; the files written.
+
+    InputError if the folder can't be written to.
+    """
+    import matplotlib as mpl
+
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with mpl.rc_context(STYLE):
+            for name, figure in _figures(result, placement):
+                for kind in ("png", "svg"):
+                    path = folder / f"{name}.{kind}"
+                    metadata = {"Date": None} if kind == "svg" else None
+                    figure.savefig(path, dpi=150, metadata=metadata)
+                    written.append(path)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: the figures can't be written there ({error.strerror}). Give another folder."
+        ) from error
+    return written
+
+
+def _figures(result: CouplingResult, placement: TaskResult | None) -> list[tuple[str, Figure]]:
+    out = [("stiffness", stiffness(result))]
+    # an arm that the closed form does not cover has no map; the rest stands without it
+    with suppress(ValueError):
+        out.append(("map", maps(result)))
+    if result.schedule is not None:
+        out.append(("schedule", schedule(result)))
+    if placement is not None:
+        out.append(("placement", place(placement)))
+    return out
+
+
+def stiffness(result: CouplingResult) -> Figure:
+    """Bars along x and y: single and coupled, with standard uncertainties; published beside."""
+    figure = _figure(7.5, 4.6)
+    axes = figure.add_subplot()
+    bars: list[tuple[str, Array, Array | None, str, str]] = []
+    if is_published_setup(result):
+        bars.append(("single, published", np.array(PUBLISHED_SINGLE), None, "white", COLOURS[0]))
+    bars.append(("single", result.single[:2] / 1e3, result.u_single[:2] / 1e3, COLOURS[0], ""))
+    if is_published_setup(result):
+        bars.append(("coupled, published", np.array(PUBLISHED_COUPLED), None, "white", COLOURS[1]))
+    colours = {"rigid": COLOURS[1], "compliant": COLOURS[2], "point": COLOURS[3]}
+    for kind, k in result.pair.items():
+        bars.append((f"coupled, {kind}", k[:2] / 1e3, result.u_pair[kind][:2] / 1e3,
+                     colours[kind], ""))  # fmt: skip
+    width = 0.8 / len(bars)
+    for i, (label, values, u, fill, edge) in enumerate(bars):
+        at = np.arange(2) + (i - (len(bars) - 1) / 2) * width
+        drawn = axes.bar(at, values, 0.92 * width, yerr=u, color=fill, edgecolor=edge or fill,
+                         hatch="//" if edge else None, capsize=3, label=label)  # fmt: skip
+        axes.bar_label(drawn, [f"{v:.1f}" if v < 1000 else f"{v:.0f}" for v in values],
+                       fontsize=7.5, padding=2)  # fmt: skip
+    axes.set_yscale("log")
+    axes.margins(y=0.12)
+    axes.set_ylabel(_LABEL)
+    load = "mirror" if result.spec.load_axes == "mirror" else "base"
+    axes.set_xticks([0, 1], [f"{a} (coupled: {load} axes)" for a in "xy"])
+    axes.grid(visible=False, axis="x")
+    beta = np.rad2deg(result.spec.beta)
+    axes.set_title(f"One arm and two coupled arms, beta = {beta:g} deg")
+    axes.legend(frameon=False, fontsize=8, ncols=2, loc="upper left")
+    return _finish(figure, result.model)
+
+
+def maps(result: CouplingResult) -> Figure:
+    """Stiffness of the single and of the coupled arms over the mirror plane through the model's
+    node, tool and branch as there, along the first load axis that a requirement names (x if none).
+
+    Raises ValueError for an arm that the closed-form inverse does not cover.
+    """
+    model, spec = result.model, result.spec
+    mirror = mirror_axes(spec.beta)
+    node = model.arm.fk(model.q, model.tool)
+    axis = next((i for r in model.required for i in range(3) if abs(r.direction[i]) > 0.99), 0)
+    load = (mirror if spec.load_axes == "mirror" else np.eye(3))[:, axis]
+    sideways, height = np.linspace(-1.4, 1.4, _MAP_CELLS), np.linspace(-0.4, 1.6, _MAP_CELLS)
+    T, Z = np.meshgrid(sideways, height)
+    plane = (node[:3, 3] @ mirror[:, 0]) * mirror[:, 0]
+    points = plane + T[..., None] * mirror[:, 1] + Z[..., None] * mirror[:, 2]
+    branch = branch_of(model.arm, model.q)
+    stance = Stance(
+        node[:3, 2], model.tool, branch=branch, links=model.links, mounting=model.mounting
+    )
+    pair = Coupling(spec.beta, spec.kind, spec.half)
+    found = [
+        stiffness_map(model.arm, points, stance, load, c).stiffness / 1e3 for c in (None, pair)
+    ]
+    figure = _figure(10.5, 4.6)
+    titles = ("one arm", f"two arms, {spec.described}")
+    panels = figure.subplots(1, 2, sharey=True)
+    name = f"{'xyz'[axis]} of the {spec.load_axes} axes"
+    for axes, k, title in zip(panels, found, titles, strict=True):
+        _map_panel(figure, axes, sideways, height, k)
+        axes.plot(node[:3, 3] @ mirror[:, 1], node[2, 3], "+", color="black", markersize=11)
+        axes.set_title(f"{title}, along {name}", fontsize=10)
+        axes.set_xlabel("Along the mirror plane in m")
+    panels[0].set_ylabel("Height in m")
+    return _finish(figure, model)
+
+
+def _map_panel(figure: Figure, axes: Any, x: Array, y: Array, k: Array) -> None:
+    """One map with its own colours on a logarithmic scale; white where the arm does not reach."""
+    from matplotlib.colors import LogNorm
+
+    known = k[np.isfinite(k)]
+    # the few cells beside a singularity would take all colours
+    low, high = np.quantile(known, [0.01, 0.97]) if known.size else (1.0, 10.0)
+    image = axes.pcolormesh(
+        x, y, k, norm=LogNorm(low, max(high, 1.01 * low)), cmap="viridis", shading="nearest",
+        rasterized=True,
+    )  # fmt: skip
+    _bar(figure, image, axes, _LABEL, shrink=0.75)
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+
+
+def place(result: TaskResult) -> Figure:
+    """Reached over required stiffness for every base distance and angle, the best marked."""
+    from matplotlib.colors import LogNorm
+
+    best = result.best
+    figure = _figure(7.5, 5.0)
+    axes = figure.add_subplot()
+    x, y = 1e3 * best.distances, np.rad2deg(best.betas)
+    margins = best.margins.T
+    known = margins[np.isfinite(margins)]
+    low, high = np.quantile(known, [0.01, 0.99])
+    image = axes.pcolormesh(x, y, margins, norm=LogNorm(low, max(high, 1.01 * low)),
+                            cmap="viridis", shading="nearest", rasterized=True)  # fmt: skip
+    _bar(figure, image, axes, "Reached over required stiffness")
+    if known.min() < 1 < known.max():
+        lines = axes.contour(x, y, margins, levels=[1.0], colors="white", linewidths=1.5)
+        axes.clabel(lines, fmt={1.0: "just met"}, fontsize=8)
+    axes.plot(1e3 * best.base_distance, np.rad2deg(best.beta), "*", color="white",
+              markeredgecolor="black", markersize=15, label="best")  # fmt: skip
+    axes.set_xlabel("Base distance in mm")
+    axes.set_ylabel("beta in deg")
+    needs = ", ".join(f"{n.name} {n.stiffness / 1e3:g} N/mm" for n in result.model.required)
+    axes.set_title(f"Where the second arm should stand for {needs}", fontsize=10)
+    axes.grid(visible=False)
+    axes.legend(loc="upper right", fontsize=8)
+    return _finish(figure, result.model)
+
+
+def schedule(result: CouplingResult) -> Figure:
+    """Required, single and coupled stiffness along the path; shaded where the pair is coupled."""
+    assert result.schedule is not None
+    plan = result.schedule
+    figure = _figure(7.5, 4.2)
+    axes = figure.add_subplot()
+    axes.step(plan.time, plan.required / 1e3, where="post", color="black", label="required")
+    axes.plot(plan.time, plan.single / 1e3, color=COLOURS[0], label="single")
+    axes.plot(plan.time, plan.coupled / 1e3, color=COLOURS[1], label="coupled")
+    shades = {"couple": (COLOURS[1], "coupled"), "infeasible": ("red", "infeasible")}
+    named: set[str] = set()
+    for interval in plan.intervals():
+        if interval.state in shades:
+            colour, word = shades[interval.state]
+            # a label that begins with _ stays out of the legend: each state is named once
+            label = f"_{word}" if word in named else f"state: {word}"
+            axes.axvspan(interval.start, interval.end, color=colour, alpha=0.15, lw=0, label=label)
+            named.add(word)
+    axes.set_yscale("log")
+    axes.set_xlabel("Time in s")
+    axes.set_ylabel(_LABEL)
+    axes.set_title("When to couple")
+    axes.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.16))
+    return _finish(figure, result.model)
+
+
+def _bar(figure: Figure, image: Any, axes: Any, label: str, shrink: float = 1.0) -> None:
+    """A colour bar whose few logarithmic ticks are plain numbers."""
+    from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+
+    bar = figure.colorbar(image, ax=axes, label=label, extend="both", shrink=shrink)
+    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)))
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    bar.ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _finish(figure: Figure, model: ArmModel) -> Figure:
+    """The model's name; and across the figure what must not be overlooked."""
+    words = [word for word in marks([model.note]) if word]
+    if words:
+        figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.3,
+                    ha="center", va="center", rotation=25)  # fmt: skip
+    figure.text(0.995, 0.002, Path(model.name).name, fontsize=6, color="0.4", ha="right",
+                va="bottom")  # fmt: skip
+    return figure
+
+
+def marks(notes: Sequence[str]) -> list[str]:
+    """Banners ("EMULATED", "INCOMPLETE") that a model's note begins with."""
+    return [word for note in notes for word in ("EMULATED", "INCOMPLETE") if f"{word}:" in note]

@@ -1,0 +1,242 @@
+"""Stiffness maps and placements against the same quantities computed pose by pose."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.arm import along
+from identification.coupling import base_distance, coupled, mirror_axes
+from identification.inverse import BRANCHES
+from identification.maps import (
+    LEAST_SINGULAR,
+    Coupling,
+    Need,
+    Stance,
+    Task,
+    best_placement,
+    branch_of,
+    branches_at,
+    stiffness_map,
+)
+from rig.couple import couple
+from rig.coupling_figures import draw, marks, stiffness
+from rig.coupling_task import best_for, between_arms_deg
+from rig.errors import InputError
+from rig.model import MODELS, ArmModel, load_model
+
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@pytest.fixture(scope="module")
+def f1() -> ArmModel:
+    return load_model(MODELS / "F1.yaml")
+
+
+@pytest.fixture(scope="module")
+def f2() -> ArmModel:
+    return load_model(MODELS / "F2.yaml")
+
+
+def test_a_cell_is_the_pose_that_stands_there(f1: ArmModel) -> None:
+    """The reference pose comes back from its place, with its stiffness, single and coupled."""
+    place = f1.arm.fk(f1.q)[:3, 3]
+    branch = branch_of(f1.arm, f1.q)
+    stance = Stance(f1.arm.fk(f1.q)[:3, 2], f1.tool, branch=branch)
+    one = stiffness_map(f1.arm, place, stance, [0, 1, 0])
+    assert one.stiffness == pytest.approx(57.42e3, rel=1e-3)
+    assert BRANCHES[int(one.branch)] == branch
+    np.testing.assert_allclose(one.q[:5], f1.q[:5], atol=1e-9)
+    pair = stiffness_map(f1.arm, place, stance, [0, 1, 0], Coupling(0.0))
+    assert pair.stiffness == pytest.approx(140.1e3, rel=5e-3)
+    point = stiffness_map(f1.arm, place, stance, [0, 1, 0], Coupling(0.0, "point"))
+    assert point.stiffness == pytest.approx(117.6e3, rel=5e-3)
+
+
+def test_every_cell_is_reached_and_the_stiffest(f1: ArmModel) -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform([-1.2, -1.2, -0.3], [1.2, 1.2, 1.2], (4, 60, 3))
+    stance = Stance(DOWN, f1.tool, turn=0.4)
+    seen: list[float] = []
+    cells = stiffness_map(f1.arm, points, stance, [0.6, 0.0, 0.8], progress=seen.append)
+    assert seen[-1] == 1.0
+    reached = np.isfinite(cells.stiffness)
+    assert 0.2 < reached.mean() < 0.9
+    assert (cells.branch[~reached] == -1).all()
+    T = f1.arm.fk(cells.q[reached])
+    np.testing.assert_allclose(T[:, :3, 3], points[reached], atol=1e-9)
+    np.testing.assert_allclose(T[:, :3, 2], np.tile(DOWN, (len(T), 1)), atol=1e-9)
+    C = f1.arm.compliance(cells.q[reached])
+    np.testing.assert_allclose(cells.stiffness[reached], along(C, [0.6, 0, 0.8]), rtol=1e-9)
+    singular = np.linalg.svd(f1.arm.jacobian(cells.q[reached]), compute_uv=False)[:, -1]
+    assert (singular >= LEAST_SINGULAR).all()
+    for name in BRANCHES:
+        other = stiffness_map(
+            f1.arm, points, Stance(DOWN, f1.tool, 0.4, name), [0.6, 0, 0.8]
+        ).stiffness
+        assert (np.nan_to_num(other) <= np.nan_to_num(cells.stiffness) * (1 + 1e-12)).all()
+        same = BRANCHES.index(name) == cells.branch
+        np.testing.assert_array_equal(other[same], cells.stiffness[same])
+
+
+def test_bending_links_and_a_soft_stand_count(f1: ArmModel) -> None:
+    place = f1.arm.fk(f1.q)[:3, 3]
+    mounting = np.diag([0, 0, 0, 1e-6, 1e-6, 1e-6])
+    stiff = stiffness_map(f1.arm, place, Stance(DOWN, f1.tool), [1, 0, 0]).stiffness
+    for stance in (
+        Stance(DOWN, f1.tool, links=f1.arm.links),
+        Stance(DOWN, f1.tool, mounting=mounting),
+    ):
+        assert stiffness_map(f1.arm, place, stance, [1, 0, 0]).stiffness < 0.999 * stiff
+
+
+def test_joint_limits_close_cells(f1: ArmModel) -> None:
+    from dataclasses import replace
+
+    low = np.array(f1.arm.q_min)
+    low[2] = 0.0  # elbow+ only
+    arm = replace(f1.arm, q_min=low)
+    found = branches_at(arm, f1.arm.fk(f1.q)[None, :3, 3], Stance(DOWN, f1.tool))[0]
+    assert np.isfinite(found[0::2, 0]).any()
+    assert np.isnan(found[1::2]).all()
+
+
+def test_bad_maps_are_refused(f1: ArmModel) -> None:
+    with pytest.raises(ValueError, match=r"length 1\.41421"):
+        Stance(np.array([1.0, 1, 0]), f1.tool)
+    with pytest.raises(ValueError, match='"elbow" is no branch; allowed: left wrist'):
+        Stance(DOWN, f1.tool, branch="elbow")
+    with pytest.raises(ValueError, match=r"have shape \(2,\)"):
+        stiffness_map(f1.arm, [0, 1], Stance(DOWN, f1.tool), [1, 0, 0])
+    with pytest.raises(ValueError, match="joint 6 is free"):
+        branch_of(f1.arm, np.array([0.3, -1.0, 1.2, 0.4, 0.0, 0.2]))
+    with pytest.raises(ValueError, match="at least one direction"):
+        Task(0.4, Stance(DOWN, f1.tool), ())
+    with pytest.raises(ValueError, match="above 0 N/m"):
+        Need(DOWN, 0.0)
+
+
+# --- placement -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axes", ["mirror", "base"])
+def test_no_placement_of_the_grid_is_better(f1: ArmModel, axes: str) -> None:
+    needs = (Need(np.array([1.0, 0, 0]), 300e3), Need(np.array([0, 0.6, 0.8]), 200e3))
+    task = Task(0.4, Stance(DOWN, f1.tool), needs, load_axes=axes)  # type: ignore[arg-type]
+    distances, betas = np.linspace(1.0, 2.0, 7), np.deg2rad(np.linspace(-40, 40, 7))
+    best = best_placement(f1.arm, task, distances, betas)
+    assert best.margin >= np.nanmax(best.margins)
+    # what it says is so, computed anew from the pose
+    assert branch_of(f1.arm, best.q) == best.branch
+    node = f1.arm.fk(best.q, f1.tool)
+    np.testing.assert_allclose(node[1:3, 3], [0, 0.4], atol=1e-9)
+    assert base_distance(node[:3, 3], best.beta) == pytest.approx(best.base_distance)
+    load = mirror_axes(best.beta) if axes == "mirror" else np.eye(3)
+    pair = coupled(f1.arm.compliance(best.q, f1.tool), best.beta)
+    k = [float(along(pair, load @ need.direction)) for need in needs]
+    np.testing.assert_allclose(best.stiffness, k, rtol=1e-9)
+    assert best.margin == pytest.approx(min(k[0] / 300e3, k[1] / 200e3))
+    assert best.feasible == (best.margin >= 1)
+
+
+def test_placements_out_of_reach(f1: ArmModel) -> None:
+    task = Task(0.4, Stance(DOWN, f1.tool), (Need(np.array([1.0, 0, 0]), 1e5),))
+    with pytest.raises(ValueError, match=r"reaches the node at 0\.4 m in none"):
+        best_placement(f1.arm, task, [3.0], [0.0])
+    with pytest.raises(ValueError, match="above 0 m"):
+        best_placement(f1.arm, task, [0.0], [0.0])
+
+
+def test_the_modelled_place_is_among_them(f2: ArmModel) -> None:
+    """At the model's own distance and angle the grid gives the model's own stiffness."""
+    result = best_for(MODELS / "F2.yaml", (1205.8, 1205.8), (36.5, 36.5))
+    k = {n.name: v for n, v in zip(f2.required, result.best.stiffness / 1e3, strict=True)}
+    assert result.as_modelled == pytest.approx(212 / 150, rel=5e-3)
+    assert result.best.margin >= result.as_modelled * (1 - 1e-3)
+    assert set(k) == {"x", "y"}
+
+
+def test_best_for_a_model(tmp_path: Path) -> None:
+    result = best_for(MODELS / "F1.yaml", (900, 1500), (-30, 30))
+    out = json.loads(json.dumps(result.to_json(), allow_nan=False))
+    assert out["feasible"] is True
+    assert out["margin"] > out["margin_as_modelled"] == pytest.approx(140.1 / 150, rel=5e-3)
+    text = result.to_text()
+    assert "as modelled (beta = 0 deg): 0.93" in text
+    assert "150 N/mm required" in text
+    assert "Links are taken as rigid" in text
+    assert between_arms_deg(np.deg2rad(-36.5)) == pytest.approx(107)
+    for ranges, says in (
+        ((1500, 900), "1500 to 900 mm are no range"),
+        ((3000, 3100), "in none of the placements"),
+    ):
+        with pytest.raises(InputError, match=says):
+            best_for(MODELS / "F1.yaml", ranges)
+    with pytest.raises(InputError, match="-90 to 90 deg is no range"):
+        best_for(MODELS / "F1.yaml", betas_deg=(-90, 90))
+    text = (MODELS / "F1.yaml").read_text()
+    (tmp_path / "m.yaml").write_text(text[: text.index("required:")])
+    with pytest.raises(InputError, match="needs `coupling`"):
+        best_for(tmp_path / "m.yaml")
+
+
+def test_turning_the_base_changes_nothing(tmp_path: Path) -> None:
+    """A model whose node lies beside the base x axis is the same task seen from elsewhere."""
+    text = (MODELS / "F1.yaml").read_text().replace("[13.43,", "[53.43,")
+    text = text.replace("load_axes: base", "load_axes: mirror")
+    (tmp_path / "turned.yaml").write_text(text)
+    (tmp_path / "straight.yaml").write_text(text.replace("[53.43,", "[13.43,"))
+    turned = best_for(tmp_path / "turned.yaml", (900, 1500), (-30, 30))
+    straight = best_for(tmp_path / "straight.yaml", (900, 1500), (-30, 30))
+    assert turned.best.margin == pytest.approx(straight.best.margin, rel=1e-3)
+    assert any("40.0 deg to the base x axis" in note for note in turned.notes)
+
+
+# --- figures -------------------------------------------------------------------------------------
+
+
+def test_figures(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text(
+        "time_s,direction_x,direction_y,direction_z,required_N_per_mm\n0,1,0,0,50\n1,1,0,0,150\n"
+    )
+    result = couple(MODELS / "F1.yaml", samples=0, path=tmp_path / "path.csv")
+    placement = best_for(MODELS / "F1.yaml", (1000, 1400), (-20, 20))
+    written = draw(result, tmp_path / "figs", placement)
+    assert {p.name for p in written} == {
+        f"{name}.{kind}"
+        for name in ("stiffness", "map", "schedule", "placement")
+        for kind in ("png", "svg")
+    }
+    assert all(p.stat().st_size > 3000 for p in written)
+    bars = [t.get_text() for t in stiffness(result).axes[0].texts]
+    for shown in ("95.9", "57.4", "212.0", "2950", "339.5", "140.0", "337.1", "117.6"):
+        assert shown in bars
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="can't be written there"):
+        draw(result, tmp_path / "file")
+
+
+def test_emulated_models_are_marked(tmp_path: Path) -> None:
+    text = (MODELS / "F1.yaml").read_text().replace('note: "', 'note: "EMULATED: simulated. ')
+    (tmp_path / "m.yaml").write_text(text)
+    figure = stiffness(couple(tmp_path / "m.yaml", samples=0))
+    assert "EMULATED" in [t.get_text() for t in figure.texts]
+    assert marks(["nothing", "INCOMPLETE: stopped"]) == ["INCOMPLETE"]
+    plain = stiffness(couple(MODELS / "F1.yaml", samples=0))
+    assert "EMULATED" not in [t.get_text() for t in plain.texts]
+
+
+def test_an_arm_without_closed_form_has_no_map(tmp_path: Path) -> None:
+    text = (MODELS / "F1.yaml").read_text().replace(
+        "robot: ur10e",
+        "dh: {d_m: [0.18, 0.01, 0, 0.17, 0.12, 0.12], a_m: [0, -0.61, -0.57, 0, 0, 0], "
+        "alpha_rad: [1.5708, 0, 0, 1.5708, -1.5708, 0]}",
+    )  # fmt: skip
+    (tmp_path / "m.yaml").write_text(text)
+    written = draw(couple(tmp_path / "m.yaml", samples=1000), tmp_path)
+    assert {p.stem for p in written} == {"stiffness"}
+    with pytest.raises(InputError, match="built like the UR"):
+        best_for(tmp_path / "m.yaml")
