@@ -136,7 +136,7 @@ def plain_loop(seconds: int, folder: Path) -> int:
 
     station = load_station(str(folder / "stations" / "bench.yaml"), None)
     with EmulatedRig(station, {}, {}) as live:
-        robot = RTDEReceiveInterface(live.robot.host)
+        robot = RTDEReceiveInterface(live.robot.host, 125.0, ["timestamp", "actual_q"])
         port = serial.Serial(live.laser.port, live.laser.baud, timeout=0)
         channel = grpc.insecure_channel(live.dynamometer.grpc_server)
         with nidaqmx.Task(grpc_options=GrpcSessionOptions(channel, "")) as task:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import ceil
 
 from drivers.clock import Clock
 from drivers.readings import Reading
@@ -70,7 +71,12 @@ class Acquisition:
             device.collect()
         self._clock.sleep(seconds)
         devices = self.devices
-        return devices.robot.collect(), devices.dynamometer.collect(), devices.laser.collect()
+        readings = devices.robot.collect(), devices.dynamometer.collect(), devices.laser.collect()
+        # Slots that passed while the rig was being tared are not missed: nothing was to be sampled.
+        self._next_slot += self._period * max(
+            0.0, ceil((self._clock.now() - self._next_slot) / self._period)
+        )
+        return readings
 
     def live(self, displacement_mm: Callable[[float], float]) -> Live:
         """The newest values of all devices; raises the error of one that has none."""

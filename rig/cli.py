@@ -236,7 +236,10 @@ def import_(
 
     with terminal_progress() as progress:
         result = import_table(table, meta, output, progress)
-    say(f"{output}: {len(result.columns['force_N'])} rows. Next: rig analyze {output}")
+    for event in result.events:
+        if event["kind"] == "note":
+            say(f"note: {event['text']}")
+    say(f"{output}: {result.rows} rows. Next: rig analyze {output}")
 
 
 @app.command()

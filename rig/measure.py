@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -19,7 +19,7 @@ from rig.acquisition import Acquisition
 from rig.devices import Devices, make_devices, make_loader, open_devices, station_clock
 from rig.emulation import EmulatedRig
 from rig.errors import InputError, MeasurementStopped
-from rig.journal import Journal, journal_path, replay
+from rig.journal import Journal, JournalError, journal_path, replay
 from rig.limits import UNLOAD
 from rig.measured_meta import measured_meta
 from rig.progress import Progress, read_progress
@@ -188,13 +188,14 @@ def _descriptor(rig: _Rig) -> dict[str, object]:
 
 def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bool) -> None:
     """Stop record and data set; the journal goes when that is complete and has been read back."""
-    if complete:
-        recorder.stop(reason, complete=True)
-    else:
-        recorder.event("stopped", reason)
+    with suppress(JournalError):  # a disk that refuses has been reported; what it holds counts
+        if complete:
+            recorder.stop(reason, complete=True)
+        else:
+            recorder.event("stopped", reason)
     job.journal.close()
     stored = datasets.finish(job.output)
-    if not complete:
+    if not stored.complete:
         say(f"{stored.rows} rows are kept. To go on: rig measure --resume {job.output}")
 
 

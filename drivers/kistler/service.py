@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from nidaqmx._stubs import nidaqmx_pb2 as messages
 from nidaqmx._stubs import nidaqmx_pb2_grpc as stubs
-from nidaqmx.constants import ChannelType
+from nidaqmx.constants import ChannelType, UsageTypeAI
 from numpy.typing import NDArray
 
 from drivers.kistler.settings import KistlerSettings
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 _VERSION = {0x1272: 24, 0x1923: 8, 0x2F22: 0}  # NI-DAQmx major, minor, update
 _PRODUCT_TYPE, _SERIAL_NUMBER = 0x631, 0x632
 _CHANNEL_NAMES = 0x1273
+_MEASUREMENT_TYPE = 0x695
 _INPUTS = 32
 _NI_BUFFER_S = 10.0
 _GROUP_BY_CHANNEL = 0
@@ -206,9 +207,12 @@ class TaskService(stubs.NiDAQmxServicer):  # type: ignore[misc]
         return messages.GetReadAttributeStringResponse(value=", ".join(task.channels))
 
     def GetChanAttributeInt32(self, request: Any, context: Any) -> Any:
-        """Type of a channel."""
+        """Type of a channel; of an analogue one also that it measures a voltage."""
         task = self._tasks.get(request.task.name)
-        return messages.GetChanAttributeInt32Response(value_raw=task.kind.value)
+        value = task.kind.value
+        if request.attribute_raw == _MEASUREMENT_TYPE:
+            value = UsageTypeAI.VOLTAGE.value
+        return messages.GetChanAttributeInt32Response(value_raw=value)
 
     def GetWriteAttributeUInt32(self, request: Any, context: Any) -> Any:
         """Lines in a digital channel."""

@@ -426,3 +426,9 @@ def test_leading_the_arm_to_its_pose_is_no_fault(bench: Bench) -> None:
     bench.loader.ask = asked  # type: ignore[method-assign]
     bench.run()
     assert bench.steps() == ALL
+
+
+def test_taring_is_no_missed_slot(bench: Bench) -> None:
+    bench.run()
+    assert all(r["values"]["slots_missed"] == 0 for r in bench.records("sample"))
+    assert all(r["lateness_s"] < 1e-6 for r in bench.records("sample"))
