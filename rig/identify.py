@@ -41,6 +41,12 @@ class IdentifyResult:
     proposals: tuple[Proposal, ...]
     tool_xyz: tuple[float, float, float]
     notes: tuple[str, ...]
+    banners: tuple[str, ...] = ()
+
+    @property
+    def emulated(self) -> bool:
+        """Whether any of the data came from simulated devices."""
+        return any(banner.startswith("EMULATED") for banner in self.banners)
 
     def to_json(self) -> dict[str, Any]:
         """`rig.joints/1`, with further keys."""
@@ -48,6 +54,7 @@ class IdentifyResult:
         return {
             "schema": "rig.joints/1",
             "datasets": list(self.datasets),
+            "banners": list(self.banners),
             "joint_stiffness_Nm_per_rad": [
                 {
                     "value": float(fit.stiffness[j]),
@@ -133,6 +140,7 @@ def identify(
         proposals=tuple(next_poses),
         tool_xyz=first.tcp_xyz_mm,
         notes=tuple(notes),
+        banners=tuple(dict.fromkeys(b for d in datasets for b in d.banners())),
     )
 
 

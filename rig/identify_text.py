@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.errors import InputError
+from rig.files import in_place_of
 
 if TYPE_CHECKING:
     from rig.identify import IdentifyResult
+
+# Of the published pair; what stands in a model file until somebody edits it.
+_ASSUMED_DISTANCE_MM = 1500.0
 
 
 def text(result: IdentifyResult) -> str:
     """Everything that a terminal shows."""
     fit = result.fit
     lines = [
+        *result.banners,
         f"Joint torsional stiffness of the {result.arm.name} from {len(result.observations)} "
         f"poses and directions; rank {fit.rank}, null space of dimension {6 - fit.rank}, "
         f"condition number {fit.condition_number:.3g}.",
@@ -26,7 +32,7 @@ def text(result: IdentifyResult) -> str:
         c, u = fit.stiffness[j] / 1e3, fit.stiffness[j] * fit.relative_sd[j] / 1e3
         low, high = fit.ci95[j] / 1e3
         bound = f"{fit.lower_bound[j] / 1e3:.2f}" if fit.lower_bound[j] > 1 else "-"
-        share = 100 * fit.data_share[j]
+        share = max(0.0, 100 * fit.data_share[j])
         verdict = "identified" if fit.identified[j] else _not_identified(share)
         lines.append(
             f"  {j + 1}       {c:9.2f} ({u:.2g})".ljust(42)
@@ -45,10 +51,18 @@ def text(result: IdentifyResult) -> str:
 
 def model_text(result: IdentifyResult) -> str:
     """A model file that holds the identified stiffnesses, in the first measured pose."""
+    note = " ".join(result.banners)
+    return (
+        f"# Identified from {', '.join(Path(d).name for d in result.datasets)}\n"
+        + (f"note: {json.dumps(note)}\n" if note else "")
+        + _model_keys(result)
+    )
+
+
+def _model_keys(result: IdentifyResult) -> str:
     fit, q = result.fit, result.observations[0].q
     x, y, z = (v / 1e3 for v in result.tool_xyz)
     return (
-        f"# Identified from {', '.join(Path(d).name for d in result.datasets)}\n"
         f"robot: {result.arm.name}\n"
         f"pose: {{q_rad: [{_list(q, 9)}]}}\n"
         f"tool: {{flange_T_tcp: [[1, 0, 0, {x:g}], [0, 1, 0, {y:g}], [0, 0, 1, {z:g}], "
@@ -56,11 +70,16 @@ def model_text(result: IdentifyResult) -> str:
         f"joint_stiffness_Nm_per_rad: [{_list(fit.stiffness, 7)}]\n"
         f"joint_stiffness_sd: [{_list(fit.stiffness * fit.relative_sd, 4)}]\n"
         "effects: []\n"
+        "# Not measured, an assumption for rig couple: edit it to the second arm's place.\n"
+        f"coupling: {{base_distance_mm: {_ASSUMED_DISTANCE_MM:g}, beta_deg: 0, load_axes: base, "
+        "kind: rigid}\n"
     )
 
 
-def protocol_text(result: IdentifyResult, station: str = "ur10e_lab", levels: int = 10) -> str:
-    """A protocol file that measures the proposed poses and directions."""
+def protocol_text(result: IdentifyResult, station: str | None = None, levels: int = 10) -> str:
+    """A protocol file that measures the proposed poses and directions; without a station on the
+    laboratory's, after emulated data on the emulated one."""
+    station = station or ("emulated" if result.emulated else "ur10e_lab")
     if not result.proposals:
         raise InputError("rig identify: no next poses were looked for; there is no protocol.")
     poses, runs = [], []
@@ -102,13 +121,19 @@ def protocol_text(result: IdentifyResult, station: str = "ur10e_lab", levels: in
 
 
 def write_model(result: IdentifyResult, path: Path) -> None:
-    """Writes `model_text`; what rig couple, rig simulate and rig diagnose read."""
-    path.write_text(model_text(result), "utf-8")
+    """Writes `model_text`; what rig couple, rig simulate and rig diagnose read. InputError if the
+    folder refuses."""
+    _write(path, model_text(result))
 
 
-def write_protocol(result: IdentifyResult, path: Path, station: str = "ur10e_lab") -> None:
-    """Writes `protocol_text`; what rig measure runs."""
-    path.write_text(protocol_text(result, station), "utf-8")
+def write_protocol(result: IdentifyResult, path: Path, station: str | None = None) -> None:
+    """Writes `protocol_text`; what rig measure runs. InputError if the folder refuses."""
+    _write(path, protocol_text(result, station))
+
+
+def _write(path: Path, text: str) -> None:
+    with in_place_of(path) as temporary:
+        temporary.write_text(text, "utf-8")
 
 
 def _levers(result: IdentifyResult, q: object, direction: object) -> np.ndarray:
