@@ -94,7 +94,7 @@ def simulate(model: str | Path, protocol: str | Path) -> Simulation:
             f"{read.name}: robot is {read.arm.name}, but {protocol} measures a {procedure.robot}. "
             "Give a model of the robot that the protocol names."
         )
-    curves = tuple(_predict(read, procedure, run) for run in _distinct(procedure))
+    curves = tuple(_predict(read, procedure, run) for run in procedure.runs)
     return Simulation(read.name, str(protocol), procedure.title, curves, _notes(read, procedure))
 
 
@@ -134,14 +134,6 @@ def _compliance(model: ArmModel, procedure: MeasurementProtocol, run: Run) -> tu
     parts = (n @ model.arm.jacobian(q, tool)[:3]) ** 2 / model.arm.joint_stiffness
     sd = model.arm.joint_stiffness_relative_sd
     return s, float(np.linalg.norm(parts * sd) / s) if s > 0 else 0.0
-
-
-def _distinct(procedure: MeasurementProtocol) -> list[Run]:
-    """One run a pose and direction, with every force level that any of its runs has."""
-    levels: dict[tuple[str, str], set[float]] = {}
-    for run in procedure.runs:
-        levels.setdefault((run.pose, run.direction), set()).update(run.forces_N)
-    return [Run(pose, name, tuple(sorted(f))) for (pose, name), f in levels.items()]
 
 
 def _refuse_effects(model: ArmModel) -> None:
