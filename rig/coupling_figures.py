@@ -196,6 +196,7 @@ def schedule(result: CouplingResult) -> Figure:
             axes.axvspan(interval.start, interval.end, color=colour, alpha=0.15, lw=0, label=label)
             named.add(word)
     axes.set_yscale("log")
+    _plain_numbers(axes.yaxis)
     axes.set_xlabel("Time in s")
     axes.set_ylabel(_LABEL)
     axes.set_title("When to couple")
@@ -204,13 +205,17 @@ def schedule(result: CouplingResult) -> Figure:
 
 
 def _bar(figure: Figure, image: Any, axes: Any, label: str, shrink: float = 1.0) -> None:
-    """A colour bar whose few logarithmic ticks are plain numbers."""
+    bar = figure.colorbar(image, ax=axes, label=label, extend="both", shrink=shrink)
+    _plain_numbers(bar.ax.yaxis)
+
+
+def _plain_numbers(axis: Any) -> None:
+    """Few ticks on a logarithmic axis, written out."""
     from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
-    bar = figure.colorbar(image, ax=axes, label=label, extend="both", shrink=shrink)
-    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)))
-    bar.ax.yaxis.set_minor_locator(NullLocator())
-    bar.ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def _figure(width: float, height: float) -> Figure:

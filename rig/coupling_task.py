@@ -159,7 +159,8 @@ def _notes(model: ArmModel, best: Placement, azimuth: float) -> tuple[str, ...]:
     notes = [model.note] if model.note else []
     ends = ((best.base_distance, best.distances, "base distances"), (best.beta, best.betas, "beta"))
     for value, grid, name in ends:
-        if grid.size > 1 and (np.isclose(value, grid[0]) or np.isclose(value, grid[-1])):
+        near = 0.5 * np.ptp(grid) / (grid.size - 1)
+        if near > 0 and min(value - grid[0], grid[-1] - value) < near:
             notes.append(f"The best place lies at an end of the range of {name}.")
     if abs(azimuth) > 1e-3:
         notes.append(
