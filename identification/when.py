@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.arm import Arm, along, unit_vector
 from identification.coupling import Kind, State, coupled, decide
+from identification.elastic import Beam
 
 Array = NDArray[np.float64]
 
@@ -86,18 +87,21 @@ def schedule(
     kind: Kind = "rigid",
     half: Array | None = None,
     dead_band: float = 0.0,
+    links: Sequence[Beam] = (),
+    base: ArrayLike | None = None,
 ) -> Schedule:
     """Coupling and release along a path.
 
     time (n,) s, not decreasing; q (n, 6) rad; direction (n, 3) unit vectors in the base frame;
-    required (n,) N/m. Raises ValueError for rows that make no path.
+    required (n,) N/m; links, base: what bends besides the joints, as in `Arm.compliance`.
+    Raises ValueError for rows that make no path.
     """
     t, need = np.asarray(time, dtype=float), np.asarray(required, dtype=float)
     if t.ndim != 1 or t.size == 0 or need.shape != t.shape:
         raise ValueError("a path needs at least one row, and one requirement a row")
     if (np.diff(t) < 0).any():
         raise ValueError(f"time goes back in row {int(np.argmax(np.diff(t) < 0)) + 2} of the path")
-    C = arm.compliance(q, tool)
+    C = arm.compliance(q, tool, links=links, base=base)
     n = unit_vector(direction)
     single, pair = along(C, n), along(coupled(C, beta, kind, half), n)
     rule = CouplingRule(dead_band)

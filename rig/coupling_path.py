@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.arm import Arm
 from identification.when import Schedule, schedule
 from rig.errors import InputError, did_you_mean
 from rig.model import ArmModel, CouplingSpec
@@ -23,9 +25,10 @@ _COLUMNS = ("time_s", *_Q, *_DIRECTION, "required_N_per_mm")
 @dataclass(frozen=True, eq=False)
 class Path6:
     """time (n,) s, q (n, 6) rad or None (the model's pose throughout), direction (n, 3) in the
-    base frame, required (n,) N/m."""
+    base frame, required (n,) N/m; lines (n,) of the file."""
 
     name: str
+    lines: tuple[int, ...]
     time: Array
     q: Array | None
     direction: Array
@@ -59,6 +62,7 @@ def read_path(path: Path) -> Path6:
     table = dict(zip(wanted, rows.T, strict=True))
     return Path6(
         str(path),
+        tuple(i for i, _ in lines[1:]),
         table["time_s"],
         np.stack([table[n] for n in _Q], axis=-1) if with_q else None,
         np.stack([table[n] for n in _DIRECTION], axis=-1),
@@ -69,9 +73,7 @@ def read_path(path: Path) -> Path6:
 def run_path(model: ArmModel, spec: CouplingSpec, path: Path6, dead_band: float) -> Schedule:
     """The schedule of coupling and release; InputError for rows that make no path."""
     q = path.q if path.q is not None else np.broadcast_to(model.q, (path.time.size, 6))
-    if (path.required < 0).any():
-        row = int(np.argmax(path.required < 0)) + 1
-        raise InputError(f"{path.name}: row {row}: required_N_per_mm must be at least 0 N/mm.")
+    _check_rows(model, path, q)
     try:
         return schedule(
             model.arm,
@@ -84,9 +86,39 @@ def run_path(model: ArmModel, spec: CouplingSpec, path: Path6, dead_band: float)
             kind=spec.kind,
             half=spec.half,
             dead_band=dead_band,
+            links=model.links,
+            base=model.mounting,
         )
     except ValueError as error:
         raise InputError(f"{path.name}: {error}.") from error
+
+
+def _check_rows(model: ArmModel, path: Path6, q: Array) -> None:
+    """Refuses the first row that breaks a rule, with its line, value and what is allowed."""
+    arm = model.arm
+    length = np.linalg.norm(path.direction, axis=1)
+    back = np.diff(path.time, prepend=path.time[0]) < 0
+    outside = (q < arm.q_min) | (q > arm.q_max)
+    checks: list[tuple[NDArray[np.bool_], Callable[[int], str]]] = [
+        (path.required < 0, lambda i: f"required_N_per_mm is {path.required[i] / 1e3:g} N/mm; "
+         "wanted: at least 0 N/mm"),
+        (back, lambda i: f"time_s goes back to {path.time[i]:g} s; wanted: rows in order of time"),
+        (np.abs(length - 1) > 1e-3, lambda i: f"direction_x, _y, _z have length {length[i]:.6g}; "
+         "wanted: a unit vector in the base frame"),
+        (np.asarray(outside.any(axis=1)), lambda i: _outside(arm, q[i])),
+    ]  # fmt: skip
+    for broken, says in checks:
+        if broken.any():
+            i = int(np.argmax(broken))
+            raise InputError(f"{path.name}:{path.lines[i]}: {says(i)}.")
+
+
+def _outside(arm: Arm, q: Array) -> str:
+    j = int(np.argmax((q < arm.q_min) | (q > arm.q_max)))
+    return (
+        f"q{j + 1}_rad is {q[j]:g} rad; wanted: {arm.q_min[j]:.4g} to {arm.q_max[j]:.4g} rad, "
+        f"the joint limits of {arm.name}"
+    )
 
 
 def _number(path: Path, line_number: int, line: str, column: str, place: int) -> float:

@@ -316,19 +316,6 @@ def test_uncertainty_of_one_spring(f1: ArmModel) -> None:
     assert result.u_single[0] == pytest.approx(wanted, rel=1e-4)
 
 
-def test_path_file(tmp_path: Path) -> None:
-    path = tmp_path / "path.csv"
-    path.write_text(
-        "time_s,direction_x,direction_y,direction_z,required_N_per_mm\n# cut\n"
-        "0,1,0,0,50\n1,1,0,0,150\n2,1,0,0,50\n"
-    )
-    result = couple(MODELS / "F1.yaml", samples=0, path=path)
-    assert [i["state"] for i in result.to_json()["schedule"]] == ["single", "couple", "single"]
-    path.write_text("time_s,direction_x,direction_y,direction_z,required_N_per_mm\n0,1,0,0,lots\n")
-    with pytest.raises(InputError, match=r'path\.csv:2: required_N_per_mm is "lots"'):
-        couple(MODELS / "F1.yaml", samples=0, path=path)
-
-
 def refused(tmp_path: Path, old: str, new: str) -> str:
     text = (MODELS / "F1.yaml").read_text()
     assert old in text

@@ -22,10 +22,9 @@ def builder() -> ModuleType:
 
 
 def test_cells_share_a_namespace_and_show_what_they_print(builder: ModuleType) -> None:
-    page = builder.build(
-        "# T\n```python hide\na = 2\n```\n\n```python\nprint(a + 1)\nshow(None, 'n', 'words')\n```\n",
-        None,
-    )
+    source = "# T\n```python hide\na = 2\n```\n\n"
+    source += "```python\nprint(a + 1)\nshow(None, 'n', 'words')\n```\n"
+    page = builder.build(source, None)
     assert "a = 2" not in page
     assert "```python\nprint(a + 1)\n" in page
     assert "```text\n3\n```\n\n![words](figures/n.png)\n" in page
