@@ -150,7 +150,7 @@ class StepProcedure:
         wanted = round(seconds * self._protocol.sampling.rate_Hz)
         if wanted == 0:
             return
-        self._supervision.show(step=0, target_N=0.0, samples=0, samples_wanted=wanted)
+        self._supervision.show(step=0, target_N=0.0, band_N=0.0, samples=0, samples_wanted=wanted)
         self._settle(where, zero, banded=False)
         taken = 0
         while taken < wanted:

@@ -98,7 +98,7 @@ class Runner:
         where = self._zeroed(where)
         self._steps.zero_plateau(where, self._protocol.zero.before_s)
         self._all_steps(where)
-        self._supervision.show(phase="unloading", step=0, target_N=0.0)
+        self._supervision.show(phase="unloading", step=0, target_N=0.0, band_N=0.0)
         self._unload()
         self._steps.event(where, "unloaded", "screw turned back")
         self._steps.zero_plateau(where, self._protocol.zero.after_s)
@@ -200,7 +200,7 @@ class Runner:
 
     def _zeroed(self, where: Where) -> Where:
         """Unload, reset and operate the amplifier, tare, set the datum of a new setup."""
-        self._supervision.show(phase="taring", step=0, target_N=0.0)
+        self._supervision.show(phase="taring", step=0, target_N=0.0, band_N=0.0)
         self._unload()
         self._devices.dynamometer.reset()
         self._devices.dynamometer.operate()

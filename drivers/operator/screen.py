@@ -76,13 +76,14 @@ def bar(view: LiveView, width: int = BAR_WIDTH) -> Text:
     text = Text()
     if not (math.isfinite(view.force_N) and math.isfinite(view.target_N)):
         return Text("·" * width, style="dim")
-    top = 1.25 * max(abs(view.target_N), 4 * (view.band_N if view.band_N > 0 else 1.0), 1.0)
+    band = view.band_N if view.band_N > 0 else 0.0  # nan: there is none yet
+    top = 1.25 * max(abs(view.target_N), 4 * (band or 1.0), 1.0)
     sense = -1.0 if view.target_N < 0 else 1.0
     scale = (width - 1) / top
     at = round(min(max(sense * view.force_N, 0.0), top) * scale)
-    low = round(max(sense * view.target_N - view.band_N, 0.0) * scale)
-    high = round(min(sense * view.target_N + view.band_N, top) * scale)
-    inside = abs(view.force_N - view.target_N) <= view.band_N
+    low = round(max(sense * view.target_N - band, 0.0) * scale)
+    high = round(min(sense * view.target_N + band, top) * scale)
+    inside = abs(view.force_N - view.target_N) <= band
     for column in range(width):
         if column == at:
             text.append("█", style="bold green" if inside else "bold yellow")

@@ -63,6 +63,7 @@ def test_bar_shows_force_and_band() -> None:
     assert len(text) == 76
     assert "█" in bar(known(500.0, 60.0)).plain, "beyond the end it stays at the end"
     assert "█" not in bar(known(float("nan"), 60.0)).plain
+    assert "█" in bar(known(30.0, 60.0, band_N=float("nan"))).plain, "a view without a band yet"
 
 
 def test_large_digits_are_three_lines_of_equal_width() -> None:
