@@ -46,11 +46,12 @@ class StepProcedure:
         self._recorder = recorder
         self._loader = loader
         self._window = SettleWindow(protocol.settle)
-        self._done: list[tuple[float, float]] = []  # (force N, displacement mm) of earlier steps
+        self._done: list[tuple[float, float]] = []  # (force N, displacement mm), unloaded first
+        self.restart()
 
     def restart(self) -> None:
         """A new setup: earlier steps say nothing about how far to turn."""
-        self._done.clear()
+        self._done = [(0.0, 0.0)]
 
     def measure(self, where: Where, step: Step, steps: int) -> str:
         """Carries out the step and returns how it went, in words."""
