@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from identification.arm import JOINTS, Arm, tool_transform
 from identification.joints import Gains, JointFit
 
 Array = NDArray[np.float64]
+# A: least sum of the relative standard uncertainties; D: least volume of the joint confidence
+# region; E: least uncertainty of the worst-known combination of joints.
+Criterion = Literal["A", "D", "E"]
 
 _AXES = np.eye(3)
 _LEAST_SHARE = 0.05  # a pose that may carry less of the plan's force is not worth mounting
@@ -56,14 +60,22 @@ class Proposal:
 
 
 def propose(
-    arm: Arm, fit: JointFit, plan: Plan, count: int = 6, seed: int = 0, candidates: int = 3000
+    arm: Arm,
+    fit: JointFit,
+    plan: Plan,
+    count: int = 6,
+    seed: int = 0,
+    candidates: int = 3000,
+    criterion: Criterion = "A",
 ) -> list[Proposal]:
-    """Greedy choice among random poses in reach: each adds what lowers the summed relative
-    standard uncertainty of the six stiffnesses most (A-optimal in ln c).
+    """Greedy choice among random poses in reach: each lowers what `criterion` measures on the
+    covariance of ln c most (Atkinson, Donev, Tobias 2007).
 
     The expected uncertainties count the gains of the new set-up as shared by all proposals.
-    Raises ValueError when no pose meets the plan's limits.
+    Raises ValueError when no pose meets the plan's limits, or for an unknown criterion.
     """
+    if criterion not in _CRITERIA:
+        raise ValueError(f'criterion "{criterion}" is unknown; allowed: {", ".join(_CRITERIA)}')
     q, levers, force = _candidates(arm.with_stiffness(fit.stiffness), plan, seed, candidates)
     gains = np.diag([plan.gains.force**2, plan.gains.displacement**2])
     P = np.zeros((JOINTS + 2, JOINTS + 2))
@@ -79,7 +91,7 @@ def propose(
         Ph = h @ P
         gained = Ph / np.sqrt(u**2 + (Ph * h).sum(axis=-1))[:, None]
         left = np.sqrt(np.maximum(np.diag(P) - gained**2, 0.0))[:, :JOINTS]
-        best = int(np.argmin(left.sum(axis=-1)))
+        best = int(np.argmin(_CRITERIA[criterion](P[:JOINTS, :JOINTS], gained[:, :JOINTS])))
         before = np.sqrt(np.diag(P))[:JOINTS]
         P = P - np.outer(gained[best], gained[best])
         axis = best % 3
@@ -94,6 +106,24 @@ def propose(
             )
         )
     return out
+
+
+def _summed(P: Array, gained: Array) -> Array:
+    """Sum of the standard uncertainties when `P - g g^T` is left, for each row g."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(P) - gained**2, 0.0)).sum(axis=-1))
+
+
+def _volume(P: Array, gained: Array) -> Array:
+    """`det(P - g g^T) / det P = 1 - g^T P^-1 g`."""
+    return np.asarray(1.0 - np.einsum("mi,ij,mj->m", gained, np.linalg.inv(P), gained))
+
+
+def _worst(P: Array, gained: Array) -> Array:
+    """Largest eigenvalue of `P - g g^T`."""
+    return np.asarray(np.linalg.eigvalsh(P - gained[:, :, None] * gained[:, None, :])[:, -1])
+
+
+_CRITERIA = {"A": _summed, "D": _volume, "E": _worst}
 
 
 def expected_after(proposals: list[Proposal], fit: JointFit) -> Array:

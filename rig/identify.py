@@ -16,11 +16,11 @@ from identification.estimate import stated_uncertainty
 from identification.joints import Gains, JointFit, Observation, Prior
 from identification.joints import identify as estimate
 from identification.levels import grid_of
-from identification.next_poses import Plan, Proposal, propose
+from identification.next_poses import Criterion, Plan, Proposal, propose
 from identification.stiffness import Stiffness, analyze_curve
 from rig.dataset import Dataset, load
 from rig.errors import InputError
-from rig.model import load_robot
+from rig.model import load_model, load_robot
 from rig.reduce import curves
 
 Array = NDArray[np.float64]
@@ -103,11 +103,13 @@ def identify(
     joint_readings: bool = True,
     proposals: int = 6,
     seed: int = 0,
+    criterion: Criterion = "A",
 ) -> IdentifyResult:
     """Joint stiffnesses from one or many data sets.
 
     prior: by default the robot file's stiffnesses and relative sd. joint_readings False: the laser
-    alone. proposals: how many next poses are looked for. Raises InputError.
+    alone. proposals: how many next poses are looked for, and by which criterion
+    (`identification.next_poses`). Raises InputError.
     """
     if not paths:
         raise InputError("rig identify: give at least one data set.")
@@ -127,7 +129,7 @@ def identify(
     try:
         fit = estimate(arm, observations, gains, prior)
         planned = _plan(datasets[0], gains[0])
-        next_poses = propose(arm, fit, planned, proposals, seed) if proposals else []
+        next_poses = _propose(arm, fit, planned, proposals, seed, criterion)
     except ValueError as error:
         raise InputError(f"{', '.join(names)}: {error}.") from error
     notes += _blind_joints(arm, observations, fit)
@@ -142,6 +144,28 @@ def identify(
         notes=tuple(notes),
         banners=tuple(dict.fromkeys(b for d in datasets for b in d.banners())),
     )
+
+
+def _propose(
+    arm: Arm, fit: JointFit, planned: Plan, count: int, seed: int, criterion: Criterion
+) -> list[Proposal]:
+    if count == 0:
+        return []
+    return propose(arm, fit, planned, count, seed, criterion=criterion)
+
+
+def prior_of(model: str | Path) -> Prior:
+    """The joint stiffnesses of a model file, with their stated uncertainties, as a prior.
+
+    Raises InputError where the file states none: a prior without spread leaves nothing to learn.
+    """
+    arm = load_model(model).arm
+    if not (arm.joint_stiffness_relative_sd > 0).all():
+        raise InputError(
+            f"{model}: as a prior it needs joint_stiffness_relative_sd (or joint_stiffness_sd) "
+            "above 0 for all six joints."
+        )
+    return Prior(arm.joint_stiffness, arm.joint_stiffness_relative_sd, str(model))
 
 
 def _arm(datasets: Sequence[Dataset], names: Sequence[str]) -> Arm:

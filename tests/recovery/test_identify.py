@@ -15,9 +15,9 @@ from identification.joints import JointFit
 from rig.couple import couple
 from rig.dataset import write
 from rig.errors import InputError
-from rig.identify import IdentifyResult, identify
+from rig.identify import IdentifyResult, identify, prior_of
 from rig.identify_text import model_text, protocol_text, write_model, write_protocol
-from rig.model import load_model, load_robot
+from rig.model import MODELS, load_model, load_robot
 from rig.model_export import write as write_export
 from rig.plan import plan
 from rig.protocol import load_protocol
@@ -162,6 +162,18 @@ def test_the_next_protocol_can_be_carried_out(single: IdentifyResult, tmp_path: 
     assert error[after.identified].max() < 0.05
     with pytest.raises(InputError, match="no next poses were looked for"):
         protocol_text(identify([single.datasets[0]], proposals=0))
+
+
+def test_a_model_file_as_prior(files: Path, tmp_path: Path) -> None:
+    prior = prior_of(MODELS / "F1.yaml")
+    found = identify([files / "single.h5"], prior=prior, proposals=0)
+    assert found.fit.stiffness[5] == pytest.approx(8000)
+    assert found.fit.relative_sd[5] == pytest.approx(np.sqrt(np.log1p(0.1**2)))
+    assert "F1.yaml" in found.to_json()["prior"]["source"]
+    text = (MODELS / "F1.yaml").read_text().replace("relative_sd: 0.1", "relative_sd: 0")
+    (tmp_path / "sure.yaml").write_text(text)
+    with pytest.raises(InputError, match=r"sure\.yaml: as a prior it needs"):
+        prior_of(tmp_path / "sure.yaml")
 
 
 # --- what cannot be identified -------------------------------------------------------------------

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.arm import Arm, tool_offset
-from identification.joints import Gains, Observation, Prior, identify
+from identification.joints import Gains, JointFit, Observation, Prior, identify
 from identification.next_poses import Plan, Proposal, expected_after, propose
 from rig.model import load_robot
 from tests.recovery.joint_world import deflect, place
@@ -243,3 +243,36 @@ def test_proposals_stay_within_the_limits(arm: Arm) -> None:
             p.q, p.direction, plan.tool
         )
         assert moved <= plan.range * (1 + 1e-9)
+
+
+def test_criteria_are_what_their_letters_say(arm: Arm) -> None:
+    """The first choice of each criterion is the best by that criterion, among all three."""
+    prior = default_prior(arm)
+    data = draw(np.random.default_rng(3), PAPER_C, PAPER_Q[None], directions=np.eye(3)[:2])
+    fit = identify(arm, data, [GAINS], prior)
+    plan = Plan(tool=tool_offset(OFFSET), gains=GAINS)
+    score = {
+        "A": lambda P: np.sqrt(np.diag(P)).sum(),
+        "D": np.linalg.det,
+        "E": lambda P: np.linalg.eigvalsh(P)[-1],
+    }
+    left = {}
+    for letter in score:
+        first = propose(arm, fit, plan, 1, candidates=400, criterion=letter)[0]  # type: ignore[arg-type]
+        left[letter] = _posterior(arm, fit, plan, first)
+        np.testing.assert_allclose(np.sqrt(np.diag(left[letter])), first.expected, rtol=1e-6)
+    for letter, measure in score.items():
+        assert measure(left[letter]) <= min(measure(P) for P in left.values()) * (1 + 1e-9)
+    with pytest.raises(ValueError, match='criterion "G" is unknown; allowed: A, D, E'):
+        propose(arm, fit, plan, 1, criterion="G")  # type: ignore[arg-type]
+
+
+def _posterior(arm: Arm, fit: JointFit, plan: Plan, chosen: Proposal) -> Array:
+    """Covariance of ln c after one more observation, by adding informations."""
+    lever = chosen.direction @ arm.jacobian(chosen.q, plan.tool)[:3]
+    parts = lever**2 / fit.stiffness
+    s = parts.sum()
+    u = np.sqrt(12 / plan.levels) * np.hypot(plan.u_displacement, s * plan.u_force)
+    variance = (u / (s * chosen.force)) ** 2 + plan.gains.force**2 + plan.gains.displacement**2
+    h = parts / s
+    return np.linalg.inv(np.linalg.inv(fit.covariance) + np.outer(h, h) / variance)
