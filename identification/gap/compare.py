@@ -10,7 +10,13 @@ from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.variants import Variant
 
-IMPERFECTION = 0.03  # of an effect's size: how well a family of shapes meets a real mechanism
+IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a real mechanism
+# Elasticity, gains and leverage are laws, not families: exact to half a percent of their size.
+LAW_IMPERFECTION = 0.005
+LINEAR = frozenset(
+    "link_flexibility base_compliance load_misalignment force_scale displacement_scale pose_error "
+    "joint_stiffness_error".split()
+)
 _SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
 
 
@@ -29,7 +35,7 @@ def score(
 ) -> list[Scored]:
     """Evidence of every variant on top of `levels` (base, or base and an effect already chosen).
 
-    already: whitened energy of that effect: it brings imperfection of its own.
+    already: mean square (m^2) of that effect: it brings imperfection of its own.
     """
     out: list[Scored | None] = [None] * len(variants)
     by_size: dict[tuple[int, int], list[int]] = {}
@@ -48,7 +54,7 @@ def _score_batch(
     columns = np.array([v.columns for v in batch])  # (v, k)
     root = np.stack([v.root for v in batch])
     scales = np.array([v.scales for v in batch])  # (v, s)
-    plain = _rotate(levels[0].gram, columns, root)
+    plain = np.stack([raw_gram(engine, v) for v in batch])
     logs = np.empty((len(levels), *scales.shape))
     etas = np.array([level.eta for level in levels])
     for i, level in enumerate(levels):
@@ -64,7 +70,7 @@ def _score_batch(
         fit += _sign(batch, vectors, mean, s2 / gain)
         turned = np.einsum("vij,vsj->vsi", vectors, mean)
         energy = np.einsum("vsi,vij,vsj->vs", turned, plain, turned)
-        logs[i] = level.log_base + fit + _log_level(engine, etas, i, energy + already)
+        logs[i] = level.log_base + fit + _log_level(etas, i, energy + already)
     flat = logs.transpose(1, 0, 2).reshape(len(batch), -1)
     best = flat.argmax(axis=1)
     total = _logsumexp(flat) - np.log(scales.shape[1])
@@ -99,27 +105,46 @@ def _sign(batch: list[Variant], vectors: Array, mean: Array, variance: Array) ->
     return np.where(want[:, None], factor, 0.0)
 
 
-def effect_rms(engine: Engine, energy: Array) -> Array:
-    """Size of an effect, m rms, from its whitened energy beyond the base."""
-    n = engine.bench.rows.n
-    total = float(np.sum(1 / engine.sigma[:n] ** 2))
-    return np.asarray(np.sqrt(np.maximum(energy, 0.0) / total))
+def raw_gram(engine: Engine, variant: Variant) -> Array:
+    """(k, k): mean square response (m^2) of coefficients, without the datum of each setup; of a
+    linear law only the part that counts as imperfect."""
+    key = (variant.columns, variant.root.tobytes())
+    if key not in engine.cache:
+        u = moved_response(engine, engine.pool[: engine.bench.rows.n, list(variant.columns)])
+        weight = engine.bench.rows.weight
+        part = (u * weight[:, None]).T @ u / weight.sum()
+        if variant.word in LINEAR:
+            part = part * (LAW_IMPERFECTION / IMPERFECTION) ** 2
+        engine.cache[key] = variant.root.T @ part @ variant.root
+    return engine.cache[key]
+
+
+def moved_response(engine: Engine, response: Array) -> Array:
+    """Responses (n, k) less their mean per setup: the datum says nothing."""
+    rows = engine.bench.rows
+    count = len(engine.bench.data.setups)
+    total = np.bincount(rows.setup, weights=rows.weight, minlength=count)
+    out = np.empty_like(response)
+    for k in range(response.shape[1]):
+        sums = np.bincount(rows.setup, weights=rows.weight * response[:, k], minlength=count)
+        out[:, k] = response[:, k] - (sums / np.maximum(total, 1e-300))[rows.setup]
+    return out
 
 
 def level_prior(engine: Engine, i: int, energy: float) -> float:
-    """log prior of level i for an explanation of that whitened energy."""
+    """log prior of level i for an explanation of that mean square (m^2)."""
     etas = np.array([level.eta for level in engine.levels])
-    return float(_log_level(engine, etas, i, np.array(energy)))
+    return float(_log_level(etas, i, np.array(energy)))
 
 
-def _log_level(engine: Engine, etas: Array, i: int, energy: Array) -> Array:
+def _log_level(etas: Array, i: int, energy: Array) -> Array:
     """log prior of level i for effects of that energy: log-normal about IMPERFECTION x size.
 
     Levels are bins of log eta; the lowest takes all below.
     """
     from scipy.special import ndtr
 
-    centre = np.log(IMPERFECTION * effect_rms(engine, energy) + 1e-300)
+    centre = 0.5 * np.log(IMPERFECTION**2 * np.maximum(energy, 0.0) + 1e-300)
     with np.errstate(divide="ignore"):
         upper = np.inf if i == len(etas) - 1 else np.log(_edge(etas, i))
         lower = -np.inf if i == 0 else np.log(_edge(etas, i - 1))

@@ -61,6 +61,7 @@ class Engine:
             np.column_stack(bench.columns) if bench.columns else np.zeros((bench.layout.size, 0))
         )
         self.sigma = row_noise(bench)
+        self.cache: dict[object, Array] = {}
         self._split()
         self.levels = [self._level(float(eta)) for eta in etas]
 

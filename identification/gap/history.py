@@ -50,6 +50,30 @@ def play(load: Array, radius: Array, rest: Flags, fresh: Flags) -> Array:
     return out
 
 
+def bristles(load: Array, reach: Array, fresh: Flags, elastic: bool) -> Array:
+    """State z in [-1, 1] of a friction whose bristles bend over `reach` (k,), (n, k).
+
+    `dz = (s - z) s dx / r` with s the sense of motion (Dahl); elastic: while z opposes the motion it
+    falls linearly, `dz = dx / r` (Bouc-Wen with beta = gamma). Exact between rows.
+    """
+    out = np.empty((len(load), len(reach)))
+    z = np.zeros(len(reach))
+    before = 0.0
+    for i, x in enumerate(load):
+        if fresh[i]:
+            z, before = np.zeros_like(z), 0.0
+        way = np.abs(x - before) / reach
+        s = np.sign(x - before)
+        if elastic:
+            back = np.minimum(np.maximum(-s * z, 0.0), way)
+            z, way = z + s * back, way - back
+        if s != 0:
+            z = s - (s - z) * np.exp(-way)
+        before = x
+        out[i] = z
+    return out
+
+
 def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
     """First-order lag `T z' = x - z` of a load (n, k) with times (k,): deflection of a Kelvin-Voigt
     element per unit of its compliance. Exact for a load that ramps between rows and then stands."""

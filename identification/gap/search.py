@@ -14,11 +14,14 @@ import numpy as np
 from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.compare import (
+    IMPERFECTION,
+    LAW_IMPERFECTION,
+    LINEAR,
     Scored,
     condition,
-    effect_rms,
     level_prior,
     log_mean,
+    moved_response,
     score,
 )
 from identification.gap.data import Array
@@ -34,6 +37,13 @@ WORD_COUNT = 18
 REMAINDER = 0.33
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
+# Mechanisms of the same kind mimic parts of each other: rate-dependent flow looks like creep.
+LEAST_SHARE_AKIN = 0.3
+MECHANISMS = frozenset(
+    "joint_yield joint_backlash joint_nonlinear_stiffness joint_hysteresis joint_creep base_slip "
+    "contact_seating".split()
+)
+FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 _SEEDS = 6
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 
@@ -109,12 +119,22 @@ def search(
     none = log_mean([levels[0].log_base, levels[1].log_base], [0.95, 0.05])
     empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
-    front = sorted(pool.values(), key=lambda e: -e.log_weight)[:_SEEDS]
+    front = _seeds(engine, pool)
     for depth in range(2, deepest + 1):
         front = _deepen(engine, variants, pool, front, depth)
         if not front:
             break
     return _conclude(engine, pool, alone, none)
+
+
+def _seeds(engine: Engine, pool: dict[frozenset[str], Explanation]) -> list[Explanation]:
+    """Where to look for a second effect: around all good ones; where the best explains the data
+    down to the noise, around those within reach of it."""
+    ranked = sorted((e for e in pool.values() if e.parts), key=lambda e: -e.log_weight)
+    best = max(e.log_weight for e in pool.values())
+    clean = [e for e in pool.values() if e.log_weight == best and e.eta == 0]
+    reach = _WINDOW / 2 if clean else np.inf
+    return [e for e in ranked[:_SEEDS] if e.log_weight > best - reach]
 
 
 def _by_word(scored: list[Scored]) -> dict[str, list[Scored]]:
@@ -205,19 +225,44 @@ def _conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], 
 
 
 def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> tuple[Array, float]:
-    """rms (m) of each part's most probable contribution, and whitened energy of all together."""
+    """rms (m) of each part's most probable contribution to the gap, and mean square (m^2) of all
+    contributions. What springs would take over is no gap, unless the effect is linear itself."""
     columns = [c for p in parts for c in p.variant.columns]
     root = _block([p.root for p in parts])
     lv, plain = engine.levels[level], engine.levels[0].gram
     inner = np.eye(len(columns)) + root.T @ lv.gram[np.ix_(columns, columns)] @ root
     w = root @ np.linalg.solve(inner, root.T @ lv.moment[columns])
-    sizes, start = [], 0
+    n, weight = engine.bench.rows.n, engine.bench.rows.weight
+    precision = float(np.sum(1 / engine.sigma[:n] ** 2))
+    sizes, raw, start = [], 0.0, 0
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
-        sizes.append(float(effect_rms(engine, part @ plain[np.ix_(c, c)] @ part)))
+        moved = moved_response(engine, (engine.pool[:n, c] @ part)[:, None])[:, 0]
+        square = float(weight @ moved**2 / weight.sum())
+        if p.word in LINEAR:
+            sizes.append(_beyond_springs(engine, moved))
+            square *= (LAW_IMPERFECTION / IMPERFECTION) ** 2
+        else:
+            structural = float(part @ plain[np.ix_(c, c)] @ part) / precision
+            sizes.append(float(np.sqrt(min(structural, square))))
+        raw += square
         start += k
-    return np.array(sizes), float(w @ plain[np.ix_(columns, columns)] @ w)
+    return np.array(sizes), raw
+
+
+def _beyond_springs(engine: Engine, moved: Array) -> float:
+    """rms (m) of a linear effect beyond what the springs give within three standard deviations."""
+    base, n = engine.base, engine.bench.rows.n
+    springs = base.index("spring")
+    root = np.sqrt(engine.bench.rows.weight / engine.bench.rows.weight.sum())
+    sd = base.sd[springs]
+    A = moved_response(engine, base.columns[:n, springs]) * sd
+    t = np.linalg.lstsq(A * root[:, None], moved * root, rcond=1e-6)[0]
+    left = float(np.sqrt(np.sum(((moved - A @ t) * root) ** 2)))
+    most = float(np.abs(t).max()) if t.size else 0.0
+    beyond = max(0.0, 1 - 3 / most) if most > 0 else 1.0
+    return max(left, beyond * float(np.sqrt(np.sum((moved * root) ** 2))))
 
 
 def _block(roots: list[Array]) -> Array:
@@ -238,11 +283,12 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     for p in parts:
         levels = [condition(lv, p.variant.columns, p.variant.root, p.scale) for lv in levels]
     logs, good, sizes = [], [], []
+    bare = max(engine.levels, key=lambda lv: lv.log_base).eta
+    noise = 0.6 * engine.bench.noise.stated
     for i, lv in enumerate(levels):
         each, energy = part_sizes(engine, parts, i)
-        total = float(effect_rms(engine, np.array(energy)))
         logs.append(lv.log_base + level_prior(engine, i, energy))
-        good.append(lv.eta <= REMAINDER * total)
+        good.append(lv.eta <= max(noise, REMAINDER * max(bare, float(np.hypot.reduce(each)))))
         sizes.append(each)
     logs_, good_ = np.array(logs), np.array(good)
     best = int(logs_.argmax())
@@ -251,7 +297,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     order = np.argsort(-sizes[best], kind="stable")
     weight = log_evidence + prior_of(len(parts))
     if len(parts) > 1:
-        weight -= _pettiness(sizes[best])
+        weight -= _pettiness(engine, parts, sizes[best])
     return Explanation(
         tuple(parts[i] for i in order),
         weight,
@@ -261,10 +307,30 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     )
 
 
-def _pettiness(sizes: Array) -> float:
-    """Penalty in nats for parts below LEAST_SHARE of the largest: a steep, smooth wall."""
-    share = np.maximum(sizes / max(float(sizes.max()), 1e-300), 1e-6)
-    return float(np.sum(np.maximum(0.0, np.log(LEAST_SHARE / share)) * 60.0))
+def _pettiness(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
+    """Penalty in nats, a steep wall, for parts that may be freedom of another one's law."""
+    penalty = 0.0
+    for i, p in enumerate(parts):
+        for k, other in enumerate(parts):
+            # a small knee beside a large error of the springs is no freedom of the latter
+            if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
+                continue
+            akin = p.word in MECHANISMS and other.word in MECHANISMS
+            share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
+            least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
+            penalty += 60.0 * max(0.0, float(np.log(least / share)))
+            if _same_element(engine, p, other):
+                penalty += 1e3
+    return penalty
+
+
+def _same_element(engine: Engine, one: Part, other: Part) -> bool:
+    """Both are friction of one joint, or would be, for all that the data show."""
+    if not {one.word, other.word} <= FRICTION:
+        return False
+    if not engine.bench.has_q:
+        return True
+    return one.variant.info.get("joint") == other.variant.info.get("joint")
 
 
 def _conclude(

@@ -4,7 +4,7 @@ Net torque = load and, in an upright arm, its own weight. The joint lies at one 
 or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where it was pushed until
 the torque has turned: a play of radius `zone` on the torque, cut at the ends of the play. Gears
 with play rub too: a stop operator of the zone's strength rides along. Without torque the joint
-lies anywhere in its play: a free place per setup for the zero load between two runs.
+lies anywhere in its play: a free place per setup at its first zero load, and at later ones.
 Size: gears of ratio >= 80 about 1 arcmin (3e-4 rad).
 """
 
@@ -73,14 +73,15 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
 
 
 def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[int]]) -> list[int]:
-    """Columns per setup that was unloaded again after its first run: rows in which the joint is
+    """Columns per setup: unloaded rows of its first run, and of later ones, in which the joint is
     loose. Zones that agree on these rows share their columns."""
     rows, key = bench.rows, loose.tobytes()
     if key not in places:
         places[key] = []
         for s in range(len(bench.data.setups)):
             mine = rows.setup == s
-            later = mine & (rows.run > rows.run[mine].min()) & loose
-            if later.any():
-                places[key].append(bench.add_joint(joint, later.astype(float)))
+            first = rows.run == rows.run[mine].min()
+            for place in (mine & first & loose, mine & ~first & loose):
+                if place.any() and not np.all(loose[mine]):
+                    places[key].append(bench.add_joint(joint, place.astype(float)))
     return places[key]

@@ -20,7 +20,9 @@ from identification.gap.history import retarded
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_yield"
-THRESHOLDS = (0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
+THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
+_FIRST = 2  # lower ones only round off the knees above them
+_TAIL = np.array([0.15, 0.4, 1.0, 0.5, 0.25])
 SCALES = (0.3, 1.0, 4.0, 20.0)
 FLOW_S = (5.0,)
 
@@ -59,14 +61,17 @@ def knee_variants(
             columns = [column(moved[:, k]) for k in range(len(radius))]
             label = f"{name}{memory}{f' flow {flow:g} s' if flow else ''}"
             share = (0.7 if flow == 0 else 0.3 / len(FLOW_S)) / len(radius)
-            for k in range(len(radius)):
-                chosen = columns[k : k + 3]
-                root = np.diag(0.5 ** np.arange(len(chosen)))
-                out.append(
-                    variant(word, f"{label} at {THRESHOLDS[k]:g}", chosen, SCALES, root,
-                            prior=share, radius=radius[k : k + 3], memory=memory, flow_s=flow,
-                            **info)
-                )  # fmt: skip
+            for k in range(_FIRST, len(radius)):
+                for knee, weights in (("sharp", _TAIL[2:4]), ("round", _TAIL)):
+                    first = k - (2 if knee == "round" else 0)
+                    chosen = columns[first : first + len(weights)]
+                    kept = weights[: len(chosen)]
+                    out.append(
+                        variant(word, f"{label} at {THRESHOLDS[k]:g} {knee}", chosen, SCALES,
+                                np.diag(kept), prior=share / 2, memory=memory, flow_s=flow,
+                                radius=radius[first : first + len(chosen)], centre=radius[k],
+                                **info)
+                    )  # fmt: skip
     return out
 
 
