@@ -16,8 +16,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from identification import workspace
-from identification.arm import along
+from identification import maps, workspace
+from identification.inverse import BRANCHES
 from identification.kernels import compliance_many
 from rig.model import load_robot
 
@@ -90,8 +90,16 @@ def main() -> None:
             lambda: [ur10e.inverse_kinematics(t) for t in T[:20_000]],
         )  # fmt: skip
         print(f"  ratio to ur-analytic-ik: {theirs / ik:.2f}")
-    cells = q[:100_000]
-    timed("stiffness map, cells", len(cells), lambda: along(compliance_many(arm, cells), [1, 0, 0]))
+    points = rng.uniform([-1.2, -1.2, 0.0], [1.2, 1.2, 1.2], (100_000, 3))
+    down, pair = np.array([0.0, 0.0, -1.0]), maps.Coupling(0.0)
+    for words, branch in (("one branch", BRANCHES[0]), ("best of eight branches", None)):
+        stance = maps.Stance(down, np.eye(4), branch=branch)
+        for name, coupling in (("single", None), ("coupled", pair)):
+            timed(
+                f"stiffness map, {name}, {words}, cells", len(points),
+                lambda s=stance, c=coupling: maps.stiffness_map(arm, points, s, [1, 0, 0], c),
+                repeat=1,
+            )  # fmt: skip
     timed(
         "Monte Carlo workspace, samples", 10_000_000,
         lambda: workspace.monte_carlo(arm, 1.5, 10_000_000), repeat=1,

@@ -31,10 +31,12 @@ def test_stiffness_of_the_reference_arm(predicted: Simulation) -> None:
     assert found == pytest.approx({"x": 95.94, "y": 57.42}, rel=1e-3)
 
 
-def test_curves_are_those_of_an_independent_world() -> None:
+def test_curves_are_those_of_an_independent_world(tmp_path: Path) -> None:
     """The emulated rig's noise-free curve of the same springs, pose by pose; levers of the
-    unloaded pose in both."""
-    path = PROTOCOLS / "load_unload_hold.yaml"
+    unloaded pose in both. Pose and point of load are the procedure's, not the model's."""
+    text = (PROTOCOLS / "load_unload_hold.yaml").read_text()
+    path = tmp_path / "p.yaml"
+    path.write_text(text.replace("tcp_xyz_mm: [0, 0, 0]", "tcp_xyz_mm: [50, -20, 130]"))
     procedure = load_protocol(path)
     curves = simulate(MODELS / "F1.yaml", path).curves
     assert [(c.pose, c.direction) for c in curves] == [
@@ -72,12 +74,13 @@ def test_json_and_text(predicted: Simulation) -> None:
 
 
 def test_uncertainty_follows_the_springs(tmp_path: Path) -> None:
-    """One uncertain spring: its share of the compliance times its relative sd."""
-    text = F1.replace("joint_stiffness_relative_sd: 0.1", "joint_stiffness_sd: [3720.1,0,0,0,0,0]")
+    """Each joint's share of the compliance times its relative sd, independent of each other."""
+    sd = [3720.1, 0, 0, 0, 1506.6, 0]  # 10 % and 20 %
+    text = F1.replace("joint_stiffness_relative_sd: 0.1", f"joint_stiffness_sd: {sd}")
     (tmp_path / "m.yaml").write_text(text)
     curve = next(c for c in simulate(tmp_path / "m.yaml", PAPER_XY).curves if c.direction == "y")
-    share = 0.75**2 / 37201 * curve.stiffness
-    assert curve.relative_u == pytest.approx(0.1 * share, rel=1e-3)
+    shares = np.array([0.7500**2 / 37201, 0.11342**2 / 7533]) * curve.stiffness
+    assert curve.relative_u == pytest.approx(np.hypot(*(shares * [0.1, 0.2])), rel=1e-3)
 
 
 def test_links_and_mounting_are_part_of_the_model(tmp_path: Path) -> None:
