@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 
 from identification.arm import Arm, tool_offset
 from identification.joints import Gains, JointFit, Observation, Prior, identify
-from identification.next_poses import Plan, Proposal, _candidates, expected_after, propose
+from identification.next_poses import (
+    _CRITERIA,
+    Plan,
+    Proposal,
+    _candidates,
+    expected_after,
+    propose,
+)
 from rig.model import load_robot
 from tests.recovery.joint_world import deflect, place
 
@@ -269,6 +276,21 @@ def test_criteria_are_what_their_letters_say(arm: Arm) -> None:
     assert len(set(chosen)) > 1
     with pytest.raises(ValueError, match='criterion "G" is unknown; allowed: A, D, E'):
         propose(arm, fit, plan, 1, criterion="G")  # type: ignore[arg-type]
+
+
+def test_criteria_measure_what_is_left() -> None:
+    rng = np.random.default_rng(4)
+    L = rng.standard_normal((6, 6))
+    P = L @ L.T + np.diag(10.0 ** np.arange(-3, 3))
+    rows = 0.1 * rng.standard_normal((5, 6)) @ L.T
+    rows *= 0.5 / np.sqrt(np.einsum("mi,ij,mj->m", rows, np.linalg.inv(P), rows))[:, None]
+    left = P - rows[:, :, None] * rows[:, None, :]
+    det = np.linalg.det(left) / np.linalg.det(P)
+    np.testing.assert_allclose(_CRITERIA["D"](P, rows), det, rtol=1e-9)
+    worst = [np.linalg.norm(one, 2) for one in left]
+    np.testing.assert_allclose(_CRITERIA["E"](P, rows), worst, rtol=1e-9)
+    summed = [np.sqrt(np.diag(one)).sum() for one in left]
+    np.testing.assert_allclose(_CRITERIA["A"](P, rows), summed, rtol=1e-9)
 
 
 def _posterior(
