@@ -198,5 +198,3 @@ def _unevenness(values: Array) -> float:
     speed = np.abs(np.diff(smooth))
     mean = speed.mean() if speed.size else 0.0
     return float(speed.std() / mean) if mean > 0 else np.inf
-
-

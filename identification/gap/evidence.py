@@ -112,7 +112,9 @@ class Engine:
         weighted = self._contrast / factor[:, None]
         gram[np.ix_(self._varying, self._varying)] += self._contrast.T @ weighted
         share = self._freedom / max(len(factor), 1)
-        log_noise = 0.5 * (np.log(extra_u).sum() + np.log(extra_q).sum() * bool(self._length_q.size))
+        log_noise = 0.5 * (
+            np.log(extra_u).sum() + np.log(extra_q).sum() * bool(self._length_q.size)
+        )
         log_noise += 0.5 * share * np.log(factor).sum()
         return self._integrate(eta, gram, float(log_noise))
 

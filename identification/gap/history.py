@@ -6,6 +6,8 @@ both neighbours stay far from it (one continuous recording cut into runs).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from identification.gap.data import Array, Flags
@@ -48,6 +50,27 @@ def play(load: Array, radius: Array, rest: Flags, fresh: Flags) -> Array:
         state = np.minimum(upper[i], np.maximum(lower[i], state))
         out[i] = state
     return out
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A load path with a cycle put before every fresh start; kept: the rows that were there."""
+
+    load: Array
+    fresh: Flags
+    kept: Flags
+
+
+def worked_in(load: Array, fresh: Flags) -> Path:
+    """The path (n,) with a cycle to its largest load and back before every fresh start."""
+    starts = np.flatnonzero(fresh)
+    parts, begins, kept = [], [], []
+    for a, b in zip(starts, np.append(starts[1:], len(load)), strict=True):
+        top = load[a + int(np.abs(load[a:b]).argmax())]
+        parts.append(np.concatenate([[top, 0.0], load[a:b]]))
+        begins.append(np.concatenate([[True], np.zeros(b - a + 1, dtype=bool)]))
+        kept.append(np.concatenate([[False, False], np.ones(b - a, dtype=bool)]))
+    return Path(np.concatenate(parts), np.concatenate(begins), np.concatenate(kept))
 
 
 def bristles(load: Array, reach: Array, fresh: Flags, elastic: bool) -> Array:

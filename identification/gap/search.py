@@ -44,6 +44,7 @@ MECHANISMS = frozenset(
     "contact_seating".split()
 )
 FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
+_PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 
@@ -187,7 +188,10 @@ def _with_one_more(
     others = [v for v in variants if v.word not in start.words]
     levels, energy = _conditioned(engine, start.parts)
     out: dict[frozenset[str], Explanation] = {}
-    for word, scored in _by_word(score(engine, levels, others, energy)).items():
+    found_words = _by_word(score(engine, levels, others, energy))
+    promising = sorted(found_words, key=lambda w: -_marginal(found_words[w]))[:_PROMISING]
+    for word in promising:
+        scored = found_words[word]
         words = start.words | {word}
         top = max(scored, key=lambda s: s.log_evidence)
         parts = (*start.parts, Part(top.variant, top.scale))
@@ -219,9 +223,8 @@ def _conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], 
         levels = [condition(lv, p.variant.columns, p.variant.root, p.scale) for lv in levels]
     if not parts:
         return levels, 0.0
-    energies = [part_sizes(engine, parts, i)[1] for i in range(len(levels))]
     weights = np.array([lv.log_base for lv in levels])
-    return levels, float(energies[int(weights.argmax())])
+    return levels, part_sizes(engine, parts, int(weights.argmax()))[1]
 
 
 def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> tuple[Array, float]:
@@ -280,31 +283,36 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     """The explanation with its prior; too small a part is charged as what it is: freedom of the
     larger one's law."""
     levels = engine.levels
-    for p in parts:
-        levels = [condition(lv, p.variant.columns, p.variant.root, p.scale) for lv in levels]
-    logs, good, sizes = [], [], []
+    bases = np.array([_log_joint(lv, parts) for lv in levels])
+    each, energy = part_sizes(engine, parts, int(bases.argmax()))
+    logs = bases + [level_prior(engine, i, energy) for i in range(len(levels))]
+    best = int(logs.argmax())
     bare = max(engine.levels, key=lambda lv: lv.log_base).eta
-    noise = 0.6 * engine.bench.noise.stated
-    for i, lv in enumerate(levels):
-        each, energy = part_sizes(engine, parts, i)
-        logs.append(lv.log_base + level_prior(engine, i, energy))
-        good.append(lv.eta <= max(noise, REMAINDER * max(bare, float(np.hypot.reduce(each)))))
-        sizes.append(each)
-    logs_, good_ = np.array(logs), np.array(good)
-    best = int(logs_.argmax())
-    share = np.exp(logs_ - logs_.max())
-    fraction = float(share[good_].sum() / share.sum())
-    order = np.argsort(-sizes[best], kind="stable")
+    least = max(0.6 * engine.bench.noise.stated, REMAINDER * max(bare, float(np.linalg.norm(each))))
+    good = np.array([lv.eta <= least for lv in levels])
+    share = np.exp(logs - logs.max())
+    fraction = float(share[good].sum() / share.sum())
+    order = np.argsort(-each, kind="stable")
     weight = log_evidence + prior_of(len(parts))
     if len(parts) > 1:
-        weight -= _pettiness(engine, parts, sizes[best])
+        weight -= _pettiness(engine, parts, each)
     return Explanation(
         tuple(parts[i] for i in order),
         weight,
         levels[best].eta,
-        tuple(float(sizes[best][i]) for i in order),
+        tuple(float(each[i]) for i in order),
         weight + log(max(fraction, 1e-300)),
     )
+
+
+def _log_joint(level: Level, parts: tuple[Part, ...]) -> float:
+    """log evidence of all parts together with fixed scales at one level."""
+    columns = [c for p in parts for c in p.variant.columns]
+    root = _block([p.root for p in parts])
+    inner = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
+    factor = np.linalg.cholesky(inner)
+    left = np.linalg.solve(factor, root.T @ level.moment[columns])
+    return level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum())
 
 
 def _pettiness(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
@@ -325,12 +333,15 @@ def _pettiness(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
 
 
 def _same_element(engine: Engine, one: Part, other: Part) -> bool:
-    """Both are friction of one joint, or would be, for all that the data show."""
-    if not {one.word, other.word} <= FRICTION:
+    """Both are friction of one joint, or would be, for all that the data show; or one is the
+    linear part of the other: a mechanism's law brings its own mean stiffness."""
+    same = one.variant.info.get("joint") == other.variant.info.get("joint")
+    words = {one.word, other.word}
+    if "joint_stiffness_error" in words and words & MECHANISMS:
+        return same or not engine.bench.has_q
+    if not words <= FRICTION:
         return False
-    if not engine.bench.has_q:
-        return True
-    return one.variant.info.get("joint") == other.variant.info.get("joint")
+    return same or not engine.bench.has_q
 
 
 def _conclude(
@@ -363,4 +374,3 @@ def _conclude(
         best=ranked[0],
         unknown_eta=eta,
     )
-

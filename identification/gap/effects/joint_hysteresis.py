@@ -13,7 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.history import bristles
+from identification.gap.data import Flags
+from identification.gap.history import Path, bristles, play, worked_in
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_hysteresis"
@@ -23,48 +24,68 @@ SCALES = (0.015, 0.05, 0.15, 0.5)
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Per joint: each strength alone with its neighbour, and the whole spectrum."""
+    """Per joint and memory: kept while the arm stands; lost in the rest between runs; there from
+    the beginning, of loads like those measured (rigs are cycled before they are measured)."""
+    memories = {"": (bench.moved, False), " worked in": (bench.moved, True)}
+    if np.sum(bench.rest) > np.sum(bench.moved):
+        memories[" rested"] = (bench.moved | bench.rest, False)
     out = []
     for j in bench.moving_joints():
-        torque = bench.torque[:, j]
-        span = float(np.ptp(np.append(torque, 0.0)))
+        span = float(np.ptp(np.append(bench.torque[:, j], 0.0)))
         if not span > 0:
             continue
-        radius = span * np.array(RADII)
-        states = bench.plays(torque, radius)
-        c = bench.compliance[j]
-        columns = [
-            bench.add_joint(j, -bench.sense * c * (torque - states[:, k]))
-            for k in range(len(radius))
-        ]
-        info = {"joint": j, "radius": radius}
-        out.append(
-            variant(WORD, f"joint {j + 1} spectrum", columns, SCALES,
-                    smooth_root(len(columns), 0.6, 0.3), prior=0.25, **info)
-        )  # fmt: skip
-        for k in range(len(columns) - 1):
-            pair = {"joint": j, "radius": radius[k : k + 2]}
-            out.append(
-                variant(WORD, f"joint {j + 1} r {RADII[k]}", columns[k : k + 2], SCALES,
-                        smooth_root(2, 0.7), prior=0.25 / (len(columns) - 1), **pair)
-            )  # fmt: skip
-        out += _exponential(bench, j, span)
+        for memory, (fresh, worked) in memories.items():
+            name = f"joint {j + 1}{memory}"
+            path = worked_in(bench.torque[:, j], fresh) if worked else None
+            out += _spectrum(bench, j, name, span, fresh, path)
+            out += _exponential(bench, j, name, span, fresh, path)
     return out
 
 
-def _exponential(bench: Bench, joint: int, span: float) -> list[Variant]:
+def _spectrum(
+    bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None
+) -> list[Variant]:
+    """The whole spectrum of strengths, and each strength with its neighbour."""
+    torque, c = bench.torque[:, joint], bench.compliance[joint]
+    radius = span * np.array(RADII)
+    if path is None:
+        states = bench.plays(torque, radius, fresh)
+    else:
+        tiled = np.tile(path.load[:, None], (1, len(radius)))
+        states = play(tiled, radius, path.fresh, path.fresh)[path.kept]
+    columns = [
+        bench.add_joint(joint, -bench.sense * c * (torque - states[:, k]))
+        for k in range(len(radius))
+    ]
+    root = smooth_root(len(columns), 0.6, 0.3)
+    out = [variant(WORD, f"{name} spectrum", columns, SCALES, root, prior=0.25, joint=joint,
+                   radius=radius)]  # fmt: skip
+    for k in range(len(columns) - 1):
+        out.append(
+            variant(WORD, f"{name} r {RADII[k]}", columns[k : k + 2], SCALES, smooth_root(2, 0.7),
+                    prior=0.25 / (len(columns) - 1), joint=joint, radius=radius[k : k + 2])
+        )  # fmt: skip
+    return out
+
+
+def _exponential(
+    bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None
+) -> list[Variant]:
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches."""
     torque, c = bench.torque[:, joint], bench.compliance[joint]
+    reach = span * np.array(REACHES)
     out = []
     for law in ("Dahl", "Bouc-Wen"):
-        reach = span * np.array(REACHES)
-        z = bristles(torque, reach, bench.moved, elastic=law == "Bouc-Wen")
+        if path is None:
+            z = bristles(torque, reach, fresh, elastic=law == "Bouc-Wen")
+        else:
+            z = bristles(path.load, reach, path.fresh, elastic=law == "Bouc-Wen")[path.kept]
         columns = [
             bench.add_joint(joint, -bench.sense * c * reach[k] * z[:, k]) for k in range(len(reach))
         ]
         for k in range(len(reach) - 1):
             out.append(
-                variant(WORD, f"joint {joint + 1} {law} {REACHES[k]}", columns[k : k + 2], SCALES,
+                variant(WORD, f"{name} {law} {REACHES[k]}", columns[k : k + 2], SCALES,
                         smooth_root(2, 0.5), prior=0.25 / (len(reach) - 1), joint=joint,
                         radius=reach[k : k + 2])
             )  # fmt: skip

@@ -13,7 +13,7 @@ from identification.gap.bench import Bench
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
-HINGES = (0.12, 0.25, 0.4, 0.55, 0.7, 0.85)
+HINGES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 SCALES = (0.05, 0.15, 0.4, 1.0)
 
 
@@ -30,8 +30,11 @@ def variants(bench: Bench) -> list[Variant]:
             bench.add_joint(j, c * np.sign(x) * np.maximum(np.abs(x) - b, 0)) for b in HINGES
         ]
         info = {"joint": j, "torque": top, "hinges": HINGES}
+        line = bench.add_joint(j, c * x)
+        root = np.zeros((len(HINGES) + 1,) * 2)
+        root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(HINGES), 0.5)
         out.append(
-            variant(WORD, f"joint {j + 1} curve", columns, SCALES, smooth_root(len(HINGES), 0.5),
+            variant(WORD, f"joint {j + 1} curve", [line, *columns], SCALES, root,
                     positive=False, prior=0.5, **info)
         )  # fmt: skip
         for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
@@ -42,7 +45,7 @@ def variants(bench: Bench) -> list[Variant]:
             )  # fmt: skip
         for k in range(len(HINGES) - 1):
             out.append(
-                variant(WORD, f"joint {j + 1} bend {HINGES[k]}", columns[k : k + 2], SCALES,
+                variant(WORD, f"joint {j + 1} bend {HINGES[k]}", [line, *columns[k : k + 2]], SCALES,
                         positive=False, prior=0.2 / (len(HINGES) - 1), **info)
             )  # fmt: skip
     return out

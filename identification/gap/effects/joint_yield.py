@@ -21,9 +21,14 @@ from identification.gap.variants import Variant, variant
 
 WORD = "joint_yield"
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
+# A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
+_LIKELY = {"": 1.0, " lasting": 0.5, " taken back": 0.3}
 _FIRST = 2  # lower ones only round off the knees above them
-_TAIL = np.array([0.15, 0.4, 1.0, 0.5, 0.25])
-SCALES = (0.3, 1.0, 4.0, 20.0)
+# Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
+# Bauschinger's effect: after a reversal metal yields earlier than at first.
+_SHARP = {0: 1.0, 1: 0.5}
+_ROUND = {-6: 0.1, -4: 0.15, -2: 0.25, -1: 0.5, 0: 1.0, 1: 0.5, 2: 0.25}
+SCALES = (0.5, 1.5, 6.0, 25.0)
 FLOW_S = (5.0,)
 
 
@@ -36,7 +41,9 @@ def variants(bench: Bench) -> list[Variant]:
         def column(state: Array, j: int = j, c: float = float(c)) -> int:
             return bench.add_joint(j, bench.sense * c * state)
 
-        out += knee_variants(bench, bench.torque[:, j], column, WORD, f"joint {j + 1}", {"joint": j})
+        out += knee_variants(
+            bench, bench.torque[:, j], column, WORD, f"joint {j + 1}", {"joint": j}
+        )
     return out
 
 
@@ -60,17 +67,16 @@ def knee_variants(
             moved = _flow(bench, states, flow, fresh)
             columns = [column(moved[:, k]) for k in range(len(radius))]
             label = f"{name}{memory}{f' flow {flow:g} s' if flow else ''}"
-            share = (0.7 if flow == 0 else 0.3 / len(FLOW_S)) / len(radius)
+            share = (0.7 if flow == 0 else 0.3 / len(FLOW_S)) / len(radius) * _LIKELY[memory]
             for k in range(_FIRST, len(radius)):
-                for knee, weights in (("sharp", _TAIL[2:4]), ("round", _TAIL)):
-                    first = k - (2 if knee == "round" else 0)
-                    chosen = columns[first : first + len(weights)]
-                    kept = weights[: len(chosen)]
+                for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
+                    place = [k + d for d in steps if 0 <= k + d < len(radius)]
+                    kept = [w for d, w in steps.items() if 0 <= k + d < len(radius)]
+                    chosen = [columns[i] for i in place]
                     out.append(
                         variant(word, f"{label} at {THRESHOLDS[k]:g} {knee}", chosen, SCALES,
                                 np.diag(kept), prior=share / 2, memory=memory, flow_s=flow,
-                                radius=radius[first : first + len(chosen)], centre=radius[k],
-                                **info)
+                                radius=radius[place], centre=radius[k], **info)
                     )  # fmt: skip
     return out
 

@@ -25,7 +25,5 @@ def variants(bench: Bench) -> list[Variant]:
         variant(WORD, f"segment {k + 1}", [c], SCALES, segments=[k]) for k, c in enumerate(columns)
     ]
     if len(columns) > 1:
-        out.append(
-            variant(WORD, "both arms", columns, SCALES, segments=list(range(len(columns))))
-        )
+        out.append(variant(WORD, "both arms", columns, SCALES, segments=list(range(len(columns)))))
     return out
