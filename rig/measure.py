@@ -173,17 +173,20 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
         say(f"Interrupted. {UNLOAD}")
         raise
     finally:
+        rig.loader.close()  # what is said from here on must not be painted over
         with _signals(_patience(say), _patience(say)):
             _finish(job, recorder, reason, say, complete=complete)
     return job.output
 
 
 def _descriptor(rig: _Rig) -> dict[str, object]:
-    """Who measures what: identities, and the columns that the devices deliver."""
+    """Who measures what: identities, calibration, and the columns that the devices deliver."""
     devices = {device.name: dict(device.identity()) for device in rig.devices.all()}
     columns = [asdict(signal) for device in rig.devices.all() for signal in device.signals]
     operator = {rig.loader.name: dict(rig.loader.identity())}
-    return {"devices": devices | operator, "signals": columns}
+    settings = {"dynamometer": rig.station.dynamometer, "laser": rig.station.laser}
+    calibration = {name: asdict(each) for name, each in settings.items() if each is not None}
+    return {"devices": devices | operator, "signals": columns, "calibration": calibration}
 
 
 def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bool) -> None:

@@ -54,7 +54,11 @@ def test_a_short_run_ends_complete_and_marked_as_emulated(tmp_path: Path) -> Non
     assert np.all(columns["laser_count"] > 0)
     for name in ("q1_rad", "temperature6_C", "laser_mm", "dynamometer1_V", "lateness_s"):
         assert np.all(np.isfinite(columns[name])), name
-    assert dataset.devices["laser"]
+    assert dataset.devices["laser"]["source"] == "emulated+ild2200"
+    assert dataset.calibration["dynamometer"]["full_scale_N"]["x"] == 500
+    assert dataset.calibration["laser"]["range_mm"] == 10
+    assert "schema: rig.protocol/1" in dataset.texts["protocol"]
+    assert "schema: rig.station/1" in dataset.texts["station"]
     assert no_process_left(tmp_path)
 
 
