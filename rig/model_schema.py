@@ -12,6 +12,8 @@ _Six = Annotated[list[float], Len(6, 6)]
 _Matrix6 = Annotated[list[_Six], Len(6, 6)]
 _Positive = Annotated[float, Gt(0)]
 _SixPositive = Annotated[list[_Positive], Len(6, 6)]
+# From a hair spring to what no drive reaches: beyond, sums of compliances lose their digits.
+_SixSprings = Annotated[list[Annotated[float, Interval(ge=1e-3, le=1e15)]], Len(6, 6)]
 _SixNotNegative = Annotated[list[Annotated[float, Ge(0)]], Len(6, 6)]
 _Forbid: dict[str, str] = {"extra": "forbid"}
 
@@ -71,7 +73,7 @@ class RobotFile:
     joint_torque_limits_Nm: _SixPositive
     payload_limit_kg: _Positive
     reach_mm: _Positive
-    joint_stiffness_Nm_per_rad: _SixPositive
+    joint_stiffness_Nm_per_rad: _SixSprings
     joint_stiffness_relative_sd: Annotated[float, Ge(0)]
     link_segments: list[SegmentFile] = field(default_factory=list)
 
@@ -165,7 +167,7 @@ class ModelFile:
     dh: DhTable | None = None
     pose: PoseFile
     tool: ToolFile = ToolFile(length_mm=0.0)
-    joint_stiffness_Nm_per_rad: _SixPositive | None = None
+    joint_stiffness_Nm_per_rad: _SixSprings | None = None
     joint_stiffness_relative_sd: Annotated[float, Ge(0)] | _SixNotNegative | None = None
     joint_stiffness_sd: _SixNotNegative | None = None
     link_segments: Literal["none", "robot"] | list[SegmentFile] = "none"
