@@ -70,7 +70,9 @@ def gap_data(dataset: Dataset) -> GapData:
 
 def _runs(setup: Ints, repetition: Ints) -> Ints:
     """Consecutive numbers: a run is an unbroken stretch of one setup and repetition."""
-    new = (np.diff(setup, prepend=setup[0]) != 0) | (np.diff(repetition, prepend=repetition[0]) != 0)
+    new = (np.diff(setup, prepend=setup[0]) != 0) | (
+        np.diff(repetition, prepend=repetition[0]) != 0
+    )
     return np.cumsum(new).astype(np.int64)
 
 
@@ -85,7 +87,9 @@ def _springs(dataset: Dataset) -> tuple[Array, Array]:
     return 1 / np.array(per_m), np.full(len(per_m), simulation.stiffness_relative_sd)
 
 
-def _optional(columns: dict[str, NDArray[np.generic]], names: list[str], width: int) -> Array | None:
+def _optional(
+    columns: dict[str, NDArray[np.generic]], names: list[str], width: int
+) -> Array | None:
     """(n,) or (n, width) where every column is there and finite throughout."""
     if not all(n in columns for n in names):
         return None

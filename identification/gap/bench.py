@@ -39,7 +39,7 @@ class Bench:
     compliance along the direction. sense: +1 where the force is imposed and the effect adds
     displacement; -1 where the displacement is imposed and the same effect takes force away.
     reach m: largest simulated or measured response, the natural unit of what has no other.
-    columns: the pool, filled by the effects.
+    scatter (n,) m^2: mean square of the samples about their row. columns: the pool, filled by the effects.
     """
 
     data: GapData
@@ -56,6 +56,7 @@ class Bench:
     elastic: Array
     slope: Array
     reach: float
+    scatter: Array
     observed: Array
     columns: list[Array] = field(default_factory=list)
 
@@ -143,9 +144,11 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     stated = lever**2 @ data.compliance
     imposed = displacement_imposed(data)
     if imposed:
-        load, response = rows.displacement / stated, rows.force * stated
+        load, response = rows.displacement / stated, rows.measured_force * stated
+        scatter = rows.force_scatter * stated**2
     else:
         load, response = rows.force, rows.displacement
+        scatter = rows.displacement_scatter
     torque = lever * load[:, None]
     layout = _layout(data, rows)
     observed = np.zeros(layout.size)
@@ -159,7 +162,7 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     return Bench(
         data=data, rows=rows, layout=layout, noise=estimate_noise(data, rows, stated, imposed),
         imposed=imposed, sense=-1.0 if imposed else 1.0, compliance=c, load=load, response=response,
-        torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, observed=observed,
+        torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, scatter=scatter, observed=observed,
     )  # fmt: skip
 
 

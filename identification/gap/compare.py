@@ -14,8 +14,15 @@ IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a 
 # Elasticity, gains and leverage are laws, not families: exact to half a percent of their size.
 LAW_IMPERFECTION = 0.005
 LINEAR = frozenset(
-    "link_flexibility base_compliance load_misalignment force_scale displacement_scale pose_error "
-    "joint_stiffness_error".split()
+    [
+        "link_flexibility",
+        "base_compliance",
+        "load_misalignment",
+        "force_scale",
+        "displacement_scale",
+        "pose_error",
+        "joint_stiffness_error",
+    ]
 )
 _SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
 

@@ -62,6 +62,7 @@ class Engine:
         )
         self.sigma = row_noise(bench)
         self.cache: dict[object, Array] = {}
+        self.level_columns = _level_columns(bench)
         self._split()
         self.levels = [self._level(float(eta)) for eta in etas]
 
@@ -69,7 +70,7 @@ class Engine:
         """Whitens [target, base, levels, pool] and separates hold means from contrasts."""
         bench, n = self.bench, self.bench.rows.n
         everything = np.column_stack(
-            [self.target, self.base.columns, _level_columns(bench), self.pool]
+            [self.target, self.base.columns, self.level_columns, self.pool]
         )
         white = everything / self.sigma[:, None]
         inverse = 1 / self.sigma
@@ -121,7 +122,7 @@ class Engine:
     def _integrate(self, eta: float, gram: Array, log_noise: float) -> Level:
         """Takes base and repeatable imperfection out of [target, base, levels, pool]."""
         kb = self.base.columns.shape[1]
-        covariance, count = _level_covariance(self.bench), 0
+        covariance, count = level_covariance(self.bench), 0
         sd = self.base.sd
         if eta > 0:
             count = covariance.shape[0]
@@ -180,7 +181,7 @@ def _level_columns(bench: Bench) -> Array:
     return out
 
 
-def _level_covariance(bench: Bench) -> Array:
+def level_covariance(bench: Bench) -> Array:
     """Imperfection of levels of one setup: alike for neighbouring forces, half so between branches.
 
     Unit variance; `exp(-|dF| / a quarter of the range)`, a path that may have corners.

@@ -26,7 +26,8 @@ class Rows:
     repetition to repetition shares a level. session (n,) s is always there: `clock` says whether
     it was recorded. force: of a hold whose samples scatter by no more than their noise, the mean
     of the hold in all its rows (its noise would else pass for a small friction or a lag);
-    measured_force: as it is. steady (n,): such holds. hold_weight (n,): samples of the row's hold.
+    measured_force: as it is. steady (n,): such holds. hold_weight (n,): samples of the row's hold;
+    force_scatter, displacement_scatter (n,): mean squares of the samples about their row, N^2, m^2.
     """
 
     time: Array
@@ -50,6 +51,8 @@ class Rows:
     zero: Flags
     steady: Flags
     hold_weight: Array
+    force_scatter: Array
+    displacement_scatter: Array
     continuous: bool
     starts: Flags  # first row of a run
     hold_starts: Flags
@@ -71,6 +74,9 @@ def reduce_rows(data: GapData) -> Rows:
         sums = np.add.reduceat(values, edges, axis=0)
         return np.asarray(sums / (count if values.ndim == 1 else count[:, None]))
 
+    def scatter(values: Array) -> Array:
+        return np.maximum(mean(values**2) - mean(values) ** 2, 0.0)
+
     def first(values: Ints) -> Ints:
         return values[edges]
 
@@ -90,7 +96,8 @@ def reduce_rows(data: GapData) -> Rows:
         time=mean(data.time), session=session, clock=data.session is not None, run=run, setup=setup,
         repetition=first(data.repetition), branch=branch, step=step, hold=holds, level=level,
         weight=weight, force=np.where(steady, mean_force, force), measured_force=force, steady=steady,
-        hold_weight=hold_weight, displacement=mean(data.displacement),
+        hold_weight=hold_weight, force_scatter=scatter(data.force - data.force.mean()),
+        displacement_scatter=scatter(data.displacement - data.displacement.mean()), displacement=mean(data.displacement),
         tangential=None if data.tangential is None else mean(data.tangential),
         q=None if data.q is None else mean(data.q),
         temperature=None if data.temperature is None else mean(data.temperature),

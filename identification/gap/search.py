@@ -40,8 +40,15 @@ LEAST_SHARE = 0.12
 # Mechanisms of the same kind mimic parts of each other: rate-dependent flow looks like creep.
 LEAST_SHARE_AKIN = 0.3
 MECHANISMS = frozenset(
-    "joint_yield joint_backlash joint_nonlinear_stiffness joint_hysteresis joint_creep base_slip "
-    "contact_seating".split()
+    [
+        "joint_yield",
+        "joint_backlash",
+        "joint_nonlinear_stiffness",
+        "joint_hysteresis",
+        "joint_creep",
+        "base_slip",
+        "contact_seating",
+    ]
 )
 FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 _PROMISING = 7  # further words of an explanation that are looked at closely
@@ -231,7 +238,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> tuple[Arr
     """rms (m) of each part's most probable contribution to the gap, and mean square (m^2) of all
     contributions. What springs would take over is no gap, unless the effect is linear itself."""
     columns = [c for p in parts for c in p.variant.columns]
-    root = _block([p.root for p in parts])
+    root = block([p.root for p in parts])
     lv, plain = engine.levels[level], engine.levels[0].gram
     inner = np.eye(len(columns)) + root.T @ lv.gram[np.ix_(columns, columns)] @ root
     w = root @ np.linalg.solve(inner, root.T @ lv.moment[columns])
@@ -268,7 +275,8 @@ def _beyond_springs(engine: Engine, moved: Array) -> float:
     return max(left, beyond * float(np.sqrt(np.sum((moved * root) ** 2))))
 
 
-def _block(roots: list[Array]) -> Array:
+def block(roots: list[Array]) -> Array:
+    """The roots along the diagonal."""
     size = sum(r.shape[0] for r in roots)
     out = np.zeros((size, size))
     at = 0
@@ -308,7 +316,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
 def _log_joint(level: Level, parts: tuple[Part, ...]) -> float:
     """log evidence of all parts together with fixed scales at one level."""
     columns = [c for p in parts for c in p.variant.columns]
-    root = _block([p.root for p in parts])
+    root = block([p.root for p in parts])
     inner = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
     factor = np.linalg.cholesky(inner)
     left = np.linalg.solve(factor, root.T @ level.moment[columns])

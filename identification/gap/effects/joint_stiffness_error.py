@@ -6,8 +6,6 @@ stiff; a bench's spring may be off by ten.
 
 from __future__ import annotations
 
-import numpy as np
-
 from identification.gap.bench import Bench
 from identification.gap.variants import Variant, variant
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from identification.gap.bench import Bench
 from identification.gap.variants import Variant, variant
 

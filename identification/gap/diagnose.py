@@ -1,0 +1,241 @@
+"""The diagnosis: which effect, where, how far the gap shrinks, what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import Bench, make_bench
+from identification.gap.data import Array, GapData
+from identification.gap.discriminate import NextMeasurement, next_measurement
+from identification.gap.effects import WORDS, library
+from identification.gap.evidence import Engine, eta_levels
+from identification.gap.fit import Fit, fit
+from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
+from identification.gap.locate import Where, locate
+from identification.gap.parameters import Parameter, parameters
+from identification.gap.search import Explanation, Found, search
+
+ALIKE = 3.0  # nats within which two words explain data equally well (odds of 20 to 1)
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """One effect of the chosen explanation; probability: that it is present at all."""
+
+    name: str
+    label: str
+    probability: float
+    parameters: dict[str, Parameter]
+    indistinguishable_from: tuple[str, ...]
+    share_of_gap: float
+    size: float  # rms, m
+
+
+@dataclass(frozen=True, eq=False)
+class GapResult:
+    """All lengths in m. before, after, noise: rms over samples. held_out: the main fold first.
+
+    runners_up: word -> rms after on the main fold, of the best explanations by other words.
+    remainder: rms of repeatable structure that is left unexplained.
+    """
+
+    verdict: str
+    probabilities: dict[str, float]
+    effects: tuple[Effect, ...]
+    where: Where
+    noise: float
+    before: float
+    after: float
+    held_out: tuple[HeldOut, ...]
+    runners_up: dict[str, float]
+    next_measurement: NextMeasurement | None
+    remainder: float
+    notes: tuple[str, ...]
+    bench: Bench
+    engine: Engine
+    fit: Fit
+    found: Found
+
+
+def diagnose_gap(
+    data: GapData,
+    *,
+    withhold: Iterable[str] = (),
+    add: Iterable[str] = (),
+    progress: Progress | None = None,
+) -> GapResult:
+    """The diagnosis of a data set. withhold: words taken out of the library; add: words that the
+    explanation must contain. Raises ValueError for unknown words."""
+    tell = progress or _silent
+    out, forced = set(withhold), frozenset(add)
+    _check_words(out | forced)
+    tell("preparing", 0.0)
+    bench = make_bench(data)
+    base = base_columns(bench)
+    target = bench.observed - prediction(bench)
+    variants = library(bench, [w for w in WORDS if w not in out])
+    tell("comparing effects", 0.2)
+    engine = Engine(bench, base, target, eta_levels(bench, base, target))
+    found = search(bench, base, engine, variants)
+    tell("withheld data", 0.7)
+    verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
+    chosen = _chosen(found, verdict, forced)
+    result = _result(bench, engine, found, verdict, chosen)
+    tell("done", 1.0)
+    return result
+
+
+def _silent(_: str, __: float) -> None:
+    """Progress that nobody looks at."""
+
+
+def _check_words(words: set[str] | frozenset[str]) -> None:
+    for word in words:
+        if word not in WORDS:
+            raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
+
+
+def _chosen(found: Found, verdict: str, forced: frozenset[str]) -> Explanation:
+    """The best explanation with the verdict as its main cause (or with the forced words)."""
+    empty = next(e for e in found.explanations if not e.parts)
+    if forced:
+        return next((e for e in found.explanations if forced <= e.words), empty)
+    if verdict in ("none", "unknown"):
+        return empty
+    return next(e for e in found.explanations if e.parts and e.parts[0].word == verdict)
+
+
+def _result(
+    bench: Bench, engine: Engine, found: Found, verdict: str, chosen: Explanation
+) -> GapResult:
+    n = bench.rows.n
+    fitted = fit(engine, chosen)
+    gap = bench.response - stated_prediction(engine)
+    left = engine.target[:n] - fitted.response
+    ways = folds(engine)
+    held = tuple(held_out(engine, chosen, name, number) for name, number in ways.items())
+    springs = fit(engine, next(e for e in found.explanations if not e.parts))
+    structural = engine.target[:n] - springs.response
+    effects = _effects(bench, found, chosen, fitted)
+    return GapResult(
+        verdict=verdict,
+        probabilities=found.probabilities,
+        effects=effects,
+        where=locate(engine, fitted, structural),
+        noise=_noise(bench),
+        before=_sample_rms(bench, gap),
+        after=_sample_rms(bench, left),
+        held_out=held,
+        runners_up=_runners_up(engine, found, verdict, ways),
+        next_measurement=_next(bench, found, verdict, effects),
+        remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
+        notes=_notes(bench),
+        bench=bench,
+        engine=engine,
+        fit=fitted,
+        found=found,
+    )
+
+
+def _effects(bench: Bench, found: Found, chosen: Explanation, fitted: Fit) -> tuple[Effect, ...]:
+    weights = np.array([e.log_weight for e in found.explanations])
+    share = np.exp(weights - weights.max())
+    total = float(share.sum())
+    squares = np.array(chosen.sizes) ** 2 if chosen.sizes else np.zeros(0)
+    out = []
+    for i, part in enumerate(chosen.parts):
+        present = sum(
+            float(s) for e, s in zip(found.explanations, share, strict=True) if part.word in e.words
+        )
+        w, cov = fitted.of(i)
+        power = float(squares.sum())
+        out.append(
+            Effect(
+                name=part.word,
+                label=part.variant.label,
+                probability=min(1.0, present / total),
+                parameters=parameters(bench, part, w, cov),
+                indistinguishable_from=_alike(found, chosen, part.word),
+                share_of_gap=float(squares[i] / power) if power > 0 else 1.0 / len(squares),
+                size=float(chosen.sizes[i]),
+            )
+        )
+    return tuple(out)
+
+
+def _alike(found: Found, chosen: Explanation, word: str) -> tuple[str, ...]:
+    """Words that could stand in for `word` in the explanation, at the same evidence."""
+    rest = chosen.words - {word}
+    out = []
+    for e in found.explanations:
+        extra = e.words - rest
+        if rest <= e.words and len(extra) == 1 and word not in extra:
+            (other,) = extra
+            if e.log_weight > chosen.log_weight - ALIKE:
+                out.append(other)
+    return tuple(out)
+
+
+def _runners_up(
+    engine: Engine, found: Found, verdict: str, ways: dict[str, Array]
+) -> dict[str, float]:
+    """The three best explanations by one other word: withheld rms on the main fold."""
+    if not ways or verdict == "none":
+        return {}
+    name, number = next(iter(ways.items()))
+    others = [e for e in found.explanations if len(e.parts) == 1 and verdict not in e.words]
+    return {e.parts[0].word: held_out(engine, e, name, number).after for e in others[:3]}
+
+
+def _next(
+    bench: Bench, found: Found, verdict: str, effects: tuple[Effect, ...]
+) -> NextMeasurement | None:
+    """For the first pair that can't be told apart; for an unsure verdict, its nearest rival."""
+    for e in effects:
+        for other in e.indistinguishable_from:
+            proposal = next_measurement(bench, e.name, other)
+            if proposal is not None:
+                return proposal
+    ranked = sorted(found.probabilities.items(), key=lambda i: -i[1])
+    words = [w for w, p in ranked[:2] if p > 0.02 and w in WORDS]
+    if verdict in WORDS and len(words) == 2:
+        return next_measurement(bench, words[0], words[1])
+    return None
+
+
+def _noise(bench: Bench) -> float:
+    """rms that the instruments alone would leave in single samples, m."""
+    noise, weight = bench.noise, bench.rows.weight
+    count = np.ones(bench.rows.n) if bench.rows.continuous else weight
+    square = noise.response**2 * count + noise.hold**2 + noise.run**2
+    return float(np.sqrt(weight @ square / weight.sum()))
+
+
+def _sample_rms(bench: Bench, values: Array) -> float:
+    """rms over samples: that of the rows, and the scatter of the samples within rows."""
+    weight = bench.rows.weight
+    return float(np.sqrt(weight @ (values**2 + bench.scatter) / weight.sum()))
+
+
+def _notes(bench: Bench) -> tuple[str, ...]:
+    """What these data can't decide, whatever the verdict."""
+    data, rows, out = bench.data, bench.rows, list(bench.data.notes)
+    if not np.ptp(bench.load) > 0:
+        out.append("The load does not change: nothing can be said of stiffness or of joints.")
+    if not np.any(np.diff(np.abs(bench.load)) < -0.2 * np.ptp(bench.load)):
+        out.append("Nothing was unloaded: lasting and elastic deflection look alike.")
+    if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
+        out.append("One repetition: what repeats and what does not can't be told apart.")
+    if data.arm and not bench.has_q:
+        reason = "not recorded" if data.q is None else "taken before the gear"
+        out.append(f"Joint readings are {reason}: joints, links and base look alike.")
+    if data.session is None and data.arm:
+        out.append("No session clock: drifts are seen only within runs and from run to run.")
+    if bench.imposed:
+        out.append("The displacement is imposed: force is predicted from it.")
+    return tuple(out)

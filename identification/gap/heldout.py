@@ -1,0 +1,124 @@
+"""Withheld data: parameters fitted without a fold, judged on the fold.
+
+Folds are whole repetitions, directions or poses; of a single run, blocks of time. The zero-load
+rows of a withheld run stay in: they carry its datum (of the laser, and of a drift), which no model
+can know. A withheld direction's datum is taken from its own mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.data import Array, Flags, Ints
+from identification.gap.evidence import Engine
+from identification.gap.fit import fit
+from identification.gap.search import Explanation
+
+BLOCKS = 5
+_DRAWS = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """fold: what was withheld in turn; rms m before and after; shrink factor with ci95."""
+
+    fold: str
+    before: float
+    after: float
+    ci95: tuple[float, float]
+
+    @property
+    def shrink(self) -> float:
+        """before / after."""
+        return self.before / self.after if self.after > 0 else 1.0
+
+
+def folds(engine: Engine) -> dict[str, Ints]:
+    """Name -> number of the fold of every row (n,), for all ways of withholding these data."""
+    rows, data = engine.bench.rows, engine.bench.data
+    directions = list(dict.fromkeys(s.direction for s in data.setups))
+    poses = list(dict.fromkeys(s.pose for s in data.setups))
+    out = {}
+    if len(np.unique(rows.repetition)) > 1:
+        out["repetition"] = np.unique(rows.repetition, return_inverse=True)[1].astype(np.int64)
+    if len(directions) > 1:
+        of = np.array([directions.index(s.direction) for s in data.setups])
+        out["direction"] = of[rows.setup]
+    if len(poses) > 1:
+        of = np.array([poses.index(s.pose) for s in data.setups])
+        out["pose"] = of[rows.setup]
+    if "repetition" not in out and rows.n >= 4 * BLOCKS:
+        out["block"] = (np.arange(rows.n) * BLOCKS // rows.n).astype(np.int64)
+    return out
+
+
+def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) -> HeldOut:
+    """Judges an explanation on every fold in turn."""
+    bench, n = engine.bench, engine.bench.rows.n
+    before, after = np.zeros(n), np.zeros(n)
+    for f in np.unique(fold):
+        test = (fold == f) & ~bench.rows.zero
+        if not test.any():
+            continue
+        out = fold == f
+        fitted = fit(engine, explanation, _stacked_keep(engine, out))
+        left = engine.target[:n] - fitted.response
+        gap = bench.response - stated_prediction(engine)
+        whole = np.array([bool(np.all(out[bench.rows.setup == s])) for s in bench.rows.setup])
+        after[test] = _less_datum(bench.rows.setup, left, whole & test)[test]
+        before[test] = _less_datum(bench.rows.setup, gap, whole & test)[test]
+    judged = ~bench.rows.zero
+    scatter = bench.scatter
+    before, after = np.sqrt(before**2 + scatter), np.sqrt(after**2 + scatter)
+    blocks = bench.rows.run if len(np.unique(bench.rows.run)) > 2 else fold
+    return HeldOut(
+        name,
+        _rms(before[judged], bench.rows.weight[judged]),
+        _rms(after[judged], bench.rows.weight[judged]),
+        _bootstrap(before[judged], after[judged], blocks[judged], bench.rows.weight[judged]),
+    )
+
+
+def stated_prediction(engine: Engine) -> Array:
+    """(n,) response that the simulation as stated predicts."""
+    bench = engine.bench
+    if bench.rows.simulated is not None:
+        return bench.rows.simulated
+    stated = np.sum(bench.lever**2 * bench.data.compliance, axis=1)
+    return np.asarray(stated * bench.load)
+
+
+def _stacked_keep(engine: Engine, out: Flags) -> Flags:
+    """Stacked rows to fit on: not the fold, but its zero-load rows."""
+    bench, n = engine.bench, engine.bench.rows.n
+    row = ~out | bench.rows.zero
+    keep = np.ones(bench.layout.size, dtype=bool)
+    for start in range(0, bench.layout.tangential.stop, n):
+        keep[start : start + n] = row
+    return keep
+
+
+def _less_datum(setup: Ints, values: Array, rows: Flags) -> Array:
+    """Values less their mean per setup over `rows`, where a setup was withheld as a whole."""
+    out = values.copy()
+    for s in np.unique(setup[rows]) if rows.any() else []:
+        mine = rows & (setup == s)
+        out[mine] -= values[mine].mean()
+    return out
+
+
+def _rms(values: Array, weight: Array) -> float:
+    return float(np.sqrt(weight @ values**2 / weight.sum())) if weight.size else 0.0
+
+
+def _bootstrap(before: Array, after: Array, blocks: Ints, weight: Array) -> tuple[float, float]:
+    """95 % interval of the ratio over resampled blocks (runs, or blocks of time)."""
+    names, number = np.unique(blocks, return_inverse=True)
+    a = np.bincount(number, weights=weight * before**2, minlength=len(names))
+    b = np.bincount(number, weights=weight * after**2, minlength=len(names))
+    draw = np.random.default_rng(0).integers(0, len(names), (_DRAWS, len(names)))
+    ratio = np.sqrt(a[draw].sum(axis=1) / np.maximum(b[draw].sum(axis=1), 1e-300))
+    low, high = np.quantile(ratio, [0.025, 0.975])
+    return float(low), float(high)

@@ -1,0 +1,106 @@
+"""Where the gap lies: directions, poses, forces, branches, repetitions, joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.compare import LINEAR, moved_response
+from identification.gap.data import BRANCH_NAMES, Array, Flags
+from identification.gap.evidence import Engine
+from identification.gap.fit import Fit
+
+_SHOWS = 0.15  # an effect shows where it reaches this share of its largest part
+_INSTRUMENT = frozenset(
+    ["load_misalignment", "force_drift", "force_scale", "time_lag", "pose_error"]
+)  # channels that say nothing about the encoders
+
+
+@dataclass(frozen=True, eq=False)
+class Where:
+    """As CONTRACT: names, force ranges N per direction, joints from 1, share of the gap."""
+
+    directions: tuple[str, ...]
+    poses: tuple[str, ...]
+    force: dict[str, tuple[float, float]]
+    branches: tuple[str, ...]
+    repetitions: tuple[int, ...]
+    joints: tuple[int, ...]
+    seen_by_encoders: bool | None
+    share: float
+
+
+def locate(engine: Engine, fit: Fit, gap: Array) -> Where:
+    """From the main effect's contribution; without one, from the gap (n,) that springs leave."""
+    bench, n = engine.bench, engine.bench.rows.n
+    main = fit.contribution(engine, 0)[:n] if fit.parts else gap
+    per_setup = _size_per(bench.rows.setup, _visible(engine, fit, main), len(bench.data.setups))
+    top = per_setup.max()
+    if not top > 0:
+        return Where((), (), {}, (), (), (), None, 0.0)
+    shows = per_setup >= _SHOWS * top
+    setups = [s for s, yes in zip(bench.data.setups, shows, strict=True) if yes]
+    rows = shows[bench.rows.setup] & (np.abs(main) >= _SHOWS * np.abs(main).max())
+    total = float(np.sum(gap**2))
+    inside = float(np.sum(gap[shows[bench.rows.setup]] ** 2))
+    word = fit.parts[0].word if fit.parts else ""
+    return Where(
+        directions=tuple(dict.fromkeys(s.direction for s in setups)),
+        poses=tuple(dict.fromkeys(s.pose for s in setups)),
+        force=_ranges(engine, rows),
+        branches=tuple(BRANCH_NAMES[b] for b in np.unique(bench.rows.branch[rows])),
+        repetitions=tuple(int(r) for r in np.unique(bench.rows.repetition[rows])),
+        joints=_joints(engine, fit),
+        seen_by_encoders=(word.startswith("joint_") if bench.has_q and word and
+                          word not in _INSTRUMENT else None),
+        share=inside / total if total > 0 else 0.0,
+    )  # fmt: skip
+
+
+def _visible(engine: Engine, fit: Fit, main: Array) -> Array:
+    """The main effect less what the springs would take over per setup, unless it is linear."""
+    moved = moved_response(engine, main[:, None])[:, 0]
+    if not fit.parts or fit.parts[0].word in LINEAR:
+        return moved
+    out = moved.copy()
+    bench = engine.bench
+    for s in range(len(bench.data.setups)):
+        mine = bench.rows.setup == s
+        x = bench.load[mine] - bench.load[mine].mean()
+        power = float(x @ x)
+        if power > 0:
+            out[mine] -= x * float(x @ moved[mine]) / power
+    return out
+
+
+def _size_per(number: Array, values: Array, count: int) -> Array:
+    squares = np.bincount(number, weights=values**2, minlength=count)
+    return np.asarray(np.sqrt(squares / np.maximum(np.bincount(number, minlength=count), 1)))
+
+
+def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
+    bench, out = engine.bench, {}
+    for s, setup in enumerate(bench.data.setups):
+        force = bench.rows.force[rows & (bench.rows.setup == s)]
+        if force.size:
+            old = out.get(setup.direction, (np.inf, -np.inf))
+            out[setup.direction] = (
+                min(old[0], float(force.min())), max(old[1], float(force.max()))
+            )  # fmt: skip
+    return out
+
+
+def _joints(engine: Engine, fit: Fit) -> tuple[int, ...]:
+    """Joints (from 1) in which the joint effects of the explanation sit; of a bench, none."""
+    if not engine.bench.data.arm:
+        return ()
+    out: list[int] = []
+    for i, p in enumerate(fit.parts):
+        if "joint" in p.variant.info:
+            out.append(int(p.variant.info["joint"]) + 1)
+        elif "joints" in p.variant.info and p.word == "joint_stiffness_error":
+            w, cov = fit.of(i)
+            clear = np.abs(w) > 3 * np.sqrt(np.diag(cov))
+            out += [j + 1 for j, c in zip(p.variant.info["joints"], clear, strict=True) if c]
+    return tuple(dict.fromkeys(out))

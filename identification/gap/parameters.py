@@ -1,0 +1,192 @@
+"""Parameters of an effect in words and units, from coefficients and their covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.search import Part
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+def parameters(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    """Named parameters of one part; units are written out in the result."""
+    return _TABLE[part.word](bench, part, w, cov)
+
+
+def _linear(functional: Array, w: Array, cov: Array, unit: str, scale: float = 1.0) -> Parameter:
+    value = float(functional @ w) * scale
+    half = 1.96 * float(np.sqrt(max(functional @ cov @ functional, 0.0))) * abs(scale)
+    return Parameter(value, value - half, value + half, unit)
+
+
+def _one(w: Array, cov: Array, index: int, unit: str, scale: float = 1.0) -> Parameter:
+    return _linear(np.eye(len(w))[index], w, cov, unit, scale)
+
+
+def _torque_unit(bench: Bench) -> str:
+    return "Nm" if bench.data.arm else "N"
+
+
+def _knee(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    info = part.variant.info
+    radius = np.asarray(info["radius"])
+    power = np.maximum(w, 0.0)
+    total = float(power.sum())
+    centre = float(power @ radius / total) if total > 0 else float(info["centre"])
+    near = np.sort(np.abs(radius - centre))
+    half = float(near[min(1, len(near) - 1)])  # the grid's neighbours bound it
+    out = {
+        "threshold": Parameter(centre, centre - half, centre + half, _torque_unit(bench)),
+        "slope_beyond_over_elastic": _linear(np.ones(len(w)), w, cov, "1"),
+    }
+    if info["flow_s"]:
+        flow = float(info["flow_s"])
+        out["flow_time"] = Parameter(flow, flow / 3, flow * 3, "s")
+    return out
+
+
+def _hysteresis(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    radius = np.asarray(part.variant.info["radius"])
+    return {
+        "friction": _linear(radius, w, cov, _torque_unit(bench)),
+        "share_through_friction": _linear(np.ones(len(w)), w, cov, "1"),
+    }
+
+
+def _backlash(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    return {
+        "width": _one(w, cov, 0, "rad" if bench.data.arm else "mm", 1.0 if bench.data.arm else 1e3)
+    }
+
+
+def _curve(_: Bench, __: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    return {"change_of_compliance_over_range": _linear(np.ones(len(w)), w, cov, "1")}
+
+
+def _creep(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    times = np.asarray(part.variant.info["times_s"])
+    power = np.maximum(w, 0.0)
+    mean = (
+        float(np.exp(power @ np.log(times) / power.sum())) if power.sum() > 0 else float(times[0])
+    )
+    return {
+        "creep_fraction": _linear(np.ones(len(w)), w, cov, "1"),
+        "retardation_time": Parameter(mean, mean / 3, mean * 3, "s"),
+    }
+
+
+def _stiffness(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    out = {}
+    for i, j in enumerate(part.variant.info["joints"]):
+        c = _one(w, cov, i, "1")
+        ends = [1 / max(1 + v, 0.02) for v in (c.value, c.high, c.low)]
+        out[f"factor_joint{j + 1}"] = Parameter(ends[0], ends[1], ends[2], "1")
+    return out
+
+
+def _gain(_: Bench, __: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    g = _one(w, cov, 0, "1")
+    return {"factor": Parameter(1 + g.value, 1 + g.low, 1 + g.high, "1")}
+
+
+def _links(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    return {
+        f"compliance_over_nominal_segment{k + 1}": _one(w, cov, i, "1")
+        for i, k in enumerate(part.variant.info["segments"])
+    }
+
+
+def _base(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    return {
+        f"compliance_about_{'xyz'[a]}": _one(w, cov, i, "rad/Nm")
+        for i, a in enumerate(part.variant.info["axes"])
+    }
+
+
+def _seating(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    f0 = float(part.variant.info["force_N"])
+    return {
+        "depth": _linear(np.ones(len(w)), w, cov, "mm", 1e3),
+        "force_scale": Parameter(f0, f0 / 2, f0 * 2, "N"),
+    }
+
+
+def _misalignment(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    names = part.variant.info["directions"]
+    return {
+        f"tangent_{name}_{k + 1}": _one(w, cov, 2 * i + k, "1")
+        for i, name in enumerate(names)
+        for k in range(2)
+    }
+
+
+def _drift(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    """Change from start to end of the session, per coefficient of a path, or of a free one."""
+    force = part.word == "force_drift"
+    unit, scale = ("N", 1.0) if force else ("mm", 1e3)
+    names = [""] if force else [
+        f"_{d}" for d in dict.fromkeys(s.direction for s in bench.data.setups)
+    ]  # fmt: skip
+    per = len(w) // len(names)
+    out = {}
+    for i, name in enumerate(names):
+        f = np.zeros(len(w))
+        f[(i + 1) * per - 1] = 1.0
+        if per > 1:
+            f[i * per] = -1.0
+        out[f"drift_over_session{name}"] = _linear(f, w, cov, unit, scale)
+    return out
+
+
+def _shift(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    if len(w) == 1:
+        run = part.variant.info["runs"][0] + 1
+        return {f"shift_before_run{run}": _one(w, cov, 0, "mm", 1e3)}
+    return {f"shift{i + 1}": _one(w, cov, i, "mm", 1e3) for i in range(len(w))}
+
+
+def _lag(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    lag = float(part.variant.info["lag_s"])
+    return {"lag": _one(w, cov, 0, "s", lag)}
+
+
+def _pose(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    if part.variant.info["kind"] == "tool":
+        return {f"offset_{a}": _one(w, cov, i, "mm", 1e3) for i, a in enumerate("xyz")}
+    return {f"angle_joint{j + 1}": _one(w, cov, j, "rad") for j in range(len(w))}
+
+
+_TABLE: dict[str, Callable[[Bench, Part, Array, Array], dict[str, Parameter]]] = {
+    "joint_yield": _knee,
+    "base_slip": _knee,
+    "joint_hysteresis": _hysteresis,
+    "joint_backlash": _backlash,
+    "joint_nonlinear_stiffness": _curve,
+    "joint_creep": _creep,
+    "joint_stiffness_error": _stiffness,
+    "force_scale": _gain,
+    "displacement_scale": _gain,
+    "link_flexibility": _links,
+    "base_compliance": _base,
+    "contact_seating": _seating,
+    "load_misalignment": _misalignment,
+    "force_drift": _drift,
+    "thermal_drift": _drift,
+    "zero_shift": _shift,
+    "time_lag": _lag,
+    "pose_error": _pose,
+}

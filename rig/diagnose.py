@@ -1,0 +1,175 @@
+"""`rig diagnose`: where the simulation misses the measurement, which effect causes it, how far the
+gap shrinks once that effect is added."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification.gap.data import GapData
+from identification.gap.diagnose import Effect, GapResult, diagnose_gap
+from identification.gap.heldout import HeldOut
+from identification.gap.parameters import Parameter
+from rig.dataset import Dataset
+from rig.errors import InputError
+from rig.gap_data import gap_data
+
+MM = 1e3  # mm per m
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The result with what it came from; `to_json` is schema rig.diagnosis/1."""
+
+    dataset: str
+    result: GapResult
+
+    def to_json(self) -> dict[str, Any]:
+        """The diagnosis as plain values."""
+        r = self.result
+        return {
+            "schema": "rig.diagnosis/1",
+            "dataset": self.dataset,
+            "verdict": r.verdict,
+            "probabilities": {w: float(p) for w, p in r.probabilities.items()},
+            "effects": [_effect(e) for e in r.effects],
+            "where": _where(r),
+            "gap": _gap(r),
+            "next_measurement": None
+            if r.next_measurement is None
+            else {
+                "text": r.next_measurement.text,
+                "separates": list(r.next_measurement.separates),
+                "kind": r.next_measurement.kind,
+            },
+            "remainder_mm": r.remainder * MM,
+            "runners_up": {w: {"held_out_after_rms_mm": v * MM} for w, v in r.runners_up.items()},
+            "notes": list(r.notes),
+        }
+
+    def to_text(self) -> str:
+        """What the terminal shows."""
+        from rig.diagnose_text import render
+
+        return render(self.result)
+
+
+def diagnose(
+    dataset: Dataset,
+    *,
+    simulation: Path | None = None,
+    withhold: Iterable[str] = (),
+    add: Iterable[str] = (),
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnoses a data set. simulation: CSV with another simulator's curves; withhold: words taken
+    out of the library; add: words the explanation must contain. InputError for anything wrong."""
+    data = gap_data(dataset)
+    if simulation is not None:
+        data = _with_curves(data, simulation)
+    try:
+        result = diagnose_gap(data, withhold=withhold, add=add, progress=progress)
+    except ValueError as error:
+        raise InputError(f"{dataset.path or 'data set'}: {error}.") from error
+    return Diagnosis(dataset.uuid, result)
+
+
+def _with_curves(data: GapData, csv: Path) -> GapData:
+    """Displacement that the curves (pose, direction, force_N, displacement_mm) give per sample."""
+    from dataclasses import replace
+
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(csv, comment="#")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{csv}: can't be read as CSV ({error}).") from error
+    missing = {"force_N", "displacement_mm"} - set(table.columns)
+    if missing:
+        raise InputError(
+            f"{csv}: lacks the column {sorted(missing)[0]}; "
+            "wanted: pose, direction, force_N, displacement_mm."
+        )
+    simulated = np.empty(len(data.force))
+    for s, setup in enumerate(data.setups):
+        mine = np.ones(len(table), dtype=bool)
+        for key, value in (("pose", setup.pose), ("direction", setup.direction)):
+            if key in table.columns:
+                mine &= (table[key].astype(str) == value).to_numpy()
+        curve = table[mine].sort_values("force_N")
+        if len(curve) < 2:
+            raise InputError(
+                f"{csv}: {len(curve)} rows for pose {setup.pose or '-'}, direction "
+                f"{setup.direction}; wanted: at least 2, over the range of force."
+            )
+        rows = data.setup == s
+        simulated[rows] = _along(
+            data.force[rows], curve["force_N"].to_numpy(float),
+            curve["displacement_mm"].to_numpy(float) / MM,
+        )  # fmt: skip
+    return replace(data, simulated=simulated)
+
+
+def _along(force: Any, f: Any, u: Any) -> Any:
+    """Linear between the curve's points, straight on beyond its ends."""
+    inner = np.interp(force, f, u)
+    below = u[0] + (force - f[0]) * (u[1] - u[0]) / max(f[1] - f[0], 1e-300)
+    above = u[-1] + (force - f[-1]) * (u[-1] - u[-2]) / max(f[-1] - f[-2], 1e-300)
+    return np.where(force < f[0], below, np.where(force > f[-1], above, inner))
+
+
+def _effect(e: Effect) -> dict[str, Any]:
+    return {
+        "name": e.name,
+        "probability": e.probability,
+        "parameters": {name: _parameter(p) for name, p in e.parameters.items()},
+        "indistinguishable_from": list(e.indistinguishable_from),
+        "share_of_gap": e.share_of_gap,
+        "rms_mm": e.size * MM,
+        "form": e.label,
+    }
+
+
+def _parameter(p: Parameter) -> dict[str, Any]:
+    return {"value": p.value, "ci95": [p.low, p.high], "unit": p.unit}
+
+
+def _where(r: GapResult) -> dict[str, Any]:
+    w = r.where
+    return {
+        "directions": list(w.directions),
+        "poses": list(w.poses),
+        "force_N": {d: [low, high] for d, (low, high) in w.force.items()},
+        "branches": list(w.branches),
+        "repetitions": list(w.repetitions),
+        "joints": list(w.joints),
+        "seen_by_encoders": w.seen_by_encoders,
+        "share_of_gap": w.share,
+    }
+
+
+def _gap(r: GapResult) -> dict[str, Any]:
+    held = [_held(h) for h in r.held_out]
+    return {
+        "noise_rms_mm": r.noise * MM,
+        "before_rms_mm": r.before * MM,
+        "after_rms_mm": r.after * MM,
+        "shrink_factor": r.before / r.after if r.after > 0 else 1.0,
+        "held_out": held[0] if held else None,
+        "held_out_other": held[1:],
+    }
+
+
+def _held(h: HeldOut) -> dict[str, Any]:
+    return {
+        "fold": h.fold,
+        "before_rms_mm": h.before * MM,
+        "after_rms_mm": h.after * MM,
+        "shrink_factor": h.shrink,
+        "ci95": list(h.ci95),
+    }

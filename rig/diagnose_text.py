@@ -1,0 +1,129 @@
+"""The diagnosis on the terminal: answer, where, effects, how far, what next."""
+
+from __future__ import annotations
+
+from identification.gap.diagnose import Effect, GapResult
+from identification.gap.parameters import Parameter
+
+MM = 1e3
+
+_MEANING = {
+    "joint_yield": "a joint gives way above a threshold torque",
+    "joint_backlash": "a joint has lost motion where its torque passes zero",
+    "joint_nonlinear_stiffness": "a joint's spring is curved, reversibly",
+    "joint_hysteresis": "a joint rubs: loading and unloading differ from the first load on",
+    "joint_creep": "a joint creeps under the held load",
+    "link_flexibility": "arm segments bend",
+    "base_compliance": "the mounting gives way elastically",
+    "base_slip": "the mounting slips above a threshold moment",
+    "contact_seating": "the fixture between flange and target seats itself",
+    "load_misalignment": "the load acts askew",
+    "force_drift": "the amplifier drifts",
+    "force_scale": "the gain of the force chain is off",
+    "displacement_scale": "the gain of the laser is off",
+    "thermal_drift": "the displacement drifts with time or temperature",
+    "zero_shift": "the datum jumps between repetitions",
+    "time_lag": "one channel lags the other",
+    "pose_error": "arm or tool stand elsewhere than simulated",
+    "joint_stiffness_error": "the joints' stiffnesses are not the simulated ones",
+}
+
+
+def render(r: GapResult) -> str:
+    """All lines, in the order of importance."""
+    parts = [_answer(r), _where(r), _effects(r), _gap(r), _next(r)]
+    if r.notes:
+        parts.append("Not decidable from these data:\n" + "\n".join(f"  {n}" for n in r.notes))
+    return "\n\n".join(p for p in parts if p)
+
+
+def _answer(r: GapResult) -> str:
+    p = r.probabilities[r.verdict]
+    if r.verdict == "none":
+        return (
+            f"none ({p:.0%}): noise, gains and joint stiffnesses within their stated uncertainty "
+            "explain all that was measured. There is no gap to close."
+        )
+    if r.verdict == "unknown":
+        return (
+            f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
+            f"the uncertainty; about {r.remainder * MM:.3g} mm rms of structure remain."
+        )
+    more = [e.name for e in r.effects[1:]]
+    also = f" Beside it: {', '.join(more)}." if more else ""
+    return (
+        f"{r.verdict} ({p:.0%}): {_MEANING[r.verdict]}.{also} With it the gap shrinks from "
+        f"{r.before * MM:.3g} to {r.after * MM:.3g} mm rms; the instruments alone leave "
+        f"{r.noise * MM:.3g} mm."
+    )
+
+
+def _where(r: GapResult) -> str:
+    w = r.where
+    if not w.directions:
+        return ""
+    forces = ", ".join(f"{d}: {a:.4g} to {b:.4g} N" for d, (a, b) in w.force.items())
+    lines = [f"Where ({w.share:.0%} of the gap that springs leave)", f"  directions  {forces}"]
+    poses = ", ".join(p for p in w.poses if p)
+    if poses:
+        lines.append(f"  poses       {poses}")
+    lines.append(f"  branches    {', '.join(w.branches)}")
+    lines.append(f"  repetitions {', '.join(map(str, w.repetitions))}")
+    if w.joints:
+        lines.append(f"  joints      {', '.join(map(str, w.joints))}")
+    if w.seen_by_encoders is not None:
+        lines.append(f"  the joint readings {'see' if w.seen_by_encoders else 'do not see'} it")
+    return "\n".join(lines)
+
+
+def _effects(r: GapResult) -> str:
+    lines = ["Effects"] if r.effects else []
+    for e in r.effects:
+        lines += _one_effect(e)
+    ranked = sorted(r.probabilities.items(), key=lambda i: -i[1])
+    shown = ", ".join(f"{w} {p:.2f}" for w, p in ranked if p >= 0.005)
+    lines.append(f"Probability of being the main cause: {shown}")
+    return "\n".join(lines)
+
+
+def _one_effect(e: Effect) -> list[str]:
+    lines = [f"  {e.name}: present with {e.probability:.0%}, {e.share_of_gap:.0%} of the gap"]
+    lines += [f"    {name} = {_value(p)}" for name, p in e.parameters.items()]
+    if e.indistinguishable_from:
+        lines.append(f"    can't be told apart from {', '.join(e.indistinguishable_from)} here")
+    return lines
+
+
+def _value(p: Parameter) -> str:
+    unit = "" if p.unit == "1" else f" {p.unit}"
+    return f"{p.value:.4g}{unit} (95 %: {p.low:.4g} to {p.high:.4g}{unit})"
+
+
+def _gap(r: GapResult) -> str:
+    lines = [
+        "How far (rms, mm)",
+        "                    before      after  after/noise  shrinks by",
+        _row("fitted", r.before, r.after, r.noise),
+    ]
+    for h in r.held_out:
+        low, high = h.ci95
+        lines.append(
+            _row(f"withheld {h.fold}", h.before, h.after, r.noise) + f" ({low:.3g} to {high:.3g})"
+        )
+    lines.append(f"  noise of the instruments {r.noise * MM:.4g}")
+    for word, after in r.runners_up.items():
+        lines.append(f"  withheld, with {word} instead: {after * MM:.4g}")
+    return "\n".join(lines)
+
+
+def _row(name: str, before: float, after: float, noise: float) -> str:
+    shrink = before / after if after > 0 else 1.0
+    ratio = after / noise if noise > 0 else 1.0
+    return f"  {name:18s}{before * MM:10.4g} {after * MM:10.4g} {ratio:10.2f}  {shrink:10.3g}"
+
+
+def _next(r: GapResult) -> str:
+    if r.next_measurement is None:
+        return ""
+    first, second = r.next_measurement.separates
+    return f"Next, to tell {first} from {second}:\n  {r.next_measurement.text}"
