@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.errors import DeviceError
-from rig.devices import in_short, make_devices, station_clock
 from rig.measure import SAFETY_NOTE, emulated_rig
 from rig.plan import Plan, plan
+from rig.procedure.devices import in_short, make_devices, station_clock
 from rig.protocol import load_protocol
 from rig.station import load_station
 

@@ -9,10 +9,10 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from rig.columns import Values
 from rig.errors import InputError
 from rig.journal import Record, journal_path, replay
 from rig.meta import Meta
+from rig.storage.columns import Values
 from rig.yamlfile import load_yaml_text
 
 Origin = Literal["measured", "emulated", "imported"]
@@ -93,7 +93,7 @@ def from_records(records: list[Record], path: Path | None = None) -> Dataset:
 
     path: of the data set, for messages and for the result.
     """
-    from rig.records import Story
+    from rig.storage.records import Story
 
     name = str(journal_path(path)) if path else "journal"
     story = Story(records, name)
@@ -127,7 +127,7 @@ def write(dataset: Dataset, path: Path) -> None:
 
     An older file stays whole until the new one is on disk. InputError if the folder refuses.
     """
-    from rig.hdf5 import write_file
+    from rig.storage.hdf5 import write_file
 
     write_file(dataset, path)
 
@@ -138,7 +138,7 @@ def load(path: Path) -> Dataset:
     A journal is there while a measurement goes on or after it was cut short; it then is the truth,
     whatever the HDF5 file holds. InputError naming file, group and column for anything wrong.
     """
-    from rig.hdf5read import read_file, read_uuid
+    from rig.storage.hdf5read import read_file, read_uuid
 
     journal = journal_path(path)
     if not journal.exists():
@@ -156,7 +156,7 @@ def load(path: Path) -> Dataset:
 def finish(path: Path) -> Dataset:
     """Builds the HDF5 file from the journal beside `path`, reads it back, and removes the journal
     if the measurement is complete. An incomplete one keeps it, to be resumed."""
-    from rig.hdf5read import read_file
+    from rig.storage.hdf5read import read_file
 
     journal = journal_path(path)
     dataset = from_records(replay(journal), path)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.errors import InputError
-from rig.files import in_place_of
+from rig.storage.files import in_place_of
 
 if TYPE_CHECKING:
     from rig.identify import IdentifyResult

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import InputError, MeasurementStopped
-from rig.files import sync_folder
+from rig.storage.files import sync_folder
 
 KINDS = ("start", "descriptor", "sample", "event", "stop")
 SCHEMA = "rig.journal/1"

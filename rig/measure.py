@@ -15,17 +15,18 @@ from drivers.clock import Clock
 from drivers.errors import DeviceError
 from drivers.interfaces import Loader
 from rig import dataset as datasets
-from rig.acquisition import Acquisition
-from rig.devices import Devices, make_devices, make_loader, open_devices, station_clock
 from rig.emulation import EmulatedRig
 from rig.errors import InputError, MeasurementStopped
 from rig.journal import Journal, JournalError, journal_path, replay
-from rig.limits import UNLOAD
 from rig.measured_meta import measured_meta
-from rig.progress import Progress, read_progress
-from rig.progress_bar import LoaderWithBar
+from rig.plan import plan
+from rig.procedure.acquisition import Acquisition
+from rig.procedure.devices import Devices, make_devices, make_loader, open_devices, station_clock
+from rig.procedure.limits import UNLOAD
+from rig.procedure.progress import Progress, read_progress
+from rig.procedure.progress_bar import LoaderWithBar
+from rig.procedure.recorder import Recorder
 from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
-from rig.recorder import Recorder
 from rig.runner import Runner
 from rig.station import Station, load_station, parse_station
 
@@ -56,6 +57,7 @@ def measure(protocol_file: Path, station_name: str | None, output: Path | None, 
     """
     protocol = load_protocol(protocol_file)
     station = load_station(station_name or protocol.station, protocol_file.parent)
+    plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
     path = output or default_output(protocol_file)
     _refuse_existing(path)
     start = {

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.arm import JOINTS, STANDARD_GRAVITY, Arm, joint_positions, tool_transform
-from rig.files import in_place_of
+from rig.storage.files import in_place_of
 
 if TYPE_CHECKING:
     from rig.identify import IdentifyResult

@@ -9,14 +9,14 @@ from dataclasses import replace
 from math import degrees, isnan, nan, radians
 
 from drivers.interfaces import Loader, Prompt
-from rig.acquisition import Acquisition
 from rig.errors import MeasurementStopped
-from rig.limits import Watch
-from rig.procedure_step import StepProcedure, TopReached, Where
-from rig.progress import Progress
+from rig.procedure.acquisition import Acquisition
+from rig.procedure.limits import Watch
+from rig.procedure.progress import Progress
+from rig.procedure.recorder import Recorder
+from rig.procedure.step import StepProcedure, TopReached, Where
+from rig.procedure.supervision import Supervision, Wish
 from rig.protocol import MeasurementProtocol, Run, Step
-from rig.recorder import Recorder
-from rig.supervision import Supervision, Wish
 
 TARE_S = 2.0
 # Within this the arm counts as standing in its reference pose: RTDE shows commanded poses to

@@ -100,7 +100,7 @@ def simulate(model: str | Path, protocol: str | Path) -> Simulation:
 
 def write_csv(simulation: Simulation, path: Path) -> None:
     """Writes `to_csv`; InputError if the folder refuses."""
-    from rig.files import in_place_of
+    from rig.storage.files import in_place_of
 
     with in_place_of(path) as temporary:
         temporary.write_text(simulation.to_csv(), "utf-8")

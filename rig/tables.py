@@ -10,14 +10,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig import csvcells
-from rig.columns import BRANCHES, KNOWN, NO_STEP, TABLE_COLUMNS, Column, Values, empty, unit_of
-from rig.csvblocks import Block, CsvFile, close_match
 from rig.dataset import Dataset, Origin, software_version, write
 from rig.errors import InputError, did_you_mean
-from rig.files import in_place_of
 from rig.journal import journal_path
 from rig.meta import Meta
+from rig.storage import csvcells
+from rig.storage.columns import (
+    BRANCHES,
+    KNOWN,
+    NO_STEP,
+    TABLE_COLUMNS,
+    Column,
+    Values,
+    empty,
+    unit_of,
+)
+from rig.storage.csvblocks import Block, CsvFile, close_match
+from rig.storage.files import in_place_of
 from rig.terminal import Progress, silent
 from rig.yamlfile import read_document
 
@@ -54,7 +63,7 @@ def import_table(
 
 def _check_target(out: Path) -> None:
     """Imported data sets may be made anew; measurements are never written over."""
-    from rig.hdf5read import holds_import
+    from rig.storage.hdf5read import holds_import
 
     if journal_path(out).exists():
         raise InputError(f"{out}: a measurement is under way there (journal). Choose another name.")

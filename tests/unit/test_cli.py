@@ -205,3 +205,13 @@ def test_packages_of_other_distributions_are_noticed(tmp_path: Path) -> None:
     )
     assert result.returncode == 2, result.stderr
     assert "the package drivers comes from" in result.stderr
+
+
+def test_a_load_that_a_joint_cannot_take_is_refused_before_measuring(rig: Rig, files: Path) -> None:
+    heavy = PROTOCOL.replace("[20, 40, 60]", "[20, 400, 900]").replace("{max: 100", "{max: 1000")
+    (files / "heavy.yaml").write_text(heavy)
+    status, _, err = rig("measure", "heavy.yaml", "--station", "emulated", "-o", "run.h5")
+    assert status == 2
+    assert "heavy.yaml:" in err
+    assert "Nm" in err
+    assert not list(files.glob("run.h5*"))

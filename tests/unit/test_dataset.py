@@ -14,10 +14,10 @@ import h5py
 import numpy as np
 import pytest
 
-from rig import hdf5
 from rig.dataset import Dataset, equal, finish, from_records, load, write
 from rig.errors import InputError
 from rig.journal import Journal, journal_path
+from rig.storage import hdf5
 from tests.unit import example_data as example
 
 

@@ -11,13 +11,13 @@ import pytest
 
 from drivers.errors import ReadTimeout, SafetyStop
 from drivers.interfaces import LiveView
-from rig.acquisition import Acquisition
-from rig.devices import Devices
 from rig.errors import MeasurementStopped
 from rig.journal import Journal, Record, replay
-from rig.progress import Progress, read_progress
+from rig.procedure.acquisition import Acquisition
+from rig.procedure.devices import Devices
+from rig.procedure.progress import Progress, read_progress
+from rig.procedure.recorder import Recorder
 from rig.protocol import parse_protocol
-from rig.recorder import Recorder
 from rig.runner import Runner
 from tests.unit.fake_rig import Arm, FakeDynamometer, FakeLaser, FakeLoader, FakeRobot, JumpClock
 

@@ -14,9 +14,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rig import csvblocks, csvcells
 from rig.dataset import Dataset, equal, load, write
 from rig.errors import InputError
+from rig.storage import csvblocks, csvcells
 from rig.tables import export_table, import_table
 from tests.unit import example_data as example
 

@@ -7,9 +7,9 @@ from math import ceil
 
 from drivers.clock import Clock
 from drivers.readings import Reading
-from rig.devices import Devices
-from rig.limits import Live
-from rig.recorder import Slot
+from rig.procedure.devices import Devices
+from rig.procedure.limits import Live
+from rig.procedure.recorder import Slot
 
 TICK_S = 0.1
 # A sped-up clock must not make the loop spin: between two ticks at least so much wall time.

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from drivers.readings import Reading
-from rig.devices import Devices
 from rig.journal import Journal
+from rig.procedure.devices import Devices
 
 Vector = tuple[float, float, float]
 

@@ -8,11 +8,11 @@ from typing import Any
 
 from drivers.interfaces import Loader, Prompt
 from rig.errors import MeasurementStopped
-from rig.limits import UNLOAD
+from rig.procedure.limits import UNLOAD
+from rig.procedure.recorder import Place, Recorder, Slot, Vector
+from rig.procedure.settle import SettleWindow
+from rig.procedure.supervision import Supervision
 from rig.protocol import MeasurementProtocol, Run, Step
-from rig.recorder import Place, Recorder, Slot, Vector
-from rig.settle import SettleWindow
-from rig.supervision import Supervision
 
 
 class TopReached(Exception):

@@ -14,10 +14,10 @@ from math import nan
 from typing import Any
 
 from drivers.interfaces import Command, LiveView, Loader, Prompt
-from rig.acquisition import Acquisition
 from rig.errors import MeasurementStopped
-from rig.limits import UNLOAD, Breach, Live, Watch
-from rig.recorder import Recorder, Slot, Vector
+from rig.procedure.acquisition import Acquisition
+from rig.procedure.limits import UNLOAD, Breach, Live, Watch
+from rig.procedure.recorder import Recorder, Slot, Vector
 
 PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
 

@@ -29,9 +29,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from rig.columns import Values
 from rig.dataset import TEXTS, Dataset
-from rig.files import in_place_of
+from rig.storage.columns import Values
+from rig.storage.files import in_place_of
 
 SCHEMA = "rig.dataset"
 SCHEMA_VERSION = 1

@@ -14,8 +14,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rig.columns import Values, unit_of
-from rig.csvblocks import Block, CsvFile
+from rig.storage.columns import Values, unit_of
+from rig.storage.csvblocks import Block, CsvFile
 
 Reading = Literal["number", "word", "further"]
 

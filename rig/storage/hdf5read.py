@@ -1,4 +1,4 @@
-"""Reading the HDF5 layout of `rig.hdf5`, checked whole before anything is believed."""
+"""Reading the HDF5 layout of `rig.storage.hdf5`, checked whole before anything is believed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
-from rig.columns import Values
 from rig.dataset import ORIGINS, Dataset
 from rig.errors import InputError
-from rig.hdf5 import MANIFEST, SAMPLES, SCHEMA, SCHEMA_VERSION, SEAL, content_of, digest_of
 from rig.meta import Meta
+from rig.storage.columns import Values
+from rig.storage.hdf5 import MANIFEST, SAMPLES, SCHEMA, SCHEMA_VERSION, SEAL, content_of, digest_of
 from rig.yamlfile import load_yaml_text
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"

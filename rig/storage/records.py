@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from rig.columns import KNOWN, Values, empty, unit_of
 from rig.errors import InputError
 from rig.journal import Record
+from rig.storage.columns import KNOWN, Values, empty, unit_of
 
 _PLACE = ("time_s", "session_s", "pose", "direction", "repetition", "branch", "step")
 _SLOT = ("target_N", "segment", "number", "lateness_s")

@@ -1,0 +1,1 @@
+"""The procedure at the rig, piece by piece; `rig.runner` puts them together."""
