@@ -25,9 +25,10 @@ from rig.reduce import curves
 
 Array = NDArray[np.float64]
 
-# What a joint reading may be off by from one load to another: the arm's stated repeatability,
-# 0.05 mm at 1.3 m. The readings' resolution is finer, their linearity is not published.
-ENCODER_U_RAD = 4e-5
+# What a joint reading may be off by from one load to another. The readings' resolution is far
+# finer; their linearity is not published: +-0.01 deg, usual for absolute encoders of that size,
+# with a rectangular distribution.
+ENCODER_U_RAD = 1.0e-4
 
 
 @dataclass(frozen=True, eq=False)
