@@ -77,7 +77,8 @@ def _datums(bench: Bench) -> list[tuple[str, Array, float]]:
     """Laser datum of a setup (free) and scatter of whole runs within it; tare of the force."""
     rows = bench.rows
     per_run = bench.data.datum == "repetition"
-    wide = bench.reach
+    line = np.abs(bench.slope * bench.load).max()
+    wide = max(bench.reach, float(np.abs(bench.response).max()), float(line))
     out = []
     for s in range(len(bench.data.setups)):
         mine = rows.setup == s

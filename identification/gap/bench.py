@@ -67,9 +67,55 @@ class Bench:
         return q.stop > q.start
 
     @property
+    def unloads(self) -> bool:
+        """Whether the load came back within some run, by a fifth of its range at least."""
+        size, span = np.abs(self.load), float(np.ptp(self.load))
+        for run in np.unique(self.rows.run):
+            path = size[self.rows.run == run]
+            if np.any(np.maximum.accumulate(path) - path > 0.2 * span):
+                return True
+        return False
+
+    @property
+    def once(self) -> bool:
+        """Every setup was loaded once, and never unloaded: all memory is hidden."""
+        return not self.unloads and len(np.unique(self.rows.run)) <= len(self.data.setups)
+
+    @property
+    def line(self) -> Array:
+        """(n,) response that the slope measured in each setup gives for the load, m; what a gain
+        or a lag acts on, however wrong the simulated springs are."""
+        out = np.zeros(self.rows.n)
+        for s in range(len(self.data.setups)):
+            mine = self.rows.setup == s
+            weight = self.rows.weight[mine]
+            x = self.load[mine] - np.average(self.load[mine], weights=weight)
+            power = float(weight @ x**2)
+            if power > 0:
+                out[mine] = max(float(weight @ (x * self.response[mine])) / power, 0.0)
+        return out * self.load
+
+    def reach_of(self, load: Array) -> float:
+        """Range of a load with zero in it. Where the displacement is imposed: of what the rig
+        really carried, not of what the simulated spring would have."""
+        span = float(np.ptp(np.append(load, 0.0)))
+        if not self.imposed or not span > 0:
+            return span
+        carried = float(np.ptp(np.append(self.rows.measured_force, 0.0)))
+        return min(span, span * carried / max(float(np.ptp(np.append(self.load, 0.0))), 1e-300))
+
+    @property
     def session_span(self) -> float:
         """Length of the session, s; never 0."""
         return float(np.ptp(self.rows.session)) or 1.0
+
+    def radii(self, load: Array, inner: Array) -> Array:
+        """Radii of plays: `inner`, and on an imposed path, which runs far beyond what yields,
+        three more up to half of its range."""
+        full = float(np.ptp(np.append(load, 0.0)))
+        if not self.imposed or full < 2 * inner[-1]:
+            return inner
+        return np.concatenate([inner, np.geomspace(1.7 * inner[-1], 0.5 * full, 3)])
 
     def add(self, column: Array) -> int:
         """Puts a stacked column into the pool; its index."""
@@ -185,7 +231,8 @@ def displacement_imposed(data: GapData) -> bool:
     """
     if data.imposed is not None:
         return data.imposed == "displacement"
-    if data.arm or len(data.force) < 20 or not np.ptp(data.displacement) > 0:
+    still = not (np.ptp(data.displacement) > 0 and np.ptp(data.force) > 0)
+    if data.arm or len(data.force) < 20 or still:
         return False
     from identification.gap.rows import hold_ids, is_continuous
 

@@ -24,6 +24,7 @@ LINEAR = frozenset(
         "joint_stiffness_error",
     ]
 )
+LEAST_IMPERFECTION = 0.01
 _SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
 
 
@@ -156,7 +157,10 @@ def _log_level(etas: Array, i: int, energy: Array) -> Array:
         upper = np.inf if i == len(etas) - 1 else np.log(_edge(etas, i))
         lower = -np.inf if i == 0 else np.log(_edge(etas, i - 1))
     p = ndtr((upper - centre) / _SPREAD) - ndtr((lower - centre) / _SPREAD)
-    return np.asarray(np.log(np.maximum(p, 1e-12)))
+    # no mechanism of a real rig follows a formula closer than that
+    floor = LEAST_IMPERFECTION / IMPERFECTION * np.exp(centre)
+    short = np.log(np.maximum(floor, 1e-300)) - (np.log(_edge(etas, i)) if upper < np.inf else 1e9)
+    return np.asarray(np.log(np.maximum(p, 1e-12)) - 300.0 * np.maximum(short, 0.0))
 
 
 def _edge(etas: Array, i: int) -> float:

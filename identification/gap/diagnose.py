@@ -81,7 +81,7 @@ def diagnose_gap(
     variants = library(bench, [w for w in WORDS if w not in out])
     tell("comparing effects", 0.2)
     engine = Engine(bench, base, target, eta_levels(bench, base, target))
-    found = search(bench, base, engine, variants)
+    found = search(engine, variants)
     tell("withheld data", 0.7)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     chosen = _chosen(found, verdict, forced)
@@ -227,7 +227,7 @@ def _notes(bench: Bench) -> tuple[str, ...]:
     data, rows, out = bench.data, bench.rows, list(bench.data.notes)
     if not np.ptp(bench.load) > 0:
         out.append("The load does not change: nothing can be said of stiffness or of joints.")
-    if not np.any(np.diff(np.abs(bench.load)) < -0.2 * np.ptp(bench.load)):
+    if not bench.unloads:
         out.append("Nothing was unloaded: lasting and elastic deflection look alike.")
     if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
         out.append("One repetition: what repeats and what does not can't be told apart.")

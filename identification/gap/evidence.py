@@ -21,6 +21,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 
 HOLD_PART, ROW_PART = 0.6, 0.3
+CONTINUOUS_ROW_PART = 0.3  # neighbouring rows of a running recording err alike
 _NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
 _LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
@@ -62,6 +63,7 @@ class Engine:
         )
         self.sigma = row_noise(bench)
         self.cache: dict[object, Array] = {}
+        self.structural = structural_rms(bench, base, target)
         self.level_columns = _level_columns(bench)
         self._split()
         self.levels = [self._level(float(eta)) for eta in etas]
@@ -106,7 +108,8 @@ class Engine:
         hold = noise.hold[edges] ** 2 + (HOLD_PART * eta) ** 2
         extra_u = 1 + hold * self._length_u**2
         extra_q = 1 + (eta / _LEVER_M) ** 2 * self._length_q**2 if self.bench.data.arm else 1.0
-        factor = 1 + (ROW_PART * eta / self._contrast_noise) ** 2
+        part = ROW_PART if not self.bench.rows.continuous else CONTINUOUS_ROW_PART
+        factor = 1 + (part * eta / self._contrast_noise) ** 2
         gram = self._fixed + self._mean_u.T @ (self._mean_u / extra_u[:, None])
         if self._length_q.size:
             gram = gram + self._mean_q.T @ (self._mean_q / np.asarray(extra_q)[:, None])
@@ -149,14 +152,21 @@ class Engine:
 def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
     """0, then sizes of imperfection by factors of about 2.5, from half the stated uncertainty to
     the size of what the base leaves."""
+    start = 0.5 * bench.noise.stated
+    left = structural_rms(bench, base, target)
+    count = max(3, int(np.ceil(np.log(max(1.5 * left / start, 1.0)) / np.log(2.5))) + 1)
+    return np.concatenate([[0.0], start * 2.5 ** np.arange(count)])
+
+
+def structural_rms(bench: Bench, base: Base, target: Array) -> float:
+    """rms (m) of the response that the base alone leaves at its best."""
     n, sigma = bench.rows.n, row_noise(bench)
     A = np.vstack([base.columns / sigma[:, None], np.diag(1 / base.sd)])
     b = np.concatenate([target / sigma, np.zeros(len(base.sd))])
     beta = np.linalg.lstsq(A, b, rcond=None)[0]
-    left = float(np.sqrt(np.mean((target - base.columns @ beta)[:n] ** 2)))
-    start = 0.5 * bench.noise.stated
-    count = max(3, int(np.ceil(np.log(max(1.5 * left / start, 1.0)) / np.log(2.5))) + 1)
-    return np.concatenate([[0.0], start * 2.5 ** np.arange(count)])
+    weight = bench.rows.weight
+    left = (target - base.columns @ beta)[:n]
+    return float(np.sqrt(weight @ left**2 / weight.sum()))
 
 
 def row_noise(bench: Bench) -> Array:

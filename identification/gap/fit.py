@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import Array, Flags
-from identification.gap.evidence import HOLD_PART, ROW_PART, Engine, level_covariance
+from identification.gap.evidence import HOLD_PART, ROW_PART, Engine
 from identification.gap.search import Explanation, Part, block
 
 _LEVER_M = 0.3
+_WIDER = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """effects: coefficients (k,) and covariance (k, k) of the parts' columns, one after the other.
 
-    response (n,): fitted response beyond the prior simulation; effect (n,): the effects' part;
-    remainder (n,): the repeatable imperfection that the data ask for beside them.
+    response (n,): fitted response beyond the prior simulation; effect (n,): the effects' part.
     """
 
     parts: tuple[Part, ...]
@@ -27,7 +27,6 @@ class Fit:
     covariance: Array
     response: Array
     effect: Array
-    remainder: Array
 
     def of(self, index: int) -> tuple[Array, Array]:
         """Coefficients and covariance of one part."""
@@ -48,29 +47,25 @@ def fit(engine: Engine, explanation: Explanation, keep: Flags | None = None) -> 
     keep = np.ones(bench.layout.size, dtype=bool) if keep is None else keep
     columns = [c for p in explanation.parts for c in p.variant.columns]
     E = engine.pool[:, columns]
-    roots = [np.diag(engine.base.sd)]
-    levels = np.zeros((bench.layout.size, 0))
-    if explanation.eta > 0:
-        levels = engine.level_columns
-        roots.append(explanation.eta * np.linalg.cholesky(level_covariance(bench)))
-    roots += [p.root for p in explanation.parts]
-    X = np.column_stack([engine.base.columns, levels, E])
+    # The imperfection counts as noise here and may not take over what the effects can give;
+    # priors are widened, since this is a fit and no comparison any more.
+    roots = [np.diag(engine.base.sd), *[_WIDER * p.root for p in explanation.parts]]
+    X = np.column_stack([engine.base.columns, E])
     root = block(roots)
     gram, moment = _normal(engine, X @ root, explanation.eta, keep)
     precision = gram + np.eye(len(gram))
     covariance = root @ np.linalg.solve(precision, root.T)
     beta = root @ np.linalg.solve(precision, moment)
-    kb, kl = engine.base.columns.shape[1], levels.shape[1]
-    w = beta[kb + kl :]
+    kb = engine.base.columns.shape[1]
+    w = beta[kb:]
     effect = (E @ w)[:n]
     return Fit(
         parts=explanation.parts,
         base=beta[:kb],
         coefficients=w,
-        covariance=covariance[kb + kl :, kb + kl :],
+        covariance=covariance[kb:, kb:],
         response=(engine.base.columns @ beta[:kb])[:n] + effect,
         effect=effect,
-        remainder=(levels @ beta[kb : kb + kl])[:n],
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.gap.data import ZERO, Array, Flags, GapData, Ints
 
-CONTINUOUS_ROWS = 1500  # bins of a continuous recording; more tells no effect from another
+CONTINUOUS_ROWS = 500  # bins of a continuous recording; more tells no effect from another
 _RUNNING_SHARE = 0.5  # a "hold" through which the force runs by half its range is none
 _LEVELS = 12  # force classes of a continuous recording, per sense of motion
 
@@ -26,8 +26,9 @@ class Rows:
     repetition to repetition shares a level. session (n,) s is always there: `clock` says whether
     it was recorded. force: of a hold whose samples scatter by no more than their noise, the mean
     of the hold in all its rows (its noise would else pass for a small friction or a lag);
-    measured_force: as it is. steady (n,): such holds. hold_weight (n,): samples of the row's hold;
-    force_scatter, displacement_scatter (n,): mean squares of the samples about their row, N^2, m^2.
+    measured_force: as it is. steady (n,): such holds. hold_weight (n,): samples of the
+    row's hold; force_scatter, displacement_scatter (n,): mean squares of the samples about their
+    row, N^2 and m^2.
     """
 
     time: Array
@@ -75,7 +76,16 @@ def reduce_rows(data: GapData) -> Rows:
         return np.asarray(sums / (count if values.ndim == 1 else count[:, None]))
 
     def scatter(values: Array) -> Array:
-        return np.maximum(mean(values**2) - mean(values) ** 2, 0.0)
+        """Mean square about the row; of a running recording, about the line in it."""
+        u = values - values.mean()
+        square = np.maximum(mean(u**2) - mean(u) ** 2, 0.0)
+        if not continuous:
+            return square
+        other = data.displacement if values is data.force else data.force
+        x = other - other.mean()
+        var = mean(x**2) - mean(x) ** 2
+        slope = np.where(var > 0, (mean(x * u) - mean(x) * mean(u)) / np.maximum(var, 1e-300), 0.0)
+        return np.maximum(square - slope**2 * var, 0.0)
 
     def first(values: Ints) -> Ints:
         return values[edges]
@@ -83,11 +93,11 @@ def reduce_rows(data: GapData) -> Rows:
     run, setup, branch, step = map(first, (data.run, data.setup, data.branch, data.step))
     force = mean(data.force)
     level = (
-        _continuous_levels(setup, run, force)
+        _continuous_levels(setup, force)
         if continuous
         else _ids(np.column_stack([setup, branch, step]))
     )
-    holds = np.arange(len(edges), dtype=np.int64) if continuous else _consecutive(hold[edges])
+    holds = _blocks(run) if continuous else _consecutive(hold[edges])
     zero = (branch == ZERO) & (step <= 0)
     weight = count.astype(float)
     steady, mean_force, hold_weight = _steady(holds, force, weight, data.instruments.force)
@@ -96,8 +106,8 @@ def reduce_rows(data: GapData) -> Rows:
         time=mean(data.time), session=session, clock=data.session is not None, run=run, setup=setup,
         repetition=first(data.repetition), branch=branch, step=step, hold=holds, level=level,
         weight=weight, force=np.where(steady, mean_force, force), measured_force=force, steady=steady,
-        hold_weight=hold_weight, force_scatter=scatter(data.force - data.force.mean()),
-        displacement_scatter=scatter(data.displacement - data.displacement.mean()), displacement=mean(data.displacement),
+        hold_weight=hold_weight, force_scatter=scatter(data.force),
+        displacement_scatter=scatter(data.displacement), displacement=mean(data.displacement),
         tangential=None if data.tangential is None else mean(data.tangential),
         q=None if data.q is None else mean(data.q),
         temperature=None if data.temperature is None else mean(data.temperature),
@@ -165,7 +175,18 @@ def _continuous_edges(data: GapData) -> Ints:
     return np.flatnonzero(new).astype(np.int64)
 
 
-def _continuous_levels(setup: Ints, run: Ints, force: Array) -> Ints:
+def _blocks(run: Ints) -> Ints:
+    """Stretches of a continuous recording over which a model's imperfection stays alike:
+    fifty, since a smooth curve makes no more independent mistakes than that."""
+    length = max(1, -(-len(run) // _STRETCHES))
+    new = (np.arange(len(run)) % length == 0) | _changes(run)
+    return (np.cumsum(new) - 1).astype(np.int64)
+
+
+_STRETCHES = 50
+
+
+def _continuous_levels(setup: Ints, force: Array) -> Ints:
     rising = np.gradient(force) >= 0 if len(force) > 1 else np.zeros(len(force), dtype=bool)
     span = np.ptp(force) or 1.0
     number = np.minimum((force - force.min()) / span * _LEVELS, _LEVELS - 1).astype(np.int64)

@@ -1,7 +1,7 @@
 """Explanations: none, single effects, pairs, more; their posterior and the verdict.
 
 Prior odds: a rig whose simulation misses nothing is as likely as one effect; a second effect has
-odds 1:5, a third again 1:5. Within a count all words (or sets of words) are equally likely.
+odds 1:20, a third again 1:20. Within a count all words (or sets of words) are equally likely.
 """
 
 from __future__ import annotations
@@ -11,8 +11,6 @@ from math import comb, log
 
 import numpy as np
 
-from identification.gap.base import Base
-from identification.gap.bench import Bench
 from identification.gap.compare import (
     IMPERFECTION,
     LAW_IMPERFECTION,
@@ -30,7 +28,7 @@ from identification.gap.variants import Variant
 
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
 LOG_ONE = log(0.37)
-LOG_MORE = log(0.2)
+LOG_MORE = log(0.05)
 WORD_COUNT = 18
 # An explanation that leaves an imperfection of more than this share of its own size explains the
 # gap no better than a picture of it: nine tenths of the variance are wanted.
@@ -51,6 +49,9 @@ MECHANISMS = frozenset(
     ]
 )
 FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
+# Neighbouring points of one smooth run are no independent witnesses of its law.
+TEMPER = 0.25
+SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 _PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
@@ -111,9 +112,7 @@ def prior_of(count: int) -> float:
     return LOG_ONE + (count - 1) * LOG_MORE - log(comb(WORD_COUNT, count))
 
 
-def search(
-    bench: Bench, base: Base, engine: Engine, variants: list[Variant], deepest: int = 3
-) -> Found:
+def search(engine: Engine, variants: list[Variant], deepest: int = 3) -> Found:
     """All single effects, then sets around the best ones, each re-fitted jointly."""
     levels = engine.levels
     singles = score(engine, levels, variants)
@@ -127,7 +126,7 @@ def search(
     none = log_mean([levels[0].log_base, levels[1].log_base], [0.95, 0.05])
     empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
-    front = _seeds(engine, pool)
+    front = _seeds(pool)
     for depth in range(2, deepest + 1):
         front = _deepen(engine, variants, pool, front, depth)
         if not front:
@@ -135,7 +134,7 @@ def search(
     return _conclude(engine, pool, alone, none)
 
 
-def _seeds(engine: Engine, pool: dict[frozenset[str], Explanation]) -> list[Explanation]:
+def _seeds(pool: dict[frozenset[str], Explanation]) -> list[Explanation]:
     """Where to look for a second effect: around all good ones; where the best explains the data
     down to the noise, around those within reach of it."""
     ranked = sorted((e for e in pool.values() if e.parts), key=lambda e: -e.log_weight)
@@ -275,6 +274,26 @@ def _beyond_springs(engine: Engine, moved: Array) -> float:
     return max(left, beyond * float(np.sqrt(np.sum((moved * root) ** 2))))
 
 
+def _signs(level: Level, parts: tuple[Part, ...]) -> float:
+    """log of the odds that every part keeps the sign physics wants, all fitted together."""
+    from scipy.special import log_ndtr
+
+    columns = [c for p in parts for c in p.variant.columns]
+    root = block([p.root for p in parts])
+    precision = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
+    covariance = root @ np.linalg.solve(precision, root.T)
+    w = root @ np.linalg.solve(precision, root.T @ level.moment[columns])
+    out, start = 0.0, 0
+    for p in parts:
+        s = slice(start, start + len(p.variant.columns))
+        start = s.stop
+        if p.variant.positive is not None:
+            f = p.variant.positive
+            spread = float(np.sqrt(f @ covariance[s, s] @ f)) + 1e-300
+            out += min(0.0, float(log_ndtr(float(f @ w[s]) / spread)) - log(0.5))
+    return out
+
+
 def block(roots: list[Array]) -> Array:
     """The roots along the diagonal."""
     size = sum(r.shape[0] for r in roots)
@@ -295,8 +314,10 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     each, energy = part_sizes(engine, parts, int(bases.argmax()))
     logs = bases + [level_prior(engine, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
-    bare = max(engine.levels, key=lambda lv: lv.log_base).eta
-    least = max(0.6 * engine.bench.noise.stated, REMAINDER * max(bare, float(np.linalg.norm(each))))
+    least = max(
+        0.6 * engine.bench.noise.stated,
+        REMAINDER * max(engine.structural, float(np.linalg.norm(each))),
+    )
     good = np.array([lv.eta <= least for lv in levels])
     share = np.exp(logs - logs.max())
     fraction = float(share[good].sum() / share.sum())
@@ -304,6 +325,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     weight = log_evidence + prior_of(len(parts))
     if len(parts) > 1:
         weight -= _pettiness(engine, parts, each)
+        weight += _signs(levels[best], parts)
     return Explanation(
         tuple(parts[i] for i in order),
         weight,
@@ -328,28 +350,40 @@ def _pettiness(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
     penalty = 0.0
     for i, p in enumerate(parts):
         for k, other in enumerate(parts):
+            if i < k and _same_element(engine, p, other):
+                penalty += 1e4
             # a small knee beside a large error of the springs is no freedom of the latter
             if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
                 continue
             akin = p.word in MECHANISMS and other.word in MECHANISMS
+            if akin and _joints(p) & _joints(other):
+                penalty += SAME_JOINT
             share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
             least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
             penalty += 60.0 * max(0.0, float(np.log(least / share)))
-            if _same_element(engine, p, other):
-                penalty += 1e3
     return penalty
 
 
 def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     """Both are friction of one joint, or would be, for all that the data show; or one is the
     linear part of the other: a mechanism's law brings its own mean stiffness."""
-    same = one.variant.info.get("joint") == other.variant.info.get("joint")
+    same = bool(_joints(one) & _joints(other))
     words = {one.word, other.word}
+    if engine.bench.once and words <= MECHANISMS:
+        return True
+    if not engine.bench.data.arm and words & LINEAR and words & MECHANISMS:
+        return True
     if "joint_stiffness_error" in words and words & MECHANISMS:
         return same or not engine.bench.has_q
     if not words <= FRICTION:
         return False
     return same or not engine.bench.has_q
+
+
+def _joints(part: Part) -> set[int]:
+    """Joints that the part sits in."""
+    info = part.variant.info
+    return set(info["joints"]) if "joints" in info else {info.get("joint", -1)}
 
 
 def _conclude(
@@ -372,6 +406,8 @@ def _conclude(
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         mass[e.parts[0].word if e.parts else "none"] += good
         mass["unknown"] += whole - good
+    if engine.bench.rows.continuous and ranked[0].eta > 0:
+        mass = {w: m**TEMPER for w, m in mass.items()}
     total = sum(mass.values())
     probabilities = {w: m / total for w, m in mass.items()}
     return Found(

@@ -19,6 +19,11 @@ def warm_ups(bench: Bench) -> dict[str, Array]:
     return out
 
 
+def has_runs(bench: Bench) -> bool:
+    """At least three runs: within one, a free path in time is a free curve of the load."""
+    return len(np.unique(bench.rows.run)) >= 3
+
+
 def free_path(bench: Bench) -> Array:
     """Hat functions (n, PIECES) over the session; with correlated coefficients a smooth path."""
     t = (bench.rows.session - bench.rows.session.min()) / bench.session_span

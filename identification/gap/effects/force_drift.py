@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.drift import PIECES, free_path, path_root, warm_ups
+from identification.gap.effects.drift import PIECES, free_path, has_runs, path_root, warm_ups
 from identification.gap.variants import Variant, variant
 
 WORD = "force_drift"
@@ -34,6 +34,8 @@ def variants(bench: Bench) -> list[Variant]:
         variant(WORD, label, [column(path)], scales, positive=False, path=label)
         for label, path in warm_ups(bench).items()
     ]
+    if not has_runs(bench):
+        return out
     hats = free_path(bench)
     columns = [column(hats[:, k]) for k in range(PIECES)]
     out.append(variant(WORD, "free path", columns, scales, path_root(), positive=False, prior=2.0,

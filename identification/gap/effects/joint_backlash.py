@@ -30,7 +30,7 @@ def variants(bench: Bench) -> list[Variant]:
     scales = SCALES if bench.data.arm else tuple(s * bench.reach for s in _SHARES)
     for j in bench.moving_joints():
         torque, g = bench.torque[:, j], weight[:, j]
-        span = float(np.ptp(np.append(torque, 0.0)))
+        span = bench.reach_of(torque)
         if not span > 0:
             continue
         # a joint that its weight preloads beyond the load never crosses zero

@@ -20,7 +20,9 @@ from identification.gap.variants import Variant, smooth_root, variant
 WORD = "joint_hysteresis"
 RADII = (0.012, 0.03, 0.07, 0.13, 0.22, 0.35, 0.55, 0.85)  # of the joint's range of torque
 REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
-SCALES = (0.015, 0.05, 0.15, 0.5)
+# Without unloading no loop is seen: what then bends at a large load is a knee, not friction.
+_SMALL = 4
+SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -31,7 +33,7 @@ def variants(bench: Bench) -> list[Variant]:
         memories[" rested"] = (bench.moved | bench.rest, False)
     out = []
     for j in bench.moving_joints():
-        span = float(np.ptp(np.append(bench.torque[:, j], 0.0)))
+        span = bench.reach_of(bench.torque[:, j])
         if not span > 0:
             continue
         for memory, (fresh, worked) in memories.items():
@@ -47,7 +49,8 @@ def _spectrum(
 ) -> list[Variant]:
     """The whole spectrum of strengths, and each strength with its neighbour."""
     torque, c = bench.torque[:, joint], bench.compliance[joint]
-    radius = span * np.array(RADII)
+    radius = span * np.array(RADII if bench.unloads else RADII[:_SMALL])
+    radius = bench.radii(torque, radius) if bench.unloads else radius
     if path is None:
         states = bench.plays(torque, radius, fresh)
     else:
@@ -62,7 +65,7 @@ def _spectrum(
                    radius=radius)]  # fmt: skip
     for k in range(len(columns) - 1):
         out.append(
-            variant(WORD, f"{name} r {RADII[k]}", columns[k : k + 2], SCALES, smooth_root(2, 0.7),
+            variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES, smooth_root(2, 0.7),
                     prior=0.25 / (len(columns) - 1), joint=joint, radius=radius[k : k + 2])
         )  # fmt: skip
     return out
@@ -73,7 +76,7 @@ def _exponential(
 ) -> list[Variant]:
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches."""
     torque, c = bench.torque[:, joint], bench.compliance[joint]
-    reach = span * np.array(REACHES)
+    reach = span * np.array(REACHES if bench.unloads else REACHES[:2])
     out = []
     for law in ("Dahl", "Bouc-Wen"):
         if path is None:

@@ -23,6 +23,7 @@ WORD = "joint_yield"
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 # A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
 _LIKELY = {"": 1.0, " lasting": 0.5, " taken back": 0.3}
+_HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 _FIRST = 2  # lower ones only round off the knees above them
 # Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
 # Bauschinger's effect: after a reversal metal yields earlier than at first.
@@ -59,7 +60,10 @@ def knee_variants(
     top = float(np.abs(load).max())
     if not top > 0:
         return []
-    radius = top * np.array(THRESHOLDS)
+    top *= bench.reach_of(load) / float(np.ptp(np.append(load, 0.0)))
+    if not top > 0:
+        return []
+    radius = bench.radii(load, top * np.array(THRESHOLDS))
     out = []
     for memory, fresh in _memories(bench).items():
         states = bench.plays(load, radius, fresh)
@@ -68,10 +72,12 @@ def knee_variants(
             columns = [column(moved[:, k]) for k in range(len(radius))]
             label = f"{name}{memory}{f' flow {flow:g} s' if flow else ''}"
             share = (0.7 if flow == 0 else 0.3 / len(FLOW_S)) / len(radius) * _LIKELY[memory]
-            for k in range(_FIRST, len(radius)):
+            extra = list(range(len(THRESHOLDS), len(radius)))
+            for k in range(_FIRST, len(THRESHOLDS)):
                 for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
-                    place = [k + d for d in steps if 0 <= k + d < len(radius)]
-                    kept = [w for d, w in steps.items() if 0 <= k + d < len(radius)]
+                    inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
+                    place = [*inside, *extra]
+                    kept = [*inside.values(), *[_HARDENS] * len(extra)]
                     chosen = [columns[i] for i in place]
                     out.append(
                         variant(word, f"{label} at {THRESHOLDS[k]:g} {knee}", chosen, SCALES,

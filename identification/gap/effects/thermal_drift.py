@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.drift import PIECES, free_path, path_root, warm_ups
+from identification.gap.effects.drift import PIECES, free_path, has_runs, path_root, warm_ups
 from identification.gap.variants import Variant, variant
 
 WORD = "thermal_drift"
@@ -29,6 +29,8 @@ def variants(bench: Bench) -> list[Variant]:
     for label, path in {**warm_ups(bench), **_temperatures(bench)}.items():
         columns = [bench.add(bench.stacked(m * path)) for m in masks]
         out.append(variant(WORD, label, columns, scales, positive=False, path=label))
+    if not has_runs(bench):
+        return out
     hats = free_path(bench)
     columns = [bench.add(bench.stacked(m * hats[:, k])) for m in masks for k in range(PIECES)]
     root = np.kron(np.eye(len(masks)), path_root())

@@ -21,17 +21,18 @@ def variants(bench: Bench) -> list[Variant]:
     """Lags of laser or force, as delays and as filters; coefficient 1 is the lag itself."""
     sample = 2 * half_sample(bench.rows) if not bench.rows.continuous else _typical_step(bench)
     out = []
-    rest = rests(bench.rows)
+    rest, line = rests(bench.rows), bench.line
     for multiple in LAGS:
         lag = multiple * sample
-        late = delayed(bench.load, lag, bench.rows) - bench.load
-        slow = retarded(bench.load[:, None], np.array([lag]), bench.rows, rest)[:, 0] - bench.load
+        late = delayed(line, lag, bench.rows) - line
+        slow = retarded(line[:, None], np.array([lag]), bench.rows, rest)[:, 0] - line
         for kind, change in (("delay", late), ("filter", slow)):
             if not np.any(change):
                 continue
             info = {"lag_s": lag, "kind": kind}
-            laser = bench.add(bench.stacked(bench.sense * bench.slope * change))
-            force = bench.add(bench.force_column(-bench.sense * change))
+            stiff = np.where(bench.slope > 0, change / bench.slope, 0.0)
+            laser = bench.add(bench.stacked(bench.sense * change))
+            force = bench.add(bench.force_column(-bench.sense * stiff))
             for channel, column in (("displacement", laser), ("force", force)):
                 out.append(
                     variant(WORD, f"{channel} {kind} {lag:.3g} s", [column], (0.5, 1.0),
