@@ -134,7 +134,7 @@ class World:
         self.advance_m = 0.0
         self.target_m = 0.0
         self._relative, self._seating_m = 0.0, 0.0
-        self._unloaded_s = math.inf
+        self._unloaded_s = self._peak_N = math.inf
         self._force = 0.0
         self._compliance = 1.0 / SCREW_STIFFNESS_N_PER_M
         self._aim()
@@ -195,6 +195,7 @@ class World:
         self.state = self._take(force, dt)
         if force > 0:
             self._unloaded_s = 0.0
+            self._peak_N = max(self._peak_N, force)
             rise = force - before.force_N
             if abs(rise) > 1e-6:
                 moved = self.state.displacement_m - before.displacement_m
@@ -221,11 +222,14 @@ class World:
                 law.retake(dt)
 
     def _redraw_at_contact(self, reach: float) -> None:
-        if self._unloaded_s >= NEW_CONTACT_AFTER_S and reach > self.state.displacement_m:
+        # A touch that never carried load seats nothing: how often the hand feels for the arm must
+        # not decide which scatter a loading gets.
+        parted = self._unloaded_s >= NEW_CONTACT_AFTER_S and self._peak_N > SEATING_FORCE_N
+        if parted and reach > self.state.displacement_m:
             draw = self._scatter.standard_normal(2)
             self._relative = float(self.design.scatter_relative * draw[0])
             self._seating_m = float(self.design.scatter_m * draw[1])
-            self._unloaded_s = 0.0
+            self._unloaded_s = self._peak_N = 0.0
 
     def _displacement(self, force: float, dt: float) -> float:
         total = 0.0

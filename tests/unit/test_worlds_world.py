@@ -336,3 +336,23 @@ def test_worlds_load_nothing_of_the_identification() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_feeling_for_the_arm_does_not_change_the_scatter_of_a_loading() -> None:
+    def curve(touches: int) -> float:
+        world = make_world("linear", seed=5)
+        world.mount((1.0, 0.0, 0.0))
+        for _ in range(touches):
+            world.impose(1.0, 0.1)
+            for _ in range(20):
+                world.impose(0.0, 0.1)
+        world.impose(50.0, 60.0)
+        return world.state.displacement_m
+
+    assert curve(0) == curve(1) == curve(3)
+    again = make_world("linear", seed=5)
+    again.mount((1.0, 0.0, 0.0))
+    first = again.impose(50.0, 60.0).displacement_m
+    for _ in range(20):
+        again.impose(0.0, 0.1)
+    assert again.impose(50.0, 60.0).displacement_m != first, "another loading, another scatter"
