@@ -39,7 +39,8 @@ class Bench:
     compliance along the direction. sense: +1 where the force is imposed and the effect adds
     displacement; -1 where the displacement is imposed and the same effect takes force away.
     reach m: largest simulated or measured response, the natural unit of what has no other.
-    scatter (n,) m^2: mean square of the samples about their row. columns: the pool, filled by the effects.
+    scatter (n,) m^2: mean square of the samples about their row.
+    columns: the pool, filled by the effects.
     """
 
     data: GapData
@@ -64,7 +65,7 @@ class Bench:
     def has_q(self) -> bool:
         """Joint readings are there and contain the joints' deflection."""
         q = self.layout.q
-        return q.stop > q.start
+        return bool(q.stop > q.start)
 
     @property
     def unloads(self) -> bool:
@@ -142,7 +143,7 @@ class Bench:
         return out
 
     def joint_column(self, joint: int, deflection: Array) -> Array:
-        """What a deflection (n,) rad of one joint does: the laser and that joint's reading see it."""
+        """What a deflection (n,) rad of one joint does to the laser and to that joint's reading."""
         q = np.zeros((self.rows.n, self.data.joints))
         q[:, joint] = deflection
         return self.stacked(self.lever[:, joint] * deflection, q)
@@ -208,7 +209,8 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     return Bench(
         data=data, rows=rows, layout=layout, noise=estimate_noise(data, rows, stated, imposed),
         imposed=imposed, sense=-1.0 if imposed else 1.0, compliance=c, load=load, response=response,
-        torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, scatter=scatter, observed=observed,
+        torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, scatter=scatter,
+        observed=observed,
     )  # fmt: skip
 
 

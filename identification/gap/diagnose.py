@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
-from identification.gap.data import Array, GapData
+from identification.gap.data import Array, GapData, Ints
 from identification.gap.discriminate import NextMeasurement, next_measurement
 from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
@@ -17,7 +17,7 @@ from identification.gap.fit import Fit, fit
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.locate import Where, locate
 from identification.gap.parameters import Parameter, parameters
-from identification.gap.search import Explanation, Found, search
+from identification.gap.search import Explanation, Found, refine_knees, search
 
 ALIKE = 3.0  # nats within which two words explain data equally well (odds of 20 to 1)
 Progress = Callable[[str, float], None]
@@ -80,7 +80,12 @@ def diagnose_gap(
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])
     tell("comparing effects", 0.2)
-    engine = Engine(bench, base, target, eta_levels(bench, base, target))
+    etas = eta_levels(bench, base, target)
+    engine = Engine(bench, base, target, etas)
+    finer = refine_knees(engine, variants)
+    if finer:
+        variants += finer
+        engine = Engine(bench, base, target, etas)
     found = search(engine, variants)
     tell("withheld data", 0.7)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
@@ -182,7 +187,7 @@ def _alike(found: Found, chosen: Explanation, word: str) -> tuple[str, ...]:
 
 
 def _runners_up(
-    engine: Engine, found: Found, verdict: str, ways: dict[str, Array]
+    engine: Engine, found: Found, verdict: str, ways: dict[str, Ints]
 ) -> dict[str, float]:
     """The three best explanations by one other word: withheld rms on the main fold."""
     if not ways or verdict == "none":

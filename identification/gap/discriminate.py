@@ -90,7 +90,7 @@ def _joint_or_not(words: set[str]) -> bool:
 _PROCEDURES: tuple[tuple[str, Callable[[set[str]], bool], Callable[[Bench], bool], str], ...] = (
     ("readings", _joint_or_not, _no_q,
      "Record the joint positions (output encoders) during the same procedure: what happens in a "
-     "joint shows in its reading, what happens in the base, the links or the instruments does not."),
+     "joint shows in its reading, what happens in the base, the links or instruments does not."),
     ("unload", _across(_LASTING, _REVERSIBLE), _no_unloading,
      "Unload in the same steps and hold at zero load after every run: what comes back is elastic, "
      "what stays is yield or slip."),

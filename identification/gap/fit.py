@@ -1,4 +1,4 @@
-"""Most probable coefficients of base and chosen effects, with covariance; also on part of the rows."""
+"""Most probable coefficients of base and chosen effects, with covariance; on some rows or all."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def fit(engine: Engine, explanation: Explanation, keep: Flags | None = None) -> 
 
 
 def _normal(engine: Engine, X: Array, eta: float, keep: Flags) -> tuple[Array, Array]:
-    """`X' V^-1 X` and `X' V^-1 y` over the rows kept; V: noise of rows and common noise of holds."""
+    """`X' V^-1 X` and `X' V^-1 y` over the rows kept; V: noise of rows, and common to holds."""
     key, common = _holds(engine, eta)
     sigma2 = engine.sigma**2
     n = engine.bench.rows.n

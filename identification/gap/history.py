@@ -7,6 +7,7 @@ both neighbours stay far from it (one continuous recording cut into runs).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -76,8 +77,8 @@ def worked_in(load: Array, fresh: Flags) -> Path:
 def bristles(load: Array, reach: Array, fresh: Flags, elastic: bool) -> Array:
     """State z in [-1, 1] of a friction whose bristles bend over `reach` (k,), (n, k).
 
-    `dz = (s - z) s dx / r` with s the sense of motion (Dahl); elastic: while z opposes the motion it
-    falls linearly, `dz = dx / r` (Bouc-Wen with beta = gamma). Exact between rows.
+    `dz = (s - z) s dx / r` with s the sense of motion (Dahl); elastic: while z opposes the motion
+    it falls linearly, `dz = dx / r` (Bouc-Wen with beta = gamma). Exact between rows.
     """
     out = np.empty((len(load), len(reach)))
     z = np.zeros(len(reach))
@@ -144,7 +145,7 @@ def delayed(values: Array, delay: float, rows: Rows) -> Array:
     out = np.empty_like(values)
     half = half_sample(rows)
     edges = np.append(np.flatnonzero(rows.starts), rows.n)
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         t, v = rows.time[a:b], values[a:b]
         if not rows.continuous:
             new = rows.hold_starts[a:b]

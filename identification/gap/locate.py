@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.compare import LINEAR, moved_response
-from identification.gap.data import BRANCH_NAMES, Array, Flags
+from identification.gap.data import BRANCH_NAMES, Array, Flags, Ints
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit
 
@@ -74,13 +74,14 @@ def _visible(engine: Engine, fit: Fit, main: Array) -> Array:
     return out
 
 
-def _size_per(number: Array, values: Array, count: int) -> Array:
+def _size_per(number: Ints, values: Array, count: int) -> Array:
     squares = np.bincount(number, weights=values**2, minlength=count)
     return np.asarray(np.sqrt(squares / np.maximum(np.bincount(number, minlength=count), 1)))
 
 
 def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
-    bench, out = engine.bench, {}
+    bench = engine.bench
+    out: dict[str, tuple[float, float]] = {}
     for s, setup in enumerate(bench.data.setups):
         force = bench.rows.force[rows & (bench.rows.setup == s)]
         if force.size:

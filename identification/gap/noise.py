@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import Array, GapData
+from identification.gap.data import Array, GapData, Ints
 from identification.gap.rows import Rows, hold_ids
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
@@ -21,8 +21,7 @@ _ENOUGH = 30  # second differences: then their scatter is known to about an eigh
 @dataclass(frozen=True, eq=False)
 class Noise:
     """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
-    already in `response`; hold (n,), run: common to a hold, to a run, m; force N and stated m: of one
-    sample."""
+    already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of a sample."""
 
     response: Array
     q: Array
@@ -37,7 +36,8 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     meter = data.instruments
     fallback = np.hypot(meter.displacement, slope * meter.force)
     hold = hold_ids(data)
-    common = np.where(rows.steady, slope * meter.force / np.sqrt(rows.hold_weight), 0.0)
+    steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
+    common = np.where(rows.steady, steep * meter.force / np.sqrt(rows.hold_weight), 0.0)
     if rows.continuous:
         per_sample, common = fallback, np.zeros(rows.n)
     else:
@@ -56,7 +56,26 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     )  # fmt: skip
 
 
-def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Array) -> Array:
+def tangent(rows: Rows, force_sd: float) -> Array:
+    """(n,) m/N: how steep the measured curve is at a row's hold, the steeper side counting.
+
+    Where a joint yields, the force hardly rises while the displacement runs: there an error of the
+    force, multiplied by this slope, is an error of the displacement. Steps of force below three
+    standard deviations count as that much.
+    """
+    start = np.flatnonzero(rows.hold_starts)
+    f = np.add.reduceat(rows.weight * rows.measured_force, start)
+    u = np.add.reduceat(rows.weight * rows.displacement, start)
+    total = np.add.reduceat(rows.weight, start)
+    f, u, run = f / total, u / total, rows.run[start]
+    least = 3 * force_sd
+    step = np.abs(np.diff(u)) / np.maximum(np.abs(np.diff(f)), least)
+    step[(run[1:] != run[:-1]) | (np.abs(np.diff(f)) < least)] = 0.0
+    sides = np.concatenate([[0.0], step]), np.concatenate([step, [0.0]])
+    return np.asarray(np.maximum(*sides)[rows.hold])
+
+
+def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Ints) -> Array:
     """Noise of one sample in every row (n,): measured where holds are long enough, else `alone`."""
     if float(rows.weight @ rows.steady) < 0.5 * float(rows.weight.sum()):
         measured = _scatter(data.displacement - float(np.median(slope)) * data.force, hold)
@@ -69,7 +88,7 @@ def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Array) -
     return np.where(rows.steady, white, np.hypot(white, slope * data.instruments.force))
 
 
-def _scatter(values: Array, hold: Array) -> float | None:
+def _scatter(values: Array, hold: Ints) -> float | None:
     """Standard deviation of the white part, from second differences within holds, the first
     sample left out (it may lag); trimmed at 5 %, corrected for that (normal noise: 0.8713)."""
     second = values[3:] - 2 * values[2:-1] + values[1:-2] if len(values) > 3 else np.zeros(0)

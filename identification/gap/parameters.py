@@ -29,7 +29,7 @@ def parameters(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Para
 
 def _linear(functional: Array, w: Array, cov: Array, unit: str, scale: float = 1.0) -> Parameter:
     value = float(functional @ w) * scale
-    half = 1.96 * float(np.sqrt(max(functional @ cov @ functional, 0.0))) * abs(scale)
+    half = 1.96 * max(float(functional @ cov @ functional), 0.0) ** 0.5 * abs(scale)
     return Parameter(value, value - half, value + half, unit)
 
 
@@ -48,7 +48,8 @@ def _knee(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter
     total = float(power.sum())
     centre = float(power @ radius / total) if total > 0 else float(info["centre"])
     near = np.sort(np.abs(radius - centre))
-    half = float(near[min(1, len(near) - 1)])  # the grid's neighbours bound it
+    # the grid's neighbours bound it; of the fine grid, one step
+    half = float(near[1]) if len(near) > 1 else 0.017 * centre
     out = {
         "threshold": Parameter(centre, centre - half, centre + half, _torque_unit(bench)),
         "slope_beyond_over_elastic": _linear(np.ones(len(w)), w, cov, "1"),
@@ -67,7 +68,7 @@ def _hysteresis(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Par
     }
 
 
-def _backlash(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _backlash(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Parameter]:
     return {
         "width": _one(w, cov, 0, "rad" if bench.data.arm else "mm", 1.0 if bench.data.arm else 1e3)
     }

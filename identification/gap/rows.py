@@ -105,7 +105,8 @@ def reduce_rows(data: GapData) -> Rows:
     return Rows(
         time=mean(data.time), session=session, clock=data.session is not None, run=run, setup=setup,
         repetition=first(data.repetition), branch=branch, step=step, hold=holds, level=level,
-        weight=weight, force=np.where(steady, mean_force, force), measured_force=force, steady=steady,
+        weight=weight, force=np.where(steady, mean_force, force), measured_force=force,
+        steady=steady,
         hold_weight=hold_weight, force_scatter=scatter(data.force),
         displacement_scatter=scatter(data.displacement), displacement=mean(data.displacement),
         tangential=None if data.tangential is None else mean(data.tangential),
@@ -116,7 +117,7 @@ def reduce_rows(data: GapData) -> Rows:
     )  # fmt: skip
 
 
-# Noise reaches this square sum in one hold of ten thousand (chi squared, 1 to 8 degrees of freedom);
+# Noise reaches this square sum in one hold of ten thousand (chi squared of 1 to 8 degrees);
 # what really moves (a lagging channel, a relaxing screw) goes far beyond it.
 _STEADY_PER_ROW, _STEADY_ONCE = 2.6, 12.5
 
@@ -128,7 +129,7 @@ def _steady(hold: Ints, force: Array, weight: Array, sd: float) -> tuple[Flags, 
     rows = np.bincount(hold)
     square = np.bincount(hold, weights=weight * (force - mean[hold]) ** 2) / sd**2
     steady = square <= _STEADY_PER_ROW * rows + _STEADY_ONCE
-    return steady[hold], mean[hold], total[hold]
+    return steady[hold], mean[hold], total[hold].astype(float)
 
 
 def hold_ids(data: GapData) -> Ints:

@@ -52,6 +52,7 @@ FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 # Neighbouring points of one smooth run are no independent witnesses of its law.
 TEMPER = 0.25
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
+_LEADING = 4  # words among which a knee has to be for its threshold to be refined
 _PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
@@ -132,6 +133,23 @@ def search(engine: Engine, variants: list[Variant], deepest: int = 3) -> Found:
         if not front:
             break
     return _conclude(engine, pool, alone, none)
+
+
+def refine_knees(engine: Engine, variants: list[Variant]) -> list[Variant]:
+    """Finer thresholds for each word with a knee that stands out: thresholds make the evidence
+    piecewise smooth, and the grid of the library may miss a sharp one."""
+    from identification.gap.effects.joint_yield import refined
+
+    by_word = _by_word(score(engine, engine.levels, variants))
+    none = engine.levels[0].log_base
+    ranked = sorted(by_word, key=lambda w: -_marginal(by_word[w]))[:_LEADING]
+    out: list[Variant] = []
+    for word in ("joint_yield", "base_slip"):
+        if word not in ranked or _marginal(by_word[word]) < none + _WINDOW:
+            continue
+        top = max(by_word[word], key=lambda s: s.log_evidence)
+        out += refined(engine.bench, top.variant)
+    return out
 
 
 def _seeds(pool: dict[frozenset[str], Explanation]) -> list[Explanation]:

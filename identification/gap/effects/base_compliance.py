@@ -6,6 +6,8 @@ direction `c_a (r x n)_a^2` per newton. Unseen by encoders. 5e5 to 2e6 Nm/rad.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from identification.gap.bench import Bench
@@ -32,7 +34,7 @@ def variants(bench: Bench) -> list[Variant]:
     for depth in DEPTHS_M:
         m = moments(bench, depth)
         columns = [bench.add(bench.stacked(m[:, a] ** 2 * bench.load)) for a in range(3)]
-        info = {"depth_m": depth}
+        info: dict[str, Any] = {"depth_m": depth}
         seen = [a for a in range(3) if np.abs(m[:, a]).max() > 1e-3]
         out.append(
             variant(WORD, f"axes {depth:g} m below", [columns[a] for a in seen], SCALES, axes=seen,

@@ -28,10 +28,11 @@ def free_path(bench: Bench) -> Array:
     """Hat functions (n, PIECES) over the session; with correlated coefficients a smooth path."""
     t = (bench.rows.session - bench.rows.session.min()) / bench.session_span
     at = np.linspace(0, 1, PIECES)
-    return np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (PIECES - 1))
+    return np.asarray(np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (PIECES - 1)))
 
 
 def path_root() -> Array:
     """Root of a random walk's covariance over the pieces, free where it starts."""
     at = np.linspace(0.15, 1, PIECES)
-    return np.linalg.cholesky(np.minimum(at[:, None], at) + 1e-9 * np.eye(PIECES))
+    covariance = np.minimum(at[:, None], at) + 1e-9 * np.eye(PIECES)
+    return np.asarray(np.linalg.cholesky(covariance), dtype=float)

@@ -55,6 +55,6 @@ def _imposed(bench: Bench) -> list[Variant]:
 
 def _tared(bench: Bench, path: Array) -> Array:
     if bench.data.tare == "session":
-        return path - path[0]
+        return np.asarray(path - path[0])
     starts = np.flatnonzero(bench.rows.starts)
     return np.asarray(path - path[starts][np.cumsum(bench.rows.starts) - 1])

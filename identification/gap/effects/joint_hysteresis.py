@@ -3,7 +3,7 @@
 A friction element of strength r carries `S_r(tau) = tau - P_r(tau)` (stop operator; P play): the
 spring feels so much less, and deflects less. A spectrum of strengths makes any loop that obeys
 Masing's rules (Iwan 1967). Friction that does not obey them: an asperity model whose bristles
-bend exponentially (Dahl 1968), and one that lets go elastically (Bouc 1967, Wen 1976; beta = gamma).
+bend exponentially (Dahl 1968), one that lets go elastically (Bouc 1967, Wen 1976; beta = gamma).
 The coefficients are the shares of the joint's compliance that work through friction, 0 to 1.
 Size: gears of ratio >= 80 lose about 1 arcmin; friction is 2 to 20 % of the torque they see.
 """
@@ -65,7 +65,8 @@ def _spectrum(
                    radius=radius)]  # fmt: skip
     for k in range(len(columns) - 1):
         out.append(
-            variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES, smooth_root(2, 0.7),
+            variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES,
+                    smooth_root(2, 0.7),
                     prior=0.25 / (len(columns) - 1), joint=joint, radius=radius[k : k + 2])
         )  # fmt: skip
     return out

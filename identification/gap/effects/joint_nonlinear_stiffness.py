@@ -7,6 +7,8 @@ units of the joint's compliance. Gear catalogues: K3/K1 = 1.5 to 1.85.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from identification.gap.bench import Bench
@@ -29,7 +31,7 @@ def variants(bench: Bench) -> list[Variant]:
         columns = [
             bench.add_joint(j, c * np.sign(x) * np.maximum(np.abs(x) - b, 0)) for b in HINGES
         ]
-        info = {"joint": j, "torque": top, "hinges": HINGES}
+        info: dict[str, Any] = {"joint": j, "torque": top, "hinges": HINGES}
         line = bench.add_joint(j, c * x)
         root = np.zeros((len(HINGES) + 1,) * 2)
         root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(HINGES), 0.5)

@@ -82,8 +82,26 @@ def knee_variants(
                     out.append(
                         variant(word, f"{label} at {THRESHOLDS[k]:g} {knee}", chosen, SCALES,
                                 np.diag(kept), prior=share / 2, memory=memory, flow_s=flow,
-                                radius=radius[place], centre=radius[k], **info)
+                                radius=radius[place], centre=radius[k], load=load, column=column, **info)
                     )  # fmt: skip
+    return out
+
+
+FINE = 15  # radii between the neighbours of a threshold that was found on the grid
+
+
+def refined(bench: Bench, found: Variant) -> list[Variant]:
+    """Sharp knees at finely spaced thresholds about a variant that was found."""
+    info = dict(found.info)
+    radius = float(info["centre"]) * np.linspace(0.88, 1.12, FINE)
+    fresh = _memories(bench)[info["memory"]]
+    states = _flow(bench, bench.plays(info["load"], radius, fresh), info["flow_s"], fresh)
+    columns = [info["column"](states[:, k]) for k in range(FINE)]
+    out = []
+    for k in range(FINE):
+        exact = {**info, "radius": radius[k : k + 1], "centre": radius[k]}
+        label = f"{found.label.split(' at ')[0]} at {radius[k]:.4g} fine"
+        out.append(variant(found.word, label, [columns[k]], SCALES, prior=0.5 / FINE, **exact))
     return out
 
 

@@ -33,7 +33,7 @@ def variants(bench: Bench) -> list[Variant]:
         return out
     hats = free_path(bench)
     columns = [bench.add(bench.stacked(m * hats[:, k])) for m in masks for k in range(PIECES)]
-    root = np.kron(np.eye(len(masks)), path_root())
+    root: Array = np.kron(np.eye(len(masks)), path_root()).astype(float)
     out.append(variant(WORD, "free path", columns, scales, root, positive=False, prior=2.0,
                        path="free"))  # fmt: skip
     return out

@@ -6,6 +6,8 @@ Lags of filters, averaging and transmission: 0.05 to 10 s.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from identification.gap.bench import Bench
@@ -29,7 +31,7 @@ def variants(bench: Bench) -> list[Variant]:
         for kind, change in (("delay", late), ("filter", slow)):
             if not np.any(change):
                 continue
-            info = {"lag_s": lag, "kind": kind}
+            info: dict[str, Any] = {"lag_s": lag, "kind": kind}
             stiff = np.where(bench.slope > 0, change / bench.slope, 0.0)
             laser = bench.add(bench.stacked(bench.sense * change))
             force = bench.add(bench.force_column(-bench.sense * stiff))
