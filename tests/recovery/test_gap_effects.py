@@ -1,0 +1,291 @@
+"""The diagnosis on measurements made here, by formulas of their own: one effect each.
+
+The generator shares only the arm's Jacobian with the library; its laws are other members of the
+families (sharp, exponential, power laws) than those the library is built from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification.arm import tool_offset
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import make_bench
+from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.effects import WORDS
+from rig.dataset import Dataset
+from rig.diagnose import diagnose
+from rig.errors import InputError
+from rig.gap_data import gap_data
+from rig.model import load_robot
+from rig.tables import import_table
+
+Q = {"P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],
+     "P2": [0.054, -1.480, -1.948, -1.284, 1.571, -1.336]}  # fmt: skip
+STIFFNESS = np.array([36000.0, 57000, 18500, 7300, 7400, 8000])
+TOP = {"x": 200.0, "y": 90.0}
+META = """robot: ur10e
+poses:
+  P1: {{q_rad: {P1}, tcp_xyz_mm: [0, 0, 100]}}
+  P2: {{q_rad: {P2}, tcp_xyz_mm: [0, 0, 100]}}
+directions: {{x: [1, 0, 0], y: [0, 1, 0]}}
+instruments:
+  force: {{standard_uncertainty_N: 0.05, gain_relative_sd: 0.005}}
+  displacement: {{standard_uncertainty_mm: 0.002, gain_relative_sd: 0.003}}
+simulation:
+  joint_stiffness_Nm_per_rad: [37000, 56000, 18000, 7100, 7500, 8000]
+  joint_stiffness_relative_sd: 0.1
+"""
+
+
+@dataclass
+class Sample:
+    """One row before noise: where it belongs, torques of the joints, deflection of the joints."""
+
+    pose: str
+    direction: str
+    repetition: int
+    branch: str
+    step: int
+    time: float
+    session: float
+    force: float
+    first: bool
+
+
+Law = Callable[[list[Sample], np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def walk(poses: tuple[str, ...], hold: int = 4, steps: int = 8) -> list[Sample]:
+    """Loading and unloading in steps, zero before, three times each."""
+    out, session = [], 0.0
+    for pose in poses:
+        for direction in ("x", "y"):
+            for repetition in (1, 2, 3):
+                time = 0.0
+                levels = [("zero", 0)] + [("loading", s) for s in range(1, steps + 1)]
+                levels += [("unloading", s) for s in range(steps - 1, 0, -1)]
+                for branch, step in levels:
+                    time += 7.0
+                    for i in range(hold):
+                        time += 1.0
+                        force = TOP[direction] * step / steps
+                        out.append(Sample(pose, direction, repetition, branch, step, time,
+                                          session + time, force, i == 0))  # fmt: skip
+                session += time + 200.0
+    return out
+
+
+def measure(tmp: Path, law: Law, poses: tuple[str, ...] = ("P1",), seed: int = 0,
+            drop: tuple[str, ...] = (), noise: float = 1.0) -> Dataset:  # fmt: skip
+    """A data set in which `law` acts: (samples, torques, levers) -> (joint deflections, more m)."""
+    rng = np.random.default_rng(seed)
+    arm, samples = load_robot("ur10e"), walk(poses)
+    lever = np.empty((len(samples), 6))
+    for pose in poses:
+        J = arm.jacobian(np.array(Q[pose]), tool_offset(np.array([0, 0, 0.1])))[:3]
+        for k, d in enumerate(("x", "y")):
+            mine = [s.pose == pose and s.direction == d for s in samples]
+            lever[mine] = J[k]
+    force = np.array([s.force for s in samples])
+    torque = lever * force[:, None]
+    joints, more = law(samples, torque, lever)
+    u = (np.sum(lever * (torque / STIFFNESS + joints), axis=1) + more) * 1e3
+    u += rng.normal(0, 0.0015 * noise, len(u))
+    q = torque / STIFFNESS + joints + rng.normal(0, 1e-5 * noise, joints.shape)
+    f = force + rng.normal(0, 0.05 * noise, len(u))
+    lines = ["time_s,session_s,pose,direction,repetition,branch,step,force_N,displacement_mm,"
+             + ",".join(f"q{j}_rad" for j in range(1, 7))]  # fmt: skip
+    datum: dict[tuple[str, str], float] = {}
+    for i, s in enumerate(samples):
+        zero = datum.setdefault((s.pose, s.direction), u[i])
+        angles = np.array(Q[s.pose]) + q[i]
+        values = [s.time, s.session, s.pose, s.direction, s.repetition, s.branch, s.step, f[i],
+                  u[i] - zero, *angles]  # fmt: skip
+        lines.append(",".join(str(v) for v in values))
+    if "q" in drop:
+        lines = [",".join(line.split(",")[:9]) for line in lines]
+    if "unloading" in drop:
+        lines = [lines[0], *(x for x in lines[1:] if "unloading" not in x)]
+    (tmp / "samples.csv").write_text("\n".join(lines) + "\n")
+    (tmp / "meta.yaml").write_text(META.format(**Q))
+    return import_table(tmp / "samples.csv", tmp / "meta.yaml")
+
+
+def nothing(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    return np.zeros_like(torque), np.zeros(len(samples))
+
+
+def yields(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """Joint 1 flows above 45 Nm, a fifth as stiff; what has flowed stays."""
+    joints, flowed = np.zeros_like(torque), 0.0
+    for i, s in enumerate(samples):
+        if i and samples[i - 1].pose != s.pose:
+            flowed = 0.0
+        flowed = max(flowed, max(abs(torque[i, 0]) - 45.0, 0.0) * 4 / STIFFNESS[0])
+        joints[i, 0] = np.sign(lever[i, 0]) * flowed
+    return joints, np.zeros(len(samples))
+
+
+def creeps(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """Joint 3: a fifth of its deflection comes late, with 20 s."""
+    joints, z = np.zeros_like(torque), 0.0
+    for i, s in enumerate(samples):
+        before = samples[i - 1].session if i else 0.0
+        z += (torque[i, 2] - z) * (1 - np.exp(-(s.session - before) / 20.0))
+        joints[i, 2] = 0.2 * z / STIFFNESS[2]
+    return joints, np.zeros(len(samples))
+
+
+def hardens(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """Joint 3 grows stiffer smoothly: a cubic part of a tenth at the largest torque."""
+    joints = np.zeros_like(torque)
+    top = np.abs(torque[:, 2]).max()
+    joints[:, 2] = -0.1 * torque[:, 2] ** 3 / top**2 / STIFFNESS[2]
+    return joints, np.zeros(len(samples))
+
+
+def drifts(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """The target walks away by 40 um, as warm-up does."""
+    t = np.array([s.session for s in samples])
+    return np.zeros_like(torque), 4e-5 * (1 - np.exp(-t / (0.4 * t.max())))
+
+
+def jumps(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """The datum of x jumps by 30 um before its second repetition."""
+    return np.zeros_like(torque), np.array(
+        [3e-5 if s.direction == "x" and s.repetition > 1 else 0.0 for s in samples]
+    )
+
+
+def seats(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """40 um of seating, arctangent of the force."""
+    f = np.array([s.force for s in samples])
+    return np.zeros_like(torque), 4e-5 * 2 / np.pi * np.arctan(f / 10.0)
+
+
+def slips(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """As `yields`, about the base's vertical axis, unseen by the encoders."""
+    joints, _ = yields(samples, torque, lever)
+    return np.zeros_like(torque), lever[:, 0] * joints[:, 0]
+
+
+def ripples(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """What no word stands for: the room breathes every 47 s."""
+    t = np.array([s.session for s in samples])
+    return np.zeros_like(torque), 3e-5 * np.sin(2 * np.pi * t / 47.0)
+
+
+CASES: dict[str, tuple[Law, str]] = {
+    "none": (nothing, "none"), "yield": (yields, "joint_yield"), "creep": (creeps, "joint_creep"),
+    "harden": (hardens, "joint_nonlinear_stiffness"), "drift": (drifts, "thermal_drift"),
+    "jump": (jumps, "zero_shift"), "seat": (seats, "contact_seating"),
+    "slip": (slips, "base_slip"), "ripple": (ripples, "unknown"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, GapResult]:
+    out = {}
+    for name, (law, _) in CASES.items():
+        out[name] = diagnose(measure(tmp_path_factory.mktemp(name), law)).result
+    return out
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_verdict(results: dict[str, GapResult], name: str) -> None:
+    assert results[name].verdict == CASES[name][1]
+
+
+def test_where_yield_sits(results: dict[str, GapResult]) -> None:
+    found = results["yield"]
+    assert found.where.directions == ("y",)
+    assert found.where.joints == (1,)
+    assert found.where.seen_by_encoders is True
+    assert results["slip"].where.seen_by_encoders is False
+
+
+def test_threshold_of_the_yield(results: dict[str, GapResult]) -> None:
+    threshold = results["yield"].effects[0].parameters["threshold"]
+    assert threshold.unit == "Nm"
+    assert threshold.value == pytest.approx(45.0, rel=0.05)
+
+
+def test_creep_fraction_and_time(results: dict[str, GapResult]) -> None:
+    parameters = results["creep"].effects[0].parameters
+    assert parameters["creep_fraction"].value == pytest.approx(0.2, rel=0.25)
+    assert parameters["retardation_time"].low < 20.0 < parameters["retardation_time"].high
+
+
+def test_named_effect_leaves_the_noise_and_beats_others_on_withheld_data(
+    results: dict[str, GapResult],
+) -> None:
+    for name in ("yield", "creep", "drift", "seat"):
+        r = results[name]
+        assert r.after < 1.3 * r.noise, name
+        assert all(r.held_out[0].after < other for other in r.runners_up.values()), name
+
+
+def test_without_readings_and_unloading_yield_and_slip_are_not_told_apart(tmp_path: Path) -> None:
+    found = diagnose(measure(tmp_path, yields, drop=("q", "unloading"))).result
+    main = found.effects[0]
+    assert {main.name, *main.indistinguishable_from} >= {"joint_yield", "base_slip"}
+    assert found.next_measurement is not None
+    assert "joint positions" in found.next_measurement.text
+
+
+def test_deleted_word_is_not_replaced_with_confidence(tmp_path: Path) -> None:
+    found = diagnose(measure(tmp_path, creeps), withhold=["joint_creep"]).result
+    assert found.probabilities["joint_creep"] == 0.0
+    assert found.verdict == "unknown"
+
+
+def test_same_data_same_answer(tmp_path: Path, results: dict[str, GapResult]) -> None:
+    again = diagnose(measure(tmp_path, seats)).result
+    assert again.probabilities == results["seat"].probabilities
+
+
+def test_unknown_word_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match='"joint_magic" is no effect; known: joint_yield'):
+        diagnose(measure(tmp_path, nothing), withhold=["joint_magic"])
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_null_is_exactly_nothing_and_columns_are_finite(tmp_path: Path, word: str) -> None:
+    """Coefficient zero switches an effect off; every column is finite and none is all zero."""
+    data = gap_data(measure(tmp_path, nothing, ("P1", "P2")))
+    bench = make_bench(data)
+    variants = import_module(f"identification.gap.effects.{word}").variants(bench)
+    assert variants
+    assert {v.word for v in variants} == {word}
+    columns = np.column_stack(bench.columns)
+    assert np.isfinite(columns).all()
+    assert np.all(columns @ np.zeros(columns.shape[1]) == 0.0)
+    base = base_columns(bench)
+    assert np.all(np.isfinite(base.columns))
+    assert np.all(np.isfinite(prediction(bench)))
+
+
+def test_json_is_plain_and_complete(results: dict[str, GapResult], tmp_path: Path) -> None:
+    import json
+
+    out = diagnose(measure(tmp_path, seats)).to_json()
+    assert json.loads(json.dumps(out, allow_nan=False)) == out
+    assert out["schema"] == "rig.diagnosis/1"
+    assert sum(out["probabilities"].values()) == pytest.approx(1.0)
+    assert set(out["gap"]) >= {"noise_rms_mm", "before_rms_mm", "after_rms_mm", "shrink_factor"}
+    assert out["gap"]["held_out"]["fold"] == "repetition"
+
+
+def test_text_says_the_answer_first(tmp_path: Path) -> None:
+    text = diagnose(measure(tmp_path, seats)).to_text()
+    assert text.startswith("contact_seating (")
+    assert "withheld repetition" in text
+    assert diagnose_gap.__doc__

@@ -1,0 +1,123 @@
+"""Evidence against the dense Gaussian it stands for, and the search's building blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import Bench, make_bench
+from identification.gap.compare import condition, score
+from identification.gap.effects import WORDS, library
+from identification.gap.evidence import (
+    HOLD_PART,
+    ROW_PART,
+    Engine,
+    level_covariance,
+    row_noise,
+)
+from identification.gap.search import prior_of, search
+from identification.gap.variants import variant
+from tests.unit.test_gap_operators import bench_data
+
+
+def small_bench() -> Bench:
+    rng = np.random.default_rng(3)
+    step = np.tile(np.repeat([1, 2, 3, 4], 4), 2)
+    repetition = np.repeat([1, 2], 16)
+    force = step * 20.0 + rng.normal(0, 0.05, 32)
+    u = step * 20.0 * 1.1e-5 + rng.normal(0, 1e-6, 32)
+    return make_bench(bench_data(force, u, step=step, repetition=repetition, run=repetition - 1))
+
+
+def small_engine(bench: Bench, etas: tuple[float, ...] = (0.0, 3e-6)) -> Engine:
+    x = bench.load / np.ptp(bench.load)
+    bench.add(bench.stacked(1e-5 * x**2))
+    bench.add(bench.stacked(1e-5 * np.sin(9 * x)))
+    return Engine(bench, base_columns(bench), bench.observed - prediction(bench), np.array(etas))
+
+
+def dense_covariance(engine: Engine, eta: float) -> np.ndarray:
+    """Noise, holds, levels and base as one covariance of the stacked rows (response only here)."""
+    bench = engine.bench
+    n = bench.rows.n
+    same = bench.rows.hold[:, None] == bench.rows.hold
+    sigma2 = row_noise(bench) ** 2
+    hold = np.outer(bench.noise.hold, bench.noise.hold) * same + (HOLD_PART * eta) ** 2 * same
+    part = (ROW_PART * eta) ** 2 / sigma2  # per row, on what differs within a hold
+    white = np.diag(sigma2)
+    inverse = 1 / np.sqrt(sigma2)
+    project = np.zeros((n, n))
+    for h in np.unique(bench.rows.hold):
+        mine = bench.rows.hold == h
+        a = np.where(mine, inverse, 0.0)
+        a /= np.linalg.norm(a)
+        project += np.diag(mine.astype(float)) - np.outer(a, a)
+    root = np.sqrt(sigma2)
+    spread = project @ np.diag(part) @ project * np.outer(root, root)
+    L = engine.level_columns
+    levels = eta**2 * L @ level_covariance(bench) @ L.T
+    base = engine.base.columns * engine.base.sd
+    return white + hold + spread + levels + base @ base.T
+
+
+def test_evidence_is_the_dense_gaussian_marginal() -> None:
+    bench = small_bench()
+    engine = small_engine(bench)
+    offset = None
+    for i, extra in ((0, ()), (0, (0,)), (0, (0, 1))):
+        cov = dense_covariance(engine, 0.0)
+        columns = engine.pool[:, list(extra)] * 2.0
+        cov = cov + columns @ columns.T
+        exact = multivariate_normal.logpdf(engine.target, np.zeros(len(cov)), cov)
+        level = engine.levels[i]
+        found = condition(level, extra, np.eye(len(extra)), 2.0) if extra else level
+        if offset is None:
+            offset = exact - found.log_base  # constants that all hypotheses share
+        assert found.log_base + offset == pytest.approx(exact, abs=1e-5)
+
+
+def test_levels_of_imperfection_share_their_constants() -> None:
+    """Rows within holds are alike here, so that their part of the imperfection is exact too."""
+    engine = small_engine(small_bench())
+    exact = [
+        multivariate_normal.logpdf(
+            engine.target, np.zeros(len(engine.target)), dense_covariance(engine, lv.eta)
+        )
+        for lv in engine.levels
+    ]
+    found = [lv.log_base for lv in engine.levels]
+    # the contrasts' part is taken row by row instead of in the contrasts' own axes
+    assert found[1] - found[0] == pytest.approx(exact[1] - exact[0], rel=0.03)
+
+
+def test_score_averages_over_scales_and_asks_for_the_sign() -> None:
+    engine = small_engine(small_bench())
+    free = variant("joint_creep", "free", [0], (1.0,), positive=False)
+    signed = variant("joint_creep", "signed", [0], (1.0,))
+    negative = variant("joint_creep", "negative", [0], (1.0,), positive=-np.ones(1))
+    a, b, c = (s.log_evidence for s in score(engine, engine.levels, [free, signed, negative]))
+    assert np.logaddexp(b, c) - np.log(2) == pytest.approx(a, abs=0.05)
+
+
+def test_priors_of_all_sets_up_to_two_sum_below_one() -> None:
+    n = len(WORDS)
+    total = np.exp(prior_of(0)) + n * np.exp(prior_of(1)) + n * (n - 1) / 2 * np.exp(prior_of(2))
+    assert 0.85 < total < 1.0
+
+
+def test_probabilities_cover_all_words_and_sum_to_one() -> None:
+    bench = small_bench()
+    base = base_columns(bench)
+    variants = library(bench)
+    engine = Engine(bench, base, bench.observed - prediction(bench), np.array([0.0, 1e-6, 3e-6]))
+    found = search(engine, variants)
+    assert set(found.probabilities) == {*WORDS, "none", "unknown"}
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+    assert found.best.parts == ()  # a spring 10 % off, stated within 10 %
+
+
+def test_words_that_need_an_arm_are_never_given_without_one() -> None:
+    words = {v.word for v in library(small_bench())}
+    assert not words & {"link_flexibility", "base_compliance", "base_slip", "pose_error"}

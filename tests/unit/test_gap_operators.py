@@ -1,0 +1,146 @@
+"""Operators with memory, and rows: against closed forms and conservation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from identification.gap.data import GapData, Instruments, Setup
+from identification.gap.history import bristles, delayed, play, retarded, worked_in
+from identification.gap.rows import Rows, reduce_rows
+
+
+def bench_data(force: np.ndarray, displacement: np.ndarray, **changes: object) -> GapData:
+    """A bench without an arm: one spring of 1e5 N/m."""
+    n = len(force)
+    setup = Setup(
+        "", "x", np.array([1.0, 0, 0]), np.ones(1), np.eye(3)[1:], np.zeros((2, 1)),
+        np.zeros((1, 3)), np.zeros((1, 1)), np.zeros(3), np.zeros(0), np.zeros(1),
+    )  # fmt: skip
+    zeros = np.zeros(n, dtype=np.int64)
+    values: dict[str, object] = {
+        "arm": False, "setups": (setup,), "time": np.arange(n, dtype=float), "session": None,
+        "run": zeros, "setup": zeros, "repetition": zeros + 1, "branch": zeros + 1,
+        "step": np.arange(n, dtype=np.int64) + 1, "force": force, "displacement": displacement,
+        "compliance": np.array([1e-5]), "compliance_relative_sd": np.array([0.1]),
+        "instruments": Instruments(0.1, 1e-6, 0.005, 0.003),
+    }  # fmt: skip
+    return GapData(**(values | changes))  # type: ignore[arg-type]
+
+
+def fresh(n: int) -> np.ndarray:
+    return np.arange(n) == 0
+
+
+def test_play_follows_after_its_radius_and_stays_on_return() -> None:
+    load = np.array([0.0, 1.0, 3.0, 2.0, 0.0, -3.0])[:, None]
+    state = play(load, np.array([1.0]), fresh(6), fresh(6))[:, 0]
+    assert state.tolist() == [0.0, 0.0, 2.0, 2.0, 1.0, -2.0]
+
+
+def test_play_loses_its_memory_only_where_told() -> None:
+    load = np.array([0.0, 3.0, 0.0, 0.0])[:, None]
+    rest = np.array([True, False, False, True])
+    kept = play(load, np.array([1.0]), rest, fresh(4))[:, 0]
+    lost = play(load, np.array([1.0]), rest, rest)[:, 0]
+    assert kept.tolist() == [0.0, 2.0, 1.0, 1.0]
+    assert lost[-1] == 0.0
+
+
+@given(st.lists(st.floats(-100, 100), min_size=2, max_size=30), st.floats(0.01, 50))
+def test_stop_never_carries_more_than_its_strength(path: list[float], radius: float) -> None:
+    load = np.array(path)[:, None]
+    state = play(load, np.array([radius]), fresh(len(path)), fresh(len(path)))
+    assert np.all(np.abs(load - state) <= radius + 1e-9)
+
+
+@given(st.lists(st.floats(-100, 100), min_size=2, max_size=30), st.booleans())
+def test_bristles_stay_within_one(path: list[float], elastic: bool) -> None:
+    z = bristles(np.array(path), np.array([3.0, 30.0]), fresh(len(path)), elastic)
+    assert np.all(np.abs(z) <= 1 + 1e-12)
+
+
+def test_dahl_is_exact_on_the_virgin_curve_and_bouc_wen_lets_go_linearly() -> None:
+    load = np.array([0.0, 5.0, 10.0, 9.0])
+    dahl = bristles(load, np.array([4.0]), fresh(4), elastic=False)[:, 0]
+    wen = bristles(load, np.array([4.0]), fresh(4), elastic=True)[:, 0]
+    assert dahl[:3] == pytest.approx(1 - np.exp(-load[:3] / 4), abs=1e-12)
+    assert wen[3] == pytest.approx(wen[2] - 0.25, abs=1e-12)
+    assert dahl[3] == pytest.approx(-1 + (1 + dahl[2]) * np.exp(-0.25), abs=1e-12)
+
+
+def test_worked_in_friction_starts_where_a_cycle_ends() -> None:
+    load = np.array([0.0, 10.0, 0.0, 10.0])
+    path = worked_in(load, fresh(4))
+    state = play(path.load[:, None], np.array([2.0]), path.fresh, path.fresh)[path.kept, 0]
+    assert state.tolist() == [2.0, 8.0, 2.0, 8.0]
+
+
+def rows_of(data: GapData) -> Rows:
+    return reduce_rows(data)
+
+
+def test_retardation_is_exact_under_a_held_load() -> None:
+    """One step in half a second, then a hold: z = 1 - exp(-t/T) up to the ramp's share."""
+    n, T = 60, 10.0
+    step = np.where(np.arange(n) < 1, 0, 1)
+    force = np.where(step > 0, 1.0, 0.0)
+    data = bench_data(force, force * 1e-5, step=step.astype(np.int64))
+    rows = rows_of(data)
+    z = retarded(rows.force[:, None], np.array([T]), rows, fresh(rows.n))[:, 0]
+    t = rows.time - 0.5  # the load stands from there
+    ramp = 1 - T / 0.5 * (1 - np.exp(-0.5 / T))
+    expected = 1 - (1 - ramp) * np.exp(-(t - 0.0) / T)
+    held = rows.time >= 1.0
+    assert z[held] == pytest.approx(expected[held], abs=1e-9)
+
+
+def test_delay_shows_the_step_before_and_nothing_later_in_the_hold() -> None:
+    step = np.repeat(np.arange(1, 5), 4)
+    time = np.repeat(np.arange(4) * 10.0, 4) + np.tile(np.arange(4.0), 4)
+    force = step * 10.0
+    rows = rows_of(bench_data(force, force * 1e-5, step=step, time=time))
+    late = delayed(rows.force, 1.0, rows) - rows.force
+    first = rows.hold_starts.copy()
+    first[0] = False
+    assert np.all(late[first] < 0)
+    assert late[~first] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_rows_keep_every_sample_once_and_first_samples_alone() -> None:
+    step = np.repeat([1, 2, 3], 20)
+    force = step * 10.0
+    rows = rows_of(bench_data(force, force * 1e-5, step=step))
+    assert rows.weight.sum() == 60
+    assert rows.weight[rows.hold_starts].tolist() == [1.0, 1.0, 1.0]
+    assert rows.n == 3 * 6  # 1, 1, 2, 4, 8, 4 samples
+
+
+def test_short_continuous_recordings_are_not_thinned() -> None:
+    force = np.linspace(0, 100, 300)
+    rows = rows_of(bench_data(force, force * 1e-5, step=np.full(300, -1)))
+    assert rows.continuous
+    assert rows.n == 300
+
+
+def test_long_continuous_recordings_become_few_rows_with_all_turning_points() -> None:
+    t = np.arange(200_000) * 1e-3
+    force = 100 * np.sin(2 * np.pi * t / 20)
+    data = bench_data(force, force * 1e-5, step=np.full(t.size, -1), time=t)
+    rows = rows_of(data)
+    assert rows.n <= 600
+    assert rows.force.max() > 99.0
+    assert rows.weight.sum() == t.size
+
+
+def test_noise_of_a_steady_force_is_smoothed_a_moving_force_is_not() -> None:
+    rng = np.random.default_rng(1)
+    step = np.repeat([1, 2, 3], 20)
+    noisy = step * 10.0 + rng.normal(0, 0.1, 60)
+    steady = rows_of(bench_data(noisy, noisy * 1e-5, step=step))
+    assert np.all(steady.steady)
+    assert len(np.unique(steady.force)) == 3
+    lagging = step * 10.0 - np.tile(np.r_[3.0, np.zeros(19)], 3)
+    assert not np.any(rows_of(bench_data(lagging, noisy * 1e-5, step=step)).steady)
