@@ -6,9 +6,10 @@ import json
 import sys
 import tempfile
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -30,6 +31,13 @@ StationOption = Annotated[
         help="A station's name or file, instead of the protocol's; emulated: none needed."
     ),
 ]
+FiguresOption = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Draw the figures into this folder.")
+]
+MujocoOption = Annotated[
+    Path | None, typer.Option(metavar="FILE.xml", help="Write the arm for MuJoCo.")
+]
+UrdfOption = Annotated[Path | None, typer.Option(metavar="FILE.urdf", help="Write it as URDF.")]
 ProtocolArgument = Annotated[Path, typer.Argument(metavar="PROTOCOL.yaml")]
 DatasetArgument = Annotated[Path, typer.Argument(metavar="DATASET.h5")]
 
@@ -48,6 +56,11 @@ def give(result: Any, json_file: str | None) -> None:
             return
         Path(json_file).write_text(text + "\n", encoding="utf-8")
     typer.echo(result.to_text())
+
+
+def _list_written(paths: Iterable[Path]) -> None:
+    for path in paths:
+        say(f"{path}: written")
 
 
 @app.command()
@@ -121,9 +134,7 @@ def analyze(
     keep_after_knee: Annotated[
         bool, typer.Option(help="Count the steps after a knee towards k.")
     ] = False,
-    figures: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Draw the figures into this folder.")
-    ] = None,
+    figures: FiguresOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Curve, stiffness k, pointwise k and anisotropy, with uncertainties."""
@@ -141,8 +152,7 @@ def analyze(
     if figures is not None:
         from rig.figures import draw
 
-        for path in draw(result, figures):
-            say(f"figure: {path}")
+        _list_written(draw(result, figures))
 
 
 @app.command()
@@ -151,20 +161,36 @@ def identify(
     joint_readings: Annotated[
         bool, typer.Option(help="Use the joint readings where they see the deflection.")
     ] = True,
+    prior: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL.yaml", help="Prior stiffnesses, instead of the robot file's."),
+    ] = None,
     proposals: Annotated[int, typer.Option(help="How many next poses to look for.", min=0)] = 6,
+    criterion: Annotated[
+        Literal["A", "D", "E"], typer.Option(help="What the next poses make smallest.")
+    ] = "A",
     write_model: Annotated[
         Path | None, typer.Option(metavar="MODEL.yaml", help="Write the arm as a model file.")
     ] = None,
     write_protocol: Annotated[
         Path | None, typer.Option(metavar="PROTOCOL.yaml", help="Write the next measurement.")
     ] = None,
+    export_mujoco: MujocoOption = None,
+    export_urdf: UrdfOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Joint torsional stiffnesses, and what the data can and cannot tell about them."""
-    from rig import identify_text
+    from rig import identify_text, model_export
     from rig.identify import identify as run_identify
+    from rig.identify import prior_of
 
-    result = run_identify(datasets, joint_readings=joint_readings, proposals=proposals)
+    result = run_identify(
+        datasets,
+        prior=None if prior is None else prior_of(prior),
+        joint_readings=joint_readings,
+        proposals=proposals,
+        criterion=criterion,
+    )
     give(result, json_file)
     if write_model is not None:
         identify_text.write_model(result, write_model)
@@ -172,6 +198,7 @@ def identify(
     if write_protocol is not None:
         identify_text.write_protocol(result, write_protocol)
         say(f"{write_protocol}: written")
+    _list_written(model_export.write(result, mujoco=export_mujoco, urdf_file=export_urdf))
 
 
 @app.command()
@@ -187,10 +214,19 @@ def couple(
     samples: Annotated[
         int, typer.Option(help="Samples of the Monte Carlo workspace.", min=1000)
     ] = 1_000_000,
+    best_placement: Annotated[
+        bool, typer.Option(help="Look for the base distance and angle that meet `required` best.")
+    ] = False,
+    figures: FiguresOption = None,
+    export_mujoco: MujocoOption = None,
+    export_urdf: UrdfOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Coupled state of two arms: workspace, compound stiffness, when to couple."""
+    from rig import model_export
     from rig.couple import couple as run_couple
+    from rig.coupling_task import best_for
+    from rig.model import load_model
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
@@ -202,6 +238,15 @@ def couple(
             progress=lambda share: progress("sampling the workspace", share),
         )
     give(result, json_file)
+    placement = best_for(model) if best_placement else None
+    if placement is not None and json_file != "-":
+        typer.echo(placement.to_text())
+    if figures is not None:
+        from rig.coupling_figures import draw
+
+        _list_written(draw(result, figures, placement))
+    written = model_export.write(load_model(model), mujoco=export_mujoco, urdf_file=export_urdf)
+    _list_written(written)
 
 
 @app.command()

@@ -215,3 +215,35 @@ def test_a_load_that_a_joint_cannot_take_is_refused_before_measuring(rig: Rig, f
     assert "heavy.yaml:" in err
     assert "Nm" in err
     assert not list(files.glob("run.h5*"))
+
+
+def test_couple_gives_figures_exports_and_pure_json(rig: Rig, files: Path) -> None:
+    model = str(HOME / "data" / "models" / "F1.yaml")
+    words = ["couple", model, "--samples", "20000", "--json", "-", "--figures", "f"]
+    status, out, err = rig(*words, "--export-mujoco", "a.xml", "--export-urdf", "a.urdf")
+    assert status == 0, err
+    result = json.loads(out)
+    assert result["schema"] == "rig.coupling/1"
+    assert result["single_N_per_mm"]["x"] == pytest.approx(95.94, rel=1e-3)
+    assert result["coupled_N_per_mm"]["rigid"]["x"] == pytest.approx(339.5, rel=5e-3)
+    assert {p.name for p in files.iterdir()} >= {"a.xml", "a.urdf", "f"}
+    assert list((files / "f").glob("*.png"))
+
+
+def test_simulate_writes_the_curves_that_diagnose_reads(rig: Rig, files: Path) -> None:
+    model = str(HOME / "data" / "models" / "F1.yaml")
+    status, out, _ = rig("simulate", model, "p.yaml", "--csv", "c.csv")
+    assert status == 0
+    assert "95.96 N/mm" in out
+    lines = (files / "c.csv").read_text().splitlines()
+    header = next(line for line in lines if not line.startswith("#"))
+    assert header == "pose,direction,force_N,displacement_mm"
+
+
+@pytest.mark.parametrize("words", [["couple", "m.yaml"], ["simulate", "m.yaml", "p.yaml"],
+                                   ["identify", "t.csv"], ["identify", "gone.h5"]])  # fmt: skip
+def test_wrong_models_and_data_are_refused_by_name(rig: Rig, files: Path, words: list[str]) -> None:
+    status, _, err = rig(*words)
+    assert status == 2
+    assert words[1] in err
+    assert "Traceback" not in err
