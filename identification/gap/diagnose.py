@@ -112,7 +112,8 @@ def _chosen(found: Found, verdict: str, forced: frozenset[str]) -> Explanation:
         return next((e for e in found.explanations if forced <= e.words), empty)
     if verdict in ("none", "unknown"):
         return empty
-    return next(e for e in found.explanations if e.parts and e.parts[0].word == verdict)
+    mine = [e for e in found.explanations if e.parts and e.parts[0].word == verdict]
+    return next((e for e in mine if e.good), mine[0])
 
 
 def _result(

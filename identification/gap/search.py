@@ -30,9 +30,9 @@ LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
 LOG_ONE = log(0.37)
 LOG_MORE = log(0.05)
 WORD_COUNT = 18
-# An explanation that leaves an imperfection of more than this share of its own size explains the
-# gap no better than a picture of it: nine tenths of the variance are wanted.
-REMAINDER = 0.33
+# An explanation must leave less than this share of the gap (rms), with two effects half of it and
+# so on: the more words are spent, the better they have to explain.
+REMAINDER = 0.25
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
 # Mechanisms of the same kind mimic parts of each other: rate-dependent flow looks like creep.
@@ -86,6 +86,11 @@ class Explanation:
     eta: float
     sizes: tuple[float, ...]
     log_good: float
+
+    @property
+    def good(self) -> bool:
+        """It leaves little enough."""
+        return self.log_good > self.log_weight - log(2)
 
     @property
     def words(self) -> frozenset[str]:
@@ -334,7 +339,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     best = int(logs.argmax())
     least = max(
         0.6 * engine.bench.noise.stated,
-        REMAINDER * max(engine.structural, float(np.linalg.norm(each))),
+        REMAINDER * engine.structural / max(len(parts), 1),
     )
     good = np.array([lv.eta <= least for lv in levels])
     share = np.exp(logs - logs.max())
@@ -398,6 +403,15 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     return same or not engine.bench.has_q
 
 
+def _heir(explanation: Explanation, ranked: list[Explanation]) -> str:
+    """Who gets the weight of an explanation that leaves too much for its number of effects: the
+    best one with fewer of the same effects that explains enough for itself, else unknown."""
+    for e in ranked:
+        if e.parts and e.words < explanation.words and e.good:
+            return e.parts[0].word
+    return "unknown"
+
+
 def _joints(part: Part) -> set[int]:
     """Joints that the part sits in."""
     info = part.variant.info
@@ -423,7 +437,7 @@ def _conclude(
     for e in ranked:
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         mass[e.parts[0].word if e.parts else "none"] += good
-        mass["unknown"] += whole - good
+        mass[_heir(e, ranked)] += whole - good
     if engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
     total = sum(mass.values())

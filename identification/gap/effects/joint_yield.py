@@ -82,7 +82,8 @@ def knee_variants(
                     out.append(
                         variant(word, f"{label} at {THRESHOLDS[k]:g} {knee}", chosen, SCALES,
                                 np.diag(kept), prior=share / 2, memory=memory, flow_s=flow,
-                                radius=radius[place], centre=radius[k], load=load, column=column, **info)
+                                radius=radius[place], centre=radius[k], load=load,
+                                column=column, **info)
                     )  # fmt: skip
     return out
 
