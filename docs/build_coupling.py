@@ -46,7 +46,7 @@ def build(source: str, figures: Path | None) -> str:
 
     import matplotlib as mpl
 
-    from rig.figures import STYLE
+    from rig.plotting import STYLE
 
     with mpl.rc_context(STYLE):
         return _HEAD + _CELL.sub(run, source)

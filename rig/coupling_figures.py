@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from identification.coupling import mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
 from rig.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
-from rig.errors import InputError
-from rig.figures import COLOURS, STYLE
+from rig.plotting import COLOURS, write_figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,23 +32,7 @@ def draw(result: CouplingResult, folder: Path, placement: TaskResult | None = No
 
     InputError if the folder can't be written to.
     """
-    import matplotlib as mpl
-
-    written = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with mpl.rc_context(STYLE):
-            for name, figure in _figures(result, placement):
-                for kind in ("png", "svg"):
-                    path = folder / f"{name}.{kind}"
-                    metadata = {"Date": None} if kind == "svg" else None
-                    figure.savefig(path, dpi=150, metadata=metadata)
-                    written.append(path)
-    except OSError as error:
-        raise InputError(
-            f"{folder}: the figures can't be written there ({error.strerror}). Give another folder."
-        ) from error
-    return written
+    return write_figures(folder, lambda: _figures(result, placement))
 
 
 def _figures(result: CouplingResult, placement: TaskResult | None) -> list[tuple[str, Figure]]:

@@ -10,22 +10,10 @@ import numpy as np
 
 from rig.analyze import MM, N_PER_MM, Analysis, Direction
 from rig.analyze_text import number
-from rig.errors import InputError
+from rig.plotting import COLOURS, MARKERS, write_figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-# Okabe and Ito's palette without its yellow: told apart by colour-blind readers and in print
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
-MARKERS = ("o", "s", "^", "D", "v", "P")
-STYLE: Any = {
-    "font.size": 10,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "svg.hashsalt": "rig",  # the same data give the same file
-}
 
 
 def draw(analysis: Analysis, folder: Path) -> list[Path]:
@@ -33,24 +21,9 @@ def draw(analysis: Analysis, folder: Path) -> list[Path]:
 
     InputError if the folder can't be written to.
     """
-    import matplotlib as mpl
-
-    written = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with mpl.rc_context(STYLE):
-            for name, figure in (("curve", curve(analysis)), ("pointwise", pointwise(analysis))):
-                for kind in ("png", "svg"):
-                    path = folder / f"{name}.{kind}"
-                    metadata = {"Date": None} if kind == "svg" else None
-                    figure.savefig(path, dpi=150, metadata=metadata)
-                    written.append(path)
-    except OSError as error:
-        raise InputError(
-            f"{folder}: the figures can't be written there ({error.strerror}). "
-            "Give another folder with --figures."
-        ) from error
-    return written
+    return write_figures(
+        folder, lambda: (("curve", curve(analysis)), ("pointwise", pointwise(analysis)))
+    )
 
 
 def curve(analysis: Analysis) -> Figure:

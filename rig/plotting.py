@@ -1,0 +1,49 @@
+"""What all figures share: colours, style, and how they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's palette without its yellow: told apart by colour-blind readers and in print
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P")
+STYLE: Any = {
+    "font.size": 10,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "svg.hashsalt": "rig",  # the same data give the same file
+}
+
+
+def write_figures(folder: Path, figures: Callable[[], Iterable[tuple[str, Figure]]]) -> list[Path]:
+    """Draws `figures()`, (name, figure) each, in the common style; writes PNG and SVG.
+
+    Returns the files written. InputError if the folder can't be written to.
+    """
+    import matplotlib as mpl
+
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with mpl.rc_context(STYLE):
+            for name, figure in figures():
+                for kind in ("png", "svg"):
+                    path = folder / f"{name}.{kind}"
+                    metadata = {"Date": None} if kind == "svg" else None
+                    figure.savefig(path, dpi=150, metadata=metadata)
+                    written.append(path)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: the figures can't be written there ({error.strerror}). "
+            "Give another folder with --figures."
+        ) from error
+    return written
