@@ -1,7 +1,8 @@
 """The observation model of one data set: stacked channels, their noise, and a pool of columns.
 
 Channels, one below the other: response (displacement along the direction; where the displacement
-is imposed, force over simulated stiffness), joint readings, tangential force, force at zero load.
+is imposed, force over simulated stiffness) row by row, joint readings and tangential force hold by
+hold, force at zero load row by row.
 Every effect adds columns: what one unit of a coefficient does to all channels at once. The
 observation is `y = prior simulation + base columns + effect columns + imperfection + noise`.
 """
@@ -135,9 +136,9 @@ class Bench:
         if response is not None:
             out[: self.layout.n] = response
         if q is not None and self.has_q:
-            out[self.layout.q] = q.T.reshape(-1)
+            out[self.layout.q] = hold_means(self.rows, q).T.reshape(-1)
         if tangential is not None and self.rows.tangential is not None:
-            out[self.layout.tangential] = tangential.T.reshape(-1)
+            out[self.layout.tangential] = hold_means(self.rows, tangential).T.reshape(-1)
         if zero_force is not None:
             out[self.layout.zero_force] = zero_force[self.rows.zero]
         return out
@@ -201,9 +202,9 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     observed = np.zeros(layout.size)
     observed[: rows.n] = response
     if layout.q.stop > layout.q.start and rows.q is not None:
-        observed[layout.q] = rows.q.T.reshape(-1)
+        observed[layout.q] = hold_means(rows, rows.q).T.reshape(-1)
     if rows.tangential is not None:
-        observed[layout.tangential] = rows.tangential.T.reshape(-1)
+        observed[layout.tangential] = hold_means(rows, rows.tangential).T.reshape(-1)
     observed[layout.zero_force] = rows.measured_force[rows.zero]
     reach = max(float(np.ptp(slope * load)), float(np.ptp(response)), 1e-15)
     return Bench(
@@ -214,10 +215,19 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     )  # fmt: skip
 
 
+def hold_means(rows: Rows, values: Array) -> Array:
+    """Weighted means (holds, k) of values (n, k): joint readings and force across the direction
+    are too coarse to tell more of a hold than where it lies."""
+    edges = np.flatnonzero(rows.hold_starts)
+    total = np.add.reduceat(rows.weight, edges)
+    sums = np.add.reduceat(values * rows.weight[:, None], edges, axis=0)
+    return np.asarray(sums / total[:, None])
+
+
 def _layout(data: GapData, rows: Rows) -> Layout:
-    n, m = rows.n, data.joints
-    q = n * m if data.q is not None and data.output_encoder else 0
-    t = 0 if rows.tangential is None else 2 * n
+    n, m, h = rows.n, data.joints, int(rows.hold_starts.sum())
+    q = h * m if data.q is not None and data.output_encoder else 0
+    t = 0 if rows.tangential is None else 2 * h
     z = 0 if displacement_imposed(data) else int(rows.zero.sum())
     return Layout(n, m, slice(n, n + q), slice(n + q, n + q + t),
                   slice(n + q + t, n + q + t + z), n + q + t + z)  # fmt: skip

@@ -12,9 +12,11 @@ eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.gap.base import Base
 from identification.gap.bench import Bench
@@ -37,19 +39,6 @@ class Level:
     gram: Array
     moment: Array
     log_base: float
-
-
-@dataclass(frozen=True, eq=False)
-class Whitened:
-    """Rows divided by their noise; mean: orthonormal hold means, amplification (h,) of an offset
-    common to a hold, in whitened units per metre (or radian), split by channel."""
-
-    full: Array  # gram of all columns [y, base, pool], contrasts of response excluded from means
-    contrast_rows: Array
-    contrast_noise: Array
-    means: Array
-    amplitude: Array
-    is_response: Array
 
 
 class Engine:
@@ -75,24 +64,19 @@ class Engine:
             [self.target, self.base.columns, self.level_columns, self.pool]
         )
         white = everything / self.sigma[:, None]
-        inverse = 1 / self.sigma
         edges = np.flatnonzero(bench.rows.hold_starts)
-        means, lengths = [], []
-        response = white[:n]
-        for block in range(0, bench.layout.q.stop, n):
-            a = inverse[block : block + n]
-            length = np.sqrt(np.add.reduceat(a**2, edges))
-            part = np.add.reduceat(white[block : block + n] * a[:, None], edges, axis=0)
-            means.append(part / length[:, None])
-            lengths.append(length)
-        self._mean_u, self._length_u = means[0], lengths[0]
-        self._mean_q = np.vstack(means[1:]) if len(means) > 1 else np.zeros((0, white.shape[1]))
-        self._length_q = np.concatenate(lengths[1:]) if len(lengths) > 1 else np.zeros(0)
-        rest = white[n:]
-        self._fixed = rest.T @ rest - self._mean_q.T @ self._mean_q
+        response, inverse = white[:n], 1 / self.sigma[:n]
+        lengths = np.sqrt(np.add.reduceat(inverse**2, edges))
+        means = np.add.reduceat(response * inverse[:, None], edges, axis=0) / lengths[:, None]
+        self._mean_u, self._length_u = means, lengths
+        q = bench.layout.q
+        self._length_q = 1 / self.sigma[q]
+        self._readings = list(_per_joint(white[q], len(edges)))
+        rest = white[q.stop :]
+        self._fixed = rest.T @ rest
         hold = np.repeat(np.arange(len(edges)), np.diff(np.append(edges, n)))
-        direction = inverse[:n] / lengths[0][hold]
-        contrast = response - direction[:, None] * means[0][hold]
+        direction = inverse / lengths[hold]
+        contrast = response - direction[:, None] * means[hold]
         alone = np.diff(np.append(edges, n))[hold] == 1
         contrast = contrast[~alone]
         # most columns stand still within a hold: only the others need the product
@@ -108,11 +92,14 @@ class Engine:
         hold = noise.hold[edges] ** 2 + (HOLD_PART * eta) ** 2
         extra_u = 1 + hold * self._length_u**2
         extra_q = 1 + (eta / _LEVER_M) ** 2 * self._length_q**2 if self.bench.data.arm else 1.0
-        part = ROW_PART if not self.bench.rows.continuous else CONTINUOUS_ROW_PART
-        factor = 1 + (part * eta / self._contrast_noise) ** 2
+        row_part = ROW_PART if not self.bench.rows.continuous else CONTINUOUS_ROW_PART
+        factor = 1 + (row_part * eta / self._contrast_noise) ** 2
         gram = self._fixed + self._mean_u.T @ (self._mean_u / extra_u[:, None])
         if self._length_q.size:
-            gram = gram + self._mean_q.T @ (self._mean_q / np.asarray(extra_q)[:, None])
+            for rows, columns, values in self._readings:
+                gram[np.ix_(columns, columns)] += values.T @ (
+                    values / np.asarray(extra_q)[rows, None]
+                )
         weighted = self._contrast / factor[:, None]
         gram[np.ix_(self._varying, self._varying)] += self._contrast.T @ weighted
         share = self._freedom / max(len(factor), 1)
@@ -149,6 +136,14 @@ class Engine:
         )
 
 
+def _per_joint(q: Array, holds: int) -> Iterator[tuple[slice, NDArray[np.intp], Array]]:
+    """Rows, columns and values of each joint's readings; a column touches few joints."""
+    for start in range(0, len(q), holds):
+        part = q[start : start + holds]
+        columns = np.flatnonzero(np.any(part != 0, axis=0))
+        yield slice(start, start + holds), columns, part[:, columns]
+
+
 def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
     """0, then sizes of imperfection by factors of about 2.5, from half the stated uncertainty to
     the size of what the base leaves."""
@@ -175,10 +170,11 @@ def row_noise(bench: Bench) -> Array:
     out = np.empty(layout.size)
     root = np.sqrt(rows.weight) if not rows.continuous else np.ones(rows.n)
     out[: layout.n] = noise.response
+    total = np.sqrt(np.add.reduceat(rows.weight, np.flatnonzero(rows.hold_starts)))
     if layout.q.stop > layout.q.start:
-        out[layout.q] = np.concatenate([s / root for s in noise.q])
+        out[layout.q] = np.concatenate([s / total for s in noise.q])
     if rows.tangential is not None:
-        out[layout.tangential] = np.tile(noise.force / root, 2)
+        out[layout.tangential] = np.tile(noise.force / total, 2)
     out[layout.zero_force] = noise.force / root[rows.zero]
     return out
 

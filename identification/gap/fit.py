@@ -95,10 +95,8 @@ def _holds(engine: Engine, eta: float) -> tuple[Array, Array]:
     """Per stacked row: number of its hold (per channel), standard deviation common to the hold."""
     bench, n = engine.bench, engine.bench.rows.n
     size = bench.layout.size
-    key, common = np.zeros(size), np.zeros(size)
-    count = int(bench.rows.hold.max()) + 1
-    for i, start in enumerate(range(0, bench.layout.q.stop, n)):
-        key[start : start + n] = bench.rows.hold + i * count
-        common[start : start + n] = eta / _LEVER_M if i else 0.0
+    key, common = np.arange(size) + float(n), np.zeros(size)
+    key[:n] = bench.rows.hold
+    common[bench.layout.q] = eta / _LEVER_M
     common[:n] = np.hypot(bench.noise.hold, HOLD_PART * eta)
-    return key, common
+    return np.asarray(key, dtype=float), common

@@ -95,8 +95,10 @@ def _stacked_keep(engine: Engine, out: Flags) -> Flags:
     bench, n = engine.bench, engine.bench.rows.n
     row = ~out | bench.rows.zero
     keep = np.ones(bench.layout.size, dtype=bool)
-    for start in range(0, bench.layout.tangential.stop, n):
-        keep[start : start + n] = row
+    keep[:n] = row
+    held = row[np.flatnonzero(bench.rows.hold_starts)]
+    copies = (bench.layout.tangential.stop - n) // max(len(held), 1)
+    keep[n : bench.layout.tangential.stop] = np.tile(held, copies)
     return keep
 
 

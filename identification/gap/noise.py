@@ -21,7 +21,8 @@ _ENOUGH = 30  # second differences: then their scatter is known to about an eigh
 @dataclass(frozen=True, eq=False)
 class Noise:
     """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
-    already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of a sample."""
+    already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
+    one sample."""
 
     response: Array
     q: Array

@@ -47,7 +47,8 @@ def variants(bench: Bench) -> list[Variant]:
             )  # fmt: skip
         for k in range(len(HINGES) - 1):
             out.append(
-                variant(WORD, f"joint {j + 1} bend {HINGES[k]}", [line, *columns[k : k + 2]], SCALES,
+                variant(WORD, f"joint {j + 1} bend {HINGES[k]}", [line, *columns[k : k + 2]],
+                        SCALES,
                         positive=False, prior=0.2 / (len(HINGES) - 1), **info)
             )  # fmt: skip
     return out
