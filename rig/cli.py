@@ -269,6 +269,39 @@ def simulate(
         say(f"{csv}: written")
 
 
+@app.command()
+def diagnose(
+    dataset: DatasetArgument,
+    simulation: Annotated[
+        Path | None,
+        typer.Option(metavar="CURVES.csv", help="Curves of another simulator, instead of META's."),
+    ] = None,
+    add: Annotated[
+        list[str] | None,
+        typer.Option(metavar="WORD", help="An effect that the explanation must contain."),
+    ] = None,
+    withhold: Annotated[
+        list[str] | None,
+        typer.Option(metavar="WORD", help="An effect to take out of the library."),
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """The sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
+    from rig.dataset import load
+    from rig.diagnose import diagnose as run_diagnose
+    from rig.terminal import terminal_progress
+
+    with terminal_progress() as progress:
+        result = run_diagnose(
+            load(dataset),
+            simulation=simulation,
+            add=add or (),
+            withhold=withhold or (),
+            progress=progress,
+        )
+    give(result, json_file)
+
+
 @app.command("import")
 def import_(
     table: Annotated[Path, typer.Argument(metavar="TABLE.csv")],
