@@ -13,6 +13,7 @@ import numpy as np
 
 from identification.gap.data import ZERO, Array, Flags, GapData, Ints
 
+_ROWS_PER_PASS, _MOST_ROWS = 80, 4000  # memory needs the turning points of every cycle
 CONTINUOUS_ROWS = 500  # bins of a continuous recording; more tells no effect from another
 _RUNNING_SHARE = 0.5  # a "hold" through which the force runs by half its range is none
 _LEVELS = 12  # force classes of a continuous recording, per sense of motion
@@ -162,18 +163,33 @@ def _continuous_edges(data: GapData) -> Ints:
     """Bins of equal path of force and displacement together, so that fast and slow parts count
     alike and no bin straddles much of either; every run starts a bin."""
     n = len(data.force)
-    if n <= CONTINUOUS_ROWS:
+    wanted = int(np.clip(_ROWS_PER_PASS * _passes(data.force), CONTINUOUS_ROWS, _MOST_ROWS))
+    if n <= wanted:
         return np.arange(n, dtype=np.int64)
     path = np.arange(n) / n
-    width = max(1, n // (4 * CONTINUOUS_ROWS))
+    width = max(1, n // (4 * wanted))
     for values in (data.force, data.displacement):
         smooth = np.repeat(values[::width], width)[:n]  # steps of the noise are no path
         step = np.abs(np.diff(smooth, prepend=smooth[0]))
         total = step.sum()
         path = path + (np.cumsum(step) / total if total > 0 else 0.0)
-    number = np.floor(path / path[-1] * CONTINUOUS_ROWS * (1 - 1e-12)).astype(np.int64)
+    number = np.floor(path / path[-1] * wanted * (1 - 1e-12)).astype(np.int64)
     new = (np.diff(number, prepend=-1) != 0) | (np.diff(data.run, prepend=-1) != 0)
     return np.flatnonzero(new).astype(np.int64)
+
+
+def _passes(force: Array) -> int:
+    """How often the force goes up or down by a quarter of its range: passes of the cycles."""
+    coarse = force[:: max(1, len(force) // 20_000)].tolist()
+    back = 0.25 * float(np.ptp(force))
+    count, low, high, rising = 1, coarse[0], coarse[0], None
+    for x in coarse:
+        low, high = min(low, x), max(high, x)
+        if rising is not False and high - x > back:
+            count, rising, low = count + (rising is True), False, x
+        elif rising is not True and x - low > back:
+            count, rising, high = count + (rising is False), True, x
+    return count
 
 
 def _blocks(run: Ints) -> Ints:

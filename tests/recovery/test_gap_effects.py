@@ -301,3 +301,60 @@ def test_text_says_the_answer_first(tmp_path: Path) -> None:
     assert text.startswith("contact_seating (")
     assert "withheld repetition" in text
     assert diagnose_gap.__doc__
+
+
+def test_a_million_samples_of_friction_on_a_bench() -> None:
+    """A stop of 60 N in series with nothing else: friction and share come back."""
+    from tests.unit.test_gap_operators import bench_data
+
+    n, rng = 200_000, np.random.default_rng(0)
+    t = np.arange(n) * 5e-3
+    force = 1000 * np.sin(2 * np.pi * t / 50)
+    state, path = 0.0, []
+    for f in force.tolist():
+        state = min(f + 60, max(f - 60, state))
+        path.append(state)
+    u = np.array(path) * 1e-5 + rng.normal(0, 1e-6, n)
+    data = bench_data(force + rng.normal(0, 0.1, n), u, time=t, step=np.full(n, -1),
+                      branch=np.full(n, 3))  # fmt: skip
+    found = diagnose_gap(data)
+    assert found.verdict == "joint_hysteresis"
+    assert found.effects[0].parameters["friction"].value == pytest.approx(60.0, rel=0.05)
+
+
+def test_renamed_poses_and_permuted_directions_change_nothing(
+    tmp_path: Path, results: dict[str, GapResult]
+) -> None:
+    dataset = measure(tmp_path, seats)
+    text = (tmp_path / "samples.csv").read_text().replace(",P1,", ",Q7,")
+    meta = (tmp_path / "meta.yaml").read_text().replace("P1:", "Q7:")
+    (tmp_path / "samples.csv").write_text(text)
+    (tmp_path / "meta.yaml").write_text(meta)
+    renamed = diagnose(import_table(tmp_path / "samples.csv", tmp_path / "meta.yaml"))
+    assert dataset.rows == renamed.result.bench.rows.weight.sum()
+    assert renamed.result.probabilities == results["seat"].probabilities
+
+
+THIN = "direction,repetition,branch,step,force_N,displacement_mm\n"
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ["x,1,loading,1,10,0.1"],
+        ["x,1,zero,0,0,0", "x,1,loading,1,10,0.1"],
+        ["x,1,zero,0,0,0"] * 30,
+        ["x,1,loading,1,50,0.5"] * 30,
+        [f"x,1,loading,{s},{20 * s},{0.2 * s}" for s in range(1, 11)],
+    ],
+    ids=["one sample", "two", "all zero", "constant", "one a step"],
+)
+def test_thin_data_are_diagnosed_without_false_confidence(tmp_path: Path, rows: list[str]) -> None:
+    (tmp_path / "samples.csv").write_text(THIN + "\n".join(rows) + "\n")
+    meta = META.format(**Q).replace(f"  P2: {{q_rad: {Q['P2']}, tcp_xyz_mm: [0, 0, 100]}}\n", "")
+    (tmp_path / "meta.yaml").write_text(meta)
+    found = diagnose(import_table(tmp_path / "samples.csv", tmp_path / "meta.yaml"))
+    named = {w: p for w, p in found.result.probabilities.items() if w not in ("none", "unknown")}
+    assert max(named.values()) < 0.6
+    assert found.to_text()
+    assert found.result.notes
