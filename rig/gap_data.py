@@ -117,7 +117,9 @@ def _tangential(
     vector = _optional(columns, [f"force_{a}_N" for a in "xyz"], 3)
     if vector is None:
         return None
-    return np.einsum("nij,nj->ni", np.stack([s.tangents for s in setups])[setup], vector)
+    return np.asarray(
+        np.einsum("nij,nj->ni", np.stack([s.tangents for s in setups])[setup], vector)
+    )
 
 
 def _setup(dataset: Dataset, arm: Arm | None, pose: str, direction: str) -> Setup:
