@@ -8,7 +8,8 @@ import numpy as np
 
 from identification.gap.data import Array, Flags
 from identification.gap.evidence import HOLD_PART, ROW_PART, Engine
-from identification.gap.search import Explanation, Part, block
+from identification.gap.parts import Part, block
+from identification.gap.search import Explanation
 
 _LEVER_M = 0.3
 _WIDER = 3.0

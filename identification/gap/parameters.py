@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.search import Part
+from identification.gap.parts import Part
 
 
 @dataclass(frozen=True)

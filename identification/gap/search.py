@@ -12,18 +12,16 @@ from math import comb, log
 import numpy as np
 
 from identification.gap.compare import (
-    IMPERFECTION,
-    LAW_IMPERFECTION,
     LINEAR,
     Scored,
     condition,
     level_prior,
     log_mean,
-    moved_response,
     score,
 )
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
+from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
 from identification.gap.variants import Variant
 
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
@@ -56,24 +54,6 @@ _LEADING = 4  # words among which a knee has to be for its threshold to be refin
 _PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One effect of an explanation: variant and scale of its coefficients."""
-
-    variant: Variant
-    scale: float
-
-    @property
-    def word(self) -> str:
-        """Its name."""
-        return self.variant.word
-
-    @property
-    def root(self) -> Array:
-        """Root of the prior covariance of its coefficients."""
-        return np.asarray(self.scale * self.variant.root)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,84 +236,11 @@ def _conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], 
     return levels, part_sizes(engine, parts, int(weights.argmax()))[1]
 
 
-def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> tuple[Array, float]:
-    """rms (m) of each part's most probable contribution to the gap, and mean square (m^2) of all
-    contributions. What springs would take over is no gap, unless the effect is linear itself."""
-    columns = [c for p in parts for c in p.variant.columns]
-    root = block([p.root for p in parts])
-    lv, plain = engine.levels[level], engine.levels[0].gram
-    inner = np.eye(len(columns)) + root.T @ lv.gram[np.ix_(columns, columns)] @ root
-    w = root @ np.linalg.solve(inner, root.T @ lv.moment[columns])
-    n, weight = engine.bench.rows.n, engine.bench.rows.weight
-    precision = float(np.sum(1 / engine.sigma[:n] ** 2))
-    sizes, raw, start = [], 0.0, 0
-    for p in parts:
-        c, k = list(p.variant.columns), len(p.variant.columns)
-        part = w[start : start + k]
-        moved = moved_response(engine, (engine.pool[:n, c] @ part)[:, None])[:, 0]
-        square = float(weight @ moved**2 / weight.sum())
-        if p.word in LINEAR:
-            sizes.append(_beyond_springs(engine, moved))
-            square *= (LAW_IMPERFECTION / IMPERFECTION) ** 2
-        else:
-            structural = float(part @ plain[np.ix_(c, c)] @ part) / precision
-            sizes.append(float(np.sqrt(min(structural, square))))
-        raw += square
-        start += k
-    return np.array(sizes), raw
-
-
-def _beyond_springs(engine: Engine, moved: Array) -> float:
-    """rms (m) of a linear effect beyond what the springs give within three standard deviations."""
-    base, n = engine.base, engine.bench.rows.n
-    springs = base.index("spring")
-    root = np.sqrt(engine.bench.rows.weight / engine.bench.rows.weight.sum())
-    sd = base.sd[springs]
-    A = moved_response(engine, base.columns[:n, springs]) * sd
-    t = np.linalg.lstsq(A * root[:, None], moved * root, rcond=1e-6)[0]
-    left = float(np.sqrt(np.sum(((moved - A @ t) * root) ** 2)))
-    most = float(np.abs(t).max()) if t.size else 0.0
-    beyond = max(0.0, 1 - 3 / most) if most > 0 else 1.0
-    return max(left, beyond * float(np.sqrt(np.sum((moved * root) ** 2))))
-
-
-def _signs(level: Level, parts: tuple[Part, ...]) -> float:
-    """log of the odds that every part keeps the sign physics wants, all fitted together."""
-    from scipy.special import log_ndtr
-
-    columns = [c for p in parts for c in p.variant.columns]
-    root = block([p.root for p in parts])
-    precision = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
-    covariance = root @ np.linalg.solve(precision, root.T)
-    w = root @ np.linalg.solve(precision, root.T @ level.moment[columns])
-    out, start = 0.0, 0
-    for p in parts:
-        s = slice(start, start + len(p.variant.columns))
-        start = s.stop
-        if p.variant.positive is not None:
-            f = p.variant.positive
-            spread = float(np.sqrt(f @ covariance[s, s] @ f)) + 1e-300
-            out += min(0.0, float(log_ndtr(float(f @ w[s]) / spread)) - log(0.5))
-    return out
-
-
-def block(roots: list[Array]) -> Array:
-    """The roots along the diagonal."""
-    size = sum(r.shape[0] for r in roots)
-    out = np.zeros((size, size))
-    at = 0
-    for r in roots:
-        k = r.shape[0]
-        out[at : at + k, at : at + k] = r
-        at += k
-    return out
-
-
 def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:
     """The explanation with its prior; too small a part is charged as what it is: freedom of the
     larger one's law."""
     levels = engine.levels
-    bases = np.array([_log_joint(lv, parts) for lv in levels])
+    bases = np.array([log_joint(lv, parts) for lv in levels])
     each, energy = part_sizes(engine, parts, int(bases.argmax()))
     logs = bases + [level_prior(engine, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
@@ -348,7 +255,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     weight = log_evidence + prior_of(len(parts))
     if len(parts) > 1:
         weight -= _pettiness(engine, parts, each)
-        weight += _signs(levels[best], parts)
+        weight += signs_kept(levels[best], parts)
     return Explanation(
         tuple(parts[i] for i in order),
         weight,
@@ -356,16 +263,6 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
         tuple(float(each[i]) for i in order),
         weight + log(max(fraction, 1e-300)),
     )
-
-
-def _log_joint(level: Level, parts: tuple[Part, ...]) -> float:
-    """log evidence of all parts together with fixed scales at one level."""
-    columns = [c for p in parts for c in p.variant.columns]
-    root = block([p.root for p in parts])
-    inner = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
-    factor = np.linalg.cholesky(inner)
-    left = np.linalg.solve(factor, root.T @ level.moment[columns])
-    return level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum())
 
 
 def _pettiness(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:

@@ -1,0 +1,114 @@
+"""Parts of an explanation: effects with a scale, their sizes, evidence and signs together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+
+from identification.gap.compare import IMPERFECTION, LAW_IMPERFECTION, LINEAR, moved_response
+from identification.gap.data import Array
+from identification.gap.evidence import Engine, Level
+from identification.gap.variants import Variant
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One effect of an explanation: variant and scale of its coefficients."""
+
+    variant: Variant
+    scale: float
+
+    @property
+    def word(self) -> str:
+        """Its name."""
+        return self.variant.word
+
+    @property
+    def root(self) -> Array:
+        """Root of the prior covariance of its coefficients."""
+        return np.asarray(self.scale * self.variant.root)
+
+
+def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> tuple[Array, float]:
+    """rms (m) of each part's most probable contribution to the gap, and mean square (m^2) of all
+    contributions. What springs would take over is no gap, unless the effect is linear itself."""
+    columns = [c for p in parts for c in p.variant.columns]
+    root = block([p.root for p in parts])
+    lv, plain = engine.levels[level], engine.levels[0].gram
+    inner = np.eye(len(columns)) + root.T @ lv.gram[np.ix_(columns, columns)] @ root
+    w = root @ np.linalg.solve(inner, root.T @ lv.moment[columns])
+    n, weight = engine.bench.rows.n, engine.bench.rows.weight
+    precision = float(np.sum(1 / engine.sigma[:n] ** 2))
+    sizes, raw, start = [], 0.0, 0
+    for p in parts:
+        c, k = list(p.variant.columns), len(p.variant.columns)
+        part = w[start : start + k]
+        moved = moved_response(engine, (engine.pool[:n, c] @ part)[:, None])[:, 0]
+        square = float(weight @ moved**2 / weight.sum())
+        if p.word in LINEAR:
+            sizes.append(_beyond_springs(engine, moved))
+            square *= (LAW_IMPERFECTION / IMPERFECTION) ** 2
+        else:
+            structural = float(part @ plain[np.ix_(c, c)] @ part) / precision
+            sizes.append(float(np.sqrt(min(structural, square))))
+        raw += square
+        start += k
+    return np.array(sizes), raw
+
+
+def _beyond_springs(engine: Engine, moved: Array) -> float:
+    """rms (m) of a linear effect beyond what the springs give within three standard deviations."""
+    base, n = engine.base, engine.bench.rows.n
+    springs = base.index("spring")
+    root = np.sqrt(engine.bench.rows.weight / engine.bench.rows.weight.sum())
+    sd = base.sd[springs]
+    A = moved_response(engine, base.columns[:n, springs]) * sd
+    t = np.linalg.lstsq(A * root[:, None], moved * root, rcond=1e-6)[0]
+    left = float(np.sqrt(np.sum(((moved - A @ t) * root) ** 2)))
+    most = float(np.abs(t).max()) if t.size else 0.0
+    beyond = max(0.0, 1 - 3 / most) if most > 0 else 1.0
+    return max(left, beyond * float(np.sqrt(np.sum((moved * root) ** 2))))
+
+
+def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
+    """log of the odds that every part keeps the sign physics wants, all fitted together."""
+    from scipy.special import log_ndtr
+
+    columns = [c for p in parts for c in p.variant.columns]
+    root = block([p.root for p in parts])
+    precision = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
+    covariance = root @ np.linalg.solve(precision, root.T)
+    w = root @ np.linalg.solve(precision, root.T @ level.moment[columns])
+    out, start = 0.0, 0
+    for p in parts:
+        s = slice(start, start + len(p.variant.columns))
+        start = s.stop
+        if p.variant.positive is not None:
+            f = p.variant.positive
+            spread = float(np.sqrt(f @ covariance[s, s] @ f)) + 1e-300
+            out += min(0.0, float(log_ndtr(float(f @ w[s]) / spread)) - log(0.5))
+    return out
+
+
+def log_joint(level: Level, parts: tuple[Part, ...]) -> float:
+    """log evidence of all parts together with fixed scales at one level."""
+    columns = [c for p in parts for c in p.variant.columns]
+    root = block([p.root for p in parts])
+    inner = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
+    factor = np.linalg.cholesky(inner)
+    left = np.linalg.solve(factor, root.T @ level.moment[columns])
+    return level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum())
+
+
+def block(roots: list[Array]) -> Array:
+    """The roots along the diagonal."""
+    size = sum(r.shape[0] for r in roots)
+    out = np.zeros((size, size))
+    at = 0
+    for r in roots:
+        k = r.shape[0]
+        out[at : at + k, at : at + k] = r
+        at += k
+    return out
