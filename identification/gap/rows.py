@@ -155,7 +155,7 @@ def _hold_edges(hold: Ints) -> Ints:
     """Bins of 1, 1, 2, 4, 8 ... samples from the start of every hold."""
     starts = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
     within = np.arange(len(hold)) - np.repeat(starts, np.diff(np.append(starts, len(hold))))
-    edge = (within <= 1) | ((within & (within - 1)) == 0)
+    edge = (within & (within - 1)) == 0  # 0, 1, 2, 4, 8 ...
     return np.flatnonzero(edge).astype(np.int64)
 
 

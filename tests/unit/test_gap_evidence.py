@@ -93,12 +93,17 @@ def test_levels_of_imperfection_are_exact_too(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_score_averages_over_scales_and_asks_for_the_sign() -> None:
-    engine = small_engine(small_bench())
+    bench = small_bench()
+    engine = small_engine(bench)
+    # an effect of that shape is really there, at three times the noise
+    engine.target[: bench.rows.n] += 0.3 * engine.pool[: bench.rows.n, 0]
+    engine = Engine(bench, engine.base, engine.target, np.array([0.0, 3e-6]))
     free = variant("joint_creep", "free", [0], (1.0,), positive=False)
     signed = variant("joint_creep", "signed", [0], (1.0,))
     negative = variant("joint_creep", "negative", [0], (1.0,), positive=-np.ones(1))
     a, b, c = (s.log_evidence for s in score(engine, engine.levels, [free, signed, negative]))
     assert np.logaddexp(b, c) - np.log(2) == pytest.approx(a, abs=0.05)
+    assert abs(b - c) > 1.0  # the column is there with one sign, and that one is known
 
 
 def test_priors_of_all_sets_up_to_two_sum_below_one() -> None:
