@@ -34,7 +34,8 @@ def verdict(folder: Path) -> str:
 
 @pytest.mark.parametrize("case", ["1c1067c6ee", "40a4306f41", "827cbeb4a5", "d6694f0c58"])
 def test_short_labelled_cases(case: str) -> None:
-    assert verdict(CASES / case) in labels()[case]["accept"]
+    known = labels()  # skips where there are none
+    assert verdict(CASES / case) in known[case]["accept"]
 
 
 @pytest.mark.slow
