@@ -272,6 +272,10 @@ def simulate(
 @app.command()
 def diagnose(
     dataset: DatasetArgument,
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL.yaml", help="Joint stiffnesses to believe, instead of META's."),
+    ] = None,
     simulation: Annotated[
         Path | None,
         typer.Option(metavar="CURVES.csv", help="Curves of another simulator, instead of META's."),
@@ -294,6 +298,7 @@ def diagnose(
     with terminal_progress() as progress:
         result = run_diagnose(
             load(dataset),
+            model=model,
             simulation=simulation,
             add=add or (),
             withhold=withhold or (),

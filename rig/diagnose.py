@@ -4,7 +4,7 @@ gap shrinks once that effect is added."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from identification.gap.parameters import Parameter
 from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.gap_data import gap_data
+from rig.meta import Simulation
+from rig.model import load_model
 
 MM = 1e3  # mm per m
 Progress = Callable[[str, float], None]
@@ -28,6 +30,7 @@ class Diagnosis:
 
     dataset: str
     result: GapResult
+    banners: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The diagnosis as plain values."""
@@ -50,39 +53,60 @@ class Diagnosis:
             "remainder_mm": r.remainder * MM,
             "runners_up": {w: {"held_out_after_rms_mm": v * MM} for w, v in r.runners_up.items()},
             "notes": list(r.notes),
+            "banners": list(self.banners),
         }
 
     def to_text(self) -> str:
         """What the terminal shows."""
         from rig.diagnose_text import render
 
-        return render(self.result)
+        return "\n\n".join([*self.banners, render(self.result)])
 
 
 def diagnose(
     dataset: Dataset,
     *,
+    model: Path | None = None,
     simulation: Path | None = None,
     withhold: Iterable[str] = (),
     add: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Diagnoses a data set. simulation: CSV with another simulator's curves; withhold: words taken
-    out of the library; add: words the explanation must contain. InputError for anything wrong."""
-    data = gap_data(dataset)
+    """Diagnoses a data set. model: a model file whose joint stiffnesses stand for META's;
+    simulation: CSV with another simulator's curves; withhold: words taken out of the library; add:
+    words the explanation must contain. InputError for anything wrong."""
+    data = gap_data(dataset if model is None else _believing(dataset, model))
     if simulation is not None:
         data = _with_curves(data, simulation)
     try:
         result = diagnose_gap(data, withhold=withhold, add=add, progress=progress)
     except ValueError as error:
         raise InputError(f"{dataset.path or 'data set'}: {error}.") from error
-    return Diagnosis(dataset.uuid, result)
+    return Diagnosis(dataset.uuid, result, dataset.banners())
+
+
+def _believing(dataset: Dataset, model: Path) -> Dataset:
+    """The data set with the joint stiffnesses of a model file as its simulation."""
+    read = load_model(model)
+    if read.effects:
+        raise InputError(
+            f"{model}: effects: {len(read.effects)}; rig diagnose reads models without."
+        )
+    if read.arm.name != dataset.meta.robot:
+        raise InputError(
+            f"{model}: the robot is {read.arm.name}, the measurement's is {dataset.meta.robot}. "
+            "Give the model of the measured robot."
+        )
+    c1, c2, c3, c4, c5, c6 = (float(c) for c in read.arm.joint_stiffness)
+    simulation = Simulation(
+        joint_stiffness_Nm_per_rad=(c1, c2, c3, c4, c5, c6),
+        joint_stiffness_relative_sd=float(max(read.arm.joint_stiffness_relative_sd)),
+    )
+    return replace(dataset, meta=dataset.meta.model_copy(update={"simulation": simulation}))
 
 
 def _with_curves(data: GapData, csv: Path) -> GapData:
     """Displacement that the curves (pose, direction, force_N, displacement_mm) give per sample."""
-    from dataclasses import replace
-
     import pandas as pd
 
     try:

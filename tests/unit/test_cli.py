@@ -247,3 +247,27 @@ def test_wrong_models_and_data_are_refused_by_name(rig: Rig, files: Path, words:
     assert status == 2
     assert words[1] in err
     assert "Traceback" not in err
+
+
+def test_diagnose_gives_the_contracts_json(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    status, out, err = rig("diagnose", "d.h5", "--json", "-")
+    assert status == 0, err
+    result = json.loads(out)
+    assert result["schema"] == "rig.diagnosis/1"
+    assert sum(result["probabilities"].values()) == pytest.approx(1.0)
+    assert result["verdict"] in result["probabilities"]
+    assert {"noise_rms_mm", "before_rms_mm", "after_rms_mm", "shrink_factor", "held_out"} <= set(
+        result["gap"]
+    )
+    status, _, err = rig("diagnose", "d.h5", "--add", "joint_yeild")
+    assert status == 2
+    assert "joint_yield" in err
+
+
+def test_diagnose_takes_the_stiffnesses_of_a_model_of_the_same_robot(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    model = str(HOME / "data" / "models" / "F1.yaml")
+    status, _, err = rig("diagnose", "d.h5", "--model", model)
+    assert status == 2
+    assert "the robot is ur10e, the measurement's is none" in err
