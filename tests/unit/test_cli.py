@@ -271,3 +271,24 @@ def test_diagnose_takes_the_stiffnesses_of_a_model_of_the_same_robot(rig: Rig, f
     status, _, err = rig("diagnose", "d.h5", "--model", model)
     assert status == 2
     assert "the robot is ur10e, the measurement's is none" in err
+
+
+def test_diagnose_believes_the_model_it_is_given(rig: Rig, files: Path) -> None:
+    stiff = "[74402, 113892, 36220, 14216, 15066, 16000]"  # twice F1's springs
+    (files / "arm.yaml").write_text(
+        "robot: ur10e\n"
+        "poses: {P1: {q_rad: [0.234398, -1.742537, -1.886701, -1.083151, 1.570796, -1.336399]}}\n"
+        "directions: {x: [1, 0, 0]}\n"
+        "instruments: {force: {standard_uncertainty_N: 0.1},\n"
+        "  displacement: {standard_uncertainty_mm: 0.002}}\n"
+        f"simulation: {{joint_stiffness_Nm_per_rad: {stiff}}}\n"
+    )
+    rig("import", "t.csv", "arm.yaml", "-o", "a.h5")
+    before = {}
+    model = str(HOME / "data" / "models" / "F1.yaml")
+    for name, words in {"meta": [], "model": ["--model", model]}.items():
+        status, out, err = rig("diagnose", "a.h5", "--json", "-", *words)
+        assert status == 0, err
+        before[name] = json.loads(out)["gap"]["before_rms_mm"]
+    # The table is a spring of 100 N/mm; F1 has 95.96 along x, META's arm twice that.
+    assert before["model"] < 0.2 * before["meta"]
