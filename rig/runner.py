@@ -46,9 +46,8 @@ class Runner:
         self._recorder = recorder
         self._progress = progress
         self._checkpoint = checkpoint
-        self._watch = Watch(protocol.limits)
         self._supervision = Supervision(
-            acquisition, loader, recorder, self._watch, checkpoint, protocol.repetitions
+            acquisition, loader, recorder, Watch(protocol.limits), checkpoint, protocol.repetitions
         )
         self._steps = StepProcedure(protocol, self._supervision, recorder, loader)
         self._mounted: tuple[str, str] | None = None

@@ -96,7 +96,3 @@ class GapData:
     def joints(self) -> int:
         """Number of elastic elements."""
         return len(self.compliance)
-
-    def setup_compliance(self) -> Array:
-        """Simulated compliance along each setup's direction, (setups,) m/N."""
-        return np.array([np.sum(s.lever**2 * self.compliance) for s in self.setups])

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import nan, sqrt
-from pathlib import Path
 from typing import Any
 
 from drivers.readings import Reading
@@ -133,9 +131,3 @@ def along(force: Reading, unit_vector: Vector) -> tuple[float, float]:
     value = sum(f * e for f, e in zip(force.values, unit_vector, strict=False))
     variance = sum((s * e) ** 2 for s, e in zip(force.sd, unit_vector, strict=False) if e)
     return value, sqrt(variance)
-
-
-def free_space_MB(folder: Path) -> float:
-    """Space left where the data set goes."""
-    stat = os.statvfs(folder)
-    return stat.f_bavail * stat.f_frsize / 1e6
