@@ -66,7 +66,7 @@ def _score_batch(
     logs = np.empty((len(levels), *scales.shape))
     etas = np.array([level.eta for level in levels])
     for i, level in enumerate(levels):
-        gram = _rotate(level.gram, columns, root)
+        gram = _rotate(level, columns, root)
         moment = np.einsum("vji,vj->vi", root, level.moment[columns])
         values, vectors = np.linalg.eigh(gram)
         values = np.maximum(values, 0.0)
@@ -89,8 +89,11 @@ def _score_batch(
     ]
 
 
-def _rotate(gram: Array, columns: Array, root: Array) -> Array:
-    part = gram[columns[:, :, None], columns[:, None, :]]
+def _rotate(level: Level, columns: Array, root: Array) -> Array:
+    part = level.gram[columns[:, :, None], columns[:, None, :]]
+    if len(level.taken):
+        gone = level.taken[:, columns].transpose(1, 0, 2)  # (v, r, k)
+        part = part - np.swapaxes(gone, 1, 2) @ gone
     return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
 
 
@@ -171,15 +174,18 @@ def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float)
     """The level with an effect of fixed scale integrated out as well."""
     c = np.array(columns)
     T = scale * root
-    inner = np.eye(len(c)) + T.T @ level.gram[np.ix_(c, c)] @ T
+    gone = level.taken[:, c]
+    beside = T.T @ (level.gram[c] - gone.T @ level.taken)
+    inner = np.eye(len(c)) + beside[:, c] @ T
     factor = np.linalg.cholesky(inner)
-    cross = np.linalg.solve(factor, T.T @ level.gram[c])
+    cross = np.linalg.solve(factor, beside)
     left = np.linalg.solve(factor, T.T @ level.moment[c])
     return Level(
         level.eta,
-        level.gram - cross.T @ cross,
+        level.gram,
         level.moment - cross.T @ left,
         level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum()),
+        np.vstack([level.taken, cross]),
     )
 
 

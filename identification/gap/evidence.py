@@ -33,12 +33,15 @@ class Level:
     """Pool and data with the base integrated out, for one size of imperfection eta (m).
 
     gram (p, p), moment (p,): of the pool; log_base: evidence of the base alone, nats.
+    taken (r, p): what effects that were integrated out as well take from the Gram matrix,
+    `gram - taken' taken`; no full matrix is made for a candidate that is looked at once.
     """
 
     eta: float
     gram: Array
     moment: Array
     log_base: float
+    taken: Array
 
 
 class Engine:
@@ -133,6 +136,7 @@ class Engine:
             gram[np.ix_(p, p)] - pool.T @ pool,
             gram[p, 0] - pool.T @ left,
             float(log_base),
+            np.zeros((0, len(p))),
         )
 
 

@@ -40,17 +40,20 @@ def play(load: Array, radius: Array, rest: Flags, fresh: Flags) -> Array:
     1989). rest: rows before which the load was zero. fresh: rows before which the state went back
     to zero (the arm moved to another pose, or a controller took the joint back).
     """
-    out = np.empty_like(load)
-    state = np.zeros(load.shape[1])
-    upper, lower = load + radius, load - radius
-    for i in range(len(load)):
-        if fresh[i]:
-            state = np.zeros_like(state)
-        elif rest[i]:
-            state = np.clip(state, -radius, radius)
-        state = np.minimum(upper[i], np.maximum(lower[i], state))
-        out[i] = state
-    return out
+    # Every row clips the state before it to [x - r, x + r]; clips of clips are clips, so that all
+    # prefixes are found in log2(n) passes over the rows.
+    low, high = load - radius, load + radius
+    back = (np.clip(-radius, low, high), np.clip(radius, low, high))  # from within [-r, r]
+    still = np.clip(0.0, low, high)  # from zero
+    low = np.where(fresh[:, None], still, np.where(rest[:, None], back[0], low))
+    high = np.where(fresh[:, None], still, np.where(rest[:, None], back[1], high))
+    step = 1
+    while step < len(load):
+        lower = np.clip(low[:-step], low[step:], high[step:])
+        upper = np.clip(high[:-step], low[step:], high[step:])
+        low[step:], high[step:] = lower, upper
+        step *= 2
+    return np.asarray(np.clip(0.0, low, high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,22 +104,36 @@ def bristles(load: Array, reach: Array, fresh: Flags, elastic: bool) -> Array:
 def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
     """First-order lag `T z' = x - z` of a load (n, k) with times (k,): deflection of a Kelvin-Voigt
     element per unit of its compliance. Exact for a load that ramps between rows and then stands."""
-    out = np.empty_like(load)
-    z = np.zeros(load.shape[1])
-    before = np.zeros(load.shape[1])
-    step = np.diff(rows.session, prepend=rows.session[0])
+    before = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
+    before[rest] = 0.0
+    step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
     stands = settling_share(rows)
-    for i in range(len(load)):
-        d = max(step[i], 0.0)
-        if rest[i]:
-            z = z * np.exp(-d / times)
-            before = np.zeros_like(before)
-            d = min(d, 5.0)
-        z = _ramp(z, before, load[i], max(d - stands[i], 0.0), times)
-        z = load[i] + (z - load[i]) * np.exp(-min(d, stands[i]) / times)
-        before = load[i]
-        out[i] = z
-    return out
+    # z_i = keep_i z_{i-1} + gain_i: decay in a rest, a ramp to the new load, then standing there
+    ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
+    ramp = np.maximum(ease - stands, 0.0)[:, None] / times
+    held = np.exp(-np.minimum(ease, stands)[:, None] / times)
+    during = np.exp(-ramp)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(ramp > 0, -np.expm1(-ramp) / ramp, 1.0)
+    ramped = load * (1 - share) + before * (share - during)  # of a ramp, z = 0 before it
+    keep = held * during * np.where(rest[:, None], np.exp(-step[:, None] / times), 1.0)
+    return _prefix(keep, held * ramped + load * (1 - held))
+
+
+_REST_RAMP_S = 5.0  # the last of a rest: the screw comes to the load
+
+
+def _prefix(keep: Array, gain: Array) -> Array:
+    """z (n, k) of `z_i = keep_i z_{i-1} + gain_i`, z = 0 before: steps of steps are steps, so all
+    prefixes are found in log2(n) passes."""
+    keep, gain = keep.copy(), gain.copy()
+    step = 1
+    while step < len(keep):
+        further = gain[step:] + keep[step:] * gain[:-step]
+        keep[step:] = keep[step:] * keep[:-step]
+        gain[step:] = further
+        step *= 2
+    return gain
 
 
 def settling_share(rows: Rows) -> Array:
@@ -131,13 +148,6 @@ def half_sample(rows: Rows) -> float:
     step = np.diff(rows.time)
     inner = step[~rows.hold_starts[1:] & (step > 0)]
     return float(np.min(inner)) / 2 if inner.size else 0.5
-
-
-def _ramp(z: Array, start: Array, end: Array, duration: float, times: Array) -> Array:
-    if duration <= 0:
-        return z
-    rate = (end - start) / duration
-    return np.asarray(end - rate * times + (z - start + rate * times) * np.exp(-duration / times))
 
 
 def delayed(values: Array, delay: float, rows: Rows) -> Array:
