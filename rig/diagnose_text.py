@@ -7,7 +7,8 @@ from identification.gap.parameters import Parameter
 
 MM = 1e3
 
-_MEANING = {
+# One line a word: what happens there.
+MEANING = {
     "joint_yield": "a joint gives way above a threshold torque",
     "joint_backlash": "a joint has lost motion where its torque passes zero",
     "joint_nonlinear_stiffness": "a joint's spring is curved, reversibly",
@@ -52,7 +53,7 @@ def _answer(r: GapResult) -> str:
     more = [e.name for e in r.effects[1:]]
     also = f" Beside it: {', '.join(more)}." if more else ""
     return (
-        f"{r.verdict} ({p:.0%}): {_MEANING[r.verdict]}.{also} With it the gap shrinks from "
+        f"{r.verdict} ({p:.0%}): {MEANING[r.verdict]}.{also} With it the gap shrinks from "
         f"{r.before * MM:.3g} to {r.after * MM:.3g} mm rms; the instruments alone leave "
         f"{r.noise * MM:.3g} mm."
     )
