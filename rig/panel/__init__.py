@@ -1,0 +1,1 @@
+"""The operator's page: served beside the measurement by a process of its own."""
