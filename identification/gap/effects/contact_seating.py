@@ -33,6 +33,18 @@ def variants(bench: Bench) -> list[Variant]:
             column = bench.add(bench.stacked(sign * shape))
             if law == "exponential":
                 columns.append(column)
-            out.append(variant(WORD, f"{law} {share:g}", [column], scales, force_N=f0))
-    out.append(variant(WORD, "mixture", columns, scales, prior=2.0, force_N=0.1 * top))
+            out.append(
+                variant(WORD, f"{law} {share:g}", [column], scales, force_N=f0, laws=((law, f0),))
+            )
+    out.append(
+        variant(
+            WORD,
+            "mixture",
+            columns,
+            scales,
+            prior=2.0,
+            force_N=0.1 * top,
+            laws=tuple(("exponential", s * top) for s in FORCES),
+        )
+    )
     return out

@@ -50,7 +50,7 @@ def variants(bench: Bench) -> list[Variant]:
                     root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
                     out.append(
                         variant(WORD, label, columns, scales, root,
-                                positive=np.eye(len(columns))[0], **info)
+                                positive=np.eye(len(columns))[0], crossing=name, kind=kind, **info)
                     )  # fmt: skip
     return out
 

@@ -10,6 +10,8 @@ Size: gears of ratio >= 80 lose about 1 arcmin; friction is 2 to 20 % of the tor
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.gap.bench import Bench
@@ -39,8 +41,9 @@ def variants(bench: Bench) -> list[Variant]:
         for memory, (fresh, worked) in memories.items():
             name = f"joint {j + 1}{memory}"
             path = worked_in(bench.torque[:, j], fresh) if worked else None
-            out += _spectrum(bench, j, name, span, fresh, path)
-            out += _exponential(bench, j, name, span, fresh, path)
+            found = _spectrum(bench, j, name, span, fresh, path)
+            found += _exponential(bench, j, name, span, fresh, path)
+            out += [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
     return out
 
 
@@ -62,12 +65,13 @@ def _spectrum(
     ]
     root = smooth_root(len(columns), 0.6, 0.3)
     out = [variant(WORD, f"{name} spectrum", columns, SCALES, root, prior=0.25, joint=joint,
-                   radius=radius)]  # fmt: skip
+                   radius=radius, law="Iwan")]  # fmt: skip
     for k in range(len(columns) - 1):
         out.append(
             variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES,
                     smooth_root(2, 0.7),
-                    prior=0.25 / (len(columns) - 1), joint=joint, radius=radius[k : k + 2])
+                    prior=0.25 / (len(columns) - 1), joint=joint, radius=radius[k : k + 2],
+                    law="Iwan")
         )  # fmt: skip
     return out
 
@@ -91,6 +95,6 @@ def _exponential(
             out.append(
                 variant(WORD, f"{name} {law} {REACHES[k]}", columns[k : k + 2], SCALES,
                         smooth_root(2, 0.5), prior=0.25 / (len(reach) - 1), joint=joint,
-                        radius=reach[k : k + 2])
+                        radius=reach[k : k + 2], law=law)
             )  # fmt: skip
     return out

@@ -37,18 +37,19 @@ def variants(bench: Bench) -> list[Variant]:
         root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(HINGES), 0.5)
         out.append(
             variant(WORD, f"joint {j + 1} curve", [line, *columns], SCALES, root,
-                    positive=False, prior=0.5, **info)
+                    positive=False, prior=0.5, kinds=("line", *HINGES), **info)
         )  # fmt: skip
         for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
             column = bench.add_joint(j, c * shape)
             out.append(
                 variant(WORD, f"joint {j + 1} {name}", [column], SCALES, positive=False,
-                        prior=0.1, **info)
+                        prior=0.1, kinds=(name,), **info)
             )  # fmt: skip
         for k in range(len(HINGES) - 1):
             out.append(
                 variant(WORD, f"joint {j + 1} bend {HINGES[k]}", [line, *columns[k : k + 2]],
                         SCALES,
-                        positive=False, prior=0.2 / (len(HINGES) - 1), **info)
+                        positive=False, prior=0.2 / (len(HINGES) - 1),
+                        kinds=("line", *HINGES[k : k + 2]), **info)
             )  # fmt: skip
     return out

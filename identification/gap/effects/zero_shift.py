@@ -15,11 +15,12 @@ def variants(bench: Bench) -> list[Variant]:
     if bench.data.datum == "repetition":
         return []
     scales = tuple(s * bench.reach for s in SHARES)
-    out, shifts = [], []
+    out, shifts, shifted = [], [], []
     for s in range(len(bench.data.setups)):
         mine = rows.setup == s
         runs = list(dict.fromkeys(rows.run[mine].tolist()))
         for r in runs[1:]:
+            shifted.append(r)
             jump = bench.add(bench.stacked((mine & (rows.run >= r)).astype(float)))
             shifts.append(bench.add(bench.stacked((rows.run == r).astype(float))))
             out.append(variant(WORD, f"jump before run {r + 1}", [jump], scales, positive=False,
@@ -27,6 +28,6 @@ def variants(bench: Bench) -> list[Variant]:
     if len(shifts) > 1:
         out.append(
             variant(WORD, "every run", shifts, scales, positive=False, prior=float(len(out)),
-                    runs=[])
+                    runs=[], shifts=shifted)
         )  # fmt: skip
     return out
