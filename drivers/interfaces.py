@@ -93,10 +93,22 @@ class Prompt:
 
 
 @dataclass(frozen=True, slots=True)
+class LimitLevel:
+    """A watched quantity next to its limit, both in `unit`; `action`: "stop", "pause", "warn"."""
+
+    quantity: str
+    value: float
+    limit: float
+    unit: str
+    action: Literal["stop", "pause", "warn"]
+
+
+@dataclass(frozen=True, slots=True)
 class LiveView:
     """All that the person at the screw sees, ten times a second.
 
     `stale` names devices whose value is older than its deadline; their numbers must not look live.
+    Ages are wall-clock seconds of the newest single value at the time of the view.
     """
 
     phase: str  # "zero", "approach", "step", "settling", "sampling", "unloading", "paused"
@@ -116,6 +128,10 @@ class LiveView:
     samples_wanted: int
     stale: tuple[str, ...] = ()
     message: str = ""
+    branch: str = "zero"  # "zero", "loading", "unloading"
+    force_age_s: float = 0.0
+    displacement_age_s: float = 0.0
+    limits: tuple[LimitLevel, ...] = ()
 
 
 class Loader(Protocol):

@@ -89,4 +89,6 @@ class Acquisition:
             force_N=(x, y, z),
             displacement_mm=displacement_mm(laser.values[0]),
             robot=self.devices.robot.state(),
+            force_age_s=force.age_s,
+            displacement_age_s=laser.age_s,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import nan, sqrt
 from typing import Any
@@ -51,16 +51,33 @@ class Place:
     settled: bool
 
 
+Listener = Callable[[str, Mapping[str, Any]], None]
+
+
+def _nobody(_kind: str, _data: Mapping[str, Any]) -> None:
+    """Nobody listens."""
+
+
 class Recorder:
-    """Writes rows and events to the journal; counts rows, so that they can be discarded later."""
+    """Writes rows and events to the journal; counts rows, so that they can be discarded later.
+
+    `listener` is told of each record (kind, data) once it is on disk; it must return at once.
+    """
 
     def __init__(
-        self, journal: Journal, devices: Devices, now: Callable[[], float], sign: int, rows: int = 0
+        self,
+        journal: Journal,
+        devices: Devices,
+        now: Callable[[], float],
+        sign: int,
+        rows: int = 0,
+        listener: Listener = _nobody,
     ) -> None:
         self._journal = journal
         self._devices = devices
         self._now = now
         self._sign = sign
+        self._listener = listener
         self.rows = rows
         self.datum_mm = nan
 
@@ -85,7 +102,7 @@ class Recorder:
         sd["displacement_mm"] = slot.laser.sd[0]
         values["settled"] = float(place.settled)
         values["slots_missed"] = float(slot.missed)
-        self._journal.append(
+        self._write(
             "sample",
             {
                 "number": slot.number,
@@ -112,7 +129,11 @@ class Recorder:
     def event(self, kind: str, text: str, **data: Any) -> None:
         """Something that happened, in words, with what a program needs to know of it."""
         when = {"session_s": round(self._now(), 3)}
-        self._journal.append("event", {"kind": kind, "text": text, **when, **data})
+        self._write("event", {"kind": kind, "text": text, **when, **data})
+
+    def _write(self, kind: str, data: dict[str, Any]) -> None:
+        self._journal.append(kind, data)
+        self._listener(kind, data)
 
     def discard(self, first: int, reason: str) -> None:
         """Rows from `first` to the newest stay in the file, marked as not to be used."""
@@ -123,7 +144,7 @@ class Recorder:
 
     def stop(self, reason: str, *, complete: bool) -> None:
         """The last record. Without one the data set counts as incomplete."""
-        self._journal.append("stop", {"reason": reason, "complete": complete})
+        self._write("stop", {"reason": reason, "complete": complete})
 
 
 def along(force: Reading, unit_vector: Vector) -> tuple[float, float]:

@@ -58,6 +58,7 @@ class StepProcedure:
         show = self._supervision.show
         half_width = self._protocol.force_band.half_width_N(step.target_N)
         show(step=step.number, steps=steps, target_N=step.target_N, band_N=half_width)
+        show(branch=step.branch)
         show(samples=0, samples_wanted=self._wanted())
         deadline = self._supervision.now() + self._protocol.step_deadline_s
         while True:
@@ -152,6 +153,7 @@ class StepProcedure:
         if wanted == 0:
             return
         self._supervision.show(step=0, target_N=0.0, band_N=0.0, samples=0, samples_wanted=wanted)
+        self._supervision.show(branch="zero")
         self._settle(where, zero, banded=False)
         taken = 0
         while taken < wanted:

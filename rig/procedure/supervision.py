@@ -85,8 +85,15 @@ class Supervision:
         slot = self._acquisition.wait()
         live = self._acquisition.live(self._recorder.displacement_mm)
         force = sum(f * e for f, e in zip(live.force_N, self._unit_vector, strict=True))
-        self.show(force_N=force, displacement_mm=live.displacement_mm)
-        for breach in self._watch.breaches(live):
+        breaches = self._watch.breaches(live)
+        self.show(
+            force_N=force,
+            displacement_mm=live.displacement_mm,
+            force_age_s=live.force_age_s,
+            displacement_age_s=live.displacement_age_s,
+            limits=self._watch.levels,
+        )
+        for breach in breaches:
             self._on_breach(breach)
         self._loader.guide(self.view)  # during prompts too: unloading is done by the live force
         if not self._prompts:
