@@ -1,0 +1,412 @@
+"""Figures of a diagnosis: where the gap lies, which effect, how far it shrinks, what remains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.gap.data import BRANCH_NAMES
+from identification.gap.remainder import Remainder, remainder
+from rig.diagnose import Diagnosis
+from rig.errors import InputError
+from rig.gap_map import gap_map
+from rig.gap_points import (
+    FALLING,
+    MM,
+    RISING,
+    Points,
+    Table,
+    held_table,
+    point_table,
+    points,
+    remainder_table,
+    session_clock,
+    setup_name,
+    write_table,
+)
+from rig.plotting import COLOURS, write_figures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from identification.gap.diagnose import GapResult
+
+BLUE, ORANGE, GREEN = COLOURS[0], COLOURS[1], COLOURS[2]
+GREY = "0.45"
+LEAST_PROBABILITY = 0.005
+_SENSES = ((RISING, "loading", BLUE, BLUE, "o"), (FALLING, "unloading", ORANGE, "white", "s"))
+_MOST_PANELS = 12
+_MANY = 400  # points of a panel beyond which markers hide each other
+
+
+def draw(diagnosis: Diagnosis, folder: Path, name: str = "") -> list[Path]:
+    """Writes every figure as PNG and SVG and its numbers as CSV into `folder`; the files written.
+
+    name: of the data set, put into a corner. InputError if the folder can't be written to.
+    """
+    drawing = _Drawing(diagnosis, name or diagnosis.dataset)
+    written = write_figures(folder, drawing.figures)
+    try:
+        for stem, table in drawing.tables():
+            path = folder / f"{stem}.csv"
+            write_table(table, drawing.comments(), path)
+            written.append(path)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: the tables can't be written there ({error.strerror}). "
+            "Give another folder with --figures."
+        ) from error
+    return written
+
+
+class _Drawing:
+    """What all figures of one diagnosis share."""
+
+    def __init__(self, diagnosis: Diagnosis, name: str) -> None:
+        self.banners, self.name = diagnosis.banners, name
+        self.r: GapResult = diagnosis.result
+        self.points: Points = points(self.r)
+        self.remainder: Remainder = remainder(self.r.engine, self.r.fit)
+
+    def figures(self) -> Iterator[tuple[str, Figure]]:
+        """(name, figure) one after the other: only one is held in memory."""
+        yield "gap_curve", self._finish(curve(self.r, self.points))
+        yield "gap_map", self._finish(gap_map(self.r, self.points))
+        yield "gap_residual", self._finish(residual(self.r, self.points))
+        yield "gap_probabilities", self._finish(probabilities(self.r))
+        yield "gap_withheld", self._finish(withheld(self.r))
+        yield "gap_remainder", self._finish(remaining(self.r, self.points, self.remainder))
+
+    def tables(self) -> Iterator[tuple[str, Table]]:
+        """(name, numbers): curve, map and residual share one table."""
+        yield "gap_points", point_table(self.r, self.points)
+        ranked = _ranked(self.r, 0.0)
+        yield "gap_probabilities", {"word": list(ranked), "probability": list(ranked.values())}
+        yield "gap_withheld", held_table(self.r)
+        yield "gap_remainder", remainder_table(self.r, self.remainder)
+
+    def comments(self) -> tuple[str, ...]:
+        """First lines of every table."""
+        return (*self.banners, f"rig diagnose {self.name}: {self.r.verdict}")
+
+    def _finish(self, figure: Figure) -> Figure:
+        """The data set's name; and across the figure what must not be overlooked."""
+        words = [banner.split(":", maxsplit=1)[0] for banner in self.banners]
+        if words:
+            figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.25,
+                        ha="center", va="center", rotation=25)  # fmt: skip
+        figure.text(0.995, 0.003, self.name, fontsize=6, color="0.4", ha="right", va="bottom")
+        return figure
+
+
+def curve(r: GapResult, p: Points) -> Figure:
+    """Measurement and simulation before and after, one panel per pose and direction; below each,
+    measured minus simulated, which the curves alone would hide.
+
+    Displacement over force; where the displacement was imposed, force over displacement.
+    """
+    figure, grid, shown = _panels(r, below=True)
+    for (upper, lower), s in zip(grid, shown, strict=True):
+        _curve_panel(r, p, upper, s)
+        _gap_panel(r, p, lower, s)
+        upper.set_title(setup_name(r, s), fontsize=10)
+    for upper, lower in _first_column(grid):
+        upper.set_ylabel("Force in N" if r.bench.imposed else "Displacement in mm")
+        lower.set_ylabel("Gap in N" if r.bench.imposed else "Gap in mm")
+    _label_below(grid, "Displacement in mm" if r.bench.imposed else "Force in N")
+    _title(figure, f"Measured, and simulated before and after ({_after(r)})")
+    _shared_legend(figure, [axes for pair in grid for axes in pair])
+    return figure
+
+
+def _axes_of(r: GapResult, p: Points) -> tuple[Any, Any, Any]:
+    """What drives the rig, what answers (n,), and mm to the answer's unit (n,)."""
+    if r.bench.imposed:
+        return p.displacement, p.force, 1 / p.stated
+    return p.force, p.displacement, np.ones(len(p.force))
+
+
+def _curve_panel(r: GapResult, p: Points, axes: Any, s: int) -> None:
+    mine = p.setup == s
+    x, y, scale = _axes_of(r, p)
+    many = np.count_nonzero(mine) > _MANY
+    for sense, label, edge, fill, marker in _SENSES:
+        here = mine & (p.sense == sense)
+        if here.any():
+            axes.plot(x[here], y[here], marker, color=edge, markerfacecolor=fill,
+                      markersize=1.5 if many else 4, markeredgewidth=0.5 if many else 0.9,
+                      label=f"measured, {label}", rasterized=many, zorder=2)  # fmt: skip
+    zero = mine & (p.sense == 0)
+    if zero.any():
+        axes.plot(x[zero], y[zero], "x", color=GREY, markersize=4, label="measured, zero load")
+    order = np.flatnonzero(mine)[np.argsort(x[mine], kind="stable")]
+    axes.plot(x[order], (p.before * scale)[order], "--", color="black", linewidth=1.2,
+              label="simulated before", zorder=3)  # fmt: skip
+    for i, run in enumerate(np.unique(p.run[mine])):
+        path = mine & (p.run == run)
+        axes.plot(x[path], (p.after * scale)[path], "-", color=GREEN, linewidth=1.1, zorder=3,
+                  label="_" if i else "simulated after (each run)")  # fmt: skip
+
+
+def _gap_panel(r: GapResult, p: Points, axes: Any, s: int) -> None:
+    """Measured minus simulated, before and after, run by run."""
+    x, _, scale = _axes_of(r, p)
+    axes.axhline(0, color="0.4", linewidth=0.8)
+    for run in np.unique(p.run[p.setup == s]):
+        path = p.run == run
+        axes.plot(x[path], (p.gap_before * scale)[path], "--", color="black", linewidth=0.9)
+        axes.plot(x[path], (p.gap_after * scale)[path], "-", color=GREEN, linewidth=1.1)
+
+
+def residual(r: GapResult, p: Points) -> Figure:
+    """What the chosen explanation leaves, over force and over the session's time."""
+    figure = _figure(11.0, 4.6)
+    left, right = figure.subplots(1, 2, sharey=True)
+    band = 2 * float(np.median(p.noise))
+    minutes, unit = session_clock(p)
+    for axes, x in ((left, p.displacement if r.bench.imposed else p.force), (right, minutes)):
+        axes.axhspan(-band, band, color="0.88", zorder=0, label="noise, ±2 standard deviations")
+        axes.axhline(0, color="0.4", linewidth=0.8, zorder=1)
+        _residual_points(r, p, axes, x)
+    left.set_xlabel("Displacement in mm" if r.bench.imposed else "Force in N")
+    right.set_xlabel(f"Time in the {'session' if r.bench.rows.clock else 'runs, rests assumed'} "
+                     f"in {unit}")  # fmt: skip
+    left.set_ylabel(_gap_label(r, "Left"))
+    _title(
+        figure,
+        f"Left {_after(r)}: {r.after * MM:.3g} mm rms of single samples; the instruments alone "
+        f"leave {r.noise * MM:.3g} mm",
+    )
+    _shared_legend(figure, [left])
+    return figure
+
+
+def _residual_points(r: GapResult, p: Points, axes: Any, x: Any) -> None:
+    count = len(r.bench.data.setups)
+    many = len(x) > _MANY
+    for s in range(count):
+        for sense, label, _, _, marker in _SENSES:
+            here = (p.setup == s) & (p.sense == sense)
+            if not here.any():
+                continue
+            colour = COLOURS[s % len(COLOURS)]
+            axes.plot(x[here], p.gap_after[here], marker, color=colour,
+                      markerfacecolor=colour if sense == RISING else "white",
+                      markersize=2 if many else 4, markeredgewidth=0.6 if many else 0.9,
+                      label=f"{setup_name(r, s)}: {label}", rasterized=many)  # fmt: skip
+    zero = p.sense == 0
+    if zero.any():
+        axes.plot(x[zero], p.gap_after[zero], "x", color=GREY, markersize=4, label="zero load")
+
+
+def probabilities(r: GapResult) -> Figure:
+    """Probability of every word above half a percent of being the main cause; verdict marked."""
+    ranked = _ranked(r, LEAST_PROBABILITY)
+    alike = {w for e in r.effects if e.name == r.verdict for w in e.indistinguishable_from}
+    figure = _figure(7.5, 1.3 + 0.36 * max(len(ranked), 3))
+    axes = figure.add_subplot()
+    for i, (word, p) in enumerate(ranked.items()):
+        chosen = word == r.verdict
+        axes.barh(i, p, 0.7, color=BLUE if chosen else "0.75", linewidth=0,
+                  hatch="//" if word in alike else None, edgecolor="white")  # fmt: skip
+        note = "  verdict" if chosen else "  can't be told from it here" if word in alike else ""
+        axes.text(p + 0.01, i, f"{p:.1%}{note}", va="center", fontsize=9,
+                  fontweight="bold" if chosen else "normal")  # fmt: skip
+    axes.set_yticks(range(len(ranked)), list(ranked))
+    axes.set_ylim(max(len(ranked), 3) - 0.4, -0.6)
+    axes.set_xlim(0, 1.28)
+    axes.set_xticks(np.linspace(0, 1, 6))
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("Probability of being the main cause")
+    rest = 1 - sum(ranked.values())
+    axes.set_title(f"Which effect causes the gap (all others together {max(rest, 0):.1%})",
+                   fontsize=11)  # fmt: skip
+    return figure
+
+
+def withheld(r: GapResult) -> Figure:
+    """Before and after, fitted and withheld in turn, beside other effects; noise as a line."""
+    entries = [("fitted", r.before, r.after, "", GREEN)]
+    for h in r.held_out:
+        low, high = h.ci95
+        text = f"shrinks by {h.shrink:.3g} ({low:.3g} to {high:.3g})"
+        entries.append((f"withheld {h.fold}", h.before, h.after, text, GREEN))
+    for word, after in r.runners_up.items():
+        entries.append((f"withheld {r.held_out[0].fold},\nwith {word} instead",
+                        r.held_out[0].before, after, "", COLOURS[3]))  # fmt: skip
+    figure = _figure(8.5, 1.9 + 0.5 * len(entries))
+    axes = figure.add_subplot()
+    for i, (_, before, after, text, colour) in enumerate(entries):
+        b, a = before * MM, after * MM
+        axes.plot([a, b], [i, i], "-", color="0.7", linewidth=2, zorder=1)
+        axes.plot(b, i, "o", color="black", markerfacecolor="white", markersize=8,
+                  label="_" if i else "before")  # fmt: skip
+        axes.plot(a, i, "o", color=colour, markersize=8)
+        middle = (float(np.sqrt(max(a * b, 1e-300))), i)
+        axes.annotate(text or f"{b / a if a > 0 else 1:.3g}", middle, xytext=(0, 5),
+                      textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
+    axes.plot([], [], "o", color=GREEN, label=f"after, {_after(r)}")
+    if r.runners_up:
+        axes.plot([], [], "o", color=COLOURS[3], label="after, with another effect instead")
+    axes.axvline(r.noise * MM, color=BLUE, linestyle="--", label="noise of the instruments")
+    axes.set_yticks(range(len(entries)), [e[0] for e in entries])
+    axes.set_ylim(len(entries) - 0.5, -0.7)
+    _log_axis(axes)
+    axes.set_xlabel(_gap_label(r, "Gap", "rms in mm"))
+    axes.set_title(f"How far the gap shrinks {_after(r)}", fontsize=11)
+    _shared_legend(figure, [axes])
+    return figure
+
+
+def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
+    """What repeats of the residual, as a smooth curve with its uncertainty, over the residuals of
+    all runs, setup by setup."""
+    figure, grid, shown = _panels(r)
+    for (axes,), s in zip(grid, shown, strict=True):
+        axes.axhline(0, color="0.4", linewidth=0.8)
+        for sense, label, edge, fill, marker in _SENSES:
+            _left_by_runs(r, p, axes, s, sense)
+            here = np.flatnonzero((m.setup == s) & _of_sense(m, sense))
+            here = here[np.argsort(m.load[here], kind="stable")]
+            if not here.size:
+                continue
+            x = m.displacement[here] * MM if r.bench.imposed else m.load[here]
+            mean, sd = m.mean[here] * MM, m.sd[here] * MM
+            axes.plot(x, m.residual[here] * MM, marker, color=edge, markerfacecolor=fill,
+                      markersize=4, label=f"{label}: mean of the runs")  # fmt: skip
+            axes.fill_between(x, mean - 2 * sd, mean + 2 * sd, color=edge, alpha=0.2, linewidth=0)
+            axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
+        axes.set_title(setup_name(r, s), fontsize=10)
+    _label_below(grid, "Displacement in mm" if r.bench.imposed else "Force in N")
+    figure.supylabel(_gap_label(r, "Left unexplained"), fontsize=10)
+    _title(figure, _remainder_title(r, m))
+    _shared_legend(figure, [axes for (axes,) in grid])
+    return figure
+
+
+def _left_by_runs(r: GapResult, p: Points, axes: Any, s: int, sense: int) -> None:
+    """Residual of every run as a faint line."""
+    x, _, _ = _axes_of(r, p)
+    colour = BLUE if sense == RISING else ORANGE
+    for run in np.unique(p.run[p.setup == s]):
+        path = (p.run == run) & (p.sense == sense)
+        # a running recording would join the ends of its cycles
+        style = "," if r.bench.rows.continuous else "-"
+        axes.plot(x[path], p.gap_after[path], style, color=colour, linewidth=0.7, alpha=0.45)
+
+
+def _of_sense(m: Remainder, sense: int) -> Any:
+    """(k,) levels of a sense; cycles that rest at levels count as loading."""
+    known = np.where(m.branch == 3, RISING, m.branch)
+    return known == sense
+
+
+def _remainder_title(r: GapResult, m: Remainder) -> str:
+    low, high = (edge * MM for edge in m.ci95)
+    differs = (
+        f"another {m.unrepeated_rms * MM:.2g} mm rms is finer or does not repeat"
+        if m.visits > 1
+        else "each load was met once, so that what repeats can't be told"
+    )
+    if m.largest is None:
+        seen = f"nothing that repeats for sure (95 %: below {high:.2g} mm rms)"
+        return f"Left {_after(r)}: {seen}; {differs}"
+    e = m.largest
+    where = ", ".join(w for w in (e.pose, e.direction, BRANCH_NAMES[e.branch]) if w)
+    at = f"{e.displacement * MM:.3g} mm" if r.bench.imposed else f"{e.force:.4g} N"
+    return (
+        f"Left {_after(r)}: {m.rms * MM:.2g} mm rms repeat (95 %: {low:.2g} to {high:.2g}), "
+        f"most at {where}, {at}: {e.mean * MM:.2g} mm; {differs}"
+    )
+
+
+def _panels(r: GapResult, *, below: bool = False) -> tuple[Figure, list[list[Any]], list[int]]:
+    """One panel per setup (a second one below it, if asked), up to `_MOST_PANELS`; their axes; the
+    setups shown. All lower panels, or all panels, share their y axis."""
+    shown = list(range(min(len(r.bench.data.setups), _MOST_PANELS)))
+    columns = min(len(shown), 3 if len(shown) > 4 or len(shown) == 3 else 2)
+    lines = -(-len(shown) // columns)
+    figure = _figure(7.5 if columns == 1 else 4.2 * columns + 0.6,
+                     1.4 + (4.4 if below else 3.3) * lines)  # fmt: skip
+    heights = [3.0, 1.3] * lines if below else None
+    deep = 2 if below else 1
+    axes = figure.subplots(lines * deep, columns, squeeze=False, height_ratios=heights,
+                           sharey=False if below else "all")  # fmt: skip
+    grid = []
+    for i in range(lines * columns):
+        line, column = divmod(i, columns)
+        stack = list(axes[line * deep : (line + 1) * deep, column])
+        for one in stack:
+            one.set_visible(i < len(shown))
+        if below:
+            stack[0].sharex(stack[1])
+            stack[0].tick_params(labelbottom=False)
+            stack[1].sharey(axes[1, 0]) if i else None
+        grid.append(stack)
+    return figure, grid[: len(shown)], shown
+
+
+def _first_column(grid: list[list[Any]]) -> list[list[Any]]:
+    return [stack for stack in grid if stack[0].get_subplotspec().is_first_col()]
+
+
+def _label_below(grid: list[list[Any]], label: str) -> None:
+    """The x label below the last panel of every column."""
+    for i, stack in enumerate(grid):
+        column = stack[-1].get_subplotspec().colspan.start
+        after = (other[-1].get_subplotspec().colspan.start for other in grid[i + 1 :])
+        if column not in after:
+            stack[-1].set_xlabel(label)
+
+
+def _title(figure: Figure, text: str) -> None:
+    """Over the whole figure, in as many lines as its width asks for."""
+    figure.suptitle("\n".join(wrap(text, int(10.5 * figure.get_size_inches()[0]))), fontsize=11)
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _shared_legend(figure: Figure, panels: list[Any]) -> None:
+    """One legend below, every label once."""
+    found: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    if found:
+        fitting = int(figure.get_size_inches()[0] / 2)
+        figure.legend(list(found.values()), list(found), loc="outside lower center", frameon=False,
+                      fontsize=8, ncols=min(len(found), fitting))  # fmt: skip
+
+
+def _ranked(r: GapResult, least: float) -> dict[str, float]:
+    ranked = sorted(r.probabilities.items(), key=lambda item: -item[1])
+    return {word: p for word, p in ranked if p >= least or word == r.verdict}
+
+
+def _after(r: GapResult) -> str:
+    """What stands in the simulation after."""
+    if r.effects:
+        return "with " + " + ".join(e.name for e in r.effects)
+    return "with springs and gains refitted"
+
+
+def _gap_label(r: GapResult, what: str, unit: str = "in mm") -> str:
+    return f"{what} {unit}" + (" (force over simulated stiffness)" if r.bench.imposed else "")
+
+
+def _log_axis(axes: Any) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.margins(x=0.12)
