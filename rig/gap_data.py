@@ -124,11 +124,18 @@ def _tangential(
 
 def _setup(dataset: Dataset, arm: Arm | None, pose: str, direction: str) -> Setup:
     n = np.array(dataset.meta.directions[direction], dtype=float)
-    tangents = _tangents(n)
     if arm is None:
-        return _bench_setup(dataset, direction, n, tangents)
+        return _bench_setup(dataset, direction, n, _tangents(n))
     where = dataset.meta.poses[pose]
-    q, tool = np.array(where.q_rad), tool_offset(np.array(where.tcp_xyz_mm) * MM)
+    return arm_setup(
+        arm, pose, np.array(where.q_rad), np.array(where.tcp_xyz_mm) * MM, direction, n
+    )
+
+
+def arm_setup(arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Array) -> Setup:
+    """The setup of an arm: q (6,) rad, point of load tcp (3,) m in the flange frame, direction n
+    (3,) of length 1."""
+    tool, tangents = tool_offset(tcp), _tangents(n)
     J = arm.jacobian(q, tool)[:3]
     point = arm.fk(q, tool)[:3, 3]
     frames = arm.frames(q)

@@ -1,0 +1,99 @@
+"""Effects in absolute units: what was fitted on one measurement, carried over to any other.
+
+The library searches on grids relative to the data. A `Form` is the same law in newton metres,
+seconds and radians per newton metre; `describe` makes it from a fitted part, `realise` gives what
+it does on another bench. On the bench that it came from, it is the fitted contribution again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.forms import elastic, friction, instruments, knees
+from identification.gap.forms.law import Columns, Describe, Law, Term
+from identification.gap.parts import Part
+from identification.gap.variants import Variant
+
+__all__ = ["SESSION", "Form", "Law", "Term", "describe", "law_of", "lawful", "realise", "rows_of"]
+
+_TABLE: dict[str, tuple[Describe, Columns]] = {
+    "joint_yield": (knees.describe, knees.columns),
+    "base_slip": (knees.describe, knees.columns),
+    "joint_hysteresis": (friction.describe_hysteresis, friction.hysteresis),
+    "joint_backlash": (friction.describe_backlash, friction.backlash),
+    "joint_nonlinear_stiffness": (elastic.describe_curve, elastic.curve),
+    "joint_creep": (elastic.describe_creep, elastic.creep),
+    "joint_stiffness_error": (elastic.describe_springs, elastic.springs),
+    "link_flexibility": (elastic.describe_links, elastic.links),
+    "base_compliance": (elastic.describe_base, elastic.base),
+    "contact_seating": (elastic.describe_seating, elastic.seating),
+    "load_misalignment": (elastic.describe_misalignment, elastic.misalignment),
+    "pose_error": (elastic.describe_pose, elastic.pose),
+    "force_scale": (instruments.describe_gain, instruments.force_gain),
+    "displacement_scale": (instruments.describe_gain, instruments.displacement_gain),
+    "time_lag": (instruments.describe_lag, instruments.lag),
+    "force_drift": (instruments.describe_force_drift, instruments.drift_of_force),
+    "thermal_drift": (instruments.describe_thermal, instruments.drift_of_displacement),
+    "zero_shift": (instruments.describe_shift, instruments.shift),
+}
+# Coefficients of one session that say nothing of the next: chance, or a path without a law.
+SESSION = frozenset({"place", "shift", "drift_knot", "drift_per_kelvin"})
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """An effect with numbers: values (k,) of the law's terms in SI units, covariance (k, k)."""
+
+    word: str
+    law: Law
+    values: Array
+    covariance: Array
+
+
+def law_of(bench: Bench, variant: Variant) -> tuple[Law, Array]:
+    """The law of a variant of the library on its bench, and (k,) its units in those of the law.
+
+    Raises ValueError for a variant that says too little of itself.
+    """
+    try:
+        return _TABLE[variant.word][0](bench, variant)
+    except KeyError as missing:
+        raise ValueError(
+            f"{variant.word}, {variant.label}: the library does not say {missing} of this shape"
+        ) from missing
+
+
+def describe(bench: Bench, part: Part, w: Array, covariance: Array) -> Form:
+    """The form of a fitted part; w (k,), covariance (k, k): of the variant's coefficients."""
+    law, scale = law_of(bench, part.variant)
+    return Form(part.word, law, w * scale, covariance * np.outer(scale, scale))
+
+
+def rows_of(bench: Bench, word: str, law: Law) -> Array:
+    """(size, k): stacked columns of the law's terms on this bench, per SI unit."""
+    columns = _TABLE[word][1](bench, law)
+    return np.column_stack(columns) if columns else np.zeros((bench.layout.size, 0))
+
+
+def realise(bench: Bench, form: Form) -> Array:
+    """(size,): what the effect adds to every channel of this bench."""
+    return np.asarray(rows_of(bench, form.word, form.law) @ form.values)
+
+
+def lawful(form: Form) -> Form:
+    """The form without what belongs to its session alone."""
+    keep = [i for i, t in enumerate(form.law.terms) if t.coefficient not in SESSION]
+    law = Law(form.law.constants, tuple(form.law.terms[i] for i in keep))
+    return replace(
+        form, law=law, values=form.values[keep], covariance=form.covariance[np.ix_(keep, keep)]
+    )
+
+
+def known_words() -> Iterable[str]:
+    """Words that have a form: all of the library."""
+    return _TABLE

@@ -1,0 +1,190 @@
+"""Springs and what stands in for them: curved, creeping, wrong ones; links, base, seating, pose."""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+from typing import Any
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.effects.base_compliance import moments
+from identification.gap.forms.law import Law, Term, along, scaled
+from identification.gap.history import rests, retarded
+from identification.gap.variants import Variant
+
+_POWERS = {"quadratic": 2, "cubic": 3, "even": 2}
+
+
+def describe_curve(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: a line, hinges `beyond` a torque, powers; `measured_to`: where they were seen."""
+    joint, top = int(v.info["joint"]), float(v.info["torque"])
+    c = float(bench.compliance[joint])
+    terms, unit = [], []
+    for kind in v.info["kinds"]:
+        if kind == "line":
+            terms.append(Term("compliance"))
+        elif isinstance(kind, float):
+            terms.append(Term("compliance", {"beyond": kind * top}))
+        else:
+            terms.append(Term(f"compliance_{kind}"))
+        unit.append(c / top ** (_POWERS.get(kind, 1) - 1))
+    return Law({"joint": joint, "measured_to": top}, tuple(terms)), scaled(unit)
+
+
+def curve(bench: Bench, law: Law) -> list[Array]:
+    """Deflection of the joint over its torque."""
+    joint = law.constants["joint"]
+    x = bench.torque[:, joint]
+    shapes = {
+        "compliance_quadratic": x * np.abs(x),
+        "compliance_cubic": x**3,
+        "compliance_even": x**2,
+    }
+    out = []
+    for t in law.terms:
+        beyond = t.shape.get("beyond", 0.0)
+        hinge = np.sign(x) * np.maximum(np.abs(x) - beyond, 0.0)
+        out.append(bench.joint_column(joint, shapes.get(t.coefficient, hinge)))
+    return out
+
+
+def describe_creep(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: Kelvin-Voigt elements with their retardation time."""
+    joint = int(v.info["joint"])
+    terms = tuple(Term("compliance", {"retardation_time": float(t)}) for t in v.info["times_s"])
+    return Law({"joint": joint}, terms), np.full(len(terms), float(bench.compliance[joint]))
+
+
+def creep(bench: Bench, law: Law) -> list[Array]:
+    """Retarded torques on the session clock."""
+    joint = law.constants["joint"]
+    times = np.array([t.shape["retardation_time"] for t in law.terms])
+    load = np.tile(bench.torque[:, joint][:, None], (1, len(times)))
+    z = retarded(load, times, bench.rows, rests(bench.rows))
+    return [bench.joint_column(joint, bench.sense * column) for column in z.T]
+
+
+def describe_springs(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: joints whose compliance is another."""
+    joints = [int(j) for j in v.info["joints"]]
+    terms = tuple(Term("compliance", {"joint": j}) for j in joints)
+    return Law({}, terms), np.asarray(bench.compliance[joints])
+
+
+def springs(bench: Bench, law: Law) -> list[Array]:
+    """Deflection of the joint per unit of compliance: its torque."""
+    joints = [t.shape["joint"] for t in law.terms]
+    return [bench.joint_column(j, bench.torque[:, j]) for j in joints]
+
+
+def describe_links(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: segments, as multiples of the nominal tube of the robot file."""
+    terms = tuple(Term("over_nominal", {"segment": int(k)}) for k in v.info["segments"])
+    return Law({}, terms), np.ones(len(terms))
+
+
+def links(bench: Bench, law: Law) -> list[Array]:
+    """Compliance of the segment along the direction times the load."""
+    each = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]
+    return [bench.stacked(each[:, t.shape["segment"]] * bench.load) for t in law.terms]
+
+
+def describe_base(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: axes through a point `depth` below the base."""
+    terms = tuple(Term("compliance", {"axis": "xyz"[a]}) for a in v.info["axes"])
+    return Law({"depth": float(v.info["depth_m"])}, terms), np.ones(len(terms))
+
+
+def base(bench: Bench, law: Law) -> list[Array]:
+    """`(r x n)_a^2` times the load."""
+    m = moments(bench, law.constants["depth"])
+    axes = ["xyz".index(t.shape["axis"]) for t in law.terms]
+    return [bench.stacked(m[:, a] ** 2 * bench.load) for a in axes]
+
+
+def describe_seating(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: saturating curves of the force."""
+    terms = tuple(
+        Term("depth", {"law": law, "force_scale": float(f0)}) for law, f0 in v.info["laws"]
+    )
+    return Law({}, terms), np.ones(len(terms))
+
+
+def seating(bench: Bench, law: Law) -> list[Array]:
+    """`1 - exp(-F/F0)` or `F / (F + F0)`."""
+    size, sign = np.abs(bench.load), bench.sense * np.sign(bench.load)
+    out = []
+    for t in law.terms:
+        f0 = t.shape["force_scale"]
+        exponential = t.shape["law"] == "exponential"
+        shape = 1 - np.exp(-size / f0) if exponential else size / (size + f0)
+        out.append(bench.stacked(sign * shape))
+    return out
+
+
+def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: shares of the load across the nominal direction, as vectors in the base frame."""
+    terms = []
+    for name in v.info["directions"]:
+        s = next(s for s in bench.data.setups if s.direction == name)
+        for k in range(2):
+            shape = {"along": _triple(s.unit_vector), "across": _triple(s.tangents[k])}
+            terms.append(Term("tangent", shape))
+    return Law({}, tuple(terms)), np.ones(len(terms))
+
+
+def misalignment(bench: Bench, law: Law) -> list[Array]:
+    """Deflections under the load across, for setups of the same direction and sense."""
+    rows, data = bench.rows, bench.data
+    out = []
+    for t in law.terms:
+        load = np.where(along(bench, t.shape["along"]) > 0, bench.load, 0.0)
+        parts = np.stack([s.tangents @ np.array(t.shape["across"]) for s in data.setups])
+        lever = np.stack([p @ s.tangent_lever for p, s in zip(parts, data.setups, strict=True)])
+        q = lever[rows.setup] * bench.compliance * load[:, None]
+        response = np.sum(bench.lever * q, axis=1)
+        out.append(bench.stacked(response, q, parts[rows.setup] * load[:, None]))
+    return out
+
+
+def describe_pose(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: offset of the tool in the base frame (and its products), or angles of the joints."""
+    if v.info["kind"] == "joints":
+        terms = [Term("angle", {"joint": j}) for j in range(bench.data.joints)]
+        return Law({}, tuple(terms)), np.ones(len(terms))
+    terms = [Term("offset", {"axis": a}) for a in "xyz"]
+    pairs = combinations_with_replacement("xyz", 2)
+    terms += [Term("offset_product", {"axes": a + b}) for a, b in pairs]
+    return Law({}, tuple(terms)), np.ones(len(terms))
+
+
+def pose(bench: Bench, law: Law) -> list[Array]:
+    """Change of the levers: twice in the laser, once in the joint readings."""
+    setup, data = bench.rows.setup, bench.data
+    offset = np.stack([s.offset_lever for s in data.setups])[setup]
+    turned = np.stack([s.turned_lever for s in data.setups])[setup]
+    out = []
+    for t in law.terms:
+        if t.coefficient == "offset_product":
+            a, b = ("xyz".index(x) for x in t.shape["axes"])
+            product = offset[:, :, a] * offset[:, :, b] * (1.0 if a == b else 2.0)
+            out.append(bench.stacked((product @ bench.compliance) * bench.load))
+        elif t.coefficient == "angle":
+            stands = np.zeros((bench.rows.n, data.joints))
+            stands[:, t.shape["joint"]] = 1.0
+            out.append(_leverage(bench, turned[:, :, t.shape["joint"]], stands))
+        else:
+            out.append(_leverage(bench, offset[:, :, "xyz".index(t.shape["axis"])], 0.0))
+    return out
+
+
+def _leverage(bench: Bench, change: Array, stands: Any) -> Array:
+    deflection = change * bench.compliance * bench.load[:, None]
+    return bench.stacked(2 * np.sum(bench.lever * deflection, axis=1), deflection + stands)
+
+
+def _triple(vector: Array) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in vector)
+    return x, y, z

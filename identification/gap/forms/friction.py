@@ -1,0 +1,110 @@
+"""`joint_hysteresis` and `joint_backlash`: friction and lost motion in absolute torques."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array, Flags
+from identification.gap.effects import joint_backlash
+from identification.gap.forms.law import KEPT, LOST, WORKED, Law, Term, fresh_after
+from identification.gap.history import bristles, play, worked_in
+from identification.gap.variants import Variant
+
+_MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST}
+
+
+def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: friction elements; of Iwan's law with their strength, else with their reach."""
+    joint, law = int(v.info["joint"]), str(v.info["law"])
+    key = "strength" if law == "Iwan" else "reach"
+    constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
+    terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
+    return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
+
+
+def hysteresis(bench: Bench, law: Law) -> list[Array]:
+    """What the friction holds back: `S_r(tau)` (stop operator), or reach times bristle state."""
+    c = law.constants
+    joint, iwan = c["joint"], c["law"] == "Iwan"
+    torque, fresh = bench.torque[:, joint], fresh_after(bench, c["memory"])
+    size = np.array([t.shape["strength" if iwan else "reach"] for t in law.terms])
+    load, kept = torque, np.ones(len(torque), dtype=bool)
+    rest = bench.rest
+    if c["memory"] == WORKED:
+        path = worked_in(torque, fresh)
+        load, fresh, kept, rest = path.load, path.fresh, path.kept, path.fresh
+    if iwan:
+        state = play(np.tile(load[:, None], (1, len(size))), size, rest, fresh)
+        held = (load[:, None] - state)[kept]
+    else:
+        held = (size * bristles(load, size, fresh, elastic=c["law"] == "Bouc-Wen"))[kept]
+    return [bench.joint_column(joint, -bench.sense * h) for h in held.T]
+
+
+def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: width of the play, friction beside it, and where the joint lay while unloaded."""
+    info = v.info
+    constants = {
+        "joint": int(info["joint"]),
+        "zone": float(info["zone_Nm"]),
+        "crossing": str(info["crossing"]),
+        "kind": str(info["kind"]),
+    }
+    terms = [Term("width"), Term("rub")]
+    law = Law(constants, ())
+    for s, first in _places(bench, law):
+        setup = bench.data.setups[s]
+        terms.append(
+            Term("place", {"pose": setup.pose, "direction": setup.direction, "first": first})
+        )
+    return Law(constants, tuple(terms)), np.ones(len(terms))
+
+
+def backlash(bench: Bench, law: Law) -> list[Array]:
+    """Deflections of the library's shapes, in rad per unit."""
+    c = law.constants
+    joint, x = c["joint"], _net(bench, law)
+    shape = joint_backlash._shapes(bench, x, c["zone"])[c["kind"]]
+    parts = {"width": bench.sense * shape[0], "rub": bench.sense * shape[1]}
+    names = [(s.pose, s.direction) for s in bench.data.setups]
+    loose = np.abs(x) < c["zone"]
+    out = []
+    for t in law.terms:
+        if t.coefficient in parts:
+            out.append(bench.joint_column(joint, parts[t.coefficient]))
+            continue
+        key = (t.shape["pose"], t.shape["direction"])
+        place = np.zeros(bench.rows.n)
+        if key in names:
+            place = _place(bench, names.index(key), t.shape["first"], loose).astype(float)
+        out.append(bench.joint_column(joint, place))
+    return out
+
+
+def _net(bench: Bench, law: Law) -> Array:
+    joint = law.constants["joint"]
+    torque = bench.torque[:, joint]
+    if law.constants["crossing"] == "load":
+        return torque
+    weight = np.array([s.gravity[joint] for s in bench.data.setups])
+    return np.asarray(torque + weight[bench.rows.setup])
+
+
+def _places(bench: Bench, law: Law) -> list[tuple[int, bool]]:
+    """(setup, whether in its first run) of every place that the library leaves free."""
+    loose = np.abs(_net(bench, law)) < law.constants["zone"]
+    out = []
+    for s in range(len(bench.data.setups)):
+        held = not np.all(loose[bench.rows.setup == s])
+        for first in (True, False):
+            if held and _place(bench, s, first, loose).any():
+                out.append((s, first))
+    return out
+
+
+def _place(bench: Bench, s: int, first: bool, loose: Flags) -> Flags:
+    rows = bench.rows
+    mine = rows.setup == s
+    in_first = rows.run == rows.run[mine].min()
+    return np.asarray(mine & loose & (in_first if first else ~in_first))

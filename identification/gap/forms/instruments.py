@@ -1,0 +1,165 @@
+"""Gains, lags, drifts and shifts: what the instruments do, on absolute clocks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.effects import force_drift
+from identification.gap.effects.drift import PIECES
+from identification.gap.forms.law import Law, Term, along
+from identification.gap.history import delayed, rests, retarded
+from identification.gap.variants import Variant
+
+
+def describe_gain(_: Bench, __: Variant) -> tuple[Law, Array]:
+    """One term: gain minus one."""
+    return Law({}, (Term("gain"),)), np.ones(1)
+
+
+def force_gain(bench: Bench, _: Law) -> list[Array]:
+    """Less force than read deflects less."""
+    if bench.imposed:
+        return [bench.stacked(bench.slope * bench.load)]
+    return [bench.force_column(-bench.load)]
+
+
+def displacement_gain(bench: Bench, _: Law) -> list[Array]:
+    """A share of the response to the load."""
+    return [bench.stacked(bench.sense * bench.line)]
+
+
+def describe_lag(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """One term: 1 where the lag is as long as stated."""
+    constants = {
+        "channel": str(v.info["channel"]),
+        "kind": str(v.info["kind"]),
+        "lag": float(v.info["lag_s"]),
+    }
+    return Law(constants, (Term("share"),)), np.ones(1)
+
+
+def lag(bench: Bench, law: Law) -> list[Array]:
+    """The channel shows where the load was a little earlier."""
+    line, time = bench.line, law.constants["lag"]
+    if law.constants["kind"] == "delay":
+        change = delayed(line, time, bench.rows) - line
+    else:
+        slow = retarded(line[:, None], np.array([time]), bench.rows, rests(bench.rows))
+        change = slow[:, 0] - line
+    if law.constants["channel"] == "displacement":
+        return [bench.stacked(bench.sense * change)]
+    stiff = np.where(bench.slope > 0, change / np.where(bench.slope > 0, bench.slope, 1.0), 0.0)
+    return [bench.force_column(-bench.sense * stiff)]
+
+
+def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms of the path; of an imposed displacement, as displacement of the simulated spring."""
+    constants, terms, scale = _path(bench, str(v.info["path"]))
+    return Law(constants | {"quantity": "displacement" if bench.imposed else "force"}, terms), scale
+
+
+def describe_thermal(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms of the path for every direction."""
+    constants, terms, scale = _path(bench, str(v.info["path"]))
+    every: list[Term] = []
+    vectors = {s.direction: s.unit_vector for s in reversed(bench.data.setups)}
+    names = list(dict.fromkeys(s.direction for s in bench.data.setups))
+    for name in names:
+        n = tuple(float(x) for x in vectors[name])
+        every += [Term(t.coefficient, {**t.shape, "along": n}) for t in terms]
+    law = Law(constants | {"quantity": "displacement"}, tuple(every))
+    return law, np.tile(scale, len(names))
+
+
+def drift_of_force(bench: Bench, law: Law) -> list[Array]:
+    """Measured = true + d(t), less what was tared away; zero plateaus show d itself."""
+    out = []
+    for t in law.terms:
+        d = force_drift._tared(bench, _moved(bench, law, t))
+        if bench.imposed:
+            out.append(bench.stacked(d))
+        else:
+            out.append(bench.force_column(-d) + bench.stacked(zero_force=d))
+    return out
+
+
+def drift_of_displacement(bench: Bench, law: Law) -> list[Array]:
+    """Along the term's direction; against it, the other way round."""
+    return [
+        bench.stacked(along(bench, t.shape["along"]) * _moved(bench, law, t)) for t in law.terms
+    ]
+
+
+def _path(bench: Bench, label: str) -> tuple[dict[str, object], tuple[Term, ...], Array]:
+    """Constants, terms and scales of a path of the library, in seconds and kelvin."""
+    span = bench.session_span
+    if label == "linear":
+        return {"path": "linear"}, (Term("drift_rate"),), np.array([1 / span])
+    if label == "root":
+        return {"path": "root"}, (Term("drift_per_root"),), np.array([span**-0.5])
+    if label.startswith("T "):
+        share = float(label[2:])
+        rise = 1 / (1 - np.exp(-1 / share))
+        term = Term("drift", {"time_constant": share * span})
+        return {"path": "exponential"}, (term,), np.array([rise])
+    if label == "free":
+        places = np.linspace(0, span, PIECES)
+        terms = tuple(Term("drift_knot", {"at": float(t)}) for t in places)
+        return {"path": "free"}, terms, np.ones(PIECES)
+    values = bench.rows.temperature
+    assert values is not None
+    sensor = "mean" if label.startswith("mean") else label.rsplit(maxsplit=1)[-1]
+    v = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
+    term = Term("drift_per_kelvin", {"sensor": sensor})
+    return {"path": "temperature"}, (term,), np.array([1 / float(np.ptp(v))])
+
+
+def _moved(bench: Bench, law: Law, term: Term) -> Array:
+    """(n,): the path per unit of the coefficient, 0 at the start of the session."""
+    t = bench.rows.session - bench.rows.session.min()
+    path = law.constants["path"]
+    if path == "linear":
+        return np.asarray(t)
+    if path == "root":
+        return np.asarray(np.sqrt(t))
+    if path == "exponential":
+        return np.asarray(1 - np.exp(-t / term.shape["time_constant"]))
+    if path == "free":
+        places = [x.shape["at"] for x in law.terms if _twin(x, term)]
+        hat = np.equal(places, term.shape["at"]).astype(float)
+        return np.asarray(np.interp(t, places, hat))
+    values = bench.rows.temperature
+    if values is None:
+        return np.zeros(bench.rows.n)
+    sensor = term.shape["sensor"]
+    v = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
+    return np.asarray(v - v[0])
+
+
+def _twin(one: Term, other: Term) -> bool:
+    return one.shape.get("along") == other.shape.get("along")
+
+
+def describe_shift(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: one lasting jump before a run, or the offsets of whole runs (numbers from 0)."""
+    if v.info["runs"]:
+        terms = tuple(Term("shift", {"run": int(r), "lasts": True}) for r in v.info["runs"])
+    else:
+        terms = tuple(Term("shift", {"run": int(r), "lasts": False}) for r in v.info["shifts"])
+    return Law({}, terms), np.ones(len(terms))
+
+
+def shift(bench: Bench, law: Law) -> list[Array]:
+    """The runs of that setup, from the jump on or that one alone."""
+    rows, out = bench.rows, []
+    for t in law.terms:
+        r = t.shape["run"]
+        mine = np.zeros(rows.n)
+        if np.any(rows.run == r):
+            setup = rows.setup[int(np.argmax(rows.run == r))]
+            mine = np.where((rows.setup == setup) & (rows.run >= r), 1.0, 0.0)
+            mine = mine if t.shape["lasts"] else np.where(rows.run == r, 1.0, 0.0)
+        out.append(bench.stacked(mine))
+    return out

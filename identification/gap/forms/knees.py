@@ -1,0 +1,70 @@
+"""`joint_yield` and `base_slip`: plays beyond thresholds, in absolute torques and compliances."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.effects import base_slip, joint_yield
+from identification.gap.effects.base_compliance import moments
+from identification.gap.forms.law import ACROSS, KEPT, LOST, Law, Term, fresh_after
+from identification.gap.variants import Variant
+
+_MEMORY = {"": KEPT, " lasting": ACROSS, " taken back": LOST}
+
+
+def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: plays (threshold), and what flows back once the threshold `after` was passed."""
+    info = v.info
+    constants = {"memory": _MEMORY[info["memory"]], "flow_time": float(info["flow_s"])}
+    if v.word == base_slip.WORD:
+        constants |= {"axis": "xyz"[info["axis"]], "depth": float(info["depth_m"])}
+        unit = base_slip._NATURAL
+    else:
+        constants |= {"joint": int(info["joint"])}
+        unit = float(bench.compliance[info["joint"]])
+    radius = [float(r) for r in info["radius"]]
+    terms = [Term("compliance", {"threshold": r}) for r in radius]
+    if len(v.columns) > len(radius):
+        top = _range(bench, np.asarray(info["load"]))
+        terms += [
+            Term("compliance", {"returns_beyond": f * top, "after": joint_yield.BACK_FROM * top})
+            for f in joint_yield.BACK
+        ]
+    return Law(constants, tuple(terms)), np.full(len(terms), unit)
+
+
+def _range(bench: Bench, load: Array) -> float:
+    """Largest load that the rig carried: what the library's grid is relative to."""
+    top = float(np.abs(load).max())
+    return top * bench.reach_of(load) / float(np.ptp(np.append(load, 0.0)))
+
+
+def columns(bench: Bench, law: Law) -> list[Array]:
+    """Column of every play: state of radius `threshold` on the torque (or moment), lagging."""
+    c = law.constants
+    if "joint" in c:
+        load = bench.torque[:, c["joint"]]
+    else:
+        lever = moments(bench, c["depth"])[:, "xyz".index(c["axis"])]
+        load = lever * bench.load
+    out = []
+    for state in _states(bench, law, load):
+        if "joint" in c:
+            out.append(bench.joint_column(c["joint"], bench.sense * state))
+        else:
+            out.append(bench.stacked(lever * state))
+    return out
+
+
+def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
+    fresh = fresh_after(bench, law.constants["memory"])
+    radius = np.array([t.shape["threshold"] for t in law.terms if "threshold" in t.shape])
+    flow = law.constants["flow_time"]
+    out = list(joint_yield._states(bench, load, radius, flow, fresh).T)
+    after = [t.shape["after"] for t in law.terms if "after" in t.shape]
+    if after:
+        back = joint_yield._flowing_back(bench, load, after[0], fresh)
+        out += back or [np.zeros(bench.rows.n)] * len(after)
+    return out
