@@ -85,7 +85,7 @@ def diagnose_gap(
     finer = refine_knees(engine, variants)
     if finer:
         variants += finer
-        engine = Engine(bench, base, target, etas)
+        engine.extend()
     found = search(engine, variants)
     tell("withheld data", 0.7)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])

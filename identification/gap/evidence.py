@@ -12,8 +12,7 @@ eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,108 +43,150 @@ class Level:
     taken: Array
 
 
+@dataclass(frozen=True, eq=False)
+class _White:
+    """Whitened stacked columns, taken apart: what is common to a hold and what differs in it.
+
+    mean (holds, k): of the response; q: per joint the columns that touch its readings and their
+    values (holds, k''); fixed (rest, k): channels without imperfection; contrast (rows, k'):
+    deviations within holds of the columns `varying` (k',).
+    """
+
+    mean: Array
+    q: list[tuple[NDArray[np.intp], Array]]
+    fixed: Array
+    contrast: Array
+    varying: NDArray[np.intp]
+
+
 class Engine:
     """Evidence for the pool of one bench; `levels[i].eta` ascending, the first is 0."""
 
     def __init__(self, bench: Bench, base: Base, target: Array, etas: Array) -> None:
         """target: stacked observation minus the simulation's prediction."""
-        self.bench, self.base, self.target = bench, base, target
-        self.pool = (
-            np.column_stack(bench.columns) if bench.columns else np.zeros((bench.layout.size, 0))
-        )
+        self.bench, self.base, self.target, self.etas = bench, base, target, etas
+        self.pool = np.zeros((bench.layout.size, 0))
         self.sigma = row_noise(bench)
         self.cache: dict[object, Array] = {}
         self.structural = structural_rms(bench, base, target)
-        self.level_columns = _level_columns(bench)
-        self._split()
-        self.levels = [self._level(float(eta)) for eta in etas]
+        n = bench.rows.n
+        self._edges = np.flatnonzero(bench.rows.hold_starts)
+        self._inverse = 1 / self.sigma[:n]
+        self._length_u = np.sqrt(np.add.reduceat(self._inverse**2, self._edges))
+        self._length_q = 1 / self.sigma[bench.layout.q]
+        counts = np.diff(np.append(self._edges, n))
+        self._hold = np.repeat(np.arange(len(self._edges)), counts)
+        self._alone = counts[self._hold] == 1
+        self._contrast_noise = self.sigma[:n][~self._alone]
+        self._freedom = n - len(self._edges)
+        common = np.column_stack([target, base.columns, level_columns(bench)])
+        self._common = self._whiten(common)
+        self._white: list[_White] = []
+        self._bases = [self._integrate(float(eta)) for eta in etas]
+        self.levels: list[Level] = []
+        self.extend()
 
-    def _split(self) -> None:
-        """Whitens [target, base, levels, pool] and separates hold means from contrasts."""
-        bench, n = self.bench, self.bench.rows.n
-        everything = np.column_stack(
-            [self.target, self.base.columns, self.level_columns, self.pool]
-        )
-        white = everything / self.sigma[:, None]
-        edges = np.flatnonzero(bench.rows.hold_starts)
-        response, inverse = white[:n], 1 / self.sigma[:n]
-        lengths = np.sqrt(np.add.reduceat(inverse**2, edges))
-        means = np.add.reduceat(response * inverse[:, None], edges, axis=0) / lengths[:, None]
-        self._mean_u, self._length_u = means, lengths
-        q = bench.layout.q
-        self._length_q = 1 / self.sigma[q]
-        self._readings = list(_per_joint(white[q], len(edges)))
-        rest = white[q.stop :]
-        self._fixed = rest.T @ rest
-        hold = np.repeat(np.arange(len(edges)), np.diff(np.append(edges, n)))
-        direction = inverse / lengths[hold]
-        contrast = response - direction[:, None] * means[hold]
-        alone = np.diff(np.append(edges, n))[hold] == 1
-        contrast = contrast[~alone]
+    def extend(self) -> None:
+        """Takes in the columns that were put into the bench's pool since."""
+        old = self.pool.shape[1]
+        added = self.bench.columns[old:]
+        fresh = np.column_stack(added) if added else np.zeros((self.bench.layout.size, 0))
+        self.pool = np.column_stack([self.pool, fresh])
+        white = self._whiten(fresh)
+        self.levels = [self._grown(i, white, old) for i in range(len(self.etas))]
+        self._white.append(white)
+
+    def _whiten(self, columns: Array) -> _White:
+        bench, n, q = self.bench, self.bench.rows.n, self.bench.layout.q
+        white = columns / self.sigma[:, None]
+        response, inverse = white[:n], self._inverse
+        means = np.add.reduceat(response * inverse[:, None], self._edges, axis=0)
+        means /= self._length_u[:, None]
+        direction = inverse / self._length_u[self._hold]
+        contrast = (response - direction[:, None] * means[self._hold])[~self._alone]
         # most columns stand still within a hold: only the others need the product
         size = np.abs(contrast).max(axis=0) if len(contrast) else np.zeros(contrast.shape[1])
-        self._varying = np.flatnonzero(size > 1e-9 * (1 + np.abs(response).max(axis=0)))
-        self._contrast = contrast[:, self._varying]
-        self._contrast_noise = self.sigma[:n][~alone]
-        self._freedom = n - len(edges)
+        top = np.abs(response).max(axis=0) if bench.rows.n else size
+        varying = np.flatnonzero(size > 1e-9 * (1 + top))
+        readings, holds = [], len(self._edges)
+        for start in range(q.start, q.stop, holds):  # a column touches the readings of few joints
+            part = white[start : start + holds]
+            columns_q = np.flatnonzero(np.any(part != 0, axis=0))
+            readings.append((columns_q, part[:, columns_q]))
+        return _White(means, readings, white[q.stop :], contrast[:, varying], varying)
 
-    def _level(self, eta: float) -> Level:
-        noise = self.bench.noise
-        edges = np.flatnonzero(self.bench.rows.hold_starts)
-        hold = noise.hold[edges] ** 2 + (HOLD_PART * eta) ** 2
+    def _weights(self, eta: float) -> tuple[Array, Array, Array]:
+        """Precision left to hold means (holds,), joint readings, and contrasts (rows,)."""
+        hold = self.bench.noise.hold[self._edges] ** 2 + (HOLD_PART * eta) ** 2
         extra_u = 1 + hold * self._length_u**2
-        extra_q = 1 + (eta / _LEVER_M) ** 2 * self._length_q**2 if self.bench.data.arm else 1.0
+        lever = (eta / _LEVER_M) ** 2 if self.bench.data.arm else 0.0
+        extra_q = 1 + lever * self._length_q**2
         row_part = ROW_PART if not self.bench.rows.continuous else CONTINUOUS_ROW_PART
         factor = 1 + (row_part * eta / self._contrast_noise) ** 2
-        gram = self._fixed + self._mean_u.T @ (self._mean_u / extra_u[:, None])
-        if self._length_q.size:
-            for rows, columns, values in self._readings:
-                gram[np.ix_(columns, columns)] += values.T @ (
-                    values / np.asarray(extra_q)[rows, None]
-                )
-        weighted = self._contrast / factor[:, None]
-        gram[np.ix_(self._varying, self._varying)] += self._contrast.T @ weighted
-        share = self._freedom / max(len(factor), 1)
-        log_noise = 0.5 * (
-            np.log(extra_u).sum() + np.log(extra_q).sum() * bool(self._length_q.size)
-        )
-        log_noise += 0.5 * share * np.log(factor).sum()
-        return self._integrate(eta, gram, float(log_noise))
+        return 1 / extra_u, 1 / extra_q, 1 / factor
 
-    def _integrate(self, eta: float, gram: Array, log_noise: float) -> Level:
-        """Takes base and repeatable imperfection out of [target, base, levels, pool]."""
+    def _gram(self, eta: float, one: _White, other: _White) -> Array:
+        """(k, l) product of two sets of whitened columns under the imperfection eta."""
+        u, q, contrast = self._weights(eta)
+        gram = one.fixed.T @ other.fixed + one.mean.T @ (other.mean * u[:, None])
+        holds = len(self._edges)
+        for j, ((i, mine), (k, theirs)) in enumerate(zip(one.q, other.q, strict=True)):
+            weight = q[j * holds : (j + 1) * holds, None]
+            gram[np.ix_(i, k)] += mine.T @ (theirs * weight)
+        varying = np.ix_(one.varying, other.varying)
+        gram[varying] += one.contrast.T @ (other.contrast * contrast[:, None])
+        return np.asarray(gram)
+
+    def _integrate(self, eta: float) -> _Integrated:
+        """Base and repeatable imperfection, integrated out of target and, later, of the pool."""
+        gram = self._gram(eta, self._common, self._common)
         kb = self.base.columns.shape[1]
-        covariance, count = level_covariance(self.bench), 0
-        sd = self.base.sd
-        if eta > 0:
-            count = covariance.shape[0]
-        total = covariance.shape[0]
-        b = np.arange(1, 1 + kb + count)
-        p = np.arange(1 + kb + total, gram.shape[0])
+        covariance = level_covariance(self.bench)
+        count = covariance.shape[0] if eta > 0 else 0
         root = np.zeros((kb + count, kb + count))
-        root[:kb, :kb] = np.diag(sd)
+        root[:kb, :kb] = np.diag(self.base.sd)
         if count:
             root[kb:, kb:] = eta * np.linalg.cholesky(covariance)
-        inner = np.eye(kb + count) + root.T @ gram[np.ix_(b, b)] @ root
-        factor = np.linalg.cholesky(inner)
-        cross = np.linalg.solve(factor, root.T @ gram[np.ix_(b, np.append(0, p))])
-        left, pool = cross[:, 0], cross[:, 1:]
+        b = slice(1, 1 + kb + count)
+        factor = np.asarray(np.linalg.cholesky(np.eye(kb + count) + root.T @ gram[b, b] @ root))
+        left = np.asarray(np.linalg.solve(factor, root.T @ gram[b, 0]))
+        u, q, contrast = self._weights(eta)
+        share = self._freedom / max(len(contrast), 1)
+        log_noise = -0.5 * (np.log(u).sum() + np.log(q).sum() + share * np.log(contrast).sum())
         log_base = -0.5 * (gram[0, 0] - left @ left) - np.log(np.diag(factor)).sum() - log_noise
-        return Level(
-            eta,
-            gram[np.ix_(p, p)] - pool.T @ pool,
-            gram[p, 0] - pool.T @ left,
-            float(log_base),
-            np.zeros((0, len(p))),
-        )
+        none = np.zeros((kb + count, 0))
+        return _Integrated(root, factor.astype(float), left.astype(float), float(log_base), none)
+
+    def _grown(self, i: int, white: _White, old: int) -> Level:
+        """Level i with further columns."""
+        eta, base = float(self.etas[i]), self._bases[i]
+        beside = self._gram(eta, self._common, white)
+        b = slice(1, 1 + base.root.shape[0])
+        fresh = np.linalg.solve(base.factor, base.root.T @ beside[b])
+        before = base.pool
+        moment = beside[0] - fresh.T @ base.left
+        corner = self._gram(eta, white, white) - fresh.T @ fresh
+        self._bases[i] = replace(base, pool=np.column_stack([before, fresh]))
+        if not old:
+            return Level(eta, corner, moment, base.log_base, np.zeros((0, len(moment))))
+        earlier = np.vstack([self._gram(eta, w, white) for w in self._white])
+        edge = earlier - before.T @ fresh
+        level = self.levels[i]
+        gram = np.block([[level.gram, edge], [edge.T, corner]])
+        both = np.concatenate([level.moment, moment])
+        return Level(eta, gram, both, base.log_base, np.zeros((0, len(both))))
 
 
-def _per_joint(q: Array, holds: int) -> Iterator[tuple[slice, NDArray[np.intp], Array]]:
-    """Rows, columns and values of each joint's readings; a column touches few joints."""
-    for start in range(0, len(q), holds):
-        part = q[start : start + holds]
-        columns = np.flatnonzero(np.any(part != 0, axis=0))
-        yield slice(start, start + holds), columns, part[:, columns]
+@dataclass(frozen=True, eq=False)
+class _Integrated:
+    """Prior root (k, k) of base and imperfection, Cholesky factor (k, k) of their precision, what
+    the target (k,) and the pool (k, p) share with them, evidence of the base alone."""
+
+    root: Array
+    factor: Array
+    left: Array
+    log_base: float
+    pool: Array
 
 
 def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
@@ -183,7 +224,7 @@ def row_noise(bench: Bench) -> Array:
     return out
 
 
-def _level_columns(bench: Bench) -> Array:
+def level_columns(bench: Bench) -> Array:
     """Indicator of every level, response only, (size, levels)."""
     rows = bench.rows
     out = np.zeros((bench.layout.size, int(rows.level.max()) + 1))

@@ -136,6 +136,38 @@ def _prefix(keep: Array, gain: Array) -> Array:
     return gain
 
 
+def flowing_play(load: Array, radius: Array, times: Array, rows: Rows, fresh: Flags) -> Array:
+    """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
+
+    `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
+    falls below it, wherever it has come to. Ramps between rows in _PARTS parts, then standing.
+    """
+    out = np.empty((len(load), len(radius)))
+    state, before = np.zeros(len(radius)), 0.0
+    rest = rests(rows)
+    step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
+    ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
+    stands = np.minimum(settling_share(rows), ease)
+    part = (np.arange(_PARTS) + 0.5) / _PARTS
+    for i, x in enumerate(load):
+        if fresh[i]:
+            state, before = np.zeros_like(state), 0.0
+        elif rest[i]:  # minutes without load
+            state, before = np.clip(state, -radius, radius), 0.0
+        if ease[i] > stands[i]:
+            share = -np.expm1(-(ease[i] - stands[i]) / _PARTS / times)
+            for at in before + part * (x - before):
+                state = state + share * (np.clip(state, at - radius, at + radius) - state)
+        beyond = np.clip(state, x - radius, x + radius) - state
+        state = state - beyond * np.expm1(-stands[i] / times)
+        before = x
+        out[i] = state
+    return out
+
+
+_PARTS = 4
+
+
 def settling_share(rows: Rows) -> Array:
     """(n,) s: how long the load has stood before a row: half a sample at the start of a hold."""
     if rows.continuous:

@@ -44,6 +44,7 @@ def _torque_unit(bench: Bench) -> str:
 def _knee(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
     info = part.variant.info
     radius = np.asarray(info["radius"])
+    w, cov = w[: len(radius)], cov[: len(radius), : len(radius)]  # the rest flows back
     power = np.maximum(w, 0.0)
     total = float(power.sum())
     centre = float(power @ radius / total) if total > 0 else float(info["centre"])

@@ -50,6 +50,7 @@ FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 # Neighbouring points of one smooth run are no independent witnesses of its law.
 TEMPER = 0.25
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
+_REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 4  # words among which a knee has to be for its threshold to be refined
 _PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
@@ -121,8 +122,8 @@ def search(engine: Engine, variants: list[Variant], deepest: int = 3) -> Found:
 
 
 def refine_knees(engine: Engine, variants: list[Variant]) -> list[Variant]:
-    """Finer thresholds for each word with a knee that stands out: thresholds make the evidence
-    piecewise smooth, and the grid of the library may miss a sharp one."""
+    """Finer thresholds where a knee stands out: thresholds make the evidence piecewise smooth, and
+    the grid of the library may miss a sharp one."""
     from identification.gap.effects.joint_yield import refined
 
     by_word = _by_word(score(engine, engine.levels, variants))
@@ -132,8 +133,11 @@ def refine_knees(engine: Engine, variants: list[Variant]) -> list[Variant]:
     for word in ("joint_yield", "base_slip"):
         if word not in ranked or _marginal(by_word[word]) < none + _WINDOW:
             continue
-        top = max(by_word[word], key=lambda s: s.log_evidence)
-        out += refined(engine.bench, top.variant)
+        places: dict[object, Scored] = {}
+        for s in sorted(by_word[word], key=lambda s: -s.log_evidence):
+            places.setdefault((s.variant.info.get("joint"), s.variant.info.get("axis")), s)
+        for s in list(places.values())[:_REFINED]:
+            out += refined(engine.bench, s.variant)
     return out
 
 

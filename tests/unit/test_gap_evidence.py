@@ -15,6 +15,7 @@ from identification.gap.evidence import (
     HOLD_PART,
     ROW_PART,
     Engine,
+    level_columns,
     level_covariance,
     row_noise,
 )
@@ -57,7 +58,7 @@ def dense_covariance(engine: Engine, eta: float, row_part: float = ROW_PART) -> 
         project += np.diag(mine.astype(float)) - np.outer(a, a)
     root = np.sqrt(sigma2)
     spread = project @ np.diag(part) @ project * np.outer(root, root)
-    L = engine.level_columns
+    L = level_columns(bench)
     levels = eta**2 * L @ level_covariance(bench) @ L.T
     base = engine.base.columns * engine.base.sd
     return white + hold + spread + levels + base @ base.T

@@ -10,13 +10,14 @@ that takes the joint back resets it between runs. w in units of the joint's elas
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
-from identification.gap.history import retarded
+from identification.gap.history import flowing_play, retarded
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_yield"
@@ -66,10 +67,9 @@ def knee_variants(
     radius = bench.radii(load, top * np.array(THRESHOLDS))
     out = []
     for memory, fresh in _memories(bench).items():
-        states = bench.plays(load, radius, fresh)
+        back = [column(s) for s in _flowing_back(bench, load, BACK_FROM * top, fresh)]
         for flow in (0.0, *(FLOW_S if not bench.rows.continuous else ())):
-            moved = _flow(bench, states, flow, fresh)
-            columns = [column(moved[:, k]) for k in range(len(radius))]
+            columns = [column(s) for s in _states(bench, load, radius, flow, fresh).T]
             label = f"{name}{memory}{f' flow {flow:g} s' if flow else ''}"
             share = (0.7 if flow == 0 else 0.3 / len(FLOW_S)) / len(radius) * _LIKELY[memory]
             extra = list(range(len(THRESHOLDS), len(radius)))
@@ -79,31 +79,75 @@ def knee_variants(
                     place = [*inside, *extra]
                     kept = [*inside.values(), *[_HARDENS] * len(extra)]
                     chosen = [columns[i] for i in place]
-                    out.append(
-                        variant(word, f"{label} at {THRESHOLDS[k]:g} {knee}", chosen, SCALES,
-                                np.diag(kept), prior=share / 2, memory=memory, flow_s=flow,
-                                radius=radius[place], centre=radius[k], load=load,
-                                column=column, **info)
-                    )  # fmt: skip
+                    exact = {**info, "memory": memory, "flow_s": flow, "radius": radius[place],
+                             "centre": radius[k], "load": load, "column": column,
+                             "back": back}  # fmt: skip
+                    at = f"{label} at {THRESHOLDS[k]:g} {knee}"
+                    out += _with_back(word, at, chosen, kept, share / 4, exact)
     return out
 
 
-FINE = 15  # radii between the neighbours of a threshold that was found on the grid
+def _with_back(
+    word: str, label: str, columns: list[int], root: list[float], prior: float, info: dict[str, Any]
+) -> list[Variant]:
+    """A knee as it is, and with Bauschinger's effect: once it has yielded, metal flows back early
+    when unloaded."""
+    back = info["back"]
+    plain = variant(word, label, columns, SCALES, np.diag(root), prior=prior, **info)
+    if not back:
+        return [plain]
+    both = np.diag([*root, *[_RETURNS] * len(back)])
+    return [plain, variant(word, f"{label}, flows back", [*columns, *back], SCALES, both,
+                           prior=prior, **info)]  # fmt: skip
+
+
+FINE = 13  # radii about a threshold that was found on the grid, from 0.84 to 1.2 of it
+FLOWS_S = (1.2, 2.5, 5.0, 10.0, 25.0)
+BACK = (0.1, 0.2, 0.3, 0.42, 0.56)  # radii of what flows back after a reversal, of the range
+BACK_FROM = 0.25  # of the range: a load from which on a joint may have yielded
 
 
 def refined(bench: Bench, found: Variant) -> list[Variant]:
-    """Sharp knees at finely spaced thresholds about a variant that was found."""
+    """Finely spaced thresholds and flow times about a variant that was found."""
     info = dict(found.info)
-    radius = float(info["centre"]) * np.linspace(0.88, 1.12, FINE)
+    radius = float(info["centre"]) * np.linspace(0.84, 1.2, FINE)
     fresh = _memories(bench)[info["memory"]]
-    states = _flow(bench, bench.plays(info["load"], radius, fresh), info["flow_s"], fresh)
-    columns = [info["column"](states[:, k]) for k in range(FINE)]
-    out = []
-    for k in range(FINE):
-        exact = {**info, "radius": radius[k : k + 1], "centre": radius[k]}
-        label = f"{found.label.split(' at ')[0]} at {radius[k]:.4g} fine"
-        out.append(variant(found.word, label, [columns[k]], SCALES, prior=0.5 / FINE, **exact))
+    name, out = found.label.split(" at ")[0].split(" flow")[0], []
+    for flow, states in _flowing(bench, info["load"], radius, fresh).items():
+        columns = [info["column"](s) for s in states.T]
+        share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S))
+        for k in range(FINE):
+            exact = {**info, "centre": radius[k], "flow_s": flow}
+            label = f"{name}{f' flow {flow:g} s' if flow else ''} at {radius[k]:.4g} fine"
+            kinds = {"": slice(k, k + 1), " rounded": slice(max(k - 2, 0), k + 3)}
+            for kind, place in kinds.items():
+                exact["radius"] = radius[place]
+                ones = [1.0] * len(radius[place])
+                out += _with_back(found.word, label + kind, columns[place], ones, share, exact)
     return out
+
+
+_RETURNS = 0.4  # coefficients of what flows back, against those of the knee
+_REVERSED = 0.05  # of the largest load: so far back it is a reversal
+
+
+def _flowing_back(bench: Bench, load: Array, threshold: float, fresh: Flags) -> list[Array]:
+    """States (n,) of smaller plays from the first reversal after the threshold was passed on, zero
+    before (the first loading has a knee as sharp as it likes); empty where nothing is reversed."""
+    size = np.abs(load)
+    edges = np.append(np.flatnonzero(fresh | (np.arange(len(load)) == 0)), len(load))
+    peak_of = np.full(len(load), -1)
+    for a, b in pairwise(edges):
+        peak = np.maximum.accumulate(size[a:b])
+        turned = (peak > threshold) & (size[a:b] < peak - _REVERSED * size.max())
+        if turned.any():
+            first = a + int(turned.argmax())
+            peak_of[first:b] = a + int(size[a:first].argmax())
+    after = peak_of >= 0
+    if not after.any():
+        return []
+    states = bench.plays(load, threshold / BACK_FROM * np.array(BACK), fresh)
+    return [np.where(after, s - s[peak_of], 0.0) for s in states.T]
 
 
 def _memories(bench: Bench) -> dict[str, Flags]:
@@ -117,8 +161,19 @@ def _memories(bench: Bench) -> dict[str, Flags]:
     return out
 
 
-def _flow(bench: Bench, states: Array, flow: float, fresh: Flags) -> Array:
-    """The states reached with a first-order lag (viscoplastic flow of Perzyna's kind)."""
+def _states(bench: Bench, load: Array, radius: Array, flow: float, fresh: Flags) -> Array:
+    """Play states (n, k), reached at once or with a lag: near enough to find where flow is."""
+    states = bench.plays(load, radius, fresh)
     if flow == 0:
         return states
     return retarded(states, np.full(states.shape[1], flow), bench.rows, fresh)
+
+
+def _flowing(bench: Bench, load: Array, radius: Array, fresh: Flags) -> dict[float, Array]:
+    """Flow time s -> play states (n, k): at once, and by viscoplastic flow."""
+    out = {0.0: bench.plays(load, radius, fresh)}
+    if bench.rows.continuous:
+        return out
+    every = flowing_play(load, np.tile(radius, len(FLOWS_S)),
+                         np.repeat(FLOWS_S, len(radius)), bench.rows, fresh)  # fmt: skip
+    return out | dict(zip(FLOWS_S, np.split(every, len(FLOWS_S), axis=1), strict=True))
