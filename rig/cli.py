@@ -288,6 +288,7 @@ def diagnose(
         list[str] | None,
         typer.Option(metavar="WORD", help="An effect to take out of the library."),
     ] = None,
+    figures: FiguresOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """The sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
@@ -305,6 +306,10 @@ def diagnose(
             progress=progress,
         )
     give(result, json_file)
+    if figures is not None:
+        from rig.gap_figures import draw
+
+        _list_written(draw(result, figures, dataset.name))
 
 
 @app.command("import")
