@@ -19,13 +19,13 @@ _WIDER = 3.0
 class Fit:
     """effects: coefficients (k,) and covariance (k, k) of the parts' columns, one after the other.
 
-    base, base_covariance: of the base's columns.
+    base (b,): of the base's columns; joint_covariance (b + k, b + k): of base and effects together.
     response (n,): fitted response beyond the prior simulation; effect (n,): the effects' part.
     """
 
     parts: tuple[Part, ...]
     base: Array
-    base_covariance: Array
+    joint_covariance: Array
     coefficients: Array
     covariance: Array
     response: Array
@@ -65,7 +65,7 @@ def fit(engine: Engine, explanation: Explanation, keep: Flags | None = None) -> 
     return Fit(
         parts=explanation.parts,
         base=beta[:kb],
-        base_covariance=covariance[:kb, :kb],
+        joint_covariance=covariance,
         coefficients=w,
         covariance=covariance[kb:, kb:],
         response=(engine.base.columns @ beta[:kb])[:n] + effect,
