@@ -69,6 +69,12 @@ class Bench:
         return bool(q.stop > q.start)
 
     @property
+    def has_zero_force(self) -> bool:
+        """Force at zero load is a channel; where the displacement is imposed, it is a response."""
+        zero = self.layout.zero_force
+        return bool(zero.stop > zero.start)
+
+    @property
     def unloads(self) -> bool:
         """Whether the load came back within some run, by a fifth of its range at least."""
         size, span = np.abs(self.load), float(np.ptp(self.load))
@@ -139,7 +145,7 @@ class Bench:
             out[self.layout.q] = hold_means(self.rows, q).T.reshape(-1)
         if tangential is not None and self.rows.tangential is not None:
             out[self.layout.tangential] = hold_means(self.rows, tangential).T.reshape(-1)
-        if zero_force is not None:
+        if zero_force is not None and self.has_zero_force:
             out[self.layout.zero_force] = zero_force[self.rows.zero]
         return out
 
@@ -205,7 +211,8 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         observed[layout.q] = hold_means(rows, rows.q).T.reshape(-1)
     if rows.tangential is not None:
         observed[layout.tangential] = hold_means(rows, rows.tangential).T.reshape(-1)
-    observed[layout.zero_force] = rows.measured_force[rows.zero]
+    if layout.zero_force.stop > layout.zero_force.start:
+        observed[layout.zero_force] = rows.measured_force[rows.zero]
     reach = max(float(np.ptp(slope * load)), float(np.ptp(response)), 1e-15)
     return Bench(
         data=data, rows=rows, layout=layout, noise=estimate_noise(data, rows, stated, imposed),
