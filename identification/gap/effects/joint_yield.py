@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array, Flags
+from identification.gap.data import Array, Flags, Ints
 from identification.gap.history import flowing_play, retarded
 from identification.gap.variants import Variant, variant
 
@@ -134,6 +134,17 @@ _REVERSED = 0.05  # of the largest load: so far back it is a reversal
 def _flowing_back(bench: Bench, load: Array, threshold: float, fresh: Flags) -> list[Array]:
     """States (n,) of smaller plays from the first reversal after the threshold was passed on, zero
     before (the first loading has a knee as sharp as it likes); empty where nothing is reversed."""
+    peak_of = peaks(load, threshold, fresh)
+    after = peak_of >= 0
+    if not after.any():
+        return []
+    states = bench.plays(load, threshold / BACK_FROM * np.array(BACK), fresh)
+    return [np.where(after, s - s[peak_of], 0.0) for s in states.T]
+
+
+def peaks(load: Array, threshold: float, fresh: Flags) -> Ints:
+    """(n,) row of the largest load before a row, -1 where nothing beyond the threshold has been
+    reversed since the memory was last fresh."""
     size = np.abs(load)
     edges = np.append(np.flatnonzero(fresh | (np.arange(len(load)) == 0)), len(load))
     peak_of = np.full(len(load), -1)
@@ -143,11 +154,7 @@ def _flowing_back(bench: Bench, load: Array, threshold: float, fresh: Flags) -> 
         if turned.any():
             first = a + int(turned.argmax())
             peak_of[first:b] = a + int(size[a:first].argmax())
-    after = peak_of >= 0
-    if not after.any():
-        return []
-    states = bench.plays(load, threshold / BACK_FROM * np.array(BACK), fresh)
-    return [np.where(after, s - s[peak_of], 0.0) for s in states.T]
+    return peak_of
 
 
 def _memories(bench: Bench) -> dict[str, Flags]:

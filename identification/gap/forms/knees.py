@@ -63,8 +63,10 @@ def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     radius = np.array([t.shape["threshold"] for t in law.terms if "threshold" in t.shape])
     flow = law.constants["flow_time"]
     out = list(joint_yield._states(bench, load, radius, flow, fresh).T)
-    after = [t.shape["after"] for t in law.terms if "after" in t.shape]
-    if after:
-        back = joint_yield._flowing_back(bench, load, after[0], fresh)
-        out += back or [np.zeros(bench.rows.n)] * len(after)
+    for term in law.terms:
+        if "after" in term.shape:
+            radius = np.array([term.shape["returns_beyond"]])
+            state = bench.plays(load, radius, fresh)[:, 0]
+            peak = joint_yield.peaks(load, term.shape["after"], fresh)
+            out.append(np.where(peak >= 0, state - state[peak], 0.0))
     return out
