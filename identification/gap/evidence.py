@@ -3,7 +3,9 @@
 Data whitened by their noise, `y = B beta + E w + imperfection + noise`, all Gaussian. The
 imperfection of a model (no formula is the rig) has a size eta on a grid of levels:
 - repeatable: an unknown smooth function of setup, branch and force step, standard deviation eta;
-- per hold: each hold off by 0.6 eta; within holds: every row off by 0.3 eta more than its noise;
+- per run: a smooth function of branch and force of each run's own, 0.6 eta (memory makes a law's
+  mistakes differ from run to run, but alike along one);
+- per hold: each hold off by 0.3 eta; within holds: every row off by 0.3 eta more than its noise;
 - joint readings: each hold off by eta over the joint's lever.
 For every level the base (with the repeatable part) is integrated out of the Gram matrices of the
 pool; then the evidence of any set of columns with prior covariance `s^2 T T^T` costs one small
@@ -19,9 +21,10 @@ from numpy.typing import NDArray
 
 from identification.gap.base import Base
 from identification.gap.bench import Bench
-from identification.gap.data import Array
+from identification.gap.data import UNLOADING, Array
 
-HOLD_PART, ROW_PART = 0.6, 0.3
+RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
+CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
 CONTINUOUS_ROW_PART = 0.3  # neighbouring rows of a running recording err alike
 _NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
 _LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
@@ -79,7 +82,7 @@ class Engine:
         self._alone = counts[self._hold] == 1
         self._contrast_noise = self.sigma[:n][~self._alone]
         self._freedom = n - len(self._edges)
-        common = np.column_stack([target, base.columns, level_columns(bench)])
+        common = np.column_stack([target, base.columns, level_columns(bench), run_columns(bench)])
         self._common = self._whiten(common)
         self._white: list[_White] = []
         self._bases = [self._integrate(float(eta)) for eta in etas]
@@ -117,7 +120,8 @@ class Engine:
 
     def _weights(self, eta: float) -> tuple[Array, Array, Array]:
         """Precision left to hold means (holds,), joint readings, and contrasts (rows,)."""
-        hold = self.bench.noise.hold[self._edges] ** 2 + (HOLD_PART * eta) ** 2
+        part = HOLD_PART if not self.bench.rows.continuous else CONTINUOUS_HOLD_PART
+        hold = self.bench.noise.hold[self._edges] ** 2 + (part * eta) ** 2
         extra_u = 1 + hold * self._length_u**2
         lever = (eta / _LEVER_M) ** 2 if self.bench.data.arm else 0.0
         extra_q = 1 + lever * self._length_q**2
@@ -142,11 +146,13 @@ class Engine:
         gram = self._gram(eta, self._common, self._common)
         kb = self.base.columns.shape[1]
         covariance = level_covariance(self.bench)
-        count = covariance.shape[0] if eta > 0 else 0
+        levels = covariance.shape[0]
+        count = gram.shape[0] - 1 - kb if eta > 0 else 0
         root = np.zeros((kb + count, kb + count))
         root[:kb, :kb] = np.diag(self.base.sd)
         if count:
-            root[kb:, kb:] = eta * np.linalg.cholesky(covariance)
+            root[kb : kb + levels, kb : kb + levels] = eta * np.linalg.cholesky(covariance)
+            root[kb + levels :, kb + levels :] = RUN_PART * eta * np.eye(count - levels)
         b = slice(1, 1 + kb + count)
         factor = np.asarray(np.linalg.cholesky(np.eye(kb + count) + root.T @ gram[b, b] @ root))
         left = np.asarray(np.linalg.solve(factor, root.T @ gram[b, 0]))
@@ -220,7 +226,8 @@ def row_noise(bench: Bench) -> Array:
         out[layout.q] = np.concatenate([s / total for s in noise.q])
     if rows.tangential is not None:
         out[layout.tangential] = np.tile(noise.force / total, 2)
-    out[layout.zero_force] = noise.force / root[rows.zero]
+    if bench.has_zero_force:
+        out[layout.zero_force] = noise.force / root[rows.zero]
     return out
 
 
@@ -230,6 +237,28 @@ def level_columns(bench: Bench) -> Array:
     out = np.zeros((bench.layout.size, int(rows.level.max()) + 1))
     out[np.arange(rows.n), rows.level] = 1.0
     return out
+
+
+_HATS = 4  # of a run's own imperfection, over its range of load
+
+
+def run_columns(bench: Bench) -> Array:
+    """Hat functions of the load for every run and sense of loading, response only, (size, k);
+    none where no run is there twice, or the rig runs on and on."""
+    rows = bench.rows
+    runs = np.unique(rows.run)
+    if rows.continuous or len(runs) <= len(bench.data.setups):
+        return np.zeros((bench.layout.size, 0))
+    out = []
+    for run in runs:
+        mine = rows.run == run
+        low, high = float(bench.load[mine].min()), float(bench.load[mine].max())
+        at = (bench.load - low) / ((high - low) or 1.0) * (_HATS - 1)
+        for back in (False, True):
+            here = mine & ((rows.branch == UNLOADING) == back)
+            for k in range(_HATS) if here.any() else ():
+                out.append(bench.stacked(np.where(here, np.maximum(0.0, 1 - np.abs(at - k)), 0.0)))
+    return np.column_stack(out)
 
 
 def level_covariance(bench: Bench) -> Array:
