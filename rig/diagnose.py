@@ -26,11 +26,13 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The result with what it came from; `to_json` is schema rig.diagnosis/1."""
+    """The result with what it came from; `to_json` is schema rig.diagnosis/1. known_effects: of
+    the model that was given, part of the simulation."""
 
     dataset: str
     result: GapResult
     banners: tuple[str, ...] = ()
+    known_effects: tuple[dict[str, Any], ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The diagnosis as plain values."""

@@ -88,7 +88,7 @@ def describe_links(_: Bench, v: Variant) -> tuple[Law, Array]:
 def links(bench: Bench, law: Law) -> list[Array]:
     """Compliance of the segment along the direction times the load."""
     each = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]
-    return [bench.stacked(each[:, t.shape["segment"]] * bench.load) for t in law.terms]
+    return [bench.outside_column(each[:, t.shape["segment"]] * bench.load) for t in law.terms]
 
 
 def describe_base(_: Bench, v: Variant) -> tuple[Law, Array]:
@@ -101,7 +101,7 @@ def base(bench: Bench, law: Law) -> list[Array]:
     """`(r x n)_a^2` times the load."""
     m = moments(bench, law.constants["depth"])
     axes = ["xyz".index(t.shape["axis"]) for t in law.terms]
-    return [bench.stacked(m[:, a] ** 2 * bench.load) for a in axes]
+    return [bench.outside_column(m[:, a] ** 2 * bench.load) for a in axes]
 
 
 def describe_seating(_: Bench, v: Variant) -> tuple[Law, Array]:
@@ -114,13 +114,13 @@ def describe_seating(_: Bench, v: Variant) -> tuple[Law, Array]:
 
 def seating(bench: Bench, law: Law) -> list[Array]:
     """`1 - exp(-F/F0)` or `F / (F + F0)`."""
-    size, sign = np.abs(bench.load), bench.sense * np.sign(bench.load)
+    size, sign = np.abs(bench.load), np.sign(bench.load)
     out = []
     for t in law.terms:
         f0 = t.shape["force_scale"]
         exponential = t.shape["law"] == "exponential"
         shape = 1 - np.exp(-size / f0) if exponential else size / (size + f0)
-        out.append(bench.stacked(sign * shape))
+        out.append(bench.outside_column(sign * shape))
     return out
 
 

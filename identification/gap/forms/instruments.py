@@ -27,14 +27,14 @@ def force_gain(bench: Bench, _: Law) -> list[Array]:
 
 def displacement_gain(bench: Bench, _: Law) -> list[Array]:
     """A share of the response to the load."""
-    return [bench.stacked(bench.sense * bench.line)]
+    return [bench.outside_column(bench.line)]
 
 
 def describe_lag(_: Bench, v: Variant) -> tuple[Law, Array]:
     """One term: 1 where the lag is as long as stated."""
     constants = {
         "channel": str(v.info["channel"]),
-        "kind": str(v.info["kind"]),
+        "way": str(v.info["kind"]),
         "lag": float(v.info["lag_s"]),
     }
     return Law(constants, (Term("share"),)), np.ones(1)
@@ -43,7 +43,7 @@ def describe_lag(_: Bench, v: Variant) -> tuple[Law, Array]:
 def lag(bench: Bench, law: Law) -> list[Array]:
     """The channel shows where the load was a little earlier."""
     line, time = bench.line, law.constants["lag"]
-    if law.constants["kind"] == "delay":
+    if law.constants["way"] == "delay":
         change = delayed(line, time, bench.rows) - line
     else:
         slow = retarded(line[:, None], np.array([time]), bench.rows, rests(bench.rows))
@@ -88,7 +88,8 @@ def drift_of_force(bench: Bench, law: Law) -> list[Array]:
 def drift_of_displacement(bench: Bench, law: Law) -> list[Array]:
     """Along the term's direction; against it, the other way round."""
     return [
-        bench.stacked(along(bench, t.shape["along"]) * _moved(bench, law, t)) for t in law.terms
+        bench.outside_column(along(bench, t.shape["along"]) * _moved(bench, law, t))
+        for t in law.terms
     ]
 
 
@@ -161,5 +162,5 @@ def shift(bench: Bench, law: Law) -> list[Array]:
             setup = rows.setup[int(np.argmax(rows.run == r))]
             mine = np.where((rows.setup == setup) & (rows.run >= r), 1.0, 0.0)
             mine = mine if t.shape["lasts"] else np.where(rows.run == r, 1.0, 0.0)
-        out.append(bench.stacked(mine))
+        out.append(bench.outside_column(mine))
     return out

@@ -54,7 +54,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
         if "joint" in c:
             out.append(bench.joint_column(c["joint"], bench.sense * state))
         else:
-            out.append(bench.stacked(lever * state))
+            out.append(bench.outside_column(lever * state))
     return out
 
 

@@ -1,0 +1,214 @@
+"""What a diagnosis found, as a model file: the simulation with its effects, and back again."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification.gap.data import Array
+from identification.gap.diagnose import Effect, GapResult
+from identification.gap.forms import Form, describe
+from rig.dataset import Dataset
+from rig.diagnose import Diagnosis
+from rig.diagnose_text import MEANING
+from rig.errors import InputError
+from rig.gap_forms import CONTAINED, FormError, from_entry, to_entry
+from rig.model import ArmModel
+from rig.model_schema import ModelFile
+from rig.storage.files import in_place_of
+from rig.yamlfile import read_document
+
+_SPRINGS = "joint_stiffness_Nm_per_rad"
+_PLAIN = re.compile(r"(?!true|false|null)[a-z]{4,}(_[a-z]+)*")  # read as text by every YAML
+    r"[a-z]{4,}(_[a-z]+)+|kept|load|linear"
+)  # no YAML reads these as else than text
+_LEAST = 0.02  # of a joint's compliance that a fit may leave of it
+# Of the published pair; what stands in a model file until somebody edits it.
+_ASSUMED_DISTANCE_MM = 1500.0
+
+
+# --- writing -------------------------------------------------------------------------------------
+
+
+def write_model(diagnosis: Diagnosis, dataset: Dataset, path: Path) -> None:
+    """Writes `model_text`; what rig simulate, rig couple and rig diagnose --model read. InputError
+    if there is nothing to write, or the folder refuses."""
+    text = model_text(diagnosis, dataset)
+    with in_place_of(path) as temporary:
+        temporary.write_text(text, "utf-8")
+
+
+def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
+    """The simulation as the data correct it: springs after the fit, effects in absolute units.
+
+    Raises InputError for a rig without an arm (a model file holds an arm), and for a diagnosis
+    against another simulator's curves (its springs are not ours to correct).
+    """
+    meta, result = dataset.meta, diagnosis.result
+    where = str(dataset.path or "data set")
+    if meta.robot == "none":
+        raise InputError(
+            f"{where}: robot: none. A model file holds an arm; write the diagnosis with --json."
+        )
+    if result.bench.rows.simulated is not None:
+        raise InputError(
+            f"{where}: diagnosed against another simulator's curves; --write-model corrects the "
+            "springs of META or --model. Leave --simulation out."
+        )
+    stiffness, sd = springs(result)
+    setup = result.bench.data.setups[0]
+    pose = meta.poses[setup.pose]
+    x, y, z = (v / 1e3 for v in pose.tcp_xyz_mm)
+    note = " ".join(
+        [*diagnosis.banners, f"Springs and effects of the diagnosis of {dataset.uuid}."]
+    )
+    lines = [
+        f"# The simulation with what rig diagnose found missing in it: {result.verdict} "
+        f"({result.probabilities[result.verdict]:.0%}).",
+        f"note: {json.dumps(note)}",
+        f"robot: {meta.robot}",
+        f"pose: {{q_rad: {_flow(list(pose.q_rad))}}}",
+        f"tool: {{flange_T_tcp: [[1, 0, 0, {x:g}], [0, 1, 0, {y:g}], [0, 0, 1, {z:g}], "
+        "[0, 0, 0, 1]]}",
+        f"{_SPRINGS}: {_flow([float(f'{k:.7g}') for k in stiffness])}",
+        f"joint_stiffness_sd: {_flow([float(f'{s:.4g}') for s in sd])}",
+        *_effects(diagnosis, dataset),
+        "# Not measured, an assumption for rig couple: edit it to the second arm's place.",
+        f"coupling: {{base_distance_mm: {_ASSUMED_DISTANCE_MM:g}, beta_deg: 0, load_axes: base, "
+        "kind: rigid}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def springs(result: GapResult) -> tuple[Array, Array]:
+    """Joint stiffnesses (m,) Nm/rad after the fit and their standard deviations (m,), an effect
+    `joint_stiffness_error` included: compliance times (1 + sum of the coefficients)."""
+    bench, fitted = result.bench, result.fit
+    sums = np.zeros((bench.data.joints, len(fitted.joint_covariance)))
+    for i, name in enumerate(result.engine.base.names):
+        if name.startswith("spring"):
+            sums[int(name.removeprefix("spring")) - 1, i] = 1.0
+    at = len(fitted.base)
+    for part in fitted.parts:
+        if part.word == "joint_stiffness_error":
+            for k, j in enumerate(part.variant.info["joints"]):
+                sums[j, at + k] = 1.0
+        at += len(part.variant.columns)
+    factor = np.maximum(1 + sums @ np.append(fitted.base, fitted.coefficients), _LEAST)
+    variance = np.maximum(np.einsum("ij,jk,ik->i", sums, fitted.joint_covariance, sums), 0.0)
+    unseen = ~sums.any(axis=1)
+    variance[unseen] = bench.data.compliance_relative_sd[unseen] ** 2
+    stiffness = 1 / (bench.compliance * factor)
+    return stiffness, stiffness * np.sqrt(variance) / factor
+
+
+def forms(result: GapResult) -> list[Form]:
+    """The chosen explanation's effects in absolute units, largest first."""
+    return [
+        describe(result.bench, part, *result.fit.of(i)) for i, part in enumerate(result.fit.parts)
+    ]
+
+
+def _effects(diagnosis: Diagnosis, dataset: Dataset) -> list[str]:
+    entries = list(diagnosis.known_effects)
+    comments = ["of the model that was given"] * len(entries)
+    for effect, form in zip(diagnosis.result.effects, forms(diagnosis.result), strict=True):
+        entries.append(to_entry(form, _about(effect, dataset)))
+        comments.append(_comment(effect))
+    if not entries:
+        return ["effects: []"]
+    lines = ["effects:"]
+    for entry, comment in zip(entries, comments, strict=True):
+        lines += [f"  # {comment}", *_entry_lines(entry)]
+    return lines
+
+
+def _about(effect: Effect, dataset: Dataset) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "name": effect.name,
+        "form": effect.label,
+        "dataset": dataset.uuid,
+        "emulated": dataset.origin == "emulated",
+        "probability": round(effect.probability, 4),
+        "share_of_gap": round(effect.share_of_gap, 4),
+        "parameters": {
+            name: {"value": p.value, "ci95": [p.low, p.high], "unit": p.unit}
+            for name, p in effect.parameters.items()
+        },
+    }
+    if effect.name == "joint_stiffness_error":
+        out[CONTAINED] = _SPRINGS
+    return out
+
+
+def _comment(effect: Effect) -> str:
+    text = f"{MEANING[effect.name]}; {effect.share_of_gap:.0%} of the gap"
+    if effect.indistinguishable_from:
+        text += f"; not told apart from {', '.join(effect.indistinguishable_from)}"
+    return text
+
+
+def _entry_lines(entry: Mapping[str, Any]) -> list[str]:
+    lines: list[str] = []
+    for key, value in entry.items():
+        mark = "  - " if not lines else "    "
+        if key in ("terms", "covariance") and isinstance(value, list):
+            lines.append(f"{mark}{key}:")
+            lines += [f"      - {_flow(one)}" for one in value]
+        elif key == "parameters" and isinstance(value, Mapping) and value:
+            lines.append(f"{mark}{key}:")
+            lines += [f"      {name}: {_flow(one)}" for name, one in value.items()]
+        else:
+            lines.append(f"{mark}{key}: {_flow(value)}")
+    return lines
+
+
+def _flow(value: Any) -> str:
+    """A value in YAML's flow style; numbers with nine digits and always read as numbers."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{k}: {_flow(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_flow(v) for v in value) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return value if _PLAIN.fullmatch(value) else json.dumps(value)
+    text = f"{value:.9g}"
+    mantissa, _, exponent = text.partition("e")
+    return f"{mantissa}.0e{exponent}" if exponent and "." not in mantissa else text
+
+
+# --- reading -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class ModelEffects:
+    """Effects of a model file; contained: words whose numbers stand in the springs already."""
+
+    forms: tuple[Form, ...]
+    contained: tuple[str, ...]
+
+
+def effects_of(model: ArmModel) -> ModelEffects:
+    """The effects of a model in absolute units. Raises InputError with every problem found."""
+    found, contained, problems = [], [], []
+    for i, entry in enumerate(model.effects):
+        try:
+            form = from_entry(entry)
+        except FormError as error:
+            problems.append((("effects", i, *error.path), str(error)))
+            continue
+        if entry.get(CONTAINED) == _SPRINGS:
+            contained.append(form.word)
+        else:
+            found.append(form)
+    if problems:
+        document = read_document(Path(model.name), ModelFile)
+        document.refuse([document.problem(place, what) for place, what in problems])
+    return ModelEffects(tuple(found), tuple(contained))
