@@ -26,8 +26,6 @@ from rig.yamlfile import read_document
 
 _SPRINGS = "joint_stiffness_Nm_per_rad"
 _PLAIN = re.compile(r"(?!true|false|null)[a-z]{4,}(_[a-z]+)*")  # read as text by every YAML
-    r"[a-z]{4,}(_[a-z]+)+|kept|load|linear"
-)  # no YAML reads these as else than text
 _LEAST = 0.02  # of a joint's compliance that a fit may leave of it
 # Of the published pair; what stands in a model file until somebody edits it.
 _ASSUMED_DISTANCE_MM = 1500.0
