@@ -150,10 +150,27 @@ class Bench:
         return out
 
     def joint_column(self, joint: int, deflection: Array) -> Array:
-        """What a deflection (n,) rad of one joint does to the laser and to that joint's reading."""
+        """What a deflection (n,) rad of one joint does to the laser and to that joint's reading;
+        where the displacement is imposed it is negative for a joint that gives way (`sense`)."""
         q = np.zeros((self.rows.n, self.data.joints))
-        q[:, joint] = deflection
-        return self.stacked(self.lever[:, joint] * deflection, q)
+        response = self.lever[:, joint] * deflection
+        if self.imposed:  # what one joint gives way, force and all other joints lose
+            q = self._follow(response)
+        q[:, joint] += self.sense * deflection
+        return self.stacked(response, q)
+
+    def outside_column(self, motion: Array) -> Array:
+        """What a motion (n,) m of the target does that does not come from the joints: the laser
+        sees it; where the displacement is imposed, the joints are spared it, and force falls."""
+        if not self.imposed:
+            return self.stacked(motion)
+        return self.stacked(-motion, self._follow(-motion))
+
+    def _follow(self, response: Array) -> Array:
+        """Deflections (n, m) of the joints under the force behind a response (n,) m."""
+        per_newton = np.sum(self.lever**2 * self.data.compliance, axis=1)  # as `response` has it
+        force = np.divide(response, per_newton, out=np.zeros_like(response), where=per_newton > 0)
+        return np.asarray(self._unit_elastic() * force[:, None])
 
     def add_joint(self, joint: int, deflection: Array) -> int:
         """Puts the column of a joint's deflection (n,) rad into the pool; its index."""

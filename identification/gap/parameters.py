@@ -75,8 +75,9 @@ def _backlash(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Paramete
     }
 
 
-def _curve(_: Bench, __: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    return {"change_of_compliance_over_range": _linear(np.ones(len(w)), w, cov, "1")}
+def _curve(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    change = _linear(np.ones(len(w)), w, cov, "1", bench.sense)
+    return {"change_of_compliance_over_range": change}
 
 
 def _creep(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
@@ -91,11 +92,14 @@ def _creep(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
     }
 
 
-def _stiffness(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _stiffness(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    """Factor on the simulated stiffness: of compliance where force is imposed, else of force."""
     out = {}
     for i, j in enumerate(part.variant.info["joints"]):
         c = _one(w, cov, i, "1")
         ends = [1 / max(1 + v, 0.02) for v in (c.value, c.high, c.low)]
+        if bench.imposed:
+            ends = [max(1 + v, 0.0) for v in (c.value, c.low, c.high)]
         out[f"factor_joint{j + 1}"] = Parameter(ends[0], ends[1], ends[2], "1")
     return out
 

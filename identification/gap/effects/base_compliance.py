@@ -33,7 +33,7 @@ def variants(bench: Bench) -> list[Variant]:
     out = []
     for depth in DEPTHS_M:
         m = moments(bench, depth)
-        columns = [bench.add(bench.stacked(m[:, a] ** 2 * bench.load)) for a in range(3)]
+        columns = [bench.add(bench.outside_column(m[:, a] ** 2 * bench.load)) for a in range(3)]
         info: dict[str, Any] = {"depth_m": depth}
         seen = [a for a in range(3) if np.abs(m[:, a]).max() > 1e-3]
         out.append(

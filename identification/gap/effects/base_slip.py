@@ -28,7 +28,7 @@ def variants(bench: Bench) -> list[Variant]:
                 continue
 
             def column(state: Array, lever: Array = lever) -> int:
-                return bench.add(bench.stacked(_NATURAL * lever * state))
+                return bench.add(bench.outside_column(_NATURAL * lever * state))
 
             name = f"axis {'xyz'[axis]} {depth:g} m below"
             info = {"axis": axis, "depth_m": depth}

@@ -22,7 +22,7 @@ def variants(bench: Bench) -> list[Variant]:
     if not top > 0:
         return []
     scales = tuple(s * bench.reach for s in SHARES)
-    size, sign = np.abs(bench.load), bench.sense * np.sign(bench.load)
+    size, sign = np.abs(bench.load), np.sign(bench.load)
     out, columns = [], []
     for share in FORCES:
         f0 = share * top
@@ -30,7 +30,7 @@ def variants(bench: Bench) -> list[Variant]:
             ("exponential", 1 - np.exp(-size / f0)),
             ("hyperbolic", size / (size + f0)),
         ):
-            column = bench.add(bench.stacked(sign * shape))
+            column = bench.add(bench.outside_column(sign * shape))
             if law == "exponential":
                 columns.append(column)
             out.append(

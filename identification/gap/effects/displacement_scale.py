@@ -14,5 +14,5 @@ SCALES = (0.03, 0.08, 0.2)
 
 def variants(bench: Bench) -> list[Variant]:
     """One coefficient: the gain of the displacement minus one."""
-    column = bench.add(bench.stacked(bench.sense * bench.line))
+    column = bench.add(bench.outside_column(bench.line))
     return [variant(WORD, "gain", [column], SCALES, positive=False)]

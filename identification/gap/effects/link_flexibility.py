@@ -20,7 +20,7 @@ def variants(bench: Bench) -> list[Variant]:
     links = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]
     columns = []
     for k in range(links.shape[1]):
-        columns.append(bench.add(bench.stacked(links[:, k] * bench.load)))
+        columns.append(bench.add(bench.outside_column(links[:, k] * bench.load)))
     out = [
         variant(WORD, f"segment {k + 1}", [c], SCALES, segments=[k]) for k, c in enumerate(columns)
     ]

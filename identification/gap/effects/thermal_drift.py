@@ -27,12 +27,14 @@ def variants(bench: Bench) -> list[Variant]:
     ]
     out = []
     for label, path in {**warm_ups(bench), **_temperatures(bench)}.items():
-        columns = [bench.add(bench.stacked(m * path)) for m in masks]
+        columns = [bench.add(bench.outside_column(m * path)) for m in masks]
         out.append(variant(WORD, label, columns, scales, positive=False, path=label))
     if not has_runs(bench):
         return out
     hats = free_path(bench)
-    columns = [bench.add(bench.stacked(m * hats[:, k])) for m in masks for k in range(PIECES)]
+    columns = [
+        bench.add(bench.outside_column(m * hats[:, k])) for m in masks for k in range(PIECES)
+    ]
     root: Array = np.kron(np.eye(len(masks)), path_root()).astype(float)
     out.append(variant(WORD, "free path", columns, scales, root, positive=False, prior=2.0,
                        path="free"))  # fmt: skip

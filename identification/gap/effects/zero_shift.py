@@ -21,8 +21,8 @@ def variants(bench: Bench) -> list[Variant]:
         runs = list(dict.fromkeys(rows.run[mine].tolist()))
         for r in runs[1:]:
             shifted.append(r)
-            jump = bench.add(bench.stacked((mine & (rows.run >= r)).astype(float)))
-            shifts.append(bench.add(bench.stacked((rows.run == r).astype(float))))
+            jump = bench.add(bench.outside_column((mine & (rows.run >= r)).astype(float)))
+            shifts.append(bench.add(bench.outside_column((rows.run == r).astype(float))))
             out.append(variant(WORD, f"jump before run {r + 1}", [jump], scales, positive=False,
                                runs=[r]))  # fmt: skip
     if len(shifts) > 1:
