@@ -312,6 +312,60 @@ def diagnose(
         _list_written(draw(result, figures, dataset.name))
 
 
+@app.command()
+def blind(
+    cases: Annotated[int, typer.Option(metavar="N", help="How many are drawn.", min=1)] = 100,
+    seed: Annotated[
+        int, typer.Option(metavar="S", help="The same seed, the same cases.", min=0)
+    ] = 1,
+    withhold: Annotated[
+        str,
+        typer.Option(
+            metavar="WORD",
+            help="Take this effect out of the library and draw it in every second case: then "
+            "`unknown` is right; each: every word in turn.",
+        ),
+    ] = "",
+    jobs: Annotated[
+        int | None,
+        typer.Option(metavar="J", help="Diagnoses at a time; left out: all cores.", min=1),
+    ] = None,
+    snr_min: Annotated[
+        float, typer.Option(help="Score gaps from so many times the noise; all are drawn.", min=0)
+    ] = 3.0,
+    deadline: Annotated[
+        float, typer.Option(metavar="SECONDS", help="A later answer counts as wrong.", min=1)
+    ] = 120.0,
+    generator: Annotated[
+        str, typer.Option(help="hidden: worlds of this project; mujoco: another engine's.")
+    ] = "hidden",
+    keep: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Keep data sets and answers in this new folder."),
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Draw measurements with hidden effects, diagnose them, open the answers, score."""
+    from rig.blind import command
+    from rig.blind.campaign import Plan
+    from rig.terminal import terminal_progress
+
+    plan = Plan(
+        cases=cases,
+        seed=seed,
+        withhold=withhold,
+        jobs=jobs or command.all_cores(),
+        deadline_s=deadline,
+        generator=generator,
+        snr_min=snr_min,
+    )
+    with terminal_progress() as progress:
+        result = command.blind(plan, keep=keep, progress=progress)
+    give(result, json_file)
+    if result.interrupted:
+        raise typer.Exit(130)
+
+
 @app.command("import")
 def import_(
     table: Annotated[Path, typer.Argument(metavar="TABLE.csv")],
