@@ -12,11 +12,13 @@ import numpy as np
 
 from identification.gap.data import GapData
 from identification.gap.diagnose import Effect, GapResult, diagnose_gap
+from identification.gap.forms.known import less_known
 from identification.gap.heldout import HeldOut
 from identification.gap.parameters import Parameter
 from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.gap_data import gap_data
+from rig.gap_forms import effects_of
 from rig.meta import Simulation
 from rig.model import load_model
 
@@ -74,37 +76,45 @@ def diagnose(
     add: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Diagnoses a data set. model: a model file whose joint stiffnesses stand for META's;
+    """Diagnoses a data set. model: a model file whose springs (and effects) stand for META's;
     simulation: CSV with another simulator's curves; withhold: words taken out of the library; add:
     words the explanation must contain. InputError for anything wrong."""
-    data = gap_data(dataset if model is None else _believing(dataset, model))
+    known: tuple[dict[str, Any], ...] = ()
+    if model is None:
+        data = gap_data(dataset)
+    else:
+        data, known = _believing(dataset, model)
     if simulation is not None:
         data = _with_curves(data, simulation)
     try:
         result = diagnose_gap(data, withhold=withhold, add=add, progress=progress)
     except ValueError as error:
         raise InputError(f"{dataset.path or 'data set'}: {error}.") from error
-    return Diagnosis(dataset.uuid, result, dataset.banners())
+    return Diagnosis(dataset.uuid, result, dataset.banners(), known)
 
 
-def _believing(dataset: Dataset, model: Path) -> Dataset:
-    """The data set with the joint stiffnesses of a model file as its simulation."""
+def _believing(dataset: Dataset, model: Path) -> tuple[GapData, tuple[dict[str, Any], ...]]:
+    """The data with springs and effects of a model file as their simulation, and those effects."""
     read = load_model(model)
-    if read.effects:
-        raise InputError(
-            f"{model}: effects: {len(read.effects)}; rig diagnose reads models without."
-        )
+    effects = effects_of(read)
     if read.arm.name != dataset.meta.robot:
         raise InputError(
             f"{model}: the robot is {read.arm.name}, the measurement's is {dataset.meta.robot}. "
             "Give the model of the measured robot."
         )
     c1, c2, c3, c4, c5, c6 = (float(c) for c in read.arm.joint_stiffness)
-    simulation = Simulation(
-        joint_stiffness_Nm_per_rad=(c1, c2, c3, c4, c5, c6),
-        joint_stiffness_relative_sd=float(max(read.arm.joint_stiffness_relative_sd)),
+    simulation = Simulation(joint_stiffness_Nm_per_rad=(c1, c2, c3, c4, c5, c6))
+    believed = dataset.meta.model_copy(update={"simulation": simulation})
+    data = replace(
+        gap_data(replace(dataset, meta=believed)),
+        compliance_relative_sd=read.arm.joint_stiffness_relative_sd,
     )
-    return replace(dataset, meta=dataset.meta.model_copy(update={"simulation": simulation}))
+    if not effects.forms:
+        return data, read.effects
+    try:
+        return less_known(data, effects.forms), read.effects
+    except ValueError as error:
+        raise InputError(f"{model}: effects: {error}. Give a model without effects.") from error
 
 
 def _with_curves(data: GapData, csv: Path) -> GapData:
@@ -120,6 +130,11 @@ def _with_curves(data: GapData, csv: Path) -> GapData:
         raise InputError(
             f"{csv}: lacks the column {sorted(missing)[0]}; "
             "wanted: pose, direction, force_N, displacement_mm."
+        )
+    if "branch" in table.columns:
+        raise InputError(
+            f"{csv}: these curves depend on the path that they were simulated along (branch, "
+            "repetition). Give the model itself: --model MODEL.yaml."
         )
     simulated = np.empty(len(data.force))
     for s, setup in enumerate(data.setups):

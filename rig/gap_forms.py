@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,9 @@ from identification.gap.effects import WORDS
 from identification.gap.forms import Form, Law, Term
 from identification.gap.forms.law import ACROSS, KEPT, LOST, WORKED
 from rig.errors import did_you_mean
+from rig.model import ArmModel
+from rig.model_schema import ModelFile
+from rig.yamlfile import read_document
 
 # What an entry says besides its law; kept, not interpreted.
 ABOUT = (
@@ -27,6 +31,7 @@ ABOUT = (
     "parameters",
     "contained_in",
 )
+SPRINGS = "joint_stiffness_Nm_per_rad"
 CONTAINED = "contained_in"  # its numbers stand in another key of the model file
 _MOST = 1e12
 
@@ -352,3 +357,30 @@ def _covariance(entry: Mapping[str, Any], factor: Any, sd: Any) -> Any:
             raise FormError(at, f"wants {k} rows of {k} numbers, one a term.")
         rows.append([_number(v, at) for v in row])
     return np.array(rows) / np.outer(factor, factor)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelEffects:
+    """Effects of a model file; contained: words whose numbers stand in the springs already."""
+
+    forms: tuple[Form, ...]
+    contained: tuple[str, ...]
+
+
+def effects_of(model: ArmModel) -> ModelEffects:
+    """The effects of a model in absolute units. Raises InputError with every problem found."""
+    found, contained, problems = [], [], []
+    for i, entry in enumerate(model.effects):
+        try:
+            form = from_entry(entry)
+        except FormError as error:
+            problems.append((("effects", i, *error.path), str(error)))
+            continue
+        if entry.get(CONTAINED) == SPRINGS:
+            contained.append(form.word)
+        else:
+            found.append(form)
+    if problems:
+        document = read_document(Path(model.name), ModelFile)
+        document.refuse([document.problem(place, what) for place, what in problems])
+    return ModelEffects(tuple(found), tuple(contained))

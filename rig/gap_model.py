@@ -1,11 +1,10 @@
-"""What a diagnosis found, as a model file: the simulation with its effects, and back again."""
+"""What a diagnosis found, as a model file: the simulation with its effects."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,20 +17,13 @@ from rig.dataset import Dataset
 from rig.diagnose import Diagnosis
 from rig.diagnose_text import MEANING
 from rig.errors import InputError
-from rig.gap_forms import CONTAINED, FormError, from_entry, to_entry
-from rig.model import ArmModel
-from rig.model_schema import ModelFile
+from rig.gap_forms import CONTAINED, SPRINGS, to_entry
 from rig.storage.files import in_place_of
-from rig.yamlfile import read_document
 
-_SPRINGS = "joint_stiffness_Nm_per_rad"
 _PLAIN = re.compile(r"(?!true|false|null)[a-z]{4,}(_[a-z]+)*")  # read as text by every YAML
 _LEAST = 0.02  # of a joint's compliance that a fit may leave of it
 # Of the published pair; what stands in a model file until somebody edits it.
 _ASSUMED_DISTANCE_MM = 1500.0
-
-
-# --- writing -------------------------------------------------------------------------------------
 
 
 def write_model(diagnosis: Diagnosis, dataset: Dataset, path: Path) -> None:
@@ -74,7 +66,7 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
         f"pose: {{q_rad: {_flow(list(pose.q_rad))}}}",
         f"tool: {{flange_T_tcp: [[1, 0, 0, {x:g}], [0, 1, 0, {y:g}], [0, 0, 1, {z:g}], "
         "[0, 0, 0, 1]]}",
-        f"{_SPRINGS}: {_flow([float(f'{k:.7g}') for k in stiffness])}",
+        f"{SPRINGS}: {_flow([float(f'{k:.7g}') for k in stiffness])}",
         f"joint_stiffness_sd: {_flow([float(f'{s:.4g}') for s in sd])}",
         *_effects(diagnosis, dataset),
         "# Not measured, an assumption for rig couple: edit it to the second arm's place.",
@@ -141,7 +133,7 @@ def _about(effect: Effect, dataset: Dataset) -> dict[str, Any]:
         },
     }
     if effect.name == "joint_stiffness_error":
-        out[CONTAINED] = _SPRINGS
+        out[CONTAINED] = SPRINGS
     return out
 
 
@@ -180,33 +172,3 @@ def _flow(value: Any) -> str:
     text = f"{value:.9g}"
     mantissa, _, exponent = text.partition("e")
     return f"{mantissa}.0e{exponent}" if exponent and "." not in mantissa else text
-
-
-# --- reading -------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class ModelEffects:
-    """Effects of a model file; contained: words whose numbers stand in the springs already."""
-
-    forms: tuple[Form, ...]
-    contained: tuple[str, ...]
-
-
-def effects_of(model: ArmModel) -> ModelEffects:
-    """The effects of a model in absolute units. Raises InputError with every problem found."""
-    found, contained, problems = [], [], []
-    for i, entry in enumerate(model.effects):
-        try:
-            form = from_entry(entry)
-        except FormError as error:
-            problems.append((("effects", i, *error.path), str(error)))
-            continue
-        if entry.get(CONTAINED) == _SPRINGS:
-            contained.append(form.word)
-        else:
-            found.append(form)
-    if problems:
-        document = read_document(Path(model.name), ModelFile)
-        document.refuse([document.problem(place, what) for place, what in problems])
-    return ModelEffects(tuple(found), tuple(contained))

@@ -2,11 +2,13 @@
 
 Linear statics: stiff links (unless the model has segments), six torsional springs, a compliant
 mounting where the model has one. Pose and point of load are the procedure's, not the model's.
+Effects of the model (`rig diagnose --write-model`) follow the procedure's whole path: loading and
+unloading, holds and rests, one repetition after the other.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,22 +16,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import along, tool_offset
+from identification.gap.forms import Form
 from rig.errors import InputError
+from rig.gap_forms import effects_of
+from rig.gap_path import predict
 from rig.model import ArmModel, load_model
-from rig.model_schema import ModelFile
 from rig.protocol import MeasurementProtocol, Run, load_protocol
-from rig.yamlfile import read_document
 
 Array = NDArray[np.float64]
 SCHEMA = "rig.simulation/1"
 CSV_HEADER = "pose,direction,force_N,displacement_mm"
+CSV_PATH = ",repetition,branch,step,session_s"
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedCurve:
     """One pose and direction: force N (n,) from zero load up, displacement m (n,) along the
     direction. stiffness N/m (infinite where the arm does not give way along it) with its relative
-    standard uncertainty, that of the joint stiffnesses."""
+    standard uncertainty, that of the joint stiffnesses: of the springs, effects left out.
+
+    path: of a model with effects; force and displacement then follow all holds of all repetitions.
+    """
 
     pose: str
     direction: str
@@ -37,6 +44,19 @@ class PredictedCurve:
     displacement: Array
     stiffness: float
     relative_u: float
+    path: CurvePath | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePath:
+    """Of every hold of a curve (n,): repetition, branch, step, session s, and the displacement m
+    of the springs alone."""
+
+    repetition: tuple[int, ...]
+    branch: tuple[str, ...]
+    step: tuple[int, ...]
+    session: Array
+    springs: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +68,7 @@ class Simulation:
     title: str
     curves: tuple[PredictedCurve, ...]
     notes: tuple[str, ...]
+    effects: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """`rig.simulation/1`."""
@@ -55,23 +76,23 @@ class Simulation:
             "schema": SCHEMA,
             "model": self.model,
             "protocol": self.protocol,
+            "effects": list(self.effects),
             "curves": [_curve_json(c) for c in self.curves],
             "notes": list(self.notes),
         }
 
     def to_csv(self) -> str:
         """Columns pose, direction, force_N, displacement_mm: what `rig diagnose --simulation`
-        takes."""
-        rows = [
-            f"{c.pose},{c.direction},{force:.10g},{1e3 * moved:.10g}"
-            for c in self.curves
-            for force, moved in zip(c.force, c.displacement, strict=True)
-        ]
-        return "\n".join([CSV_HEADER, *rows]) + "\n"
+        takes; of a model with effects also repetition, branch, step, session_s."""
+        rows = [_csv_row(c, i) for c in self.curves for i in range(len(c.force))]
+        further = CSV_PATH if any(c.path is not None for c in self.curves) else ""
+        return "\n".join([CSV_HEADER + further, *rows]) + "\n"
 
     def to_text(self) -> str:
         """One line a curve, then its levels."""
         lines = [f"Predicted by {self.model} for: {self.title}"]
+        if self.effects:
+            lines.append(f"With the effects {', '.join(self.effects)}; k is that of the springs.")
         for c in self.curves:
             u = 1e-3 * c.stiffness * c.relative_u
             k = f"{1e-3 * c.stiffness:.2f} N/mm (standard uncertainty {u:.2g})"
@@ -79,23 +100,26 @@ class Simulation:
                 f"\nPose {c.pose}, direction {c.direction}: "
                 + (k if np.isfinite(c.stiffness) else "the arm does not give way along it")
             )
-            lines.append(f"  {'force in N':>12} {'displacement in mm':>20}")
-            for force, moved in zip(c.force, c.displacement, strict=True):
-                lines.append(f"  {force:12.5g} {1e3 * moved:20.4f}")
+            lines += _levels(c) if c.path is None else _holds(c, c.path)
         return "\n".join([*lines, *(f"\nNote: {note}" for note in self.notes)])
 
 
 def simulate(model: str | Path, protocol: str | Path) -> Simulation:
     """The curves of every pose and direction that the protocol loads. Raises InputError."""
     read, procedure = load_model(model), load_protocol(Path(protocol))
-    _refuse_effects(read)
+    effects = effects_of(read)
     if read.arm.name not in (procedure.robot, "dh"):
         raise InputError(
             f"{read.name}: robot is {read.arm.name}, but {protocol} measures a {procedure.robot}. "
             "Give a model of the robot that the protocol names."
         )
     curves = tuple(_predict(read, procedure, run) for run in procedure.runs)
-    return Simulation(read.name, str(protocol), procedure.title, curves, _notes(read, procedure))
+    notes = _notes(read, procedure)
+    if effects.forms:
+        curves, more = _with_effects(read, effects.forms, procedure, curves)
+        notes = (*notes, *more)
+    names = tuple(dict.fromkeys([*effects.contained, *(f.word for f in effects.forms)]))
+    return Simulation(read.name, str(protocol), procedure.title, curves, notes, names)
 
 
 def write_csv(simulation: Simulation, path: Path) -> None:
@@ -136,31 +160,68 @@ def _compliance(model: ArmModel, procedure: MeasurementProtocol, run: Run) -> tu
     return s, float(np.linalg.norm(parts * sd) / s) if s > 0 else 0.0
 
 
-def _refuse_effects(model: ArmModel) -> None:
-    if not model.effects:
-        return
-    document = read_document(Path(model.name), ModelFile)
-    problems = []
-    for i, effect in enumerate(model.effects):
-        name = effect.get("name", effect.get("effect"))
-        called = f'the effect "{name}"' if name is not None else "an effect without a name"
-        problems.append(
-            document.problem(
-                ("effects", i),
-                f"{called} is none that rig simulate can compute; allowed: no effects. Simulate "
-                "with `effects: []`, which gives the springs alone.",
-            )
+def _with_effects(
+    model: ArmModel,
+    forms: tuple[Form, ...],
+    procedure: MeasurementProtocol,
+    curves: tuple[PredictedCurve, ...],
+) -> tuple[tuple[PredictedCurve, ...], tuple[str, ...]]:
+    """The curves with the effects along the path, and what was left out."""
+    compliance = np.array([1 / c.stiffness for c in curves])
+    path, notes = predict(model, forms, procedure, compliance)
+    out = []
+    for s, curve in enumerate(curves):
+        mine = np.flatnonzero(path.setup == s)
+        holds = CurvePath(
+            repetition=tuple(int(r) for r in path.repetition[mine]),
+            branch=tuple(path.branch[i] for i in mine),
+            step=tuple(int(k) for k in path.step[mine]),
+            session=path.session[mine],
+            springs=path.springs[mine],
         )
-    document.refuse(problems)
+        force, moved = path.force[mine], path.displacement[mine]
+        out.append(replace(curve, force=force, displacement=moved, path=holds))
+    return tuple(out), notes
 
 
 def _notes(model: ArmModel, procedure: MeasurementProtocol) -> tuple[str, ...]:
     notes = [model.note] if model.note else []
-    if procedure.branches == "loading-unloading":
+    if procedure.branches == "loading-unloading" and not model.effects:
         notes.append("Springs unload along the loading curve: each level stands once.")
     if any(run.stop_at_displacement_mm is not None for run in procedure.runs):
         notes.append("All levels are shown, also those beyond stop_at_displacement_mm.")
     return tuple(notes)
+
+
+def _levels(c: PredictedCurve) -> list[str]:
+    lines = [f"  {'force in N':>12} {'displacement in mm':>20}"]
+    for force, moved in zip(c.force, c.displacement, strict=True):
+        lines.append(f"  {force:12.5g} {1e3 * moved:20.4f}")
+    return lines
+
+
+def _holds(c: PredictedCurve, path: CurvePath) -> list[str]:
+    """The first and the last repetition; between them lies what the effects carry over."""
+    shown = {min(path.repetition), max(path.repetition)}
+    lines = [
+        f"  {'repetition':>10} {'branch':<10} {'force in N':>12} {'displacement in mm':>20} "
+        f"{'springs alone':>15}"
+    ]
+    for i, repetition in enumerate(path.repetition):
+        if repetition in shown:
+            lines.append(
+                f"  {repetition:10d} {path.branch[i]:<10} {c.force[i]:12.5g} "
+                f"{1e3 * c.displacement[i]:20.4f} {1e3 * path.springs[i]:15.4f}"
+            )
+    return lines
+
+
+def _csv_row(c: PredictedCurve, i: int) -> str:
+    row = f"{c.pose},{c.direction},{c.force[i]:.10g},{1e3 * c.displacement[i]:.10g}"
+    if c.path is None:
+        return row
+    p = c.path
+    return f"{row},{p.repetition[i]},{p.branch[i]},{p.step[i]},{p.session[i]:.10g}"
 
 
 def _curve_json(c: PredictedCurve) -> dict[str, Any]:
@@ -177,4 +238,15 @@ def _curve_json(c: PredictedCurve) -> dict[str, Any]:
         },
         "force_N": [float(f) for f in c.force],
         "displacement_mm": [float(1e3 * u) for u in c.displacement],
+        **({} if c.path is None else _path_json(c.path)),
+    }
+
+
+def _path_json(path: CurvePath) -> dict[str, Any]:
+    return {
+        "repetition": list(path.repetition),
+        "branch": list(path.branch),
+        "step": list(path.step),
+        "session_s": [float(t) for t in path.session],
+        "springs_alone_mm": [float(1e3 * u) for u in path.springs],
     }

@@ -1,0 +1,184 @@
+"""What a model with effects predicts along the path of a procedure: loads, holds, rests, poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from identification.gap.bench import Bench, make_bench
+from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints
+from identification.gap.forms import SESSION, Form, lawful, realise
+from identification.gap.forms.law import along
+from rig.gap_data import arm_setup
+from rig.model import ArmModel
+from rig.plan import AMPLIFIER_S, MOUNT_S, SCREW_S, TARE_S, UNLOAD_S
+from rig.protocol import MeasurementProtocol, Run
+
+# Act on what the instruments see of everything else: realised last.
+_LAST = ("displacement_scale", "time_lag")
+# Samples of instruments that nothing here depends on: a prediction has no noise.
+_ANY = Instruments(0.1, 2e-6, 0.005, 0.003)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedPath:
+    """n holds in the order of measurement: setup (n,) index of the run, repetition, branch, step;
+    force N, session s (n,); displacement (n,) m with the effects, `springs` (n,) m without; mean of
+    the hold, from the first value of its pose and direction on."""
+
+    setup: Ints
+    repetition: Ints
+    branch: tuple[str, ...]
+    step: Ints
+    session: Array
+    force: Array
+    springs: Array
+    displacement: Array
+
+
+def predict(
+    model: ArmModel, forms: Sequence[Form], procedure: MeasurementProtocol, compliance: Array
+) -> tuple[PlannedPath, tuple[str, ...]]:
+    """The path with its predicted displacements, and what was left out. compliance (runs,) m/N:
+    of the model's springs, links and mounting along each run's direction."""
+    data = planned_data(model, procedure)
+    bench = make_bench(replace(data, displacement=data.force * compliance[data.setup]))
+    kept = [lawful(f) for f in forms]
+    moved = bench.rows.displacement.copy()
+    for f in kept:
+        if f.word not in _LAST:
+            moved += realise(bench, f)[: bench.rows.n]
+    seen = replace(bench, response=moved)
+    for f in kept:
+        if f.word in _LAST:
+            moved = moved + realise(seen, f)[: bench.rows.n]
+    return _by_hold(bench, moved), (*_left_out(forms), *_beyond(bench, kept))
+
+
+def _by_hold(bench: Bench, moved: Array) -> PlannedPath:
+    rows = bench.rows
+    edges = np.flatnonzero(rows.hold_starts)
+
+    def mean(values: Array) -> Array:
+        total = np.add.reduceat(rows.weight, edges)
+        return np.asarray(np.add.reduceat(values * rows.weight, edges) / total)
+
+    datum = np.array([moved[int(np.argmax(rows.setup == s))] for s in np.unique(rows.setup)])
+    return PlannedPath(
+        setup=rows.setup[edges], repetition=rows.repetition[edges],
+        branch=tuple(BRANCH_NAMES[b] for b in rows.branch[edges]), step=rows.step[edges],
+        session=mean(rows.session), force=mean(rows.force), springs=mean(rows.displacement),
+        displacement=mean(moved - datum[rows.setup]),
+    )  # fmt: skip
+
+
+def planned_data(model: ArmModel, procedure: MeasurementProtocol) -> GapData:
+    """The samples that the procedure will take, without displacement: as `rig.plan` times them
+    (turning, settling, holds, plateaus, rests, mounting), each force exactly its target."""
+    walk = _Walk(procedure)
+    setup, repetition, branch, step, force, time, session = (np.array(c) for c in walk.columns())
+    whole = np.int64
+    new = np.append(True, (np.diff(setup) != 0) | (np.diff(repetition) != 0))
+    poses = procedure.poses
+    setups = tuple(
+        arm_setup(
+            model.arm, run.pose, np.array(poses[run.pose].q_rad),
+            np.array(poses[run.pose].tcp_xyz_mm) / 1e3, run.direction,
+            np.array(procedure.directions[run.direction]),
+        )
+        for run in procedure.runs
+    )  # fmt: skip
+    return GapData(
+        arm=True, setups=setups, time=time, session=session, run=np.cumsum(new).astype(whole) - 1,
+        setup=setup.astype(whole), repetition=repetition.astype(whole),
+        branch=branch.astype(whole), step=step.astype(whole), force=force.astype(float),
+        displacement=np.zeros(len(force)), compliance=1 / model.arm.joint_stiffness,
+        compliance_relative_sd=model.arm.joint_stiffness_relative_sd, instruments=_ANY,
+        output_encoder=procedure.joint_encoder == "output", tare="run", imposed="force",
+    )  # fmt: skip
+
+
+class _Walk:
+    """One walk through a procedure on the clock of its plan."""
+
+    def __init__(self, procedure: MeasurementProtocol) -> None:
+        self._procedure = procedure
+        self._now = self._start = 0.0
+        self._rows: list[tuple[float, ...]] = []
+
+    def columns(self) -> list[tuple[float, ...]]:
+        """Setup, repetition, branch, step, force, time, session of every sample."""
+        before: tuple[str, str] | None = None
+        for index, run, repetition in self._procedure.sequence():
+            if before is not None and before != (run.pose, run.direction):
+                self._now += MOUNT_S
+            before = (run.pose, run.direction)
+            self._repetition(index, run, repetition)
+        return list(zip(*self._rows, strict=True))
+
+    def _repetition(self, index: int, run: Run, repetition: int) -> None:
+        procedure = self._procedure
+        sampling = procedure.sampling
+        count = max(sampling.samples_per_step, ceil(procedure.hold_s * sampling.rate_Hz))
+        self._now += AMPLIFIER_S + TARE_S
+        self._start = self._now
+        place = (float(index), float(repetition))
+        self._hold((*place, 0.0, 0.0, 0.0), round(procedure.zero.before_s * sampling.rate_Hz))
+        for step in procedure.steps(run):
+            self._now += SCREW_S + procedure.settle.window_s
+            branch = float(BRANCH_NAMES.index(step.branch))
+            self._hold((*place, branch, float(step.number), step.target_N), count)
+        self._now += UNLOAD_S
+        self._hold((*place, 0.0, 0.0, 0.0), round(procedure.zero.after_s * sampling.rate_Hz))
+        self._now += procedure.rest_s
+
+    def _hold(self, row: tuple[float, ...], samples: int) -> None:
+        for _ in range(samples):
+            self._now += 1 / self._procedure.sampling.rate_Hz
+            self._rows.append((*row, self._now - self._start, self._now))
+
+
+# --- what a prediction leaves out ----------------------------------------------------------------
+
+_CHANCE = {
+    "place": "where the joint lies in its play while unloaded",
+    "shift": "jumps of the datum",
+    "drift_knot": "a drift without a law",
+    "drift_per_kelvin": "a drift with temperatures, which a procedure does not name",
+}
+
+
+def _left_out(forms: Sequence[Form]) -> tuple[str, ...]:
+    out = []
+    for f in forms:
+        names = dict.fromkeys(t.coefficient for t in f.law.terms if t.coefficient in SESSION)
+        out += [f"{f.word}: {_CHANCE[n]} belongs to the measured session; left out." for n in names]
+        if f.word.endswith("drift") and not names:
+            out.append(f"{f.word}: as in the measured session, counted from the start of this one.")
+    return tuple(out)
+
+
+def _beyond(bench: Bench, forms: Sequence[Form]) -> tuple[str, ...]:
+    """Where laws are stretched beyond what was seen of them."""
+    out = []
+    for f in forms:
+        seen = f.law.constants.get("measured_to")
+        if seen is not None:
+            top = float(np.abs(bench.torque[:, f.law.constants["joint"]]).max())
+            if top > 1.02 * seen:
+                out.append(
+                    f"{f.word}: seen to {seen:.4g} Nm at joint {f.law.constants['joint'] + 1}, "
+                    f"here up to {top:.4g} Nm; the curve goes on as it ended."
+                )
+        vectors = {t.shape["along"] for t in f.law.terms if "along" in t.shape}
+        if vectors:
+            one_sense = f.word == "load_misalignment"
+            signs = [along(bench, v) for v in vectors]
+            known = np.any([s > 0 if one_sense else s != 0 for s in signs], axis=0)
+            blind = sorted({bench.data.setups[s].direction for s in bench.rows.setup[~known]})
+            if blind:
+                out.append(f"{f.word}: not measured along {', '.join(blind)}; left out there.")
+    return tuple(out)
