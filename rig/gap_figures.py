@@ -173,8 +173,8 @@ def residual(r: GapResult, p: Points) -> Figure:
         axes.axhline(0, color="0.4", linewidth=0.8, zorder=1)
         _residual_points(r, p, axes, x)
     left.set_xlabel("Displacement in mm" if r.bench.imposed else "Force in N")
-    right.set_xlabel(f"Time in the {'session' if r.bench.rows.clock else 'runs, rests assumed'} "
-                     f"in {unit}")  # fmt: skip
+    assumed = not r.bench.rows.clock and len(np.unique(p.run)) > 1
+    right.set_xlabel(f"Time in the session in {unit}" + ", rests assumed" * assumed)
     left.set_ylabel(_gap_label(r, "Left"))
     _title(
         figure,
@@ -277,7 +277,7 @@ def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
             x = m.displacement[here] * MM if r.bench.imposed else m.load[here]
             mean, sd = m.mean[here] * MM, m.sd[here] * MM
             axes.plot(x, m.residual[here] * MM, marker, color=edge, markerfacecolor=fill,
-                      markersize=4, label=f"{label}: mean of the runs")  # fmt: skip
+                      markersize=4, label=f"{label}: mean")  # fmt: skip
             axes.fill_between(x, mean - 2 * sd, mean + 2 * sd, color=edge, alpha=0.2, linewidth=0)
             axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
         axes.set_title(setup_name(r, s), fontsize=10)
@@ -307,11 +307,7 @@ def _of_sense(m: Remainder, sense: int) -> Any:
 
 def _remainder_title(r: GapResult, m: Remainder) -> str:
     low, high = (edge * MM for edge in m.ci95)
-    differs = (
-        f"another {m.unrepeated_rms * MM:.2g} mm rms is finer or does not repeat"
-        if m.visits > 1
-        else "each load was met once, so that what repeats can't be told"
-    )
+    differs = _unrepeated(m)
     if m.largest is None:
         seen = f"nothing that repeats for sure (95 %: below {high:.2g} mm rms)"
         return f"Left {_after(r)}: {seen}; {differs}"
@@ -322,6 +318,14 @@ def _remainder_title(r: GapResult, m: Remainder) -> str:
         f"Left {_after(r)}: {m.rms * MM:.2g} mm rms repeat (95 %: {low:.2g} to {high:.2g}), "
         f"most at {where}, {at}: {e.mean * MM:.2g} mm; {differs}"
     )
+
+
+def _unrepeated(m: Remainder) -> str:
+    if m.visits <= 1:
+        return "each load was met once, so that what repeats can't be told"
+    if m.unrepeated_rms == 0:
+        return "beside it, noise"
+    return f"another {m.unrepeated_rms * MM:.2g} mm rms is finer or does not repeat"
 
 
 def _panels(r: GapResult, *, below: bool = False) -> tuple[Figure, list[list[Any]], list[int]]:
@@ -381,9 +385,10 @@ def _shared_legend(figure: Figure, panels: list[Any]) -> None:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
     if found:
-        fitting = int(figure.get_size_inches()[0] / 2)
+        # about 13 characters an inch at that size, six for the handle and the space between
+        fitting = int(13 * figure.get_size_inches()[0] / (max(map(len, found)) + 6))
         figure.legend(list(found.values()), list(found), loc="outside lower center", frameon=False,
-                      fontsize=8, ncols=min(len(found), fitting))  # fmt: skip
+                      fontsize=8, ncols=max(1, min(len(found), fitting)))  # fmt: skip
 
 
 def _ranked(r: GapResult, least: float) -> dict[str, float]:

@@ -103,13 +103,15 @@ def _strips(
 
 
 def _cells(x: Array, gap: Array, span: float) -> list[tuple[float, float, float]]:
-    """(from, to, gap): borders half-way between neighbouring values; many points in even bins."""
-    if len(x) > _BINS:
-        edges = np.linspace(x.min(), x.max(), _BINS + 1)
-        number = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, _BINS - 1)
-        count = np.bincount(number, minlength=_BINS)
-        sums = np.bincount(number, weights=gap, minlength=_BINS)
-        return [(edges[b], edges[b + 1], sums[b] / count[b]) for b in range(_BINS) if count[b]]
+    """(from, to, gap): borders half-way between neighbouring values; many points in bins, each
+    with as many of them."""
+    if len(x) > _BINS and np.ptp(x) > 0:
+        edges = np.quantile(x, np.linspace(0, 1, _BINS + 1))
+        edges = np.unique(np.concatenate([edges[:1], edges[1:][np.diff(edges) > 0.004 * span]]))
+        number = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
+        count = np.bincount(number, minlength=len(edges) - 1)
+        sums = np.bincount(number, weights=gap, minlength=len(edges) - 1)
+        return [(edges[b], edges[b + 1], sums[b] / count[b]) for b in np.flatnonzero(count)]
     order = np.argsort(x, kind="stable")
     at, values = x[order], gap[order]
     half = np.diff(at) / 2

@@ -150,8 +150,9 @@ def remainder_table(r: GapResult, m: Remainder) -> Table:
 def held_table(r: GapResult) -> Table:
     """Before and after, fitted, per way of withholding, and with other effects instead."""
     nan = float("nan")
-    rows = [("fitted", r.verdict, r.before, r.after, nan, nan)]
-    rows += [(f"withheld {h.fold}", r.verdict, h.before, h.after, *h.ci95) for h in r.held_out]
+    named = " + ".join(e.name for e in r.effects) or r.verdict
+    rows = [("fitted", named, r.before, r.after, nan, nan)]
+    rows += [(f"withheld {h.fold}", named, h.before, h.after, *h.ci95) for h in r.held_out]
     if r.held_out:
         main = r.held_out[0]
         rows += [

@@ -171,7 +171,8 @@ def _levels(
     samples = np.bincount(visit, weights=rows.weight)
     # the mean of the visits is one of them: it takes its share of their noise
     beyond = square - (1 / p - 1 / total[level])
-    unrepeated = float(np.sqrt(max(float(samples @ beyond) / float(samples.sum()), 0.0)))
+    excess_square = float(samples @ beyond) / float(samples.sum()) if free > 0 else 0.0
+    unrepeated = float(np.sqrt(max(excess_square, 0.0)))
     return mean, max(1.0, excess) / total, len(value) / len(total), unrepeated
 
 

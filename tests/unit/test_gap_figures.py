@@ -1,0 +1,197 @@
+"""Figures of a diagnosis: their numbers, their marks, and that odd data get a picture too."""
+
+from __future__ import annotations
+
+import csv
+import io
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from identification.gap.base import prediction
+from rig import cli
+from rig.dataset import write
+from rig.diagnose import Diagnosis, diagnose
+from rig.gap_figures import draw
+from rig.gap_map import _cells
+from rig.gap_points import held_table, point_table, points, remainder_table, write_table
+from rig.tables import import_table
+
+META = """robot: none
+directions: {x: [1, 0, 0], y: [0, 1, 0]}
+instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
+simulation: {stiffness_N_per_mm: {x: 95.0, y: 60.0}, stiffness_relative_sd: 0.1}
+"""
+IMPOSED = META.replace("robot: none", "robot: none\nimposed: displacement")
+FIGURES = ("curve", "map", "residual", "probabilities", "withheld", "remainder")
+
+
+def table(*, slip_mm: float = 0.08, repetitions: int = 2) -> str:
+    """Steps up and down; y slips by `slip_mm` beyond 60 N, for good; x is linear."""
+    rng = np.random.default_rng(5)
+    out = ["direction,repetition,branch,step,time_s,force_N,displacement_mm"]
+    for direction, k in (("x", 95.0), ("y", 60.0)):
+        lasting = 0.0
+        for repetition in range(1, repetitions + 1):
+            steps = [("zero", 0, 0.0)]
+            steps += [("loading", i, 20.0 * i) for i in range(1, 6)]
+            steps += [("unloading", i, 20.0 * i) for i in range(4, 0, -1)]
+            for t, (branch, step, force) in enumerate(steps):
+                if direction == "y" and force > 60:
+                    lasting = max(lasting, slip_mm * (force - 60) / 40)
+                u = force / k + lasting + rng.normal(0, 0.002)
+                out += [
+                    f"{direction},{repetition},{branch},{step},{10 * t + s},{force + e:.4f},{u:.6f}"
+                    for s, e in enumerate(rng.normal(0, 0.1, 2))
+                ]
+    return "\n".join(out) + "\n"
+
+
+def cycles(samples: int = 900) -> str:
+    """A running recording through zero, with dry friction beside the spring."""
+    t = np.arange(samples) / 10
+    u = np.sin(2 * np.pi * t / 30)
+    friction = 30 * np.tanh(50 * np.cos(2 * np.pi * t / 30))
+    force = 95 * u + friction + np.random.default_rng(2).normal(0, 0.1, samples)
+    rows = "".join(f"{a},x,{f:.4f},{d:.6f}\n" for a, f, d in zip(t, force, u, strict=True))
+    return "time_s,direction,force_N,displacement_mm\n" + rows
+
+
+def diagnosed(folder: Path, text: str, meta: str = META) -> Diagnosis:
+    (folder / "samples.csv").write_text(text)
+    (folder / "meta.yaml").write_text(meta)
+    return diagnose(import_table(folder / "samples.csv", folder / "meta.yaml"))
+
+
+@pytest.fixture(scope="module")
+def slipped(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
+    return diagnosed(tmp_path_factory.mktemp("slip"), table())
+
+
+def test_points_are_the_measurement_and_its_simulations(slipped: Diagnosis) -> None:
+    r = slipped.result
+    p = points(r)
+    assert len(p.force) == 40  # 2 directions, 2 repetitions, 10 holds
+    k = np.where(p.setup == 0, 95.0, 60.0)
+    assert np.allclose(p.before, p.force / k, rtol=1e-9, atol=1e-12)
+    assert np.allclose(p.measured, p.displacement)
+    fitted = (prediction(r.bench)[: r.bench.rows.n] + r.fit.response) * 1e3
+    hold, weight = r.bench.rows.hold, r.bench.rows.weight
+    assert np.allclose(p.after, np.bincount(hold, weight * fitted) / np.bincount(hold, weight))
+    rms = np.sqrt(np.mean(p.gap_after**2))
+    assert rms < 0.2 * np.sqrt(np.mean(p.gap_before**2))
+    assert p.sense.tolist()[:10] == [0, 1, 1, 1, 1, 1, 2, 2, 2, 2]
+
+
+def test_table_of_points_has_units_and_names(slipped: Diagnosis) -> None:
+    p = points(slipped.result)
+    t: dict[str, Any] = dict(point_table(slipped.result, p))
+    assert "simulated_after_mm" in t
+    assert "simulated_after_N" not in t
+    assert set(t["direction"]) == {"x", "y"}
+    assert np.allclose(t["gap_after_mm"], t["displacement_mm"] - t["simulated_after_mm"])
+
+
+def test_withheld_table_begins_with_the_fit_and_ends_with_the_rivals(slipped: Diagnosis) -> None:
+    r = slipped.result
+    t = held_table(r)
+    assert t["judged_on"][0] == "fitted"
+    assert t["before_rms_mm"][0] == pytest.approx(r.before * 1e3)
+    assert list(t["explanation"][len(t["explanation"]) - len(r.runners_up) :]) == list(r.runners_up)
+    assert t["after_rms_mm"][1] == pytest.approx(r.held_out[0].after * 1e3)
+
+
+def test_every_figure_is_written_with_its_numbers(slipped: Diagnosis, tmp_path: Path) -> None:
+    written = draw(slipped, tmp_path / "new", "slip.h5")
+    names = {p.name for p in written}
+    assert {f"gap_{f}.{kind}" for f in FIGURES for kind in ("png", "svg")} <= names
+    assert {p for p in names if p.endswith(".csv")} == {
+        "gap_points.csv", "gap_probabilities.csv", "gap_withheld.csv", "gap_remainder.csv",
+    }  # fmt: skip
+    assert all(p.stat().st_size > 100 for p in written)
+    lines = (tmp_path / "new/gap_probabilities.csv").read_text().splitlines()
+    assert lines[0] == f"# rig diagnose slip.h5: {slipped.result.verdict}"
+    total = sum(float(row["probability"]) for row in csv.DictReader(lines[1:]))
+    assert total == pytest.approx(1, abs=1e-6)
+
+
+def test_emulated_data_are_marked_in_every_figure_and_table(
+    slipped: Diagnosis, tmp_path: Path
+) -> None:
+    banner = "EMULATED: these values come from simulated devices; nothing was measured."
+    marked = Diagnosis(slipped.dataset, slipped.result, (banner,))
+    for path in draw(marked, tmp_path):
+        if path.suffix == ".svg":
+            # letters are drawn as paths; matplotlib notes each text as a comment
+            assert "<!-- EMULATED -->" in path.read_text(), path.name
+        if path.suffix == ".csv":
+            assert path.read_text().startswith(f"# {banner}\n"), path.name
+
+
+def test_imposed_displacement_is_told_in_newtons(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, cycles(), IMPOSED)
+    p = points(found.result)
+    t: dict[str, Any] = dict(point_table(found.result, p))
+    assert np.allclose(t["simulated_before_N"], 95 * p.displacement, atol=1e-6)
+    assert np.allclose(t["gap_before_mm"], p.force / 95 - p.displacement, atol=1e-6)
+    # rising while the displacement rises, though on the plateau the force only scatters
+    speed = np.gradient(p.displacement)
+    moving = np.abs(speed) > 0.3 * np.abs(speed).max()
+    assert np.mean((p.sense == 1) == (speed > 0), where=moving) > 0.95
+    assert len(draw(found, tmp_path / "figures")) == 16
+    assert len(remainder_table(found.result, _remainder(found))["load_N"]) > 10
+
+
+def _remainder(found: Diagnosis) -> Any:
+    from identification.gap.remainder import remainder
+
+    return remainder(found.result.engine, found.result.fit)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "x,1,loading,1,0,10,0.1\n",
+        "".join(f"x,1,loading,{i},{i},50,0.5\n" for i in range(9)),
+        "".join(f"x,1,loading,{i},{i},0,0\n" for i in range(50)),
+    ],
+    ids=["one sample", "constant force", "all zero"],
+)
+def test_thin_data_are_drawn_too(rows: str, tmp_path: Path) -> None:
+    text = table().splitlines()[0] + "\n" + rows
+    assert len(draw(diagnosed(tmp_path, text), tmp_path / "figures")) == 16
+
+
+def test_cells_cover_the_range_without_holes() -> None:
+    x, gap = np.array([3.0, 0.0, 1.0]), np.array([30.0, 0.0, 10.0])
+    assert _cells(x, gap, 3.0) == [(-0.5, 0.5, 0.0), (0.5, 2.0, 10.0), (2.0, 4.0, 30.0)]
+    many = np.linspace(0, 1, 1000) ** 2
+    cells = _cells(many, many, 1.0)
+    assert all(a[1] == b[0] for a, b in pairwise(cells))
+    assert cells[0][0] == 0.0
+    assert cells[-1][1] == 1.0
+    assert all(low <= value <= high for low, high, value in cells)
+
+
+def test_tables_keep_nine_digits_and_leave_out_what_is_not_defined(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    write_table({"word": ["a", "b,c"], "x_mm": np.array([1 / 3, np.nan])}, ["first"], path)
+    text = path.read_text()
+    assert text == '# first\nword,x_mm\na,0.333333333\n"b,c",\n'
+    assert list(csv.DictReader(io.StringIO(text.split("\n", 1)[1])))[1]["word"] == "b,c"
+
+
+def test_command_writes_the_figures_and_refuses_a_file_for_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "samples.csv").write_text(table(repetitions=1))
+    (tmp_path / "meta.yaml").write_text(META)
+    write(import_table(tmp_path / "samples.csv", tmp_path / "meta.yaml"), tmp_path / "d.h5")
+    args = ["diagnose", str(tmp_path / "d.h5"), "--json", str(tmp_path / "d.json"), "--figures"]
+    done = CliRunner().invoke(cli.app, [*args, str(tmp_path / "new")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "new/gap_curve.png").exists()
+    refused = CliRunner().invoke(cli.app, [*args, str(tmp_path / "d.h5")])
+    assert "the figures can't be written there" in str(refused.exception)
