@@ -274,7 +274,7 @@ def diagnose(
     dataset: DatasetArgument,
     model: Annotated[
         Path | None,
-        typer.Option(metavar="MODEL.yaml", help="Joint stiffnesses to believe, instead of META's."),
+        typer.Option(metavar="MODEL.yaml", help="Springs and effects to believe, not META's."),
     ] = None,
     simulation: Annotated[
         Path | None,
@@ -288,6 +288,10 @@ def diagnose(
         list[str] | None,
         typer.Option(metavar="WORD", help="An effect to take out of the library."),
     ] = None,
+    write_model: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL.yaml", help="Write the simulation with the effects found."),
+    ] = None,
     figures: FiguresOption = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -297,8 +301,9 @@ def diagnose(
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
+        measured = load(dataset)
         result = run_diagnose(
-            load(dataset),
+            measured,
             model=model,
             simulation=simulation,
             add=add or (),
@@ -306,6 +311,11 @@ def diagnose(
             progress=progress,
         )
     give(result, json_file)
+    if write_model is not None:
+        from rig.gap_model import write_model as write
+
+        write(result, measured, write_model)
+        say(f"{write_model}: written. Next: rig simulate {write_model} PROTOCOL.yaml")
     if figures is not None:
         from rig.gap_figures import draw
 
@@ -362,6 +372,11 @@ def blind(
     with terminal_progress() as progress:
         result = command.blind(plan, keep=keep, progress=progress)
     give(result, json_file)
+    if write_model is not None:
+        from rig.gap_model import write_model as write
+
+        write(result, measured, write_model)
+        say(f"{write_model}: written. Next: rig simulate {write_model} PROTOCOL.yaml")
     if result.interrupted:
         raise typer.Exit(130)
 
