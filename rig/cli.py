@@ -372,11 +372,6 @@ def blind(
     with terminal_progress() as progress:
         result = command.blind(plan, keep=keep, progress=progress)
     give(result, json_file)
-    if write_model is not None:
-        from rig.gap_model import write_model as write
-
-        write(result, measured, write_model)
-        say(f"{write_model}: written. Next: rig simulate {write_model} PROTOCOL.yaml")
     if result.interrupted:
         raise typer.Exit(130)
 
