@@ -2,6 +2,10 @@
 
 A moment about axis a gives a rotation `c_a M_a`, and the target moves by the same lever: along the
 direction `c_a (r x n)_a^2` per newton. Unseen by encoders. 5e5 to 2e6 Nm/rad.
+
+Size: 5e-7 to 2e-6 rad/Nm; tables and stands up to ten times softer.
+Prior: compliances positive in sum, sd out of SCALES, equally likely; single axes at 0.3.
+Source: stiffness of bolted mountings of arms, 5e5 to 2e6 Nm/rad.
 """
 
 from __future__ import annotations

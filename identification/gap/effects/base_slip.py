@@ -2,6 +2,10 @@
 do not see. The same knees as `joint_yield`, on the moment about yaw or tilt axes.
 
 The slope beyond the threshold is a compliance of 1e-6 to 1e-3 rad/Nm.
+
+Size: slope beyond the threshold 1e-6 to 1e-3 rad/Nm.
+Prior: as joint_yield, per axis and depth.
+Source: Coulomb friction in the bolted joint of the mounting, effective radius about 0.25 m.
 """
 
 from __future__ import annotations

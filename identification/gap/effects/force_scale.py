@@ -1,6 +1,10 @@
 """Gain of the force chain is off: every direction and pose by the same factor; encoders too.
 
 Wrong sensitivity or range of a charge amplifier: 2 to 20 %.
+
+Size: 2 to 20 %.
+Prior: either sign, sd out of SCALES, equally likely.
+Source: tolerances and neighbouring ranges of charge amplifiers.
 """
 
 from __future__ import annotations

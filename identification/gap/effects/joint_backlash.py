@@ -5,10 +5,15 @@ or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where 
 the torque has turned: a play of radius `zone` on the torque, cut at the ends of the play. Gears
 with play rub too: a stop operator of the zone's strength rides along. Without torque the joint
 lies anywhere in its play: a free place per setup at its first zero load, and at later ones.
-Size: gears of ratio >= 80 about 1 arcmin (3e-4 rad).
+
+Size: about 1 arcmin (3e-4 rad) with gears of ratio >= 80, ten times less and more allowed.
+Prior: width positive, sd out of SCALES, equally likely; zones and crossings equally likely.
+Source: lost motion in catalogues of strain wave gears.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +46,7 @@ def variants(bench: Bench) -> list[Variant]:
         places: dict[bytes, list[int]] = {}
         for name, x in crossings.items():
             for zone in ZONES:
-                info = {"joint": j, "zone_Nm": zone * span}
+                info: dict[str, Any] = {"joint": j, "zone_Nm": zone * span}
                 floating = _floating(bench, j, np.abs(x) < zone * span, places)
                 for kind, shape in _shapes(bench, x, zone * span).items():
                     columns = [bench.add_joint(j, bench.sense * part) for part in shape[:2]]

@@ -2,6 +2,11 @@
 
 Same columns as the six springs of the base, with a wide prior: a joint may be half or twice as
 stiff; a bench's spring may be off by ten.
+
+Size: half to twice as stiff; a bench's spring ten times off.
+Prior: relative compliances of either sign, sd SCALES times twice what META states (at least 0.2); of
+a bench's spring BENCH_SCALES besides, equally likely.
+Source: scatter between gears of one size, and simulators set up from catalogues.
 """
 
 from __future__ import annotations
@@ -10,7 +15,8 @@ from identification.gap.bench import Bench
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_stiffness_error"
-SCALES = (0.3, 0.8)
+SCALES = (1.0, 3.0)
+BENCH_SCALES = (3.0, 9.0)
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -21,7 +27,7 @@ def variants(bench: Bench) -> list[Variant]:
         column = bench.add_joint(j, bench.elastic[:, j])
         columns.append(column)
         beyond = max(2 * float(relative[j]), 0.2)
-        scales = tuple(beyond * f for f in (1.0, 3.0)) + (() if bench.data.arm else (3.0, 9.0))
+        scales = tuple(beyond * f for f in SCALES) + (() if bench.data.arm else BENCH_SCALES)
         out.append(
             variant(WORD, f"joint {j + 1}", [column], scales, positive=False, joint=j, joints=[j])
         )

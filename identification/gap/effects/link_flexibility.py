@@ -2,6 +2,10 @@
 
 Compliance along the direction of each nominal tube (model file of the robot), scaled by a
 coefficient: 1 is the nominal aluminium tube, 50 to 870 um at 100 N; castings are 0.2 to 3 times it.
+
+Size: 0.2 to 3 times the nominal tubes: 50 to 870 um at 100 N.
+Prior: factors positive in sum, sd out of SCALES, equally likely.
+Source: beam theory for the segments in the robot's model file.
 """
 
 from __future__ import annotations

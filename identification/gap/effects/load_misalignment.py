@@ -2,6 +2,10 @@
 
 The target then moves along the direction by `F n' C t`; recorded force components grow with the
 load by t F. Screws on floors and stands are set up within 1 to 15 degrees.
+
+Size: 1 to 15 degrees, tangents of 0.02 to 0.25.
+Prior: tangents of either sign, sd out of SCALES, equally likely.
+Source: how well screws are set up by eye on floors and stands.
 """
 
 from __future__ import annotations

@@ -2,6 +2,10 @@
 
 A path on the session clock, one coefficient per direction (the drift is a vector): warm-up with one
 time constant, a line, a free smooth path, or the recorded temperatures. 10 to 400 um over hours.
+
+Size: 10 to 400 um over hours; 0.3 to 30 % of the deflection.
+Prior: either sign per direction, sd out of SHARES, equally likely.
+Source: warm-up of arms with a lag, 1 um/K of laser sensors.
 """
 
 from __future__ import annotations

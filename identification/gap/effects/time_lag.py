@@ -2,6 +2,10 @@
 
 Pure delay of the laser, `u(t) = u_0(t - d)`, or of the force; or a first-order filter of either.
 Lags of filters, averaging and transmission: 0.05 to 10 s.
+
+Size: 0.05 to 10 s; 0.6 to 12 times the sampling interval here.
+Prior: coefficient positive, 1 is the lag itself; lags, channels and kinds equally likely.
+Source: averaging and filter settings of amplifiers and laser sensors.
 """
 
 from __future__ import annotations
