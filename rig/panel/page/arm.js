@@ -28,10 +28,9 @@ const draw = onChange(({ points, unit, direction }) => {
   svg.setAttribute("viewBox", `0 0 ${WIDTH} ${HEIGHT}`);
   svg.setAttribute("aria-label", label(unit, direction, known));
   svg.replaceChildren(
-    ...axes(),
     makeSvg("polyline", { class: known ? "link" : "link schematic", points: screen.join(" ") }),
     ...screen.slice(0, -1).map(([x, y], i) => makeSvg("circle", { class: "joint", cx: x, cy: y, r: i ? 9 : 24 })),
-    makeSvg("text", { x: screen[0][0], y: screen[0][1] + 54, "text-anchor": "middle", class: "axis-name" }, "base"),
+    ...axes(screen[0]),
     ...push(screen[screen.length - 1], unit),
   );
   if (!known) svg.append(makeSvg("text", { x: WIDTH - 8, y: HEIGHT - 10, "text-anchor": "end", class: "axis-name" }, "schematic"));
@@ -50,12 +49,13 @@ function label(unit, direction, known) {
 
 const isVector = (unit) => Array.isArray(unit) && unit.length === 3 && unit.every(isNumber);
 
-function axes() {
-  const [x, y] = [26, HEIGHT - 26];
+/** The base frame where the arm stands. */
+function axes([x, y]) {
   return [
-    makeSvg("path", { class: "axis", d: `M${x} ${y - 62}V${y}H${x + 62}M${x - 6} ${y - 50}l6-12 6 12M${x + 50} ${y - 6}l12 6-12 6` }),
-    makeSvg("text", { x: x + 68, y: y + 8, class: "axis-name" }, "x"),
-    makeSvg("text", { x: x - 8, y: y - 70, class: "axis-name" }, "y"),
+    makeSvg("path", { class: "axis", d: `M${x} ${y - 92}V${y}H${x + 92}M${x - 7} ${y - 78}l7-14 7 14M${x + 78} ${y - 7}l14 7-14 7` }),
+    makeSvg("text", { x: x + 98, y: y + 24, class: "axis-name" }, "x"),
+    makeSvg("text", { x: x - 26, y: y - 76, class: "axis-name" }, "y"),
+    makeSvg("text", { x, y: y + 52, "text-anchor": "middle", class: "axis-name" }, "base"),
   ];
 }
 

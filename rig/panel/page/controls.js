@@ -3,6 +3,7 @@
 import { byId, make, onChange, setHidden, setText } from "./dom.js";
 
 const CONFIRM_S = 15; // an unanswered "abort?" must not wait for a stray key
+const LONG = 150; // characters; longer questions are set smaller
 const OVER = ["done", "aborted", "fault"];
 
 /** A word for this page that outlives a reload, so that the server knows who comes back. */
@@ -80,6 +81,7 @@ export class Controls {
     setHidden(byId("controls"), watching || over || !byId("confirm").hidden);
     const paused = state.prompt?.kind === "paused";
     setText(byId("pause-word"), paused ? "Go on" : "Pause");
+    setText(byId("pause-sign"), paused ? "▶" : "❚❚");
     const allowed = { pause: paused || !state.prompt, redo: this.#can("redo_step"), abort: true };
     for (const [id, yes] of Object.entries(allowed)) byId(id).disabled = !(live && yes);
     byId("confirm-yes").disabled = !live;
@@ -147,6 +149,7 @@ export class Controls {
       return;
     }
     setText(byId("prompt-text"), prompt.text);
+    byId("prompt-text").classList.toggle("long", prompt.text.length > LONG);
     const parts = prompt.choices.length ? prompt.choices.map((c, i) => this.#choice(c, i)) : this.#field();
     byId("prompt-choices").replaceChildren(...(shown.mine ? parts : []));
     // A question goes to who is not just doing something else on the page.

@@ -31,6 +31,8 @@ const WAITING = {
 export function cueOf(state, old) {
   if (["done", "aborted", "fault"].includes(state.phase)) return WAITING[state.phase];
   if (old) return ["stop", "Stop turning", "the values are old"];
+  const failed = state.devices.find((device) => device.state === "fault");
+  if (failed) return ["stop", "Stop turning", `${failed.name} has failed`];
   if (state.turn && ["prompt", "turning"].includes(state.phase)) return turnCue(state);
   if (state.prompt) return ["ask", "Answer", "the question below"];
   const [sign, word, far] = WAITING[state.phase] ?? ["hands", "Wait", ""];
@@ -50,7 +52,7 @@ function howFar(turn) {
   const parts = [];
   if (isNumber(turn.turns)) parts.push(turns(Math.abs(turn.turns)));
   if (isNumber(turn.remaining_N)) parts.push(`${number(Math.abs(turn.remaining_N), 1)} N to go`);
-  return parts.join(", ");
+  return parts.join("\n");
 }
 
 /** Turns of a hand are judged by eye: degrees below half a turn. */
@@ -67,6 +69,8 @@ export function drawCue(state, old) {
     byId("cue-path").setAttribute("d", SIGNS[sign]);
     byId("cue-path").setAttribute("transform", sign === "out" ? "scale(-1 1)" : "");
   }
+  // A question speaks for itself, below; only a way to turn stands beside it.
+  setHidden(cue, sign === "ask");
   setText(byId("cue-word"), word);
   setText(byId("cue-far"), far);
   drawCountdown(state, old);

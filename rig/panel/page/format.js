@@ -16,10 +16,14 @@ export function number(value, places) {
 /** Three significant digits or so, for values of any size. */
 export function short(value) {
   if (!isNumber(value)) return NOTHING;
+  return rounded(value).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+}
+
+function rounded(value) {
   const size = Math.abs(value);
   if (size >= 100) return number(value, 0);
   if (size >= 10) return number(value, 1);
-  return number(value, size === 0 || size >= 1 ? 2 : 3).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+  return number(value, size === 0 || size >= 1 ? 2 : 3);
 }
 
 /** "3.2 s", "48 s", "3 min", "2 h". */

@@ -167,7 +167,7 @@ export class Surface {
     for (const t of ys) context.fillText(tickText(t, ys), left - 6, lane.y(t));
     context.textAlign = "center";
     context.textBaseline = "top";
-    if (xName) for (const t of xs) context.fillText(tickText(t, xs), lane.x(t), top + height + 4);
+    if (xName) for (const t of xs) context.fillText(tickText(t, xs), lane.x(t), top + height + 0.5 * letter);
     this.#names(lane, xName, yName);
   }
 
@@ -176,19 +176,16 @@ export class Surface {
     const { left, top, width, height } = lane.box;
     context.fillStyle = colours.ink;
     context.textAlign = "right";
-    if (xName) context.fillText(xName, left + width, top + height + 4 + 1.15 * letter);
-    context.save();
-    context.translate(left - 3.6 * letter, top + height / 2);
-    context.rotate(-Math.PI / 2);
-    context.textAlign = "center";
-    context.fillText(yName, 0, 0);
-    context.restore();
+    if (xName) context.fillText(xName, left + width, top + height + 1.7 * letter);
+    context.textAlign = "left";
+    context.textBaseline = "bottom";
+    context.fillText(yName, left, top - 0.25 * letter);
   }
 
   /** Where axes leave room; `lanes` of them one above the other. */
   boxes(lanes) {
     const { letter, width, height } = this;
-    const [left, right, top, bottom, gap] = [4.6 * letter, 0.9 * letter, 0.7 * letter, 2.7 * letter, 0.9 * letter];
+    const [left, right, top, bottom, gap] = [3.9 * letter, 0.9 * letter, 1.6 * letter, 2.7 * letter, 1.8 * letter];
     const each = Math.max(10, (height - top - bottom - gap * (lanes - 1)) / lanes);
     return Array.from({ length: lanes }, (_, i) => (
       { left, top: top + i * (each + gap), width: Math.max(10, width - left - right), height: each }));

@@ -25,7 +25,9 @@ export class Readout {
   draw(state, old, old_s) {
     const { force, displacement } = state;
     const forceOld = old || force.stale;
-    setText(byId("force-number"), number(force.N, 1));
+    const text = number(force.N, 1);
+    setText(byId("force-number"), text);
+    byId("force").classList.toggle("long", text.length > 5);
     byId("force").classList.toggle("old", forceOld);
     this.#age(byId("force-age"), forceOld, force.age_s, old_s);
     setText(byId("target"), this.#target(force));

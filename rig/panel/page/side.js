@@ -5,9 +5,10 @@ import { isNumber, number, short, vector } from "./format.js";
 
 const NEAR = 0.2; // of the limit left: shown as near
 const LATE_MS = 100;
+const UNITS = { "deg C": "°C", deg: "°" };
 // Shape says what colour says.
 const LAMPS = {
-  ok: ["ready", "M3 8a5 5 0 1 0 10 0a5 5 0 1 0-10 0z"],
+  ok: ["ready", "M1 8a7 7 0 1 0 14 0a7 7 0 1 0-14 0zm2.7 .4l1.5-1.5 2.2 2.2 4-4.4 1.5 1.4-5.5 6z"],
   warn: ["attention", "M8 1l7 13H1z"],
   fault: ["FAULT", "M1 3l2-2 5 5 5-5 2 2-5 5 5 5-2 2-5-5-5 5-2-2 5-5z"],
   off: ["off", "M3 8a5 5 0 1 0 10 0a5 5 0 1 0-10 0zm2 0a3 3 0 1 1 6 0a3 3 0 1 1-6 0z"],
@@ -22,9 +23,12 @@ function device({ name, state, reason, remedy }) {
   const item = make("li");
   const lamp = makeSvg("svg", { viewBox: "0 0 16 16", class: state, "aria-hidden": "true" });
   lamp.append(makeSvg("path", { d: path, fill: "currentColor", "fill-rule": "evenodd" }));
-  item.append(lamp, make("span", "name", name), make("span", `state ${state}`, word));
+  item.append(lamp, make("span", "name", name), make("span", state === "ok" ? "spoken" : `state ${state}`, word));
   const why = [reason, remedy].filter(Boolean).join(" ");
-  if (why) item.append(make("span", "why", why));
+  if (why) {
+    item.className = "said";
+    item.append(make("span", "why", why));
+  }
   return item;
 }
 
@@ -34,12 +38,12 @@ const limits = onChange((list) => {
 
 function limit({ name, amount, fraction, action }) {
   const item = make("li", fraction < NEAR ? "near" : "");
-  const sign = fraction < NEAR ? "▲ " : "";
+  const [sign, then] = fraction < NEAR ? ["▲ ", `, then ${action}`] : ["", ""];
   const track = make("div", "track");
   const left = make("div", "left");
   left.style.transform = `scaleX(${fraction})`;
   track.append(left);
-  item.append(make("span", "name", `${sign}${name} (${action})`), make("span", "amount", amount), track);
+  item.append(make("span", "name", `${sign}${name}`), make("span", "amount", amount + then), track);
   return item;
 }
 
@@ -48,7 +52,7 @@ export function shownLimits(list) {
   return list
     .map(({ name, value, limit: max, unit, left_fraction, action }) => ({
       name, action,
-      amount: `${isNumber(value) ? short(max - value) : "–"} of ${short(max)} ${unit}`,
+      amount: `${isNumber(value) ? short(max - value) : "–"} of ${short(max)} ${UNITS[unit] ?? unit}`,
       fraction: isNumber(left_fraction) ? Math.round(100 * Math.min(1, Math.max(0, left_fraction))) / 100 : 0,
     }))
     .sort((a, b) => a.fraction - b.fraction);

@@ -6,7 +6,7 @@ import { Lane, Surface, extent, roundRange, strokeRows } from "./plot.js";
 const WINDOW_S = 120;
 const LANES = [
   { column: "force_N", name: "Force in N", least: 1 },
-  { column: "displacement_mm", name: "Displ. in mm", least: 0.01 },
+  { column: "displacement_mm", name: "Displacement in mm", least: 0.01 },
 ];
 
 export class TimePlot {
