@@ -67,7 +67,7 @@ def test_noise_alone_leaves_nothing_clear() -> None:
     _, _, m = left(bumped=False)
     assert not m.clear
     assert m.ci95[1] < 1e-6
-    assert m.unrepeated_rms < 5e-7
+    assert m.unrepeated_rms < 3e-7  # the noise of a hold is 4.3e-7
 
 
 def test_what_differs_from_run_to_run_is_no_repeatable_remainder() -> None:
