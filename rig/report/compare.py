@@ -1,0 +1,175 @@
+"""Whether two data sets differ: k of the same pose and direction, tested.
+
+The difference k_b - k_a has the scatter between the repetitions of both sides (type A, n - 1
+degrees of freedom each) and their gains. Where both were measured with the same instruments, and
+those say so by their serial numbers, one gain moves both k the same way, and only the difference of
+its effects counts; otherwise the gains are independent. Degrees of freedom after Welch and
+Satterthwaite, probability from Student's t, two-sided; with several comparisons at once, adjusted
+after Holm (Scand. J. Statist. 6 (1979) 65), so that 5 % is the risk of one false alarm in all of
+them. What mounting the arm or the instruments anew does to k is not in the scatter of one session.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from identification.stiffness import Stiffness
+from identification.uncertainty import Contribution, Quantity, combined
+from rig.analyze import N_PER_MM, Analysis, Direction, quantity
+from rig.dataset import Dataset
+
+LEVEL = 0.05
+_IDENTITY = (
+    "serial_number", "daq_serial_number", "serial", "model", "device", "full_scale_N",
+    "sensitivity_pC_per_N", "range_mm",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One pose and direction in two data sets (numbers in the order given). N/m; ratio b / a.
+
+    p: of so large a difference by chance; adjusted: for all comparisons of the report."""
+
+    first: int
+    second: int
+    key: str
+    difference: Quantity
+    ratio: Quantity
+    p: float
+    adjusted: float
+    remarks: tuple[str, ...]
+
+    @property
+    def differs(self) -> bool:
+        """Whether the adjusted probability is below 5 %."""
+        return self.adjusted < LEVEL
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values; N/mm."""
+        return {
+            "first": self.first,
+            "second": self.second,
+            "direction": self.key,
+            "difference_N_per_mm": quantity(self.difference, N_PER_MM),
+            "ratio": quantity(self.ratio),
+            "p": self.p,
+            "p_adjusted": self.adjusted,
+            "differs": self.differs,
+            "remarks": list(self.remarks),
+        }
+
+
+def compare(sets: Sequence[tuple[Dataset, Analysis]]) -> list[Pair]:
+    """Every later data set against the first, direction by direction where both have a k."""
+    found: list[Pair] = []
+    if not sets:
+        return found
+    first_data, first = sets[0]
+    for i, (data, analysis) in enumerate(sets[1:], start=1):
+        shared = same_instruments(first_data, data)
+        for key, a in first.directions.items():
+            b = _counterpart(key, a, analysis)
+            if b is not None and a.result.k is not None and b.result.k is not None:
+                found.append(_pair(0, i, key, a.result, b.result, shared=shared))
+    return _adjusted(found)
+
+
+def same_instruments(a: Dataset, b: Dataset) -> bool:
+    """Whether dynamometer and laser name themselves, with a serial number, the same in both."""
+    for device in ("dynamometer", "laser"):
+        one, other = (d.devices.get(device, {}) for d in (a, b))
+        known = [k for k in _IDENTITY if k in one or k in other]
+        serials = [one[k] for k in known if "serial" in k and one.get(k) not in (None, "", "none")]
+        if not serials or any(one.get(k) != other.get(k) for k in known):
+            return False
+    return True
+
+
+def _counterpart(key: str, a: Direction, other: Analysis) -> Direction | None:
+    """The same pose and direction; else the same key, if poses have other names."""
+    for b in other.directions.values():
+        if (b.pose, b.direction) == (a.pose, a.direction):
+            return b
+    return other.directions.get(key)
+
+
+def _pair(first: int, second: int, key: str, a: Stiffness, b: Stiffness, *, shared: bool) -> Pair:
+    assert a.k is not None
+    assert b.k is not None
+    difference = b.k.value - a.k.value
+    total = combined(difference, _budget(a, b, 1.0, 1.0, shared=shared))
+    ratio = b.k.value / a.k.value
+    relative = _budget(a, b, 1 / abs(a.k.value), 1 / abs(b.k.value), shared=shared)
+    quotient = combined(ratio, [replace(c, u=abs(ratio) * c.u) for c in relative])
+    p = probability(total)
+    return Pair(first, second, key, total, quotient, p, p, _remarks(a, b))
+
+
+def _budget(
+    a: Stiffness, b: Stiffness, scale_a: float, scale_b: float, *, shared: bool
+) -> list[Contribution]:
+    """Contributions to the difference of a and b, each times its scale."""
+    sides = [
+        [replace(c, u=c.u * scale) for c in side.budget if c.counted]
+        for side, scale in ((a, scale_a), (b, scale_b))
+    ]
+    if not shared:
+        return [*sides[0], *sides[1]]
+    budget = [c for side in sides for c in side if not c.common]
+    gains = [{c.name: c for c in side if c.common} for side in sides]
+    for name, mine in gains[0].items():
+        other = gains[1].get(name)
+        budget.append(mine if other is None else replace(mine, u=abs(mine.u - other.u)))
+    return [*budget, *(c for name, c in gains[1].items() if name not in gains[0])]
+
+
+def probability(difference: Quantity) -> float:
+    """Two-sided probability of a difference at least so large where there is none."""
+    if difference.value == 0:
+        return 1.0
+    if not difference.u > 0:
+        return 0.0
+    t = abs(difference.value) / difference.u
+    if math.isinf(difference.dof):
+        return math.erfc(t / math.sqrt(2))
+    from scipy.special import stdtr
+
+    return float(2 * stdtr(difference.dof, -t))
+
+
+def _adjusted(pairs: list[Pair]) -> list[Pair]:
+    """Holm's step-down: the k-th smallest of m times m - k + 1, never below the ones before."""
+    order = sorted(range(len(pairs)), key=lambda i: pairs[i].p)
+    highest = 0.0
+    out = list(pairs)
+    for rank, i in enumerate(order):
+        highest = max(highest, min(1.0, (len(pairs) - rank) * pairs[i].p))
+        out[i] = replace(pairs[i], adjusted=highest)
+    return out
+
+
+def _remarks(a: Stiffness, b: Stiffness) -> tuple[str, ...]:
+    """Why the two k may not be the same quantity, in sentences."""
+    found = []
+    if a.choice != b.choice:
+        found.append(f"the lines differ ({a.choice.label}; {b.choice.label})")
+    ranges = [_range(side) for side in (a, b)]
+    if max(abs(x - y) for x, y in zip(*ranges, strict=True)) > 0.1 * max(map(abs, ranges[0])):
+        shown = "; ".join(f"{low:.4g} to {high:.4g} N" for low, high in ranges)
+        found.append(f"they rest on other ranges of force ({shown})")
+    if min(len(a.by_repetition), len(b.by_repetition)) < 2:
+        found.append("a single repetition shows no scatter, so the stated uncertainty stands in")
+    if not a.status == b.status == "ok":
+        found.append("a straight line describes one of them badly")
+    return tuple(found)
+
+
+def _range(side: Stiffness) -> tuple[float, float]:
+    """Of the forces that count towards k."""
+    out = {e.step for e in side.excluded}
+    forces = [p.force for p in side.levels if p.branch == "loading" and p.step not in out]
+    return (min(forces), max(forces)) if forces else (0.0, 0.0)

@@ -1,0 +1,233 @@
+"""The report's own figures: joints, data quality, comparison of data sets, words of the gap."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.analyze import MM, N_PER_MM, Analysis
+from rig.dataset import Dataset
+from rig.plotting import COLOURS, MARKERS
+from rig.report.quality import RunZeros
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Json = dict[str, Any]
+MOST_POINTS = 4000  # of a recording that are drawn: more than a page has dots
+K = 1e-3  # Nm/rad in kNm/rad
+
+
+def watermark(figure: Figure, banners: Sequence[str]) -> Figure:
+    """What must not be overlooked, across the figure: it may leave the page without its text."""
+    words = [banner.split(":", maxsplit=1)[0] for banner in banners]
+    if words:
+        figure.text(0.5, 0.5, " · ".join(words), fontsize=34, color="0.5", alpha=0.22,
+                    ha="center", va="center", rotation=18)  # fmt: skip
+    return figure
+
+
+def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
+    """Joint stiffness with 95 % intervals over the prior's; filled where identified.
+
+    sets: (label, rig.joints/1) each.
+    """
+    figure, axes = _axes(7.5, 3.8, "Joint", "Torsional stiffness in kNm/rad")
+    x = np.arange(1, 7)
+    prior = sets[0][1]["prior"]
+    middle = K * np.array(prior["joint_stiffness_Nm_per_rad"])
+    spread = np.exp(1.96 * np.array(prior["relative_sd"]))
+    axes.bar(x, middle * (spread - 1 / spread), 0.8, bottom=middle / spread, color="0.88",
+             label="prior, 95 %", zorder=1)  # fmt: skip
+    step = 0.5 / max(1, len(sets))
+    for i, (label, result) in enumerate(sets):
+        quantities = result["joint_stiffness_Nm_per_rad"]
+        value = K * np.array([q["value"] for q in quantities])
+        ci = K * np.array([q["ci95"] for q in quantities])
+        at = x + (i - (len(sets) - 1) / 2) * step
+        colour, known = COLOURS[i % len(COLOURS)], np.array(result["identified"], dtype=bool)
+        axes.errorbar(at, value, (value - ci[:, 0], ci[:, 1] - value), fmt="none", color=colour,
+                      capsize=4, zorder=3)  # fmt: skip
+        for which, fill, word in ((known, colour, "identified"), (~known, "white", "not to 5 %")):
+            if which.any():
+                axes.plot(at[which], value[which], MARKERS[i % len(MARKERS)], color=colour,
+                          markerfacecolor=fill, markersize=7, zorder=4,
+                          label=f"{label}: {word}")  # fmt: skip
+    axes.set_yscale("log")
+    plain_numbers(axes.yaxis)
+    axes.set_xticks(x)
+    axes.grid(visible=False, axis="x")
+    axes.legend(frameon=False, fontsize=8)
+    return watermark(figure, banners)
+
+
+def quality(dataset: Dataset, zeros: Sequence[RunZeros]) -> Figure | None:
+    """Over the session: lateness, zero of force and displacement, joint temperatures; None where
+    nothing of it was recorded."""
+    from matplotlib.figure import Figure
+
+    columns = dataset.columns
+    panels: list[Callable[[Any, Dataset, Sequence[RunZeros]], None]] = []
+    if "session_s" in columns and "lateness_s" in columns:
+        panels.append(_lateness)
+    if zeros:
+        panels += [_force_zero, _displacement_zero]
+    if "session_s" in columns and "temperature1_C" in columns:
+        panels.append(_temperature)
+    if not panels:
+        return None
+    figure = Figure(figsize=(7.5, 1.75 * len(panels) + 0.5), layout="constrained")
+    rows = np.atleast_1d(figure.subplots(len(panels), 1, sharex="session_s" in columns))
+    for axes, panel in zip(rows, panels, strict=True):
+        panel(axes, dataset, zeros)
+        axes.tick_params(labelsize=8)
+    rows[-1].set_xlabel("Time of the session in min" if "session_s" in columns else "Run")
+    return watermark(figure, dataset.banners())
+
+
+def _minutes(dataset: Dataset) -> tuple[Any, Any]:
+    rows = np.arange(0, dataset.rows, max(1, -(-dataset.rows // MOST_POINTS)))
+    return dataset.columns["session_s"][rows].astype(float) / 60, rows
+
+
+def _lateness(axes: Any, dataset: Dataset, _: Sequence[RunZeros]) -> None:
+    minutes, rows = _minutes(dataset)
+    late = 1e3 * dataset.columns["lateness_s"][rows].astype(float)
+    axes.plot(minutes, late, ".", color=COLOURS[0], markersize=3)
+    axes.set_ylabel("Slot late\nby, ms", fontsize=8)
+    axes.set_yscale("symlog", linthresh=10)
+    plain_ticks(axes.yaxis)
+
+
+def _force_zero(axes: Any, dataset: Dataset, zeros: Sequence[RunZeros]) -> None:
+    _plateaus(axes, dataset, zeros, "force")
+    axes.set_ylabel("Force at zero\nload, N", fontsize=8)
+    axes.legend(frameon=False, fontsize=7, ncols=4, loc="best")
+
+
+def _displacement_zero(axes: Any, dataset: Dataset, zeros: Sequence[RunZeros]) -> None:
+    _plateaus(axes, dataset, zeros, "displacement")
+    axes.set_ylabel("Displacement at\nzero load, mm", fontsize=8)
+
+
+def _plateaus(axes: Any, dataset: Dataset, zeros: Sequence[RunZeros], what: str) -> None:
+    on_clock = "session_s" in dataset.columns
+    setups = list(dict.fromkeys((r.pose, r.direction) for r in zeros))
+    named: set[tuple[str, str]] = set()
+    for number, run in enumerate(zeros, start=1):
+        i = setups.index((run.pose, run.direction))
+        at = [p.time / 60 if on_clock else number + 0.1 * k for k, p in enumerate(run.plateaus)]
+        label = run.direction if not run.pose else f"{run.pose}, {run.direction}"
+        # what begins with _ stays out of the legend: every setup is named once
+        label = f"_{label}" if (run.pose, run.direction) in named else label.lstrip("_")
+        named.add((run.pose, run.direction))
+        axes.plot(at, [getattr(p, what) for p in run.plateaus], color=COLOURS[i % len(COLOURS)],
+                  marker=MARKERS[i % len(MARKERS)], markersize=4, linewidth=1,
+                  label=label)  # fmt: skip
+
+
+def _temperature(axes: Any, dataset: Dataset, _: Sequence[RunZeros]) -> None:
+    minutes, rows = _minutes(dataset)
+    for joint in range(1, 7):
+        column = dataset.columns.get(f"temperature{joint}_C")
+        if column is not None:
+            axes.plot(minutes, column[rows], color=COLOURS[joint - 1], linewidth=1,
+                      label=f"joint {joint}")  # fmt: skip
+    axes.set_ylabel("Temperature,\n°C", fontsize=8)
+    axes.legend(frameon=False, fontsize=7, ncols=6, loc="best")
+
+
+def compared_k(sets: Sequence[tuple[str, Analysis]], banners: Sequence[str]) -> Figure:
+    """k of every data set and direction with its 95 % interval."""
+    keys = list(dict.fromkeys(key for _, a in sets for key in a.directions))
+    figure, axes = _axes(7.5, 3.8, "Direction", "Stiffness k in N/mm")
+    step = 0.6 / max(1, len(sets))
+    for i, (label, analysis) in enumerate(sets):
+        at, value, low, high = [], [], [], []
+        for n, key in enumerate(keys):
+            direction = analysis.directions.get(key)
+            k = direction.result.k if direction is not None else None
+            if k is not None:
+                at.append(n + (i - (len(sets) - 1) / 2) * step)
+                value.append(k.value * N_PER_MM)
+                low.append((k.value - k.interval[0]) * N_PER_MM)
+                high.append((k.interval[1] - k.value) * N_PER_MM)
+        axes.errorbar(at, value, (low, high), fmt=MARKERS[i % len(MARKERS)], capsize=4,
+                      color=COLOURS[i % len(COLOURS)], markersize=6, label=label)  # fmt: skip
+    axes.set_xticks(range(len(keys)), keys)
+    axes.set_xlim(-0.6, len(keys) - 0.4)
+    axes.grid(visible=False, axis="x")
+    axes.legend(frameon=False, fontsize=8)
+    return watermark(figure, banners)
+
+
+def compared_curves(
+    key: str, sets: Sequence[tuple[str, Analysis]], banners: Sequence[str]
+) -> Figure:
+    """The curves of one direction over each other, with their standard deviations."""
+    figure, axes = _axes(7.5, 3.8, "Force in N", "Displacement in mm")
+    for i, (label, analysis) in enumerate(sets):
+        direction = analysis.directions.get(key)
+        for branch, line in (("loading", "-"), ("unloading", ":")):
+            levels = [] if direction is None else direction.result.levels
+            mine = [p for p in levels if p.branch == branch]
+            if mine:
+                axes.errorbar([p.force for p in mine], [p.displacement * MM for p in mine],
+                              np.nan_to_num([p.sd * MM for p in mine]), linestyle=line,
+                              marker=MARKERS[i % len(MARKERS)], markersize=4, capsize=3,
+                              color=COLOURS[i % len(COLOURS)], linewidth=1,
+                              label=f"{label}: {branch}")  # fmt: skip
+    axes.set_title(f"Direction {key}", fontsize=10)
+    axes.legend(frameon=False, fontsize=8)
+    return watermark(figure, banners)
+
+
+def gap_sizes(gap: Json, banners: Sequence[str]) -> Figure:
+    """rms of the gap before and after the effects, fitted and withheld, over the noise.
+
+    gap: the object `gap` of rig.diagnosis/1.
+    """
+    held = [h for h in (gap["held_out"], *gap.get("held_out_other", ())) if h]
+    rows = [("fitted", gap), *((f"withheld {h['fold']}", h) for h in held)]
+    figure, axes = _axes(7.5, 1.2 + 0.55 * len(rows), "rms in mm", "")
+    at = -np.arange(len(rows), dtype=float)
+    for shift, key, colour, word in ((0.19, "before", "0.6", "simulation as it was"),
+                                     (-0.19, "after", COLOURS[0], "with the effects")):  # fmt: skip
+        axes.barh(at + shift, [r[f"{key}_rms_mm"] for _, r in rows], 0.36, color=colour,
+                  label=word)  # fmt: skip
+    axes.axvline(gap["noise_rms_mm"], color="black", linestyle="--", linewidth=1,
+                 label="noise of the instruments")  # fmt: skip
+    axes.set_yticks(at, [name for name, _ in rows])
+    axes.set_xscale("log")
+    plain_numbers(axes.xaxis)
+    axes.grid(visible=False, axis="y")
+    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    return watermark(figure, banners)
+
+
+def _axes(width: float, height: float, x: str, y: str) -> tuple[Figure, Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    return figure, axes
+
+
+def plain_numbers(axis: Any) -> None:
+    """Few ticks on a logarithmic axis, written out (formulas are off in reports)."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_minor_locator(NullLocator())
+    plain_ticks(axis)
+
+
+def plain_ticks(axis: Any) -> None:
+    """Tick labels without formulas."""
+    from matplotlib.ticker import StrMethodFormatter
+
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))

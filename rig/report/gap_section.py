@@ -1,0 +1,143 @@
+"""The chapter on the sim-to-real gap: answer, where, which effects, how far, what next."""
+
+from __future__ import annotations
+
+from rig.diagnose_text import MEANING
+from rig.report.document import (
+    Block,
+    Bullets,
+    Cell,
+    Facts,
+    Paragraph,
+    Rich,
+    Section,
+    Table,
+    Word,
+    row,
+)
+from rig.report.gather import Session
+from rig.report.results import NOTHING, Node
+
+_LEAST_PROBABILITY = 0.005
+
+
+def gap(session: Session, data: Node) -> Section:
+    """The sim-to-real gap: answer, where, which effects, how far, what next."""
+    banners, found = session.dataset.banners(), data["diagnose"]
+    if not found:
+        reason = data["missing"]["diagnose"].text()
+        return Section("gap", "Gap to the simulation", (Paragraph((reason,), "warning"),), banners)
+    figures = session.diagnosed.figures
+    blocks: list[Block] = [Paragraph(_answer(found), "answer"), *figures[:2], *_where(found)]
+    blocks += [*_effects(found), _probabilities(found), _how_far(found), *figures[2:]]
+    blocks += _rest(found)
+    return Section("gap", "Gap to the simulation", tuple(blocks), banners)
+
+
+def _answer(found: Node) -> Rich:
+    verdict, sizes = found["verdict"].text(), found["gap"]
+    p = found["probabilities"][verdict].percent()
+    start: Rich = (Word(verdict, "strong"), " (", *p, "): ")
+    if verdict == "none":
+        return (*start, "noise, gains and stiffnesses within their stated uncertainty explain all "
+                "that was measured. There is no gap to close.")  # fmt: skip
+    if verdict == "unknown":
+        rest = found["remainder_mm"].number(3, unit="mm")
+        return (*start, "there is a gap, and no effect of the library explains it down to the "
+                "uncertainty; about ", *rest, " rms of structure remain.")  # fmt: skip
+    others = [e["name"].text() for e in found["effects"]][1:]
+    beside = f" Beside it: {', '.join(others)}." if others else ""
+    before, after, noise = (sizes[f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise"))
+    return (*start, f"{MEANING[verdict]}.{beside} With it the gap shrinks from ", *before, " to ",
+            *after, " mm rms; the instruments alone leave ", *noise, " mm.")  # fmt: skip
+
+
+def _where(found: Node) -> list[Block]:
+    where = found["where"]
+    if not where["directions"]:
+        return []
+    rows: list[tuple[str, Cell]] = [
+        (f"Force, direction {d}", (*ends.interval(), " N")) for d, ends in where["force_N"].items()
+    ]
+    for key, name in (("poses", "Poses"), ("branches", "Branches"), ("repetitions", "Repetitions"),
+                      ("joints", "Joints")):  # fmt: skip
+        words = ", ".join(str(v) for v in where[key].value if v != "")
+        if words:
+            rows.append((name, words))
+    seen = where["seen_by_encoders"].value
+    if seen is not None:
+        rows.append(("Joint readings", "see it" if seen else "do not see it"))
+    rows.append(("Share of the gap there", where["share_of_gap"].percent()))
+    return [Section("gap-where", "Where", (Facts(tuple(rows)),))]
+
+
+def _effects(found: Node) -> list[Block]:
+    rows: list[tuple[Cell, ...]] = []
+    alike: list[Cell] = []
+    for e in found["effects"]:
+        name, empty = e["name"].text(), (NOTHING,)
+        head: tuple[Cell, ...] = (Word(name, "strong"), e["probability"].percent(),
+                                  e["share_of_gap"].percent())  # fmt: skip
+        parameters = [
+            (key, p["unit"].text(), p["value"].number(), p["ci95"][0].number(),
+             p["ci95"][1].number())
+            for key, p in e["parameters"].items()
+        ] or [("", "", empty, empty, empty)]  # fmt: skip
+        for i, (key, unit, *numbers) in enumerate(parameters):
+            lead = head if i == 0 else ("", "", "")
+            rows.append((lead[0], key, "" if unit == "1" else unit, *numbers, *lead[1:]))
+        others = e["indistinguishable_from"].value
+        if others:
+            alike.append(f"{name} can't be told apart from {', '.join(others)} in these data.")
+    if not rows:
+        return []
+    header = ("effect", "parameter", "unit", "value", "95 % from", "to", "present", "of the gap")
+    blocks: list[Block] = [Table("Effects of the chosen explanation", header, tuple(rows), 3)]
+    return [*blocks, Bullets(tuple(alike))] if alike else blocks
+
+
+def _probabilities(found: Node) -> Table:
+    ranked = sorted(found["probabilities"].items(), key=lambda i: -i[1].value)
+    rows = tuple(
+        (word, MEANING.get(word, ""), p.percent(2))
+        for word, p in ranked
+        if p.value >= _LEAST_PROBABILITY
+    )
+    header = ("word", "what happens", "probability")
+    return Table("Probability of being the main cause", header, rows, 2)
+
+
+def _how_far(found: Node) -> Table:
+    sizes = found["gap"]
+    folds = [sizes["held_out"], *sizes.get("held_out_other")]
+    noise, no = sizes["noise_rms_mm"].number(), NOTHING
+    rows = [row("fitted", *_sizes(sizes), no, no)]
+    for h in folds:
+        if h:
+            low, high = h["ci95"][0].number(3), h["ci95"][1].number(3)
+            rows.append(row(f"withheld: {h['fold'].text()}", *_sizes(h), low, high))
+    rows.append(row("noise of the instruments", no, noise, no, no, no))
+    for word, r in found.get("runners_up").items():
+        after = r["held_out_after_rms_mm"].number()
+        rows.append(row(f"withheld, with {word} instead", no, after, no, no, no))
+    header = ("", "before mm", "after mm", "shrinks by", "95 % from", "to")
+    return Table("How far the gap shrinks (rms)", header, tuple(rows))
+
+
+def _sizes(node: Node) -> tuple[Rich, Rich, Rich]:
+    before, after = node["before_rms_mm"].number(), node["after_rms_mm"].number()
+    return before, after, node["shrink_factor"].number(3)
+
+
+def _rest(found: Node) -> list[Block]:
+    blocks: list[Block] = []
+    following = found["next_measurement"]
+    if following:
+        pair = " from ".join(following.get("separates").value or ())
+        words = (f"To tell {pair}: {following['text'].text()}",)
+        blocks.append(Section("gap-next", "What to measure next", (Paragraph(words),)))
+    notes = tuple(n.text() for n in found["notes"])
+    if notes:
+        title = "Not decidable from these data"
+        blocks.append(Section("gap-notes", title, (Bullets(notes),)))
+    return blocks

@@ -1,0 +1,252 @@
+"""Everything that a report shows, computed once, by the same functions as the other commands."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from rig.analyze import Analysis, analyze
+from rig.couple import CouplingResult
+from rig.dataset import Dataset, load, software_version
+from rig.errors import InputError
+from rig.identify import IdentifyResult, identify
+from rig.journal import journal_path
+from rig.protocol import parse_protocol
+from rig.report.compare import Pair, compare, same_instruments
+from rig.report.diagnosing import TURNED_OFF, Diagnosed, Job, Waiting, diagnosing, without_name
+from rig.report.quality import Quality, assess
+from rig.terminal import Progress, silent
+
+SCHEMA = "rig.report/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """One data set and what the commands say of it. stem: what the names of its figures begin
+    with; missing: part -> why it is not there."""
+
+    path: Path
+    label: str
+    stem: str
+    dataset: Dataset
+    analysis: Analysis
+    joints: IdentifyResult | None
+    diagnosed: Diagnosed
+    quality: Quality
+    sha256: str
+    missing: dict[str, str] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """`analyze`, `identify`, `diagnose`: what those commands write with --json."""
+        d = self.dataset
+        return {
+            "label": self.label,
+            "file": str(self.path),
+            "sha256": self.sha256,
+            "uuid": d.uuid,
+            "title": d.title,
+            "created": d.created,
+            "origin": d.origin,
+            "imported": d.imported,
+            "complete": d.complete,
+            "stop_reason": d.stop_reason,
+            "software": d.software,
+            "banners": list(d.banners()),
+            "meta": d.meta.model_dump(mode="json", exclude_none=True),
+            "protocol": protocol_summary(d),
+            "devices": d.devices,
+            "calibration": d.calibration,
+            "analyze": self.analysis.to_json(),
+            "identify": None if self.joints is None else self.joints.to_json(),
+            "diagnose": self.diagnosed.json,
+            "missing": dict(self.missing),
+            "quality": self.quality.facts,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """All sessions, how they compare, and the coupled pair if a model was given."""
+
+    sessions: tuple[Session, ...]
+    pairs: tuple[Pair, ...]
+    coupling: CouplingResult | None
+    software: str
+    made: str
+    coupling_marks: tuple[str, ...] = ()
+
+    @property
+    def banners(self) -> tuple[str, ...]:
+        """What holds for at least one part of the report."""
+        lines = [b for s in self.sessions for b in s.dataset.banners()]
+        return tuple(dict.fromkeys(lines))
+
+    def to_json(self) -> dict[str, Any]:
+        """Schema rig.report/1: every number of the page stands here."""
+        first = self.sessions[0].dataset
+        return {
+            "schema": SCHEMA,
+            "software": self.software,
+            "made": self.made,
+            "banners": list(self.banners),
+            "datasets": [s.to_json() for s in self.sessions],
+            "comparison": [
+                pair.to_json()
+                | {"same_instruments": same_instruments(first, self.sessions[pair.second].dataset)}
+                for pair in self.pairs
+            ],
+            "couple": None if self.coupling is None else self.coupling.to_json(),
+        }
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What else the report should hold. made: ISO 8601 time that it shows as its own; png: figures
+    as PNG too; processes: that diagnose beside the rest, 0 for none."""
+
+    couple: Path | None = None
+    gap: bool = True
+    made: str = ""
+    png: bool = False
+    processes: int = 0
+
+
+def gather(paths: Sequence[Path], wishes: Wishes, progress: Progress = silent) -> Gathered:
+    """Reads and computes everything. A part that the data do not allow is missing, with its reason;
+    InputError only for files that cannot be read, or no file at all."""
+    if not paths:
+        raise InputError("rig report: give at least one data set.")
+    names = list(zip(paths, _labels(paths), _stems(paths), strict=True))
+    loaded = [load(path) for path in paths]  # whatever is wrong with a file shows before long work
+    jobs = [Job(path, stem, wishes.png) for path, _, stem in names] if wishes.gap else []
+    with diagnosing(jobs, wishes.processes) as begun:
+        waiting = [*begun] if wishes.gap else [None] * len(names)
+        coupling = _coupling(wishes.couple)
+        drafts: list[Session] = []
+        for (path, label, stem), dataset in zip(names, loaded, strict=True):
+            progress(f"{label}: analyzing", 0.3 * len(drafts) / len(names))
+            drafts.append(_session(path, label, stem, dataset))
+        sessions: list[Session] = []
+        for draft, wait in zip(drafts, waiting, strict=True):
+            progress(f"{draft.label}: diagnosing", 0.3 + 0.6 * len(sessions) / len(names))
+            sessions.append(_with_gap(draft, wait))
+    progress("comparing", 0.9)
+    return Gathered(
+        tuple(sessions),
+        tuple(compare([(s.dataset, s.analysis) for s in sessions])),
+        coupling,
+        software_version(),
+        wishes.made,
+        _coupling_marks(coupling),
+    )
+
+
+def _labels(paths: Sequence[Path]) -> list[str]:
+    """File names; whole paths where two names are the same."""
+    names = [p.name for p in paths]
+    return [p.name if names.count(p.name) == 1 else str(p) for p in paths]
+
+
+def _stems(paths: Sequence[Path]) -> list[str]:
+    """File names for figures, all different."""
+    found: list[str] = []
+    for n, path in enumerate(paths, start=1):
+        stem = file_stem(path.stem)
+        lower = [s.lower() for s in found]
+        found.append(stem if stem.lower() not in lower else f"{stem}_{n}")
+    return found
+
+
+def file_stem(wanted: str) -> str:
+    """A name that every file system takes."""
+    return "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "_" for c in wanted)[:80]
+
+
+def _session(path: Path, label: str, stem: str, dataset: Dataset) -> Session:
+    """Everything but the gap."""
+    missing: dict[str, str] = {}
+    joints = None
+    try:
+        joints = identify([path])
+    except InputError as error:
+        missing["identify"] = without_name(str(error), path)
+    return Session(
+        path=path,
+        label=label,
+        stem=stem,
+        dataset=dataset,
+        analysis=analyze(dataset),
+        joints=joints,
+        diagnosed=Diagnosed(None, reason=TURNED_OFF),
+        quality=assess(dataset),
+        sha256=_sha256(path),
+        missing=missing,
+    )
+
+
+def _with_gap(draft: Session, wait: Waiting | None) -> Session:
+    found = draft.diagnosed if wait is None else wait.result()
+    missing = draft.missing if found.json else draft.missing | {"diagnose": found.reason}
+    return replace(draft, diagnosed=found, missing=missing)
+
+
+def protocol_summary(dataset: Dataset) -> dict[str, Any] | None:
+    """What the protocol asked for, as JSON; None without one, or with one of another version."""
+    text = dataset.texts.get("protocol", "")
+    if not text.strip() or dataset.path is None:
+        return None
+    try:
+        protocol = parse_protocol(text, dataset.path)
+    except InputError:
+        return None
+    return {
+        "repetitions": protocol.repetitions,
+        "branches": protocol.branches,
+        "order": protocol.order,
+        "rate_Hz": protocol.sampling.rate_Hz,
+        "samples_per_step": protocol.sampling.samples_per_step,
+        "hold_s": protocol.hold_s,
+        "rest_s": protocol.rest_s,
+        "zero_before_s": protocol.zero.before_s,
+        "zero_after_s": protocol.zero.after_s,
+        "runs": [
+            {
+                "pose": run.pose,
+                "direction": run.direction,
+                "levels": len(run.forces_N),
+                "from_N": min(run.forces_N),
+                "to_N": max(run.forces_N),
+            }
+            for run in protocol.runs
+        ],
+    }
+
+
+def _sha256(path: Path) -> str:
+    """Of the file's bytes; of the journal beside it where that is the truth."""
+    journal = journal_path(path)
+    try:
+        with (journal if journal.exists() else path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}.") from error
+
+
+def _coupling(model: Path | None) -> CouplingResult | None:
+    if model is None:
+        return None
+    from rig.couple import couple
+
+    return couple(model)
+
+
+def _coupling_marks(coupling: CouplingResult | None) -> tuple[str, ...]:
+    """Banners of the data that a model was identified from."""
+    if coupling is None:
+        return ()
+    from rig.coupling_figures import marks
+
+    return tuple(marks([coupling.model.note]))

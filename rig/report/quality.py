@@ -1,0 +1,257 @@
+"""How good the data are: punctuality, invalid values, drifts, what was discarded or skipped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.dataset import Dataset
+
+Array = NDArray[np.float64]
+
+# What an operator or a device did that a reader of the results should know.
+NOTABLE = (
+    "band_not_reached",
+    "device_failed",
+    "limit",
+    "no_value",
+    "not_settled",
+    "note",
+    "pause",
+    "pose_accepted",
+    "repetition_redone",
+    "resumed",
+    "stopped",
+    "top",
+)
+MOST_EVENTS = 40
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """One zero-load hold: middle in time s, mean force N and displacement mm."""
+
+    time: float
+    force: float
+    displacement: float
+
+
+@dataclass(frozen=True)
+class RunZeros:
+    """The zero-load holds of one run, in the order of measurement."""
+
+    pose: str
+    direction: str
+    repetition: int
+    plateaus: tuple[Plateau, ...]
+
+    @property
+    def change_N(self) -> float | None:
+        """Force at zero load: last hold minus first one; None with fewer than two."""
+        if len(self.plateaus) < 2:
+            return None
+        return self.plateaus[-1].force - self.plateaus[0].force
+
+    @property
+    def drift_N_per_min(self) -> float | None:
+        """The same per minute."""
+        change = self.change_N
+        if change is None:
+            return None
+        minutes = (self.plateaus[-1].time - self.plateaus[0].time) / 60.0
+        return change / minutes if minutes > 0 else None
+
+
+@dataclass(frozen=True)
+class Quality:
+    """zeros: run by run; facts: as JSON, units in the keys, null for what was not recorded."""
+
+    zeros: tuple[RunZeros, ...]
+    facts: dict[str, Any]
+
+
+def assess(dataset: Dataset) -> Quality:
+    """All that a data set says of its own quality. Never fails: what is not there is null."""
+    zeros = tuple(_zeros(dataset))
+    used = dataset.used
+    facts: dict[str, Any] = {
+        "samples": dataset.rows,
+        "used": int(used.sum()),
+        "discarded": int((~used).sum()),
+        "discards": _discards(dataset),
+        "duration_s": _duration(dataset),
+        "lateness_s": _lateness(dataset),
+        "slots_missed": _total(dataset, "slots_missed"),
+        "devices": _devices(dataset),
+        "unsettled_levels": _unsettled(dataset),
+        "force_zero": _force_zero(zeros),
+        "displacement_zero": _displacement_zero(zeros),
+        "temperature_C": _temperature(dataset),
+        "events": _events(dataset),
+    }
+    return Quality(zeros, facts)
+
+
+def _finite(values: Array) -> Array:
+    return values[np.isfinite(values)]
+
+
+def _lateness(dataset: Dataset) -> dict[str, float] | None:
+    if "lateness_s" not in dataset.columns:
+        return None
+    late = _finite(dataset.columns["lateness_s"].astype(float))
+    if late.size == 0:
+        return None
+    median, p95, top = np.quantile(late, [0.5, 0.95, 1.0])
+    return {"median": float(median), "p95": float(p95), "max": float(top)}
+
+
+def _total(dataset: Dataset, column: str) -> int | None:
+    if column not in dataset.columns:
+        return None
+    return int(_finite(dataset.columns[column].astype(float)).sum())
+
+
+def _devices(dataset: Dataset) -> list[dict[str, Any]]:
+    columns, found = dataset.columns, []
+    for name in dataset.devices:
+        if f"{name}_count" not in columns:
+            continue
+        valid, invalid = int(columns[f"{name}_count"].sum()), _total(dataset, f"{name}_invalid")
+        ages = _finite(columns.get(f"{name}_age_s", np.array([])).astype(float))
+        empty = int((columns[f"{name}_count"] == 0).sum())
+        found.append(
+            {
+                "name": name,
+                "values": valid,
+                "invalid": invalid,
+                "samples_without_value": empty,
+                "oldest_value_s": float(ages.max()) if ages.size else None,
+            }
+        )
+    return found
+
+
+def _discards(dataset: Dataset) -> list[dict[str, Any]]:
+    return [
+        {"reason": str(e.get("reason", e["text"])), "samples": int(e["last"]) - int(e["first"]) + 1}
+        for e in dataset.events
+        if e["kind"] == "discard"
+    ]
+
+
+def _unsettled(dataset: Dataset) -> int | None:
+    """Held levels of which no sample counts as settled; None where nothing says what settled is."""
+    columns = dataset.columns
+    if "settled" not in columns:
+        return None
+    held = dataset.used & np.isin(columns["branch"], ["loading", "unloading"])
+    held &= columns["step"] > 0
+    keys = ("pose", "direction", "repetition", "branch", "step")
+    level = np.zeros(int(held.sum()), dtype=np.int64)
+    for key in keys:
+        _, number = np.unique(columns[key][held], return_inverse=True)
+        level = level * (int(number.max(initial=0)) + 1) + number
+    settled = columns["settled"][held] == 1
+    return int(np.setdiff1d(level, level[settled]).size)
+
+
+def _zeros(dataset: Dataset) -> Iterator[RunZeros]:
+    """Zero-load holds by run, from the samples in use that have both values."""
+    columns = dataset.columns
+    rows = np.flatnonzero(dataset.used)
+    if rows.size == 0:
+        return
+    time = columns["session_s"] if "session_s" in columns else columns["time_s"]
+    place = [columns[k][rows] for k in ("pose", "direction", "repetition")]
+    run_starts = _starts(place)
+    for first, last in run_starts:
+        mine = rows[first:last]
+        zero = columns["branch"][mine] == "zero"
+        plateaus = tuple(_plateau(dataset, time, mine[a:b]) for a, b in _starts([zero]) if zero[a])
+        known = tuple(p for p in plateaus if p is not None)
+        if known:
+            pose, direction, repetition = (p[first] for p in place)
+            yield RunZeros(str(pose), str(direction), int(repetition), known)
+
+
+def _starts(columns: list[NDArray[Any]]) -> list[tuple[int, int]]:
+    """Stretches of equal values, as (first, behind the last)."""
+    n = columns[0].size
+    change = np.zeros(n, dtype=bool)
+    change[:1] = True
+    for column in columns:
+        change[1:] |= column[1:] != column[:-1]
+    edges = [*np.flatnonzero(change).tolist(), n]
+    return list(pairwise(edges))
+
+
+def _plateau(dataset: Dataset, time: NDArray[Any], rows: NDArray[np.intp]) -> Plateau | None:
+    force = dataset.columns["force_N"][rows].astype(float)
+    moved = dataset.columns["displacement_mm"][rows].astype(float)
+    good = np.isfinite(force) & np.isfinite(moved) & np.isfinite(time[rows].astype(float))
+    if not good.any():
+        return None
+    return Plateau(
+        float(time[rows][good].mean()), float(force[good].mean()), float(moved[good].mean())
+    )
+
+
+def _force_zero(zeros: tuple[RunZeros, ...]) -> dict[str, Any] | None:
+    """How far the force at zero load moved within the runs."""
+    changes = [abs(c) for r in zeros if (c := r.change_N) is not None]
+    drifts = [abs(d) for r in zeros if (d := r.drift_N_per_min) is not None]
+    if not changes:
+        return None
+    return {
+        "runs": len(changes),
+        "largest_change_N": max(changes),
+        "largest_drift_N_per_min": max(drifts, default=None),
+        "median_drift_N_per_min": float(np.median(drifts)) if drifts else None,
+    }
+
+
+def _displacement_zero(zeros: tuple[RunZeros, ...]) -> list[dict[str, Any]]:
+    """How far the unloaded positions before the repetitions of a setup lie apart."""
+    by_setup: dict[tuple[str, str], list[float]] = {}
+    for run in zeros:
+        by_setup.setdefault((run.pose, run.direction), []).append(run.plateaus[0].displacement)
+    return [
+        {"pose": pose, "direction": direction, "repetitions": len(v), "apart_mm": max(v) - min(v)}
+        for (pose, direction), v in by_setup.items()
+        if len(v) > 1
+    ]
+
+
+def _duration(dataset: Dataset) -> float | None:
+    """From the session's start to its last sample; None without that clock."""
+    times = _finite(dataset.columns.get("session_s", np.array([])).astype(float))
+    return float(times.max()) if times.size else None
+
+
+def _temperature(dataset: Dataset) -> list[float] | None:
+    """The lowest and the highest of all joints."""
+    names = [f"temperature{j}_C" for j in range(1, 7)]
+    known = [_finite(dataset.columns[n].astype(float)) for n in names if n in dataset.columns]
+    values = np.concatenate(known) if known else np.array([])
+    return [float(values.min()), float(values.max())] if values.size else None
+
+
+def _events(dataset: Dataset) -> list[dict[str, Any]]:
+    """What happened beside the plan, the first ones if there are many."""
+    found = [
+        {"session_s": _time(e), "kind": str(e["kind"]), "text": str(e.get("text", ""))}
+        for e in dataset.events
+        if e["kind"] in NOTABLE
+    ]
+    return found[:MOST_EVENTS]
+
+
+def _time(event: dict[str, Any]) -> float | None:
+    value = event.get("session_s")
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) else None

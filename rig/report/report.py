@@ -1,0 +1,115 @@
+"""`rig report`: one page about one or several data sets, and the files beside it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rig.errors import InputError
+from rig.report.compose import compose
+from rig.report.document import Document, Figure, figures
+from rig.report.gather import Gathered, Wishes, gather
+from rig.report.html import render
+from rig.storage.files import in_place_of
+from rig.terminal import Progress, silent
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What was gathered, and the document that shows it."""
+
+    gathered: Gathered
+    document: Document
+
+    def to_json(self) -> dict[str, Any]:
+        """Schema rig.report/1: results of the other commands, and every number of the page."""
+        return self.gathered.to_json()
+
+    def to_html(self) -> str:
+        """The page."""
+        return render(self.document)
+
+    def to_pdf(self) -> bytes:
+        """The same as PDF; InputError where typst is not installed."""
+        from rig.report.pdf import pdf
+
+        return pdf(self.document)
+
+
+def make(
+    paths: Sequence[Path], wishes: Wishes | None = None, progress: Progress = silent
+) -> Report:
+    """A report about data sets, the first of which the others are compared with.
+
+    InputError for files that cannot be read.
+    """
+    wishes = wishes or Wishes()
+    gathered = gather(paths, wishes, progress)
+    progress("drawing", 0.92)
+    return Report(gathered, compose(gathered, png=wishes.png))
+
+
+def now() -> str:
+    """The time that a report made now shows."""
+    return datetime.now().astimezone().isoformat(timespec="seconds")
+
+
+def default_output(paths: Sequence[Path]) -> Path:
+    """In the working folder, under the first data set's name."""
+    return Path(f"{paths[0].stem if paths else 'rig'}_report.html")
+
+
+def write_html(report: Report, path: Path) -> None:
+    """Writes the page whole or not at all; InputError if the folder refuses."""
+    with in_place_of(path) as temporary:
+        temporary.write_text(report.to_html(), "utf-8")
+
+
+def write_pdf(report: Report, path: Path) -> None:
+    """Likewise as PDF."""
+    content = report.to_pdf()
+    with in_place_of(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def write_figures(report: Report, folder: Path) -> list[Path]:
+    """Every figure as SVG and PNG, and the numbers behind it as CSV; the files written."""
+    written: list[Path] = []
+    marks = [b.split(":", maxsplit=1)[0] for b in report.document.banners]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for figure in figures(report.document.sections):
+            for kind, content in _files(figure, marks).items():
+                path = folder / f"{figure.name}.{kind}"
+                path.write_bytes(content)
+                written.append(path)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: the figures can't be written there ({error.strerror}). "
+            "Give another folder with --figures."
+        ) from error
+    return written
+
+
+def _files(figure: Figure, marks: Sequence[str]) -> dict[str, bytes]:
+    files = {"svg": f'<?xml version="1.0" encoding="utf-8"?>\n{figure.svg}\n'.encode()}
+    if figure.png is not None:
+        files["png"] = figure.png
+    if figure.header:
+        files["csv"] = _csv(figure, marks).encode("utf-8", "replace")
+    return files
+
+
+def _csv(figure: Figure, marks: Sequence[str]) -> str:
+    buffer = io.StringIO()
+    for mark in marks:
+        buffer.write(f"# {mark}\n")
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(figure.header)
+    writer.writerows(figure.rows)
+    return buffer.getvalue()

@@ -1,0 +1,173 @@
+"""The chapters that frame a report: in short, data quality, provenance."""
+
+from __future__ import annotations
+
+from rig.diagnose_text import MEANING
+from rig.report.document import (
+    Block,
+    Bullets,
+    Cell,
+    Facts,
+    Inline,
+    Paragraph,
+    Rich,
+    Section,
+    Table,
+    Word,
+)
+from rig.report.gather import Session
+from rig.report.pictures import Pictures
+from rig.report.results import NOTHING, Node, quantity
+
+
+def in_short(session: Session, data: Node) -> Section:
+    """The answers first."""
+    rows: list[tuple[str, Cell]] = []
+    for key, d in data["analyze"]["directions"].items():
+        rows.append((f"Stiffness along {key}", (*quantity(d["stiffness_N_per_mm"]), *_k_unit(d))))
+        knee = d["knee"]
+        if knee:
+            rows.append((f"Knee along {key}", (*quantity(knee["force_N"]), " N")))
+    for key, q in data["analyze"]["anisotropy"].items():
+        a, _, b = key.rpartition("/")
+        rows.append((f"{a} over {b}", (*quantity(q), " times as stiff")))
+    rows.append(("Joints", _joints(data)))
+    rows.append(("Gap to the simulation", _gap(data)))
+    rows.append(("Data", _data(session, data)))
+    note = Paragraph(("In brackets: 95 % intervals.",), "note")
+    return Section("short", "In short", (Facts(tuple(rows)), note), session.dataset.banners())
+
+
+def _k_unit(d: Node) -> Rich:
+    if d["stiffness_N_per_mm"]["value"].value is None:
+        return (": ", d["status_text"].text())
+    left_out = len({e["step"].value for e in d["excluded"]})
+    words = f" N/mm ({left_out} step{'s' if left_out != 1 else ''} not counted)"
+    return (words,) if left_out else (" N/mm",)
+
+
+def _joints(data: Node) -> Cell:
+    found = data["identify"]
+    if not found:
+        return data["missing"]["identify"].text()
+    known = [str(j) for j, ok in enumerate(found["identified"].value, start=1) if ok]
+    words = f"identified: {', '.join(known)}" if known else "none identified to 5 %"
+    return (f"{words}; rank ", *found["rank"].number(), " of 6")
+
+
+def _gap(data: Node) -> Cell:
+    found = data["diagnose"]
+    if not found:
+        return data["missing"]["diagnose"].text()
+    verdict = found["verdict"].text()
+    p = found["probabilities"][verdict].percent()
+    words: Rich = (Word(verdict, "strong"), " (probability ", *p, ")")
+    held = found["gap"]["held_out"]
+    if verdict in ("none", "unknown") or not held:
+        return words
+    shrinks = held["shrink_factor"].number(3)
+    meaning = f", {MEANING[verdict]}"
+    return (*words, meaning, "; with it the gap shrinks ", *shrinks, " times on withheld data")
+
+
+def _data(session: Session, data: Node) -> Rich:
+    quality = data["quality"]
+    parts: list[Inline] = [*quality["used"].number(), " of ", *quality["samples"].number()]
+    parts.append(" samples in use; ")
+    complete = session.dataset.complete
+    parts.append(Word("complete", "good") if complete else Word("incomplete", "bad"))
+    return tuple(parts)
+
+
+def data_quality(session: Session, data: Node, pictures: Pictures) -> Section:
+    """Punctuality, invalid values, drift, what was left out and why."""
+    q = data["quality"]
+    rows: list[tuple[str, Cell]] = [
+        ("Samples", q["samples"].number()),
+        ("Discarded", q["discarded"].number()),
+        ("Slots late by", _lateness(q["lateness_s"])),
+        ("Slots missed", q["slots_missed"].number()),
+        ("Levels that never settled", q["unsettled_levels"].number()),
+    ]
+    drift = q["force_zero"]
+    if drift:
+        parts = ("at most ", *drift["largest_change_N"].number(3, unit="N"), " within a run, ")
+        rate = drift["largest_drift_N_per_min"].number(3, unit="N/min")
+        rows.append(("Force at zero load moves by", (*parts, *rate)))
+    for zero in q["displacement_zero"]:
+        where = " ".join(filter(None, (zero["pose"].value, zero["direction"].text())))
+        apart = zero["apart_mm"].number(3, unit="mm")
+        rows.append((f"Unloaded positions, {where}", (*apart, " apart over the repetitions")))
+    blocks: list[Block] = [Facts(tuple(rows)), *_per_device(q)]
+    figure = pictures.quality(session)
+    if figure is not None:
+        blocks.append(figure)
+    blocks += [*_left_out(data), *_events(q)]
+    return Section("quality", "Data quality", tuple(blocks), session.dataset.banners())
+
+
+def _lateness(node: Node) -> Rich:
+    if not node:
+        return ("not recorded",)
+    median, p95, top = (node[k].number(3, 1e3) for k in ("median", "p95", "max"))
+    return (*median, " ms (median), ", *p95, " ms (95 %), ", *top, " ms (most)")
+
+
+def _per_device(q: Node) -> list[Block]:
+    rows = tuple(
+        (
+            d["name"].text(),
+            d["values"].number(),
+            d["invalid"].number(),
+            d["samples_without_value"].number(),
+            d["oldest_value_s"].number(3),
+        )
+        for d in q["devices"]
+    )
+    header = ("device", "valid values", "invalid", "samples without", "oldest value s")
+    return [Table("Single values behind the samples", header, rows)] if rows else []
+
+
+def _left_out(data: Node) -> list[Block]:
+    """Levels that do not count towards k, and samples that were discarded, with the reason."""
+    by_reason: dict[tuple[str, str], list[str]] = {}
+    for key, d in data["analyze"]["directions"].items():
+        for e in d["excluded"]:
+            by_reason.setdefault((key, e["reason"].text()), []).append(str(e["step"].value))
+    rows: list[tuple[Cell, ...]] = [
+        (f"{key}: step {', '.join(steps)}", "not counted towards k", reason)
+        for (key, reason), steps in by_reason.items()
+    ]
+    rows += [
+        ((*d["samples"].number(), " samples"), "discarded", d["reason"].text())
+        for d in data["quality"]["discards"]
+    ]
+    if not rows:
+        return [Paragraph(("Nothing was excluded or discarded.",))]
+    return [Table("Left out, and why", ("what", "how", "why"), tuple(rows), words=3)]
+
+
+def _events(q: Node) -> list[Block]:
+    items = tuple(
+        (*e["session_s"].number(4, unit="s"), ": ", e["text"].text())
+        if e["session_s"].value is not None
+        else e["text"].text()
+        for e in q["events"]
+    )
+    return [Paragraph(("What happened beside the plan:",)), Bullets(items)] if items else []
+
+
+def provenance(session: Session, data: Node, made: str, software: str) -> Section:
+    """Where all of this comes from."""
+    diagnosed = session.diagnosed.json is not None
+    commands = ["rig analyze", "rig identify", *(["rig diagnose"] if diagnosed else [])]
+    rows: list[tuple[str, Cell]] = [
+        ("File", Word(data["file"].text(), "code")),
+        ("SHA-256", Word(data["sha256"].text(), "code")),
+        ("UUID", Word(data["uuid"].text(), "code")),
+        ("Written by", data["software"].text()),
+        ("Evaluated by", software),
+        ("Page made", made or NOTHING),
+        ("The same numbers", f"{', '.join(commands)} with --json, rig report --json"),
+    ]
+    return Section("provenance", "Provenance", (Facts(tuple(rows)),), session.dataset.banners())

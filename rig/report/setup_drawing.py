@@ -1,0 +1,150 @@
+"""The setup as a drawing: the arm in its pose from above and from the side, where screw and laser
+act. Places of screw and laser are schematic: a data set knows their line, not their distance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arm import tool_offset
+from rig.meta import Meta, MetaPose
+from rig.model import load_robot
+from rig.plotting import COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+MM = 1e3
+_ARM, _LASER = "0.35", "#CC3311"
+_VIEWS = (("From above", 0, 1), ("From the side", 0, 2))
+
+
+@dataclass(frozen=True)
+class Load:
+    """One measured direction: its name and unit vector (3,) in the base frame."""
+
+    name: str
+    vector: tuple[float, float, float]
+
+
+def arm_points(meta: Meta, pose: MetaPose) -> Array:
+    """Origins of the frames from base to flange, then the point of load: (8, 3) mm."""
+    arm = load_robot(meta.robot)
+    q, tool = np.array(pose.q_rad), tool_offset(np.array(pose.tcp_xyz_mm) / MM)
+    frames, tcp = arm.frames(q), arm.fk(q, tool)
+    return np.vstack([frames[:, :3, 3], tcp[:3, 3]]) * MM
+
+
+def arm_setup(meta: Meta, name: str, loads: Sequence[Load]) -> Figure:
+    """One pose: the arm from above and from the side, with every direction of load measured."""
+    from matplotlib.figure import Figure
+
+    points = arm_points(meta, meta.poses[name])
+    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
+    panels = figure.subplots(1, 2)
+    for axes, (title, i, j) in zip(panels, _VIEWS, strict=True):
+        _arm(axes, points[:, i], points[:, j])
+        for n, load in enumerate(loads):
+            colour = COLOURS[n % len(COLOURS)]
+            _load(axes, points[-1, [i, j]], np.array(load.vector), (i, j), load.name, colour)
+        axes.set_title(f"{title}, pose {name}", fontsize=10)
+        axes.set_xlabel("x of the base in mm")
+        axes.set_ylabel(f"{'xyz'[j]} of the base in mm")
+        axes.set_aspect("equal")
+    _same_scale(panels)
+    _legend(figure, loads)
+    return figure
+
+
+def bench_setup(loads: Sequence[Load]) -> Figure:
+    """A rig without an arm: one spring a direction between ground, force and displacement."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.5, 0.6 + 1.0 * len(loads)), layout="constrained")
+    axes = figure.add_subplot()
+    for n, load in enumerate(loads):
+        _spring(axes, -float(n), load, COLOURS[n % len(COLOURS)])
+    axes.set_xlim(-0.6, 9.0)
+    axes.set_ylim(-len(loads) + 0.35, 0.65)
+    axes.set_axis_off()
+    return figure
+
+
+def _arm(axes: Any, x: Array, y: Array) -> None:
+    axes.plot(x[:7], y[:7], color=_ARM, linewidth=7, solid_capstyle="round",
+              solid_joinstyle="round", alpha=0.45, zorder=2)  # fmt: skip
+    axes.plot(x[:7], y[:7], "o", color=_ARM, markersize=5, zorder=3)
+    if np.hypot(x[7] - x[6], y[7] - y[6]) > 1:
+        axes.plot(x[6:], y[6:], color=_ARM, linewidth=3, zorder=2)
+    axes.plot(x[0], y[0], "s", color="black", markersize=13, zorder=3)
+    axes.annotate("base", (x[0], y[0]), xytext=(-11, 0), textcoords="offset points",
+                  ha="right", va="center", fontsize=8)  # fmt: skip
+    axes.plot(x[7], y[7], "o", color="white", markeredgecolor="black", markersize=8, zorder=6)
+
+
+def _load(
+    axes: Any, at: Array, vector: Array, view: tuple[int, int], name: str, colour: str
+) -> None:
+    """Screw and force on one side of the point of load, the laser's beam on the other."""
+    inside = vector[list(view)]
+    length = float(np.hypot(*inside))
+    if length < 0.05:  # along the line of sight
+        towards = vector[3 - sum(view)] * (1 if view == (0, 1) else -1) > 0
+        axes.plot(*at, "o", color="none", markeredgecolor=colour, markersize=16, zorder=5)
+        axes.plot(*at, "." if towards else "x", color=colour, markersize=9, zorder=7)
+        axes.annotate(name, at, xytext=(12, 9), textcoords="offset points", color=colour,
+                      fontsize=10, fontweight="bold", zorder=8)  # fmt: skip
+        return
+    tail, laser = at - 250 * inside, at + 250 * inside
+    axes.annotate("", xy=at - 18 * inside, xytext=tail, zorder=5,
+                  arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.5})  # fmt: skip
+    block, head = at - 290 * inside, at + 280 * inside
+    axes.plot(*block, "s", color=colour, markersize=10, zorder=5)
+    axes.plot([at[0], laser[0]], [at[1], laser[1]], ":", color=_LASER, linewidth=1.6, zorder=4)
+    axes.plot(*head, "D", color=_LASER, markersize=8, zorder=5)
+    axes.annotate(name, block - 55 * inside, ha="center", va="center", color=colour,
+                  fontsize=10, fontweight="bold", zorder=8)  # fmt: skip
+
+
+def _same_scale(panels: Sequence[Any]) -> None:
+    """One scale for both views: the same width and height in mm, with a margin."""
+    for get, put in (("get_xlim", "set_xlim"), ("get_ylim", "set_ylim")):
+        limits = [getattr(axes, get)() for axes in panels]
+        half = 0.54 * max(high - low for low, high in limits)
+        for axes, (low, high) in zip(panels, limits, strict=True):
+            getattr(axes, put)((low + high) / 2 - half, (low + high) / 2 + half)
+
+
+def _legend(figure: Figure, loads: Sequence[Load]) -> None:
+    from matplotlib.lines import Line2D
+
+    marks = [
+        Line2D([], [], color=COLOURS[i % len(COLOURS)], marker="s", markersize=8, linewidth=2.5,
+               label=f"screw with dynamometer, pushes along {load.name}")
+        for i, load in enumerate(loads)
+    ]  # fmt: skip
+    marks += [
+        Line2D([], [], color=_LASER, marker="D", linestyle=":", label="laser"),
+        Line2D([], [], color="white", marker="o", markeredgecolor="black", label="point of load"),
+    ]
+    figure.legend(handles=marks, loc="outside lower center", ncols=min(3, len(marks)),
+                  frameon=False, fontsize=8)  # fmt: skip
+
+
+def _spring(axes: Any, y: float, load: Load, colour: str) -> None:
+    x = np.linspace(0.4, 4.0, 19)
+    zigzag = y + 0.14 * np.array([0, 0, *[(-1) ** i for i in range(15)], 0, 0], dtype=float)
+    axes.plot([0, 0], [y - 0.35, y + 0.35], color="black", linewidth=3)
+    axes.plot([0, 0.4], [y, y], color=_ARM, linewidth=1.5)
+    axes.plot(x, zigzag, color=_ARM, linewidth=1.5)
+    axes.plot([4.0, 4.6], [y, y], color=_ARM, linewidth=1.5)
+    axes.plot(4.8, y, "s", color=_ARM, markersize=13)
+    axes.annotate("", xy=(6.8, y), xytext=(5.1, y),
+                  arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.5})  # fmt: skip
+    axes.text(6.95, y, f"{load.name}: force and displacement", va="center", color=colour,
+              fontsize=9)  # fmt: skip
