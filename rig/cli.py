@@ -74,18 +74,37 @@ def measure(
         Path | None,
         typer.Option(metavar="DATASET.h5", help="Go on where an interrupted run stopped."),
     ] = None,
+    panel: Annotated[
+        bool, typer.Option("--panel", help="Serve the operator's page, and print its link.")
+    ] = False,
+    panel_host: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS", help="Where the page is served; beyond 127.0.0.1 links hold tokens."
+        ),
+    ] = "127.0.0.1",
+    panel_port: Annotated[
+        int | None,
+        typer.Option(min=1, max=65535, help="Its port; left out: 8321, or a free one."),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(min=0.01, max=1000, help="Of an emulated station, times real time."),
+    ] = None,
 ) -> None:
     """Carry out a procedure on a station, guide the operator, write the data set."""
     from rig import measure as measuring
     from rig.errors import InputError
+    from rig.panel.link import PanelOptions
 
     if (protocol is None) == (resume is None):
         raise InputError("rig measure: give a PROTOCOL.yaml, or --resume DATASET.h5.")
+    page = PanelOptions(panel_host, panel_port) if panel else None
     if resume is not None:
-        path = measuring.resume(resume, say)
+        path = measuring.resume(resume, say, page)
     else:
         assert protocol is not None
-        path = measuring.measure(protocol, station, output, say)
+        path = measuring.measure(protocol, station, output, say, page, speed)
     say(f"{path}: complete. Next: rig analyze {path}")
 
 

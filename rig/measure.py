@@ -6,10 +6,11 @@ import signal
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from drivers.clock import Clock
 from drivers.errors import DeviceError
@@ -19,6 +20,7 @@ from rig.emulation import EmulatedRig
 from rig.errors import InputError, MeasurementStopped
 from rig.journal import Journal, JournalError, journal_path, replay
 from rig.measured_meta import measured_meta
+from rig.panel.onlooker import Onlooker
 from rig.plan import plan
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.devices import Devices, make_devices, make_loader, open_devices, station_clock
@@ -29,6 +31,9 @@ from rig.procedure.recorder import Recorder
 from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
 from rig.runner import Runner
 from rig.station import Station, load_station, parse_station
+
+if TYPE_CHECKING:
+    from rig.panel.link import PanelOptions
 
 SAFETY_NOTE = (
     "Software monitoring is no safety function: keep the emergency stop within reach, "
@@ -49,14 +54,24 @@ class Job:
     progress: Progress
 
 
-def measure(protocol_file: Path, station_name: str | None, output: Path | None, say: Say) -> Path:
+def measure(
+    protocol_file: Path,
+    station_name: str | None,
+    output: Path | None,
+    say: Say,
+    panel: PanelOptions | None = None,
+    speed: float | None = None,
+) -> Path:
     """Carries out a protocol on its station and returns the data set's path.
 
+    `panel`: serve the operator's page; `speed`: of an emulated station, instead of its file's.
     Raises InputError before any device is opened; DeviceError, MeasurementStopped or
     KeyboardInterrupt after the data so far have been written.
     """
     protocol = load_protocol(protocol_file)
     station = load_station(station_name or protocol.station, protocol_file.parent)
+    if speed is not None:
+        station = _at_speed(station, speed)
     plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
     path = output or default_output(protocol_file)
     _refuse_existing(path)
@@ -71,12 +86,12 @@ def measure(protocol_file: Path, station_name: str | None, output: Path | None, 
         "meta": measured_meta(protocol, station).model_dump_json(indent=2, exclude_none=True),
     }
     # The devices come first: a run that never began leaves no file behind.
-    with _opened(protocol, station, Progress(), say) as rig:
+    with _opened(protocol, station, Progress(), say, panel) as rig:
         journal = Journal.create(journal_path(path), start)
         return _carry_out(Job(path, protocol, station, journal, Progress()), rig, say)
 
 
-def resume(path: Path, say: Say) -> Path:
+def resume(path: Path, say: Say, panel: PanelOptions | None = None) -> Path:
     """Goes on with an interrupted measurement at the step where it stopped."""
     journal_file = journal_path(path)
     if not journal_file.exists():
@@ -89,7 +104,9 @@ def resume(path: Path, say: Say) -> Path:
     protocol = parse_protocol(start["protocol"], path)
     station = parse_station(start["station"], path)
     progress = read_progress(records)
-    with _opened(protocol, station, progress, say) as rig:
+    with _opened(protocol, station, progress, say, panel) as rig:
+        for record in records:  # the page shows the whole run, not only what is still to come
+            rig.onlooker.record(record.kind, record.data)
         journal = Journal.reopen(journal_file)
         journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
         say(f"resuming after {progress.rows} rows")
@@ -119,26 +136,69 @@ class _Rig:
     devices: Devices
     loader: Loader
     clock: Clock
+    onlooker: Onlooker
 
 
 @contextmanager
 def _opened(
-    protocol: MeasurementProtocol, station: Station, progress: Progress, say: Say
+    protocol: MeasurementProtocol,
+    station: Station,
+    progress: Progress,
+    say: Say,
+    panel: PanelOptions | None,
 ) -> Iterator[_Rig]:
     """Everything that the procedure talks to; closed again in any case."""
     with ExitStack() as stack:
+        onlooker = stack.enter_context(_watched(protocol, station, say, panel))
         if station.emulation is not None:
             say("EMULATED station: whatever is measured here is no measurement of a real arm.")
             station = stack.enter_context(emulated_rig(station, protocol))
         clock = station_clock(station)
         devices = make_devices(station, clock)
-        open_devices(devices, stack, say)
+        open_devices(devices, stack, say, onlooker.device)
         loader = make_loader(station, clock)
-        if station.operator.driver == "scripted":
+        scripted = station.operator.driver == "scripted"
+        if scripted:
             loader = LoaderWithBar(loader, protocol, len(progress.steps))
+        loader = onlooker.operator(loader, clock, scripted=scripted)
         stack.callback(loader.close)
         loader.open()
-        yield _Rig(station, devices, loader, clock)
+        yield _Rig(station, devices, loader, clock, onlooker)
+
+
+@contextmanager
+def _watched(
+    protocol: MeasurementProtocol, station: Station, say: Say, options: PanelOptions | None
+) -> Iterator[Onlooker]:
+    """Whoever looks on; is told how the measurement ended once its data are written."""
+    if options is None:
+        yield Onlooker()
+        return
+    from rig.panel.panel import start_panel
+
+    onlooker = start_panel(protocol, station, options, say)
+    phase, text = "aborted", "the measurement was ended"
+    try:
+        yield onlooker
+        phase, text = "done", "all runs done"
+    except MeasurementStopped as stop:
+        text = str(stop)
+        raise
+    except DeviceError as error:
+        onlooker.device(error.device, error)
+        phase, text = "fault", str(error)
+        raise
+    finally:
+        onlooker.finish(phase, text)
+
+
+def _at_speed(station: Station, speed: float) -> Station:
+    if station.emulation is None:
+        raise InputError(
+            f"--speed {speed:g}: {station.path} is no emulated station, and real time has one "
+            "speed. Leave --speed out, or take --station emulated."
+        )
+    return replace(station, emulation=replace(station.emulation, speed=speed))
 
 
 def emulated_rig(station: Station, protocol: MeasurementProtocol) -> EmulatedRig:
@@ -153,7 +213,9 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     rate_Hz, progress = job.protocol.sampling.rate_Hz, job.progress
     acquisition = Acquisition(rig.devices, rig.clock, rate_Hz, progress.session_s)
     sign = rig.station.laser.sign if rig.station.laser else 1
-    recorder = Recorder(job.journal, rig.devices, acquisition.now, sign, progress.rows)
+    recorder = Recorder(
+        job.journal, rig.devices, acquisition.now, sign, progress.rows, rig.onlooker.record
+    )
     runner = Runner(job.protocol, acquisition, rig.loader, recorder, progress, lambda: _build(job))
     reason, complete = "a bug", False
     try:

@@ -158,6 +158,13 @@ class ConsoleOperator:
         assert question.answer is not None
         return question.answer
 
+    def answer(self, answer: str) -> None:
+        """Ends the open question with an answer that was given elsewhere."""
+        with self._lock:
+            if self._question is not None:
+                self._question.answer = answer
+                self._question.answered.set()
+
     def guide(self, view: LiveView) -> None:
         """Shows the view."""
         now = time.monotonic()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 from rich.align import Align
 from rich.console import Group, RenderableType
@@ -50,25 +52,47 @@ def large(text: str) -> list[str]:
     return [" ".join(glyph[row] for glyph in glyphs) for row in range(3)]
 
 
-def hint(view: LiveView, pitch_mm: float) -> tuple[str, str]:
-    """A word and how far: ("TIGHTEN", "about 0.4 turns"), ("HOLD", "in the band"), ...
+@dataclass(frozen=True, slots=True)
+class Turning:
+    """What the hand should do: `remaining_N` to the target, `turns` of the screw (nan: unknown)."""
+
+    sense: Literal["in", "out", "hold"]
+    remaining_N: float
+    turns: float
+
+
+def turning(view: LiveView, pitch_mm: float) -> Turning | None:
+    """Which way to turn, and about how far; None while hands are off or there is no force.
 
     How far follows from the stiffness of the last points and the screw's pitch; without a
     stiffness no number is given.
     """
     if view.phase in HANDS_OFF:
-        return HANDS_OFF[view.phase], ""
+        return None
     if not (math.isfinite(view.force_N) and math.isfinite(view.target_N)):
-        return "WAIT", "no force to go by"
+        return None
     need = view.target_N - view.force_N
     if abs(need) <= view.band_N:
-        return "HOLD", "in the band"
+        return Turning("hold", abs(need), 0.0)
     sense = math.copysign(1.0, view.target_N) if view.target_N else math.copysign(1.0, view.force_N)
-    word = "TIGHTEN" if need * sense > 0 else "LOOSEN"
-    if not view.stiffness_N_per_mm > 0:
-        return word, f"{abs(need):.1f} N to go"
-    turns = abs(need) / view.stiffness_N_per_mm / pitch_mm
-    return word, f"{abs(need):.1f} N to go, about {turns:.2f} turns"
+    known = view.stiffness_N_per_mm > 0
+    turns = abs(need) / view.stiffness_N_per_mm / pitch_mm if known else math.nan
+    return Turning("in" if need * sense > 0 else "out", abs(need), turns)
+
+
+def hint(view: LiveView, pitch_mm: float) -> tuple[str, str]:
+    """`turning` as a word and how far: ("TIGHTEN", "about 0.4 turns"), ("HOLD", "in the band")."""
+    if view.phase in HANDS_OFF:
+        return HANDS_OFF[view.phase], ""
+    turn = turning(view, pitch_mm)
+    if turn is None:
+        return "WAIT", "no force to go by"
+    if turn.sense == "hold":
+        return "HOLD", "in the band"
+    far = f"{turn.remaining_N:.1f} N to go"
+    if math.isfinite(turn.turns):
+        far += f", about {turn.turns:.2f} turns"
+    return {"in": "TIGHTEN", "out": "LOOSEN"}[turn.sense], far
 
 
 def bar(view: LiveView, width: int = BAR_WIDTH) -> Text:

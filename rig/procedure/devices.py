@@ -25,11 +25,20 @@ class Devices:
         return (self.robot, self.dynamometer, self.laser)
 
 
-def open_devices(devices: Devices, stack: ExitStack, say: Callable[[str], None]) -> None:
-    """Opens every device; whatever happens later, `stack` closes those that were opened."""
+def open_devices(
+    devices: Devices,
+    stack: ExitStack,
+    say: Callable[[str], None],
+    opened: Callable[[str], None] = lambda _name: None,
+) -> None:
+    """Opens every device; whatever happens later, `stack` closes those that were opened.
+
+    `opened` is told the name of each one that is ready.
+    """
     for device in devices.all():
         stack.callback(device.close)
         device.open()
+        opened(device.name)
         say(f"{device.name}: ready ({in_short(device.identity())})")
 
 
