@@ -395,6 +395,49 @@ def blind(
         raise typer.Exit(130)
 
 
+@app.command()
+def report(
+    datasets: Annotated[list[Path], typer.Argument(metavar="DATASET.h5 ...")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="The page.")
+    ] = None,
+    pdf: Annotated[
+        Path | None, typer.Option(metavar="FILE.pdf", help="The same as PDF (needs typst).")
+    ] = None,
+    figures: FiguresOption = None,
+    couple: Annotated[
+        Path | None, typer.Option(metavar="MODEL.yaml", help="With two arms coupled, too.")
+    ] = None,
+    gap: Annotated[bool, typer.Option("--gap/--no-gap", help="With the diagnosis or not.")] = True,
+    json_file: JsonOption = None,
+) -> None:
+    """One page with figures and tables; several data sets are compared with the first."""
+    from rig.report import report as reports
+    from rig.terminal import terminal_progress
+
+    page = reports.checked(output or reports.default_output(datasets), pdf)
+    with terminal_progress() as progress:
+        result = reports.make(
+            datasets,
+            reports.Wishes(
+                couple=couple,
+                gap=gap,
+                made=reports.now(),
+                png=figures is not None,
+                processes=reports.usable_cores() - 1,
+            ),
+            progress,
+        )
+    give(result, json_file)
+    reports.write_html(result, page)
+    _list_written([page])
+    if pdf is not None:
+        reports.write_pdf(result, pdf)
+        _list_written([pdf])
+    if figures is not None:
+        _list_written(reports.write_figures(result, figures))
+
+
 @app.command("import")
 def import_(
     table: Annotated[Path, typer.Argument(metavar="TABLE.csv")],

@@ -10,13 +10,28 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from rig.analyze_text import answer
 from rig.errors import InputError
 from rig.report.compose import compose
+from rig.report.diagnosing import usable_cores
 from rig.report.document import Document, Figure, figures
 from rig.report.gather import Gathered, Wishes, gather
 from rig.report.html import render
 from rig.storage.files import in_place_of
 from rig.terminal import Progress, silent
+
+__all__ = [
+    "Report",
+    "Wishes",
+    "checked",
+    "default_output",
+    "make",
+    "now",
+    "usable_cores",
+    "write_figures",
+    "write_html",
+    "write_pdf",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +44,10 @@ class Report:
     def to_json(self) -> dict[str, Any]:
         """Schema rig.report/1: results of the other commands, and every number of the page."""
         return self.gathered.to_json()
+
+    def to_text(self) -> str:
+        """The first lines of the page, for a terminal."""
+        return summary(self.gathered)
 
     def to_html(self) -> str:
         """The page."""
@@ -54,6 +73,13 @@ def make(
     return Report(gathered, compose(gathered, png=wishes.png))
 
 
+def summary(gathered: Gathered) -> str:
+    """One sentence a data set: banners, every k."""
+    lines = [*gathered.banners]
+    lines += [f"{s.label}: {answer(s.analysis)}" for s in gathered.sessions]
+    return "\n".join(lines)
+
+
 def now() -> str:
     """The time that a report made now shows."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
@@ -62,6 +88,17 @@ def now() -> str:
 def default_output(paths: Sequence[Path]) -> Path:
     """In the working folder, under the first data set's name."""
     return Path(f"{paths[0].stem if paths else 'rig'}_report.html")
+
+
+def checked(page: Path, pdf: Path | None) -> Path:
+    """The page's path, before long work begins; InputError where a name says another kind of file
+    (a data set must not be overwritten by its report)."""
+    for path, kinds, option in ((page, (".html", ".htm"), "-o"), (pdf, (".pdf",), "--pdf")):
+        if path is not None and path.suffix.lower() not in kinds:
+            raise InputError(f"{option} {path}: a name that ends in {kinds[0]} is wanted.")
+        if path is not None and not path.parent.is_dir():
+            raise InputError(f"{path}: the folder {path.parent} does not exist. Create it first.")
+    return page
 
 
 def write_html(report: Report, path: Path) -> None:
