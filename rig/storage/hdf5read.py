@@ -21,14 +21,14 @@ from rig.yamlfile import load_yaml_text
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 # What h5py raises on files that are damaged in one way or another.
-_BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError,
-           OverflowError, MemoryError, RecursionError)  # fmt: skip
+BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError,
+          OverflowError, MemoryError, RecursionError)  # fmt: skip
 
 
 def read_uuid(path: Path) -> str:
     """UUID of the file, "" if there is none or it cannot be read."""
-    with suppress(InputError, *_BROKEN):
-        _check_bytes(path)
+    with suppress(InputError, *BROKEN):
+        check_bytes(path)
         with h5py.File(path, "r") as file:
             return str(file.attrs["uuid"])
     return ""
@@ -36,8 +36,8 @@ def read_uuid(path: Path) -> str:
 
 def holds_import(path: Path) -> bool:
     """True for a data set that was imported from a table, and so can be made anew."""
-    with suppress(InputError, *_BROKEN):
-        _check_bytes(path)
+    with suppress(InputError, *BROKEN):
+        check_bytes(path)
         with h5py.File(path, "r") as file:
             return file.attrs["schema"] == SCHEMA and "entry/texts/comments" in file
     return False
@@ -45,11 +45,11 @@ def holds_import(path: Path) -> bool:
 
 def read_file(path: Path) -> Dataset:
     """The data set of an HDF5 file, checked whole. InputError for anything wrong."""
-    _check_bytes(path)
+    check_bytes(path)
     try:
         with h5py.File(path, "r") as file:
             return _Reading(file, path).dataset()
-    except _BROKEN as error:
+    except BROKEN as error:
         words = _first_line(error)
         raise _damaged(path, f"the HDF5 library says: {words}.") from error
 
@@ -64,8 +64,8 @@ def _damaged(path: Path, what: str) -> InputError:
     )
 
 
-def _check_bytes(path: Path) -> None:
-    """Magic number and seal, before the HDF5 library sees the file."""
+def check_bytes(path: Path) -> None:
+    """Magic number and seal, before the HDF5 library sees the file; InputError where they fail."""
     try:
         with path.open("rb") as file:
             head = file.read(len(_MAGIC))
@@ -78,6 +78,23 @@ def _check_bytes(path: Path) -> None:
         found = "an empty file" if not head else "no HDF5 file"
         hint = " A table comes in with `rig import`." if path.suffix in (".csv", ".txt") else ""
         raise InputError(f"{path}: {found}; a data set (.h5) is wanted.{hint}")
+
+
+def seal_of(path: Path) -> str:
+    """SHA-256 of the bytes as the file's last line states it, unchecked; "" where there is none, or
+    where something was cut off or added. OSError if the file can't be read."""
+    length = len(SEAL) + 65
+    with path.open("rb") as file:
+        head = file.read(48)
+        size = file.seek(0, os.SEEK_END)
+        if len(head) < 48 or not head.startswith(_MAGIC) or head[8] != 0 or size < length:
+            return ""
+        end = file.seek(size - length)
+        line = file.read()
+    stated = int.from_bytes(head[40:48], "little")
+    if end != stated or not line.startswith(SEAL):
+        return ""
+    return line[len(SEAL) : -1].decode("ascii", "replace")
 
 
 def _check_seal(file: BinaryIO) -> str:
@@ -177,7 +194,7 @@ class _Reading:
             raise _damaged(self._path, f"{place} has the shape {node.shape}, not ({self._rows},).")
         try:
             content = content_of(node)
-        except _BROKEN as error:
+        except BROKEN as error:
             raise _damaged(self._path, f"{place} cannot be read: {_first_line(error)}.") from error
         if digest_of(node, content) != expected:
             raise _damaged(self._path, f"{place} has changed since it was written.")

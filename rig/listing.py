@@ -1,0 +1,221 @@
+"""`rig list`: the data sets of a folder, with what is known of them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rig.analyze_text import number
+from rig.catalogue import recall, remember, stiffness_of
+from rig.errors import InputError
+from rig.journal import journal_path
+from rig.storage.hdf5read import seal_of
+from rig.storage.summary import Summary, journal_summary, read_summary
+
+SCHEMA = "rig.list/1"
+ENDINGS = (".h5", ".hdf5")
+_JOURNAL = ".journal"
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One data set. file: relative to the folder. stiffness: per direction as in JSON, None where
+    nobody analysed it yet; verdict: word and probability, likewise. open: a journal lies beside."""
+
+    file: str
+    summary: Summary
+    stiffness: Mapping[str, Any] | None
+    verdict: Mapping[str, Any] | None
+    open: bool
+
+    @property
+    def state(self) -> str:
+        """What must not be overlooked."""
+        s = self.summary
+        whole = "open" if self.open else "complete" if s.complete else "INCOMPLETE"
+        return f"{whole}, EMULATED" if s.origin == "emulated" else f"{whole}, {s.origin}"
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Entries by file, and (file, reason) of what was left out."""
+
+    folder: Path
+    entries: tuple[Entry, ...]
+    skipped: tuple[tuple[str, str], ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Schema rig.list/1; null for what is not known yet."""
+        return {
+            "schema": SCHEMA,
+            "folder": str(self.folder),
+            "datasets": [_json(e) for e in self.entries],
+            "skipped": [{"file": f, "reason": r} for f, r in self.skipped],
+        }
+
+    def to_text(self) -> str:
+        """A table, and a line for every file left out."""
+        lines = list(self._lines())
+        lines += [f"Left out: {file}: {reason}" for file, reason in self.skipped]
+        return "\n".join(lines)
+
+    def _lines(self) -> Iterator[str]:
+        if not self.entries:
+            yield f"{self.folder}: no data sets ({', '.join(ENDINGS)})."
+            return
+        emulated = sum(e.summary.origin == "emulated" for e in self.entries)
+        if emulated:
+            yield (
+                f"EMULATED: {emulated} of {len(self.entries)} data sets come from simulated "
+                "devices; nothing was measured there."
+            )
+        yield from _table([_HEADER, *map(_cells, self.entries)])
+        if any(e.stiffness is None for e in self.entries):
+            yield "k is -: not analysed yet; `rig list --analyze` or `rig analyze FILE` does it."
+
+
+def list_folder(
+    folder: Path, *, analyze: bool = False, progress: Progress | None = None
+) -> Listing:
+    """The data sets in a folder and below it, hidden folders left out. analyze: k is computed where
+    it is not known yet. InputError if there is no such folder; nothing else stops it."""
+    if not folder.is_dir():
+        what = "a file" if folder.exists() else "no such folder"
+        raise InputError(f"{folder}: {what}; a folder with data sets is wanted.")
+    files = list(_files(folder))
+    seals = {path: _seal(path) for path in files}
+    known = recall({s for s in seals.values() if s})
+    fresh: dict[str, Any] = {}
+    entries, skipped = [], []
+    for i, path in enumerate(files):
+        name = str(path.relative_to(folder))
+        try:
+            found = known.get(seals[path], {})
+            entries.append(_entry(path, name, found, seals[path], fresh))
+        except InputError as error:
+            skipped.append((name, str(error).removeprefix(f"{path}: ")))
+        if progress:
+            progress("reading", (i + 1) / len(files))
+    remember("summary", fresh)
+    if analyze:
+        entries = _analyzed(folder, entries, seals, skipped, progress)
+    return Listing(folder, tuple(entries), tuple(skipped))
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """Data sets by their ending, and those of which there is only a journal yet; sorted."""
+    for here, folders, names in os.walk(folder):
+        folders[:] = sorted(f for f in folders if not f.startswith("."))
+        wanted = {n for n in names if n.lower().endswith(ENDINGS) and not n.startswith(".")}
+        wanted |= {
+            n.removesuffix(_JOURNAL)
+            for n in names
+            if n.endswith(_JOURNAL) and n.removesuffix(_JOURNAL).lower().endswith(ENDINGS)
+        }
+        yield from (Path(here) / n for n in sorted(wanted))
+
+
+def _seal(path: Path) -> str:
+    """Key of the catalogue; "" for what can't be looked up."""
+    try:
+        return "" if journal_path(path).exists() else seal_of(path)
+    except OSError:
+        return ""
+
+
+def _entry(
+    path: Path, name: str, found: Mapping[str, Any], seal: str, fresh: dict[str, Any]
+) -> Entry:
+    journal = journal_path(path)
+    if journal.exists():
+        return Entry(name, journal_summary(journal), None, None, open=True)
+    if "summary" in found:
+        kept = found["summary"]
+        summary = Summary(**{**kept, "directions": tuple(kept["directions"])})
+    else:
+        summary = read_summary(path)
+        fresh[seal] = asdict(summary)
+    return Entry(name, summary, found.get("stiffness"), found.get("verdict"), open=False)
+
+
+def _analyzed(
+    folder: Path,
+    entries: list[Entry],
+    seals: Mapping[Path, str],
+    skipped: list[tuple[str, str]],
+    progress: Progress | None,
+) -> list[Entry]:
+    """The entries with k, also of open ones; what can't be analysed is left out with its reason."""
+    from rig.analyze import analyze
+    from rig.dataset import load
+
+    out = []
+    for i, entry in enumerate(entries):
+        path = folder / entry.file
+        if entry.stiffness is None:
+            try:
+                found = stiffness_of(analyze(load(path)).to_json())
+            except InputError as error:
+                skipped.append((entry.file, str(error).removeprefix(f"{path}: ")))
+                continue
+            remember("stiffness", {seals[path]: found})
+            out.append(replace(entry, stiffness=found))
+        else:
+            out.append(entry)
+        if progress:
+            progress("analysing", (i + 1) / len(entries))
+    return out
+
+
+def _json(e: Entry) -> dict[str, Any]:
+    summary = asdict(e.summary)
+    return {
+        "file": e.file,
+        **{k: summary[k] for k in ("uuid", "created", "title", "robot")},
+        "directions": list(e.summary.directions),
+        "samples": e.summary.rows,
+        "origin": e.summary.origin,
+        "complete": e.summary.complete,
+        "journal": e.open,
+        "stiffness_N_per_mm": None if e.stiffness is None else dict(e.stiffness),
+        "verdict": None if e.verdict is None else dict(e.verdict),
+    }
+
+
+_HEADER = ("file", "date", "robot", "directions", "k N/mm", "verdict", "samples", "state")
+
+
+def _cells(e: Entry) -> tuple[str, ...]:
+    s = e.summary
+    return (
+        e.file,
+        s.created[:16].replace("T", " "),
+        s.robot,
+        " ".join(s.directions),
+        _stiffness(e),
+        "-" if e.verdict is None else f"{e.verdict['word']} {e.verdict['probability']:.0%}",
+        str(s.rows),
+        e.state,
+    )
+
+
+def _stiffness(e: Entry) -> str:
+    """`x 95.94, y 57.42`; undefined where the data define none."""
+    if e.stiffness is None:
+        return "-"
+    values = {d: q["value"] for d, q in e.stiffness.items()}
+    return ", ".join(f"{d} {'undefined' if v is None else number(v)}" for d, v in values.items())
+
+
+def _table(rows: list[tuple[str, ...]]) -> Iterator[str]:
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    for row in rows:
+        cells = (
+            cell.rjust(w) if i == 6 else cell.ljust(w)
+            for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+        )
+        yield "  ".join(cells).rstrip()
