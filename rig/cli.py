@@ -168,6 +168,10 @@ def analyze(
     )
     result = analysis.analyze(load(dataset), options)
     give(result, json_file)
+    if options == analysis.Options():
+        from rig.catalogue import remember_result
+
+        remember_result(dataset, result)
     if figures is not None:
         from rig.figures import draw
 
@@ -330,6 +334,10 @@ def diagnose(
             progress=progress,
         )
     give(result, json_file)
+    if not (model or simulation or add or withhold):
+        from rig.catalogue import remember_result
+
+        remember_result(dataset, result)
     if write_model is not None:
         from rig.gap_model import write_model as write
 
@@ -436,6 +444,23 @@ def report(
         _list_written([pdf])
     if figures is not None:
         _list_written(reports.write_figures(result, figures))
+
+
+@app.command("list")
+def list_(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER")] = Path(),
+    analyze: Annotated[
+        bool, typer.Option("--analyze", help="Compute k where it is not known yet.")
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """The data sets of a folder: date, robot, directions, k, verdict, complete or not."""
+    from rig.listing import list_folder
+    from rig.terminal import terminal_progress
+
+    with terminal_progress() as progress:
+        result = list_folder(folder, analyze=analyze, progress=progress)
+    give(result, json_file)
 
 
 @app.command("import")
