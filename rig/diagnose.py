@@ -4,7 +4,7 @@ gap shrinks once that effect is added."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from rig.gap_data import gap_data
 from rig.gap_forms import effects_of
 from rig.meta import Simulation
 from rig.model import load_model
+from rig.other_setups import elsewhere
 
 MM = 1e3  # mm per m
 Progress = Callable[[str, float], None]
@@ -53,6 +54,9 @@ class Diagnosis:
                 "text": r.next_measurement.text,
                 "separates": list(r.next_measurement.separates),
                 "kind": r.next_measurement.kind,
+                "expected_nats": r.next_measurement.expected_nats,
+                "minutes": r.next_measurement.minutes,
+                "alternatives": [asdict(o) for o in r.next_measurement.alternatives],
             },
             "remainder_mm": r.remainder * MM,
             "runners_up": {w: {"held_out_after_rms_mm": v * MM} for w, v in r.runners_up.items()},
@@ -87,7 +91,13 @@ def diagnose(
     if simulation is not None:
         data = _with_curves(data, simulation)
     try:
-        result = diagnose_gap(data, withhold=withhold, add=add, progress=progress)
+        result = diagnose_gap(
+            data,
+            withhold=withhold,
+            add=add,
+            others=lambda: elsewhere(dataset),
+            progress=progress,
+        )
     except ValueError as error:
         raise InputError(f"{dataset.path or 'data set'}: {error}.") from error
     return Diagnosis(dataset.uuid, result, dataset.banners(), known)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array, GapData, Ints
-from identification.gap.discriminate import NextMeasurement, next_measurement
+from identification.gap.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.fit import Fit, fit
@@ -18,8 +18,11 @@ from identification.gap.heldout import HeldOut, folds, held_out, stated_predicti
 from identification.gap.locate import Where, locate
 from identification.gap.parameters import Parameter, parameters
 from identification.gap.search import Explanation, Found, refine_knees, search
+from identification.gap.variants import Variant
 
-ALIKE = 3.0  # nats within which two words explain data equally well (odds of 20 to 1)
+# Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
+# laws themselves are only families.
+ALIKE = 4.6
 Progress = Callable[[str, float], None]
 
 
@@ -67,10 +70,12 @@ def diagnose_gap(
     *,
     withhold: Iterable[str] = (),
     add: Iterable[str] = (),
+    others: Others | None = None,
     progress: Progress | None = None,
 ) -> GapResult:
     """The diagnosis of a data set. withhold: words taken out of the library; add: words that the
-    explanation must contain. Raises ValueError for unknown words."""
+    explanation must contain; others: setups that the rig could take up next. Raises ValueError for
+    unknown words."""
     tell = progress or _silent
     out, forced = set(withhold), frozenset(add)
     _check_words(out | forced)
@@ -91,6 +96,10 @@ def diagnose_gap(
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     chosen = _chosen(found, verdict, forced)
     result = _result(bench, engine, found, verdict, chosen)
+    tell("what to measure next", 0.9)
+    result = replace(
+        result, next_measurement=_next(found, variants, chosen, verdict, result.effects, others)
+    )
     tell("done", 1.0)
     return result
 
@@ -138,7 +147,7 @@ def _result(
         after=_sample_rms(bench, left),
         held_out=held,
         runners_up=_runners_up(engine, found, verdict, ways),
-        next_measurement=_next(bench, found, verdict, effects),
+        next_measurement=None,
         remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
         notes=_notes(bench),
         bench=bench,
@@ -199,18 +208,23 @@ def _runners_up(
 
 
 def _next(
-    bench: Bench, found: Found, verdict: str, effects: tuple[Effect, ...]
+    found: Found,
+    variants: list[Variant],
+    chosen: Explanation,
+    verdict: str,
+    effects: tuple[Effect, ...],
+    others: Others | None,
 ) -> NextMeasurement | None:
     """For the first pair that can't be told apart; for an unsure verdict, its nearest rival."""
     for e in effects:
         for other in e.indistinguishable_from:
-            proposal = next_measurement(bench, e.name, other)
+            proposal = next_measurement(found, variants, chosen, (e.name, other), others)
             if proposal is not None:
                 return proposal
     ranked = sorted(found.probabilities.items(), key=lambda i: -i[1])
     words = [w for w, p in ranked[:2] if p > 0.02 and w in WORDS]
     if verdict in WORDS and len(words) == 2:
-        return next_measurement(bench, words[0], words[1])
+        return next_measurement(found, variants, chosen, (words[0], words[1]), others)
     return None
 
 

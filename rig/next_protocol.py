@@ -1,0 +1,182 @@
+"""What to measure next, as a protocol file that `rig check` and `rig measure` take."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from identification.gap.designs import Design
+from identification.gap.discriminate import NextMeasurement
+from rig.dataset import Dataset
+from rig.diagnose import Diagnosis
+from rig.errors import InputError
+from rig.meta import Meta
+from rig.model import load_robot
+from rig.other_setups import other_poses
+from rig.plan import plan
+from rig.protocol import MeasurementProtocol, parse_protocol
+from rig.protocolfile import Settle
+from rig.station import load_station
+from rig.storage.files import in_place_of
+
+_LASER_MM = 9.0  # of a range of 10 mm
+_SETTLE = Settle(
+    window_s=4, force_slope_N_per_s=0.05, force_spread_N=0.3, displacement_slope_mm_per_s=0.002,
+    displacement_spread_mm=0.01, deadline_s=60, at_deadline="record",
+)  # fmt: skip
+_GENTLER = 0.7  # loads times this, where arm, laser or dynamometer could not take them
+_TRIES = 4
+
+
+def write_next(diagnosis: Diagnosis, dataset: Dataset, path: Path) -> str:
+    """Writes the proposed procedure; what to tell the user. Without a proposal nothing is written,
+    and the text says why. InputError for a rig without an arm, or if the folder refuses."""
+    proposal = diagnosis.result.next_measurement
+    if proposal is None:
+        return f"{path}: not written. No two effects are left that a measurement should separate."
+    if proposal.design is None:
+        return f"{path}: not written. {proposal.text}"
+    if dataset.meta.robot == "none":
+        raise InputError(
+            f"{dataset.path or 'data set'}: robot: none. A protocol file is for an arm; what to do "
+            f"on this rig: {proposal.text}"
+        )
+    text = next_text(proposal, dataset)
+    with in_place_of(path) as temporary:
+        temporary.write_text(text, "utf-8")
+    return f"{path}: written. Next: rig check {path}"
+
+
+def next_text(proposal: NextMeasurement, dataset: Dataset) -> str:
+    """The protocol file. Loads are lowered until arm, laser and dynamometer can take them."""
+    design = proposal.design
+    assert design is not None
+    old = _old_protocol(dataset)
+    station = "emulated" if dataset.origin == "emulated" else old.station if old else "ur10e_lab"
+    for _ in range(_TRIES):
+        text = "\n".join(_lines(proposal, design, dataset, old, station)) + "\n"
+        try:
+            plan(parse_protocol(text, Path("next.yaml")), load_station(station))
+        except InputError as error:
+            refusal = error
+            levels = tuple(tuple(_GENTLER * f for f in one) for one in design.levels)
+            design = replace(design, levels=levels)
+        else:
+            return text
+    raise InputError(f"The proposed procedure can't be carried out: {refusal}")
+
+
+def _old_protocol(dataset: Dataset) -> MeasurementProtocol | None:
+    """The protocol that the data set was measured with; None for an imported table."""
+    text = dataset.texts.get("protocol", "")
+    if not text:
+        return None
+    try:
+        return parse_protocol(text, dataset.path or Path("data set"))
+    except InputError:
+        return None
+
+
+def _lines(
+    proposal: NextMeasurement, design: Design, dataset: Dataset,
+    old: MeasurementProtocol | None, station: str,
+) -> Iterator[str]:  # fmt: skip
+    one, other = proposal.separates
+    yield from (f"# {line}" for line in textwrap.wrap(f"To tell {one} from {other}. "
+                                                      f"{proposal.text}", 96))  # fmt: skip
+    for banner in dataset.banners():
+        yield f"# Derived from data that are {banner}"
+    meta = dataset.meta
+    yield "schema: rig.protocol/1"
+    yield f"title: {json.dumps(f'To tell {one} from {other}')}"
+    yield f"station: {station}"
+    yield f"\nrobot: {meta.robot}"
+    yield "poses:"
+    yield from _poses(design, meta)
+    yield "move_arm: false"
+    yield f"joint_encoder: {'output' if design.readings else meta.joint_encoder}"
+    yield "\ndirections:"
+    vectors = {s.direction: s.unit_vector for s in design.setups}
+    for name, vector in vectors.items():
+        sign = _sense(design, name)
+        yield f"  {json.dumps(name)}: [{_list(sign * vector, 9)}]"
+    stop = _displacement_mm(old)
+    yield "\nruns:"
+    for setup, levels in zip(design.setups, design.levels, strict=True):
+        yield (
+            f"  - {{pose: {setup.pose}, direction: {json.dumps(setup.direction)}, "
+            f"steps_N: [{_list(np.abs(levels), 5)}], stop_at_displacement_mm: {0.8 * stop:.3g}}}"
+        )
+    yield f"repetitions: {design.repetitions}"
+    yield f"branches: {'loading-unloading' if design.unload else 'loading'}"
+    yield "order: by_run"
+    yield from _timing(design, old)
+    top = max(abs(f) for one in design.levels for f in one)
+    yield "\nlimits:"
+    yield f"  force_N: {{max: {1.15 * top + 5:.0f}, at: stop}}"
+    yield f"  displacement_mm: {{max: {stop:g}, at: stop}}"
+    yield "  displacement_rate_mm_per_s: {max: 3, at: warn}"
+    yield "  joint_deviation_deg: {max: 5, at: stop}"
+    yield "  joint_temperature_C: {max: 60, at: stop}"
+
+
+def _sense(design: Design, direction: str) -> float:
+    """-1 where the loads count against the direction: the screw only pushes."""
+    for setup, levels in zip(design.setups, design.levels, strict=True):
+        if setup.direction == direction:
+            return -1.0 if levels[-1] < 0 else 1.0
+    return 1.0
+
+
+def _poses(design: Design, meta: Meta) -> Iterator[str]:
+    known = {name: np.array(p.q_rad) for name, p in meta.poses.items()}
+    tcp = {name: p.tcp_xyz_mm for name, p in meta.poses.items()}
+    first = design.setups[0].pose
+    for name, (_, q) in other_poses(load_robot(meta.robot), meta, first).items():
+        known.setdefault(name, q)
+        tcp.setdefault(name, tcp[first])
+    for name in dict.fromkeys(s.pose for s in design.setups):
+        yield (
+            f"  {name}: {{q_rad: [{_list(known[name], 9)}], "
+            f"tcp_xyz_mm: [{_list(np.array(tcp[name]), 6)}], program: null}}"
+        )
+
+
+def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
+    rate = float(np.clip(1 / design.sample_s, 0.1, 10))
+    settle = old.settle if old else _SETTLE
+    gap = min(float(np.diff([0.0, *np.sort(np.abs(levels))]).min()) for levels in design.levels)
+    top = max(abs(f) for levels in design.levels for f in levels)
+    samples = max(1, min(5, round(design.hold_s * rate)))
+    hold = design.hold_s if design.hold_s * rate > samples else 0.0
+    zero = max(design.zero_s, 6.0, 1 / rate)
+    yield f"\nsampling: {{rate_Hz: {rate:.4g}, samples_per_step: {samples}}}"
+    yield f"hold_s: {hold:.5g}"
+    yield (
+        f"force_band: {{absolute_N: {min(0.5, gap / 4):.3g}, "
+        f"relative: {min(0.01, gap / (4 * top)):.3g}}}"
+    )
+    yield "settle:"
+    for key in (
+        "window_s", "force_slope_N_per_s", "force_spread_N", "displacement_slope_mm_per_s",
+        "displacement_spread_mm", "deadline_s", "at_deadline",
+    ):  # fmt: skip
+        yield f"  {key}: {getattr(settle, key)}"
+    yield f"step_deadline_s: {old.step_deadline_s if old else 300:g}"
+    yield f"zero: {{before_s: {zero:.5g}, after_s: {zero:.5g}}}"
+    yield f"rest_s: {min(design.rest_s, 3600):.5g}"
+    yield "rated_load_N: null"
+
+
+def _displacement_mm(old: MeasurementProtocol | None) -> float:
+    limit = None if old is None else old.limits.displacement_mm
+    return min(limit.max, _LASER_MM) if limit is not None else _LASER_MM
+
+
+def _list(values: object, digits: int) -> str:
+    return ", ".join(f"{v:.{digits}g}" for v in np.asarray(values, dtype=float))
