@@ -78,11 +78,11 @@ def measure(
         bool, typer.Option("--panel", help="Serve the operator's page, and print its link.")
     ] = False,
     panel_host: Annotated[
-        str,
+        str | None,
         typer.Option(
-            metavar="ADDRESS", help="Where the page is served; beyond 127.0.0.1 links hold tokens."
+            metavar="ADDRESS", help="Serve it there instead of 127.0.0.1, to a network: no cipher."
         ),
-    ] = "127.0.0.1",
+    ] = None,
     panel_port: Annotated[
         int | None,
         typer.Option(min=1, max=65535, help="Its port; left out: 8321, or a free one."),
@@ -95,11 +95,13 @@ def measure(
     """Carry out a procedure on a station, guide the operator, write the data set."""
     from rig import measure as measuring
     from rig.errors import InputError
-    from rig.panel.link import PanelOptions
+    from rig.panel.link import DEFAULT_HOST, PanelOptions
 
     if (protocol is None) == (resume is None):
         raise InputError("rig measure: give a PROTOCOL.yaml, or --resume DATASET.h5.")
-    page = PanelOptions(panel_host, panel_port) if panel else None
+    page = None
+    if panel or panel_host is not None or panel_port is not None:
+        page = PanelOptions(panel_host or DEFAULT_HOST, panel_port)
     if resume is not None:
         path = measuring.resume(resume, say, page)
     else:

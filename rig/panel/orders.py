@@ -33,7 +33,7 @@ def order(request: object, state: Mapping[str, Any] | None) -> dict[str, str]:
     Raises Refused. The measuring process checks again: the question may be answered meanwhile.
     """
     command = request.get("command") if isinstance(request, dict) else None
-    if not isinstance(request, dict) or command not in COMMANDS:
+    if not isinstance(request, dict) or not isinstance(command, str) or command not in COMMANDS:
         raise Refused(400, f"A command is one of {', '.join(COMMANDS)}.")
     if state is None:
         raise Refused(409, "The measurement has not begun yet.")

@@ -114,7 +114,7 @@ class Panel(Onlooker):
                 discard = Discard(data["first"], data["last"], data["reason"])
                 self._link.add({"discard": discard})
             if data["kind"] not in SILENT_EVENTS:
-                self.log(data["text"])
+                self.log(_in_words(data))
 
     def log(self, text: str, level: Level = "info") -> None:
         """One line for everybody who looks on."""
@@ -240,6 +240,15 @@ class Panel(Onlooker):
                 question.done.set()
             elif name in COMMANDS:
                 self._wishes.append(COMMANDS[name])
+
+
+def _in_words(event: Mapping[str, Any]) -> str:
+    """An event of the journal for people."""
+    if event["kind"] == "repetition_start":
+        return f"{event['direction']}, repetition {event['repetition']} begins"
+    if event["kind"] == "prompt":
+        return f"{event['text']} Answer: {event['answer']}"
+    return str(event["text"])
 
 
 def start_panel(
