@@ -166,9 +166,14 @@ class Bench:
             return self.stacked(motion)
         return self.stacked(-motion, self._follow(-motion))
 
+    @property
+    def stated_slope(self) -> Array:
+        """(n,) m/N: compliance along the direction as simulated, by which a response is a force."""
+        return np.asarray(self.lever**2 @ self.data.compliance)
+
     def _follow(self, response: Array) -> Array:
         """Deflections (n, m) of the joints under the force behind a response (n,) m."""
-        per_newton = np.sum(self.lever**2 * self.data.compliance, axis=1)  # as `response` has it
+        per_newton = self.stated_slope
         force = np.divide(response, per_newton, out=np.zeros_like(response), where=per_newton > 0)
         return np.asarray(self._unit_elastic() * force[:, None])
 

@@ -75,9 +75,13 @@ def _backlash(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Paramete
     }
 
 
-def _curve(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    change = _linear(np.ones(len(w)), w, cov, "1", bench.sense)
-    return {"change_of_compliance_over_range": change}
+def _curve(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    """What the compliance at the largest torque has more than at none: a hinge adds itself, a
+    power its exponent, a line nothing."""
+    grows = {"line": 0.0, "quadratic": 2.0, "even": 2.0, "cubic": 3.0}
+    change = np.array([grows.get(kind, 1.0) for kind in part.variant.info["kinds"]])
+    out = _linear(change, w, cov, "1", bench.sense)
+    return {"change_of_compliance_over_range": out}
 
 
 def _creep(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
@@ -104,9 +108,11 @@ def _stiffness(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Para
     return out
 
 
-def _gain(_: Bench, __: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _gain(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    """Read over true. The columns are shares of what was read, but for an imposed displacement."""
     g = _one(w, cov, 0, "1")
-    return {"factor": Parameter(1 + g.value, 1 + g.low, 1 + g.high, "1")}
+    ends = [1 + v if bench.imposed else 1 / max(1 - v, 0.02) for v in (g.value, g.low, g.high)]
+    return {"factor": Parameter(ends[0], ends[1], ends[2], "1")}
 
 
 def _links(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:

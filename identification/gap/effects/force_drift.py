@@ -23,16 +23,13 @@ SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
 
 def variants(bench: Bench) -> list[Variant]:
     """Warm-up paths, each alone, and a free smooth path."""
-    if bench.imposed:
-        return _imposed(bench)
-    top = float(np.abs(bench.rows.force).max())
+    top = float(np.abs(bench.rows.measured_force).max())
     scales = tuple(s * top for s in SHARES)
     if not top > 0:
         return []
 
     def column(path: Array) -> int:
-        d = _tared(bench, path)
-        return bench.add(bench.force_column(-d) + bench.stacked(zero_force=d))
+        return bench.add(drifting(bench, _tared(bench, path)))
 
     out = [
         variant(WORD, label, [column(path)], scales, positive=False, path=label)
@@ -47,14 +44,12 @@ def variants(bench: Bench) -> list[Variant]:
     return out
 
 
-def _imposed(bench: Bench) -> list[Variant]:
-    """Force is the answer: its drift adds to it."""
-    scales = tuple(s * bench.reach for s in SHARES)
-    return [
-        variant(WORD, label, [bench.add(bench.stacked(_tared(bench, path)))], scales,
-                positive=False, path=label)
-        for label, path in warm_ups(bench).items()
-    ]  # fmt: skip
+def drifting(bench: Bench, d: Array) -> Array:
+    """(size,): what a drift (n,) N of the readings does. Where the displacement is imposed,
+    force is the answer, and its drift adds to it."""
+    if bench.imposed:
+        return bench.stacked(bench.stated_slope * d)
+    return bench.force_column(-d) + bench.stacked(zero_force=d)
 
 
 def _tared(bench: Bench, path: Array) -> Array:

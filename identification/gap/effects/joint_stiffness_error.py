@@ -4,8 +4,8 @@ Same columns as the six springs of the base, with a wide prior: a joint may be h
 stiff; a bench's spring may be off by ten.
 
 Size: half to twice as stiff; a bench's spring ten times off.
-Prior: relative compliances of either sign, sd SCALES times twice what META states (at least 0.2); of
-a bench's spring BENCH_SCALES besides, equally likely.
+Prior: relative compliances of either sign, sd SCALES times twice what META states (at least 0.2);
+of a bench's spring BENCH_SCALES besides, equally likely.
 Source: scatter between gears of one size, and simulators set up from catalogues.
 """
 

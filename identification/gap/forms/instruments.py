@@ -55,9 +55,9 @@ def lag(bench: Bench, law: Law) -> list[Array]:
 
 
 def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms of the path; of an imposed displacement, as displacement of the simulated spring."""
+    """Terms of the path."""
     constants, terms, scale = _path(bench, str(v.info["path"]))
-    return Law(constants | {"quantity": "displacement" if bench.imposed else "force"}, terms), scale
+    return Law(constants | {"quantity": "force"}, terms), scale
 
 
 def describe_thermal(bench: Bench, v: Variant) -> tuple[Law, Array]:
@@ -78,10 +78,7 @@ def drift_of_force(bench: Bench, law: Law) -> list[Array]:
     out = []
     for t in law.terms:
         d = force_drift._tared(bench, _moved(bench, law, t))
-        if bench.imposed:
-            out.append(bench.stacked(d))
-        else:
-            out.append(bench.force_column(-d) + bench.stacked(zero_force=d))
+        out.append(force_drift.drifting(bench, d))
     return out
 
 
