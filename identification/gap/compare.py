@@ -75,7 +75,7 @@ def _score_batch(
         gain = 1 + s2 * values[:, None, :]
         mean = s2 * beta[:, None, :] / gain
         fit = 0.5 * np.sum(mean * beta[:, None, :], axis=2) - 0.5 * np.log(gain).sum(axis=2)
-        fit += _sign(batch, vectors, mean, s2 / gain)
+        fit += _sign(batch, vectors, mean, s2 / gain, s2)
         turned = np.einsum("vij,vsj->vsi", vectors, mean)
         energy = np.einsum("vsi,vij,vsj->vs", turned, plain, turned)
         logs[i] = level.log_base + fit + _log_level(etas, i, energy + already)
@@ -97,23 +97,34 @@ def _rotate(level: Level, columns: Array, root: Array) -> Array:
     return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
 
 
-def _sign(batch: list[Variant], vectors: Array, mean: Array, variance: Array) -> Array:
-    """log of P(sum of coefficients > 0 | data) / P(... | prior), (v, s); 0 where signs are free."""
+def _sign(batch: list[Variant], vectors: Array, mean: Array, variance: Array, s2: Array) -> Array:
+    """What the signs that physics wants add to the log evidence, (v, s); 0 where they are free.
+
+    mean, variance, s2 (v, s, k or 1): of the coefficients in the eigenvectors, and their prior's.
+    """
     from scipy.special import log_ndtr
 
-    out = np.zeros(mean.shape[:2])
-    want = np.array([v.positive is not None for v in batch])
-    if not want.any():
-        return out
+    if not any(v.positive is not None for v in batch):
+        return np.zeros(mean.shape[:2])
     k = mean.shape[2]
-    functional = np.stack(
-        [v.root.T @ (v.positive if v.positive is not None else np.zeros(k)) for v in batch]
-    )
-    turned = np.einsum("vji,vj->vi", vectors, functional)
-    centre = np.einsum("vi,vsi->vs", turned, mean)
-    spread = np.sqrt(np.einsum("vi,vsi->vs", turned**2, variance)) + 1e-300
-    factor = log_ndtr(centre / spread) - np.log(0.5)
-    return np.where(want[:, None], factor, 0.0)
+    wanted = [v.positive if v.positive is not None else np.zeros(k) for v in batch]
+    least = np.array([v.least for v in batch])[:, None]
+    root = np.stack([v.root for v in batch])
+    spread = np.einsum("vij,vjk->vik", root, vectors)  # of each coefficient, from the eigenvectors
+    turned = np.einsum("vi,vik->vk", np.stack(wanted), spread)
+    centre = np.einsum("vk,vsk->vs", turned, mean)
+    after = np.sqrt(np.einsum("vk,vsk->vs", turned**2, variance)) + 1e-300
+    before = np.sqrt(s2[:, :, 0] * np.sum(turned**2, axis=1)[:, None]) + 1e-300
+    total = log_ndtr((centre - least) / after) - log_ndtr(-least / before)
+    want = np.array([v.positive is not None for v in batch])
+    out = np.where(want[:, None], total, 0.0)
+    each = np.array([v.each for v in batch])
+    if k > 1 and each.any():
+        centres = np.einsum("vik,vsk->vsi", spread[each], mean[each])
+        sds = np.sqrt(np.einsum("vik,vsk->vsi", spread[each] ** 2, variance[each])) + 1e-300
+        alone = np.minimum(log_ndtr(centres / sds) - np.log(0.5), 0.0)
+        out[each] += alone.sum(axis=2)
+    return np.asarray(out)
 
 
 def raw_gram(engine: Engine, variant: Variant) -> Array:

@@ -85,10 +85,15 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
     for p in parts:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
-        if p.variant.positive is not None:
-            f = p.variant.positive
-            spread = float(np.sqrt(f @ covariance[s, s] @ f)) + 1e-300
-            out += min(0.0, float(log_ndtr(float(f @ w[s]) / spread)) - log(0.5))
+        v = p.variant
+        if v.positive is not None:
+            spread = float(np.sqrt(v.positive @ covariance[s, s] @ v.positive)) + 1e-300
+            before = float(np.linalg.norm(v.positive @ p.root)) + 1e-300
+            odds = log_ndtr((v.positive @ w[s] - v.least) / spread) - log_ndtr(-v.least / before)
+            out += min(0.0, float(odds))
+        if v.each:
+            sds = np.sqrt(np.diag(covariance[s, s])) + 1e-300
+            out += float(np.minimum(log_ndtr(w[s] / sds) - log(0.5), 0.0).sum())
     return out
 
 

@@ -92,11 +92,16 @@ class Found:
     unknown_eta: float
 
 
-def prior_of(count: int) -> float:
-    """log prior of one set of `count` words."""
-    if count == 0:
+# A bolted stand slips less often than a joint or its controller gives way.
+LOG_RARE = {"base_slip": log(0.5)}
+
+
+def prior_of(words: frozenset[str]) -> float:
+    """log prior of one set of words."""
+    if not words:
         return LOG_NONE
-    return LOG_ONE + (count - 1) * LOG_MORE - log(comb(WORD_COUNT, count))
+    rare = sum(LOG_RARE.get(w, 0.0) for w in words)
+    return LOG_ONE + (len(words) - 1) * LOG_MORE - log(comb(WORD_COUNT, len(words))) + rare
 
 
 def search(engine: Engine, variants: list[Variant], deepest: int = 3) -> Found:
@@ -134,7 +139,8 @@ def refine_knees(engine: Engine, variants: list[Variant]) -> list[Variant]:
         if word not in ranked or _marginal(by_word[word]) < none + _WINDOW:
             continue
         places: dict[object, Scored] = {}
-        for s in sorted(by_word[word], key=lambda s: -s.log_evidence):
+        sharp = [s for s in by_word[word] if s.variant.info["knee"] == "sharp"]
+        for s in sorted(sharp, key=lambda s: -s.log_evidence):
             places.setdefault((s.variant.info.get("joint"), s.variant.info.get("axis")), s)
         for s in list(places.values())[:_REFINED]:
             out += refined(engine.bench, s.variant)
@@ -256,7 +262,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     share = np.exp(logs - logs.max())
     fraction = float(share[good].sum() / share.sum())
     order = np.argsort(-each, kind="stable")
-    weight = log_evidence + prior_of(len(parts))
+    weight = log_evidence + prior_of(frozenset(p.word for p in parts))
     if len(parts) > 1:
         weight -= _pettiness(engine, parts, each)
         weight += signs_kept(levels[best], parts)

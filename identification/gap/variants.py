@@ -14,8 +14,9 @@ from identification.gap.data import Array
 @dataclass(frozen=True, eq=False)
 class Variant:
     """columns: k indices of the pool. root (k, k): prior covariance of the coefficients is
-    `s^2 root root^T` for s out of `scales`, all equally likely. positive: coefficients whose sum
-    physics wants positive (None: either sign). info: what the parameters are reported from.
+    `s^2 root root^T` for s out of `scales`, all equally likely. positive (k,): weights of a sum of
+    coefficients that physics wants above `least` (None: either sign). each: none of the
+    coefficients may be negative either. info: what the parameters are reported from.
     """
 
     word: str
@@ -24,6 +25,8 @@ class Variant:
     scales: tuple[float, ...]
     root: Array
     positive: Array | None = None
+    least: float = 0.0
+    each: bool = False
     info: Mapping[str, Any] = field(default_factory=dict)
     prior: float = 1.0
 
@@ -36,6 +39,8 @@ def variant(
     root: Array | None = None,
     positive: bool | Array = True,
     prior: float = 1.0,
+    least: float = 0.0,
+    each: bool = False,
     **info: Any,
 ) -> Variant:
     """A variant with independent unit priors unless `root` says otherwise."""
@@ -47,6 +52,8 @@ def variant(
         scales,
         np.eye(k) if root is None else root,
         positive if isinstance(positive, np.ndarray) else (np.ones(k) if positive else None),
+        least,
+        each,
         info,
         prior,
     )

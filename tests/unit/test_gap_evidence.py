@@ -14,10 +14,12 @@ from identification.gap.effects import WORDS, library
 from identification.gap.evidence import (
     HOLD_PART,
     ROW_PART,
+    RUN_PART,
     Engine,
     level_columns,
     level_covariance,
     row_noise,
+    run_columns,
 )
 from identification.gap.search import prior_of, search
 from identification.gap.variants import variant
@@ -61,7 +63,8 @@ def dense_covariance(engine: Engine, eta: float, row_part: float = ROW_PART) -> 
     L = level_columns(bench)
     levels = eta**2 * L @ level_covariance(bench) @ L.T
     base = engine.base.columns * engine.base.sd
-    return white + hold + spread + levels + base @ base.T
+    runs = RUN_PART * eta * run_columns(bench)
+    return np.asarray(white + hold + spread + levels + runs @ runs.T + base @ base.T)
 
 
 def test_evidence_is_the_dense_gaussian_marginal() -> None:
@@ -109,7 +112,10 @@ def test_score_averages_over_scales_and_asks_for_the_sign() -> None:
 
 def test_priors_of_all_sets_up_to_two_sum_below_one() -> None:
     n = len(WORDS)
-    total = np.exp(prior_of(0)) + n * np.exp(prior_of(1)) + n * (n - 1) / 2 * np.exp(prior_of(2))
+    none, one = frozenset[str](), frozenset({"joint_yield"})
+    two = one | {"joint_creep"}
+    total = np.exp(prior_of(none)) + n * np.exp(prior_of(one))
+    total += n * (n - 1) / 2 * np.exp(prior_of(two))
     assert 0.85 < total < 1.0
 
 

@@ -3,6 +3,10 @@
 Kelvin-Voigt elements behind a joint's spring: `T z' = tau - z`; any linear creep compliance is a
 spectrum of retardation times (Prony series, power and log laws included; Findley 1976). The
 coefficients are compliances in units of the joint's own: polymers, grease and gears 1 to 50 %.
+
+Size: 1 to 50 % of the elastic deflection: polymers, grease, gears.
+Prior: shares positive in sum, sd out of SCALES, equally likely; half of it on the whole spectrum.
+Source: Findley 1976.
 """
 
 from __future__ import annotations
@@ -38,11 +42,12 @@ def variants(bench: Bench) -> list[Variant]:
         columns = [bench.add_joint(j, bench.sense * c * z[:, k]) for k in range(len(spectrum))]
         out.append(
             variant(WORD, f"joint {j + 1} spectrum", columns, SCALES,
-                    smooth_root(len(columns), 0.5), prior=0.5, joint=j, times_s=spectrum)
+                    smooth_root(len(columns), 0.5), prior=0.5, each=True, joint=j, times_s=spectrum)
         )  # fmt: skip
         for k in range(len(columns) - 1):
             out.append(
                 variant(WORD, f"joint {j + 1} T {spectrum[k]:.3g} s", columns[k : k + 2], SCALES,
-                        prior=0.5 / (len(columns) - 1), joint=j, times_s=spectrum[k : k + 2])
+                        prior=0.5 / (len(columns) - 1), each=True, joint=j,
+                        times_s=spectrum[k : k + 2])
             )  # fmt: skip
     return out

@@ -5,7 +5,11 @@ spring feels so much less, and deflects less. A spectrum of strengths makes any 
 Masing's rules (Iwan 1967). Friction that does not obey them: an asperity model whose bristles
 bend exponentially (Dahl 1968), one that lets go elastically (Bouc 1967, Wen 1976; beta = gamma).
 The coefficients are the shares of the joint's compliance that work through friction, 0 to 1.
-Size: gears of ratio >= 80 lose about 1 arcmin; friction is 2 to 20 % of the torque they see.
+
+Size: friction of 2 to 20 % of the torque gears see; about 1 arcmin lost at ratio >= 80.
+Prior: shares positive in sum, sd out of SCALES, equally likely; spectrum and single strengths a
+quarter each, exponential laws the rest.
+Source: hysteresis loss in catalogues of strain wave gears.
 """
 
 from __future__ import annotations
@@ -64,13 +68,15 @@ def _spectrum(
         for k in range(len(radius))
     ]
     root = smooth_root(len(columns), 0.6, 0.3)
-    out = [variant(WORD, f"{name} spectrum", columns, SCALES, root, prior=0.25, joint=joint,
-                   radius=radius, law="Iwan")]  # fmt: skip
-    for k in range(len(columns) - 1):
+    out = [variant(WORD, f"{name} spectrum", columns, SCALES, root, prior=0.25, each=True,
+                   joint=joint, radius=radius, law="Iwan")]  # fmt: skip
+    # friction acts from the first load on: one strength alone is a small one
+    alone = len(columns) - 1 if bench.imposed else min(_SMALL + 1, len(columns) - 1)
+    for k in range(alone):
         out.append(
             variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES,
-                    smooth_root(2, 0.7),
-                    prior=0.25 / (len(columns) - 1), joint=joint, radius=radius[k : k + 2],
+                    smooth_root(2, 0.7), each=True,
+                    prior=0.25 / alone, joint=joint, radius=radius[k : k + 2],
                     law="Iwan")
         )  # fmt: skip
     return out
@@ -94,7 +100,7 @@ def _exponential(
         for k in range(len(reach) - 1):
             out.append(
                 variant(WORD, f"{name} {law} {REACHES[k]}", columns[k : k + 2], SCALES,
-                        smooth_root(2, 0.5), prior=0.25 / (len(reach) - 1), joint=joint,
+                        smooth_root(2, 0.5), prior=0.25 / (len(reach) - 1), each=True, joint=joint,
                         radius=reach[k : k + 2], law=law)
             )  # fmt: skip
     return out

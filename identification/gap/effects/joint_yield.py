@@ -5,6 +5,12 @@ hardening, Prandtl 1928): stiff below, knee, the rest stays after unloading. Rou
 several radii from the threshold on; slow flow is the same state reached with a lag; a controller
 that takes the joint back resets it between runs. w in units of the joint's elastic compliance:
 1/w is the ratio of hardening to spring, so 0.3 (little) to 30 (clamp that hardly holds).
+
+Size: slope beyond the knee 0.3 to 30 times the joint's compliance; thresholds anywhere in the range
+of load.
+Prior: sum of coefficients positive, sd out of SCALES, equally likely; rounded, lasting and flowing
+forms weighted as below.
+Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manuals (thresholds).
 """
 
 from __future__ import annotations
@@ -17,7 +23,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags, Ints
-from identification.gap.history import flowing_play, retarded
+from identification.gap.history import flowing_play
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_yield"
@@ -31,7 +37,6 @@ _FIRST = 2  # lower ones only round off the knees above them
 _SHARP = {0: 1.0, 1: 0.5}
 _ROUND = {-6: 0.1, -4: 0.15, -2: 0.25, -1: 0.5, 0: 1.0, 1: 0.5, 2: 0.25}
 SCALES = (0.5, 1.5, 6.0, 25.0)
-FLOW_S = (5.0,)
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -67,23 +72,20 @@ def knee_variants(
     radius = bench.radii(load, top * np.array(THRESHOLDS))
     out = []
     for memory, fresh in _memories(bench).items():
-        back = [column(s) for s in _flowing_back(bench, load, BACK_FROM * top, fresh)]
-        for flow in (0.0, *(FLOW_S if not bench.rows.continuous else ())):
-            columns = [column(s) for s in _states(bench, load, radius, flow, fresh).T]
-            label = f"{name}{memory}{f' flow {flow:g} s' if flow else ''}"
-            share = (0.7 if flow == 0 else 0.3 / len(FLOW_S)) / len(radius) * _LIKELY[memory]
-            extra = list(range(len(THRESHOLDS), len(radius)))
-            for k in range(_FIRST, len(THRESHOLDS)):
-                for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
-                    inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
-                    place = [*inside, *extra]
-                    kept = [*inside.values(), *[_HARDENS] * len(extra)]
-                    chosen = [columns[i] for i in place]
-                    exact = {**info, "memory": memory, "flow_s": flow, "radius": radius[place],
-                             "centre": radius[k], "load": load, "column": column,
-                             "back": back}  # fmt: skip
-                    at = f"{label} at {THRESHOLDS[k]:g} {knee}"
-                    out += _with_back(word, at, chosen, kept, share / 4, exact)
+        back = [column(s) for s in after_yield(bench, load, top, fresh)]
+        columns = [column(s) for s in bench.plays(load, radius, fresh).T]
+        label, share = f"{name}{memory}", 0.7 / len(radius) * _LIKELY[memory]
+        extra = list(range(len(THRESHOLDS), len(radius)))
+        for k in range(_FIRST, len(THRESHOLDS)):
+            for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
+                inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
+                place = [*inside, *extra]
+                kept = [*inside.values(), *[_HARDENS] * len(extra)]
+                exact = {**info, "memory": memory, "flow_s": 0.0, "radius": radius[place],
+                         "centre": radius[k], "load": load, "column": column,
+                         "back": back, "knee": knee}  # fmt: skip
+                at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
+                out += _with_back(word, at, chosen, kept, share / 4, exact)
     return out
 
 
@@ -93,17 +95,21 @@ def _with_back(
     """A knee as it is, and with Bauschinger's effect: once it has yielded, metal flows back early
     when unloaded."""
     back = info["back"]
-    plain = variant(word, label, columns, SCALES, np.diag(root), prior=prior, **info)
+    ones = np.ones(len(columns))
+    plain = variant(word, label, columns, SCALES, np.diag(root), ones, prior, LEAST, True, **info)
     if not back:
         return [plain]
-    both = np.diag([*root, *[_RETURNS] * len(back)])
-    return [plain, variant(word, f"{label}, flows back", [*columns, *back], SCALES, both,
-                           prior=prior, **info)]  # fmt: skip
+    both, knee = np.diag([*root, *[_RETURNS] * len(back)]), np.append(ones, np.zeros(len(back)))
+    label, every = f"{label}, flows back", [*columns, *back]
+    return [plain, variant(word, label, every, SCALES, both, knee, prior, LEAST, True, **info)]
 
 
+LEAST = 0.15  # of the elastic compliance: what bends less does not give way
 FINE = 13  # radii about a threshold that was found on the grid, from 0.84 to 1.2 of it
 FLOWS_S = (1.2, 2.5, 5.0, 10.0, 25.0)
 BACK = (0.1, 0.2, 0.3, 0.42, 0.56)  # radii of what flows back after a reversal, of the range
+RATCHET_FROM = 0.6  # of the range
+RATCHETS = 0.3  # of a cycle's path beyond that: creeps on so much slower than it flows
 BACK_FROM = 0.25  # of the range: a load from which on a joint may have yielded
 
 
@@ -131,15 +137,17 @@ _RETURNS = 0.4  # coefficients of what flows back, against those of the knee
 _REVERSED = 0.05  # of the largest load: so far back it is a reversal
 
 
-def _flowing_back(bench: Bench, load: Array, threshold: float, fresh: Flags) -> list[Array]:
-    """States (n,) of smaller plays from the first reversal after the threshold was passed on, zero
-    before (the first loading has a knee as sharp as it likes); empty where nothing is reversed."""
-    peak_of = peaks(load, threshold, fresh)
+def after_yield(bench: Bench, load: Array, top: float, fresh: Flags) -> list[Array]:
+    """States (n,) of what yielding leaves behind: smaller plays from the first reversal on, zero
+    before (the first loading has a knee as sharp as it likes), and a ratchet; empty where nothing
+    is reversed. top: range of the load."""
+    peak_of = peaks(load, BACK_FROM * top, fresh)
     after = peak_of >= 0
     if not after.any():
         return []
-    states = bench.plays(load, threshold / BACK_FROM * np.array(BACK), fresh)
-    return [np.where(after, s - s[peak_of], 0.0) for s in states.T]
+    states = bench.plays(load, top * np.array(BACK), fresh)
+    back = [np.where(after, s - s[peak_of], 0.0) for s in states.T]
+    return [*back, RATCHETS * np.where(after, ratchet(load, RATCHET_FROM * top, fresh), 0.0)]
 
 
 def peaks(load: Array, threshold: float, fresh: Flags) -> Ints:
@@ -168,19 +176,29 @@ def _memories(bench: Bench) -> dict[str, Flags]:
     return out
 
 
-def _states(bench: Bench, load: Array, radius: Array, flow: float, fresh: Flags) -> Array:
-    """Play states (n, k), reached at once or with a lag: near enough to find where flow is."""
-    states = bench.plays(load, radius, fresh)
+def states(bench: Bench, load: Array, radius: Array, flow: float, fresh: Flags) -> Array:
+    """Play states (n, k) of radii (k,): reached at once, or by viscoplastic flow in `flow` s."""
     if flow == 0:
-        return states
-    return retarded(states, np.full(states.shape[1], flow), bench.rows, fresh)
+        return bench.plays(load, radius, fresh)
+    return flowing_play(load, radius, np.full(len(radius), flow), bench.rows, fresh)
 
 
 def _flowing(bench: Bench, load: Array, radius: Array, fresh: Flags) -> dict[float, Array]:
-    """Flow time s -> play states (n, k): at once, and by viscoplastic flow."""
+    """Flow time s -> play states (n, k), for no flow and all flow times in one go."""
     out = {0.0: bench.plays(load, radius, fresh)}
     if bench.rows.continuous:
         return out
     every = flowing_play(load, np.tile(radius, len(FLOWS_S)),
                          np.repeat(FLOWS_S, len(radius)), bench.rows, fresh)  # fmt: skip
     return out | dict(zip(FLOWS_S, np.split(every, len(FLOWS_S), axis=1), strict=True))
+
+
+def ratchet(load: Array, threshold: float, fresh: Flags) -> Array:
+    """(n,) path on which the size of the load has grown beyond the threshold, with its sign, since
+    the memory was fresh: what creeps on with every cycle is in proportion to it."""
+    size = np.maximum(np.abs(load) - threshold, 0.0)
+    step = np.maximum(np.diff(size, prepend=size[0]), 0.0) * np.sign(load)
+    total = np.cumsum(step)
+    start = np.flatnonzero(fresh | (np.arange(len(load)) == 0))
+    group = np.cumsum(fresh | (np.arange(len(load)) == 0)) - 1
+    return np.asarray(total - (total - step)[start][group])

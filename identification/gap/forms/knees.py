@@ -32,6 +32,8 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
             Term("compliance", {"returns_beyond": f * top, "after": joint_yield.BACK_FROM * top})
             for f in joint_yield.BACK
         ]
+        unit_ratchet = {"ratchets_beyond": joint_yield.RATCHET_FROM * top}
+        terms.append(Term("compliance", unit_ratchet | {"after": joint_yield.BACK_FROM * top}))
     return Law(constants, tuple(terms)), np.full(len(terms), unit)
 
 
@@ -61,12 +63,16 @@ def columns(bench: Bench, law: Law) -> list[Array]:
 def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     fresh = fresh_after(bench, law.constants["memory"])
     radius = np.array([t.shape["threshold"] for t in law.terms if "threshold" in t.shape])
-    flow = law.constants["flow_time"]
-    out = list(joint_yield._states(bench, load, radius, flow, fresh).T)
+    out = list(joint_yield.states(bench, load, radius, law.constants["flow_time"], fresh).T)
     for term in law.terms:
-        if "after" in term.shape:
-            radius = np.array([term.shape["returns_beyond"]])
-            state = bench.plays(load, radius, fresh)[:, 0]
-            peak = joint_yield.peaks(load, term.shape["after"], fresh)
-            out.append(np.where(peak >= 0, state - state[peak], 0.0))
+        if "after" not in term.shape:
+            continue
+        peak = joint_yield.peaks(load, term.shape["after"], fresh)
+        if "ratchets_beyond" in term.shape:
+            path = joint_yield.ratchet(load, term.shape["ratchets_beyond"], fresh)
+            state = joint_yield.RATCHETS * path
+        else:
+            state = bench.plays(load, np.array([term.shape["returns_beyond"]]), fresh)[:, 0]
+            state = state - state[peak]
+        out.append(np.where(peak >= 0, state, 0.0))
     return out
