@@ -36,7 +36,7 @@ class Entry:
     def state(self) -> str:
         """What must not be overlooked."""
         s = self.summary
-        whole = "open" if self.open else "complete" if s.complete else "INCOMPLETE"
+        whole = "UNFINISHED" if self.open else "complete" if s.complete else "INCOMPLETE"
         return f"{whole}, EMULATED" if s.origin == "emulated" else f"{whole}, {s.origin}"
 
 
@@ -75,7 +75,7 @@ class Listing:
             )
         yield from _table([_HEADER, *map(_cells, self.entries)])
         if any(e.stiffness is None for e in self.entries):
-            yield "k is -: not analysed yet; `rig list --analyze` or `rig analyze FILE` does it."
+            yield "k -: not analysed yet; `rig list --analyze` or `rig analyze FILE` does it."
 
 
 def list_folder(

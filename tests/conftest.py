@@ -1,0 +1,18 @@
+"""For all tests: nothing is remembered in the user's own cache."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+
+import pytest
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_its_own() -> Iterator[None]:
+    """`rig` started by a test as a process inherits it too."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        os.environ["RIG_CACHE"] = folder
+        yield
+        del os.environ["RIG_CACHE"]
