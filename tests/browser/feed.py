@@ -19,7 +19,12 @@ from urllib.parse import parse_qs, urlsplit
 from rig.panel.state import State, to_json
 
 PAGE = Path(__file__).resolve().parents[2] / "rig" / "panel" / "page"
-TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+TYPES = {
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+}
 TOKEN = "operators-own-token"
 POLICY = "default-src 'self'; frame-ancestors 'none'"
 
@@ -57,8 +62,12 @@ class Feed:
         server.stopping.set()
         server.shutdown()
         server.server_close()
-        self._port = int(server.server_address[1])
-        return self._port
+        return int(server.server_address[1])
+
+    def close(self) -> None:
+        """Stops, if it still serves."""
+        if self._server is not None:
+            self.stop()
 
     @property
     def url(self) -> str:

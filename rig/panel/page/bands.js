@@ -30,7 +30,7 @@ export class Bands {
     setHidden(byId("emulated"), !emulated);
     setText(byId("emulated"), emulated);
     const list = [...connectionBand(connection), ...deviceBands(state)];
-    if (state?.message) list.push({ kind: "warn", text: state.message });
+    if (state?.message && !connection.end) list.push({ kind: "warn", text: state.message });
     if (this.said && performance.now() < this.saidUntil) list.push({ kind: "warn", text: this.said });
     draw(list);
   }

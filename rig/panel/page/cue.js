@@ -33,8 +33,10 @@ export function cueOf(state, old) {
   if (old) return ["stop", "Stop turning", "the values are old"];
   const failed = state.devices.find((device) => device.state === "fault");
   if (failed) return ["stop", "Stop turning", `${failed.name} has failed`];
-  if (state.turn && ["prompt", "turning"].includes(state.phase)) return turnCue(state);
-  if (state.prompt) return ["ask", "Answer", "the question below"];
+  if (state.prompt && !state.turn) return ["ask", "Answer", "the question below"];
+  if (["prompt", "turning"].includes(state.phase)) {
+    return state.force.stale || !state.turn ? ["stop", "Stop turning", "the force is old"] : turnCue(state);
+  }
   const [sign, word, far] = WAITING[state.phase] ?? ["hands", "Wait", ""];
   const { taken, wanted } = state.samples;
   const counted = ["sampling", "zero"].includes(state.phase) && wanted > 0;

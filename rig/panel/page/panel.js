@@ -75,7 +75,7 @@ class Page {
     this.bands.draw(this.state, { connected, old, last: this.last, age_s, end: this.end });
     if (this.state === null) return;
     this.readout.draw(this.state, old, old ? Math.max(0, age_s) : 0);
-    drawCue(this.state, old || this.state.force.stale);
+    drawCue(this.state, old);
     drawSide(this.state);
     drawArm(this.state, this.store.plan);
     this.curve.draw(this.store, this.state, old);

@@ -38,7 +38,7 @@ const limits = onChange((list) => {
 
 function limit({ name, amount, fraction, action }) {
   const item = make("li", fraction < NEAR ? "near" : "");
-  const [sign, then] = fraction < NEAR ? ["▲ ", `, then ${action}`] : ["", ""];
+  const [sign, then] = fraction < NEAR ? ["▲ ", ` → ${action}`] : ["", ""];
   const track = make("div", "track");
   const left = make("div", "left");
   left.style.transform = `scaleX(${fraction})`;
