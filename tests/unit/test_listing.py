@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
@@ -68,7 +69,9 @@ def test_text_word_for_word(folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
     listing = list_folder(Path("data"), analyze=True)
     digest = seal_of(folder / "old/specimen.h5")
     remember("verdict", {digest: {"word": "joint_yield", "probability": 0.934}})
-    assert list_folder(Path("data")).to_text() + "\n" == GOLDEN.read_text()
+    # how large a whole file is depends on the HDF5 library
+    text = re.sub(r"left of \d+", "left of N", list_folder(Path("data")).to_text())
+    assert text + "\n" == GOLDEN.read_text()
     assert len(listing.entries) == 3
 
 
