@@ -69,7 +69,7 @@ def _within(chapters: list[Section], session: Session, index: int) -> Section:
     """The chapters of one data set as parts of one, with identifiers of their own."""
     prefix = f"set-{index + 1}"
     parts: tuple[Block, ...] = tuple(_renamed(c, prefix) for c in chapters)
-    return Section(prefix, session.label, parts, session.dataset.banners())
+    return Section(prefix, session.label, parts, session.dataset.banners(), own_page=True)
 
 
 def _renamed(section: Section, prefix: str) -> Section:
@@ -81,7 +81,9 @@ def _title(gathered: Gathered) -> str:
     if len(gathered.sessions) > 1:
         return f"Stiffness measurements: {len(gathered.sessions)} data sets side by side"
     only = gathered.sessions[0]
-    return only.dataset.title or f"Stiffness measurement {only.label}"
+    if only.dataset.imported or not only.dataset.title:  # an imported title is the table's name
+        return f"Stiffness measurement {only.label}"
+    return only.dataset.title
 
 
 def _subtitle(gathered: Gathered) -> str:

@@ -69,22 +69,39 @@ def quality(dataset: Dataset, zeros: Sequence[RunZeros]) -> Figure | None:
     from matplotlib.figure import Figure
 
     columns = dataset.columns
-    panels: list[Callable[[Any, Dataset, Sequence[RunZeros]], None]] = []
-    if "session_s" in columns and "lateness_s" in columns:
-        panels.append(_lateness)
-    if zeros:
-        panels += [_force_zero, _displacement_zero]
-    if "session_s" in columns and "temperature1_C" in columns:
-        panels.append(_temperature)
+    panels = [panel for _, panel in _panels(dataset, zeros)]
     if not panels:
         return None
     figure = Figure(figsize=(7.5, 1.75 * len(panels) + 0.5), layout="constrained")
-    rows = np.atleast_1d(figure.subplots(len(panels), 1, sharex="session_s" in columns))
+    rows = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
     for axes, panel in zip(rows, panels, strict=True):
         panel(axes, dataset, zeros)
         axes.tick_params(labelsize=8)
     rows[-1].set_xlabel("Time of the session in min" if "session_s" in columns else "Run")
+    if "session_s" not in columns:
+        rows[-1].xaxis.get_major_locator().set_params(integer=True)
     return watermark(figure, dataset.banners())
+
+
+Panel = Callable[[Any, Dataset, Sequence[RunZeros]], None]
+
+
+def quality_caption(dataset: Dataset, zeros: Sequence[RunZeros]) -> str:
+    """What `quality` shows of this data set."""
+    return f"Over the session: {', '.join(words for words, _ in _panels(dataset, zeros))}."
+
+
+def _panels(dataset: Dataset, zeros: Sequence[RunZeros]) -> list[tuple[str, Panel]]:
+    """(what it shows, panel) for everything that was recorded."""
+    columns = dataset.columns
+    found: list[tuple[str, Panel]] = []
+    if "session_s" in columns and "lateness_s" in columns:
+        found.append(("how late the slots were", _lateness))
+    if zeros:
+        found += [("force", _force_zero), ("and displacement at zero load", _displacement_zero)]
+    if "session_s" in columns and "temperature1_C" in columns:
+        found.append(("joint temperatures", _temperature))
+    return found
 
 
 def _minutes(dataset: Dataset) -> tuple[Any, Any]:

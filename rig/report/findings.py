@@ -77,8 +77,9 @@ def _line(d: Node) -> Iterator[tuple[str, Cell]]:
         )  # fmt: skip
     loop = d["hysteresis"]
     if loop:
-        share = loop["share_of_work"].percent()
-        yield "Loop", (*loop["area_N_mm"].number(3, unit="N mm"), ", ", *share, " of the work")
+        share = loop["share_of_work"]
+        words = (", ", *share.percent(), " of the work of loading") if share else ()
+        yield "Loop", (*loop["area_N_mm"].number(3, unit="N mm"), *words)
 
 
 def _stiffness_tables(d: Node) -> Iterator[Table]:

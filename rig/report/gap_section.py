@@ -28,7 +28,7 @@ def gap(session: Session, data: Node) -> Section:
         reason = data["missing"]["diagnose"].text()
         return Section("gap", "Gap to the simulation", (Paragraph((reason,), "warning"),), banners)
     figures = session.diagnosed.figures
-    blocks: list[Block] = [Paragraph(_answer(found), "answer"), *figures[:2], *_where(found)]
+    blocks: list[Block] = [Paragraph(_answer(found), "answer"), *_where(found), *figures[:2]]
     blocks += [*_effects(found), _probabilities(found), _how_far(found), *figures[2:]]
     blocks += _rest(found)
     return Section("gap", "Gap to the simulation", tuple(blocks), banners)

@@ -114,7 +114,7 @@ class Pictures:
             for r in session.quality.zeros
             for p in r.plateaus
         )
-        caption = "Over the session: how late the slots were, the zero-load holds, temperatures."
+        caption = figures.quality_caption(session.dataset, session.quality.zeros)
         again = lambda: figures.quality(session.dataset, session.quality.zeros) or plot  # noqa: E731
         return self._draw("quality", session, caption, caption, again, header, rows)
 

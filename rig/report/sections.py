@@ -28,9 +28,9 @@ def in_short(session: Session, data: Node) -> Section:
         knee = d["knee"]
         if knee:
             rows.append((f"Knee along {key}", (*quantity(knee["force_N"]), " N")))
-    for key, q in data["analyze"]["anisotropy"].items():
-        a, _, b = key.rpartition("/")
-        rows.append((f"{a} over {b}", (*quantity(q), " times as stiff")))
+    for a, b in session.analysis.anisotropy:
+        ratio = data["analyze"]["anisotropy"][f"{a}/{b}"]
+        rows.append((f"{a} over {b}", (*quantity(ratio), " times as stiff")))
     rows.append(("Joints", _joints(data)))
     rows.append(("Gap to the simulation", _gap(data)))
     rows.append(("Data", _data(session, data)))
@@ -86,8 +86,8 @@ def data_quality(session: Session, data: Node, pictures: Pictures) -> Section:
         ("Samples", q["samples"].number()),
         ("Discarded", q["discarded"].number()),
         ("Slots late by", _lateness(q["lateness_s"])),
-        ("Slots missed", q["slots_missed"].number()),
-        ("Levels that never settled", q["unsettled_levels"].number()),
+        ("Slots missed", _count(q["slots_missed"])),
+        ("Levels that never settled", _count(q["unsettled_levels"])),
     ]
     drift = q["force_zero"]
     if drift:
@@ -104,6 +104,10 @@ def data_quality(session: Session, data: Node, pictures: Pictures) -> Section:
         blocks.append(figure)
     blocks += [*_left_out(data), *_events(q)]
     return Section("quality", "Data quality", tuple(blocks), session.dataset.banners())
+
+
+def _count(node: Node) -> Rich:
+    return ("not recorded",) if node.value is None else node.number()
 
 
 def _lateness(node: Node) -> Rich:
