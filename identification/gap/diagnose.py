@@ -18,6 +18,7 @@ from identification.gap.heldout import HeldOut, folds, held_out, stated_predicti
 from identification.gap.locate import Where, locate
 from identification.gap.parameters import Parameter, parameters
 from identification.gap.search import Explanation, Found, refine_knees, search
+from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
@@ -95,7 +96,7 @@ def diagnose_gap(
     tell("withheld data", 0.7)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     chosen = _chosen(found, verdict, forced)
-    result = _result(bench, engine, found, verdict, chosen)
+    result = _with_twins(_result(bench, engine, found, verdict, chosen), chosen, out)
     tell("what to measure next", 0.9)
     result = replace(
         result, next_measurement=_next(found, variants, chosen, verdict, result.effects, others)
@@ -181,6 +182,21 @@ def _effects(bench: Bench, found: Found, chosen: Explanation, fitted: Fit) -> tu
             )
         )
     return tuple(out)
+
+
+def _with_twins(result: GapResult, chosen: Explanation, withheld: set[str]) -> GapResult:
+    """Effects that no channel tells from the same law elsewhere share their probability with it,
+    openly: between the two only priors and grids would decide."""
+    probabilities, effects = dict(result.probabilities), []
+    for i, (effect, part) in enumerate(zip(result.effects, result.fit.parts, strict=True)):
+        twin = twin_of(result.engine, part, result.fit.of(i)[0], chosen.eta)
+        same = [twin.word] if twin is not None and twin.word not in withheld else []
+        alike = tuple(dict.fromkeys([*effect.indistinguishable_from, *same]))
+        effects.append(replace(effect, indistinguishable_from=alike))
+        if i == 0 and same:
+            each = (probabilities[effect.name] + probabilities[same[0]]) / 2
+            probabilities[effect.name] = probabilities[same[0]] = each
+    return replace(result, effects=tuple(effects), probabilities=probabilities)
 
 
 def _alike(found: Found, chosen: Explanation, word: str) -> tuple[str, ...]:

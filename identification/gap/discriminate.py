@@ -30,6 +30,7 @@ from identification.gap.evidence import Engine, eta_levels
 from identification.gap.fit import Fit, fit
 from identification.gap.forms import Form, Law, describe, law_of, lawful, realise, rows_of
 from identification.gap.search import Explanation, Found
+from identification.gap.twins import PLACE, twin_of
 from identification.gap.variants import Variant
 
 ENOUGH = 3.0  # nats: odds of 20 to 1
@@ -92,9 +93,13 @@ def next_measurement(
     engine = found.engine
     if not engine.bench.reach > 0 or not np.ptp(engine.bench.load) > 0:
         return None
-    rivals = [_rival(found, variants, chosen, pair[0], w) for w in pair]
-    first, second = rivals
-    if first is None or second is None:
+    first = _rival(found, variants, chosen, pair[0], pair[0])
+    if first is None:
+        return None
+    second = _same_elsewhere(found, chosen, first, pair[1]) or _rival(
+        found, variants, chosen, pair[0], pair[1]
+    )
+    if second is None:
         return None
     design = present_design(engine.bench)
     known = _discrimination(engine.bench, design, (first, second))
@@ -160,6 +165,24 @@ def _rival(
     ]
     shapes = _shapes(engine, [v for v in variants if v.word == word], part.variant)
     return _Rival(word, tuple(forms), _springs(engine, fitted), shapes)
+
+
+def _same_elsewhere(found: Found, chosen: Explanation, first: _Rival, word: str) -> _Rival | None:
+    """The first explanation's law at the other word's place, where the data see no difference."""
+    part = next((p for p in chosen.parts if p.word == first.word), None)
+    if part is None or word not in ("joint_yield", "base_slip"):
+        return None
+    fitted = fit(found.engine, chosen)
+    w, _ = fitted.of(chosen.parts.index(part))
+    twin = twin_of(found.engine, part, w, chosen.eta)
+    if twin is None or twin.word != word:
+        return None
+    shapes = tuple(
+        (replace(v, word=word), twin.moved(law), unit * twin.factor**-2, weight)
+        for v, law, unit, weight in first.shapes
+        if all(law.constants.get(k) == first.forms[0].law.constants.get(k) for k in PLACE)
+    )
+    return _Rival(word, tuple(twin.form(f) for f in first.forms), first.springs, shapes)
 
 
 def _springs(engine: Engine, fitted: Fit) -> dict[str, float]:
