@@ -39,6 +39,16 @@ class Entry:
         whole = "UNFINISHED" if self.open else "complete" if s.complete else "INCOMPLETE"
         return f"{whole}, EMULATED" if s.origin == "emulated" else f"{whole}, {s.origin}"
 
+    @property
+    def stiffness_text(self) -> str:
+        """`x 95.94, y 57.42` in N/mm; undefined where the data define none; - if not known yet."""
+        if self.stiffness is None:
+            return "-"
+        values = {d: q["value"] for d, q in self.stiffness.items()}
+        return ", ".join(
+            f"{d} {'undefined' if v is None else number(v)}" for d, v in values.items()
+        )
+
 
 @dataclass(frozen=True)
 class Listing:
@@ -63,16 +73,21 @@ class Listing:
         lines += [f"Left out: {file}: {reason}" for file, reason in self.skipped]
         return "\n".join(lines)
 
+    def banners(self) -> tuple[str, ...]:
+        """What has to be said before anything else."""
+        emulated = sum(e.summary.origin == "emulated" for e in self.entries)
+        if not emulated:
+            return ()
+        return (
+            f"EMULATED: {emulated} of {len(self.entries)} data sets come from simulated devices; "
+            "nothing was measured there.",
+        )
+
     def _lines(self) -> Iterator[str]:
         if not self.entries:
             yield f"{self.folder}: no data sets ({', '.join(ENDINGS)})."
             return
-        emulated = sum(e.summary.origin == "emulated" for e in self.entries)
-        if emulated:
-            yield (
-                f"EMULATED: {emulated} of {len(self.entries)} data sets come from simulated "
-                "devices; nothing was measured there."
-            )
+        yield from self.banners()
         yield from _table([_HEADER, *map(_cells, self.entries)])
         if any(e.stiffness is None for e in self.entries):
             yield "k -: not analysed yet; `rig list --analyze` or `rig analyze FILE` does it."
@@ -196,19 +211,11 @@ def _cells(e: Entry) -> tuple[str, ...]:
         s.created[:16].replace("T", " "),
         s.robot,
         " ".join(s.directions),
-        _stiffness(e),
+        e.stiffness_text,
         "-" if e.verdict is None else f"{e.verdict['word']} {e.verdict['probability']:.0%}",
         str(s.rows),
         e.state,
     )
-
-
-def _stiffness(e: Entry) -> str:
-    """`x 95.94, y 57.42`; undefined where the data define none."""
-    if e.stiffness is None:
-        return "-"
-    values = {d: q["value"] for d, q in e.stiffness.items()}
-    return ", ".join(f"{d} {'undefined' if v is None else number(v)}" for d, v in values.items())
 
 
 def _table(rows: list[tuple[str, ...]]) -> Iterator[str]:
