@@ -317,6 +317,10 @@ def diagnose(
         Path | None,
         typer.Option(metavar="MODEL.yaml", help="Write the simulation with the effects found."),
     ] = None,
+    next_file: Annotated[
+        Path | None,
+        typer.Option("--next", metavar="PROTOCOL.yaml", help="Write what to measure next."),
+    ] = None,
     figures: FiguresOption = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -345,6 +349,10 @@ def diagnose(
 
         write(result, measured, write_model)
         say(f"{write_model}: written. Next: rig simulate {write_model} PROTOCOL.yaml")
+    if next_file is not None:
+        from rig.next_protocol import write_next
+
+        say(write_next(result, measured, next_file))
     if figures is not None:
         from rig.gap_figures import draw
 
