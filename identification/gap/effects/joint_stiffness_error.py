@@ -3,7 +3,7 @@
 Same columns as the six springs of the base, with a wide prior: a joint may be half or twice as
 stiff; a bench's spring may be off by ten.
 
-Size: half to twice as stiff; a bench's spring ten times off.
+Size: 0.5 to 2 times as stiff; a bench's spring 0.1 to 10 times.
 Prior: relative compliances of either sign, sd SCALES times twice what META states (at least 0.2);
 of a bench's spring BENCH_SCALES besides, equally likely.
 Source: scatter between gears of one size, and simulators set up from catalogues.
