@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from identification.gap.diagnose import Effect, GapResult
+from identification.gap.discriminate import ENOUGH
 from identification.gap.parameters import Parameter
 
 MM = 1e3
@@ -127,4 +128,9 @@ def _next(r: GapResult) -> str:
     if r.next_measurement is None:
         return ""
     first, second = r.next_measurement.separates
-    return f"Next, to tell {first} from {second}:\n  {r.next_measurement.text}"
+    lines = [f"Next, to tell {first} from {second}:", f"  {r.next_measurement.text}"]
+    others = [o for o in r.next_measurement.alternatives if o.expected_nats >= ENOUGH]
+    if others and r.next_measurement.kind != "none":
+        shown = ", ".join(f"{o.kind} ({o.minutes:.0f} min)" for o in others[:4])
+        lines.append(f"  Other procedures that would do: {shown}.")
+    return "\n".join(lines)

@@ -110,7 +110,7 @@ def _lines(
     for setup, levels in zip(design.setups, design.levels, strict=True):
         yield (
             f"  - {{pose: {setup.pose}, direction: {json.dumps(setup.direction)}, "
-            f"steps_N: [{_list(np.abs(levels), 5)}], stop_at_displacement_mm: {0.8 * stop:.3g}}}"
+            f"steps_N: [{_list(np.abs(levels), 3)}], stop_at_displacement_mm: {0.8 * stop:.3g}}}"
         )
     yield f"repetitions: {design.repetitions}"
     yield f"branches: {'loading-unloading' if design.unload else 'loading'}"

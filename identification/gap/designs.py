@@ -234,8 +234,9 @@ def _paths(design: Design) -> Iterator[Candidate]:
     longer = 6 * max(design.hold_s, 20 * design.sample_s)
     yield Candidate(
         "holds",
-        f"Hold every step for {longer:.3g} s and unload: creep goes on, friction and lags do not.",
-        replace(design, hold_s=longer, unload=True, approach_s=max(design.approach_s, 0.0)),
+        f"Hold every second or third step for {longer:.3g} s, up and down: creep goes on, friction "
+        "and lags do not.",
+        replace(design, hold_s=longer, unload=True, levels=tuple(_fewer(v) for v in design.levels)),
     )
     plateau = max(60 * design.sample_s, 3 * design.zero_s)
     yield Candidate(
@@ -296,6 +297,11 @@ def _calibrated(design: Design) -> Iterator[Candidate]:
                 ),
             ),
         )
+
+
+def _fewer(levels: tuple[float, ...]) -> tuple[float, ...]:
+    """About five of the levels, the last one among them."""
+    return levels[:: -max(1, round(len(levels) / 5))][::-1]
 
 
 def _finer(levels: tuple[float, ...]) -> tuple[float, ...]:

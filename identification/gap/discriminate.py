@@ -26,7 +26,7 @@ from identification.gap.designs import (
     planned,
     present_design,
 )
-from identification.gap.evidence import Engine, eta_levels
+from identification.gap.evidence import Engine, Level, eta_levels
 from identification.gap.fit import Fit, fit
 from identification.gap.forms import Form, Law, describe, law_of, lawful, realise, rows_of
 from identification.gap.search import Explanation, Found
@@ -35,6 +35,7 @@ from identification.gap.variants import Variant
 
 ENOUGH = 3.0  # nats: odds of 20 to 1
 _DECISIVE = 10.0  # more certainty than this is worth no further minute
+_REPETITIONS = 2  # simulated
 _SHAPES = 8  # of each word, the best on the present data
 _WITHIN = 12.0  # nats below the best that a shape may lie
 _GAINS = {"force_scale": "force_gain", "displacement_scale": "displacement_gain"}
@@ -215,21 +216,34 @@ def _shapes(
 
 
 def _discrimination(bench: Bench, design: Design, rivals: tuple[_Rival, _Rival]) -> float:
-    """Log odds (nats) by which the true one is expected to win, whichever of the two it is."""
-    target, there = _simulated(bench, design, rivals)
+    """Log odds (nats) by which the true one is expected to win, whichever of the two it is.
+
+    At most two repetitions are simulated: more of them say little that these do not.
+    """
+    brief = replace(design, repetitions=min(design.repetitions, _REPETITIONS))
+    truths, there = _simulated(bench, brief, rivals)
     variants, weights = _carried(there, rivals)
+    places = [there.add(truth) for truth in truths]
     base = base_columns(there)
-    etas = max((eta_levels(there, base, t) for t in target), key=len)
+    etas = eta_levels(there, base, max(truths, key=lambda t: float(np.abs(t).max())))
+    engine = Engine(there, base, np.zeros(there.layout.size), etas)
     words = np.array([v.word for v in variants])
     won = []
-    for k, truth in enumerate(target):
-        engine = Engine(there, base, truth, etas)
-        found = {id(s.variant): s.log_evidence for s in score(engine, engine.levels, variants)}
+    for k, place in enumerate(places):
+        levels = [_told(level, place) for level in engine.levels]
+        found = {id(s.variant): s.log_evidence for s in score(engine, levels, variants)}
         logs = np.array([found[id(v)] - log(v.prior) for v in variants])
-        marginal = [log_mean(list(logs[words == r.word]), list(weights[words == r.word]))
-                    for r in rivals]  # fmt: skip
+        marginal = [
+            log_mean(list(logs[words == r.word]), list(weights[words == r.word])) for r in rivals
+        ]
         won.append(marginal[k] - marginal[1 - k])
     return float(min(won))
+
+
+def _told(level: Level, place: int) -> Level:
+    """The level of a bench on which nothing was observed, had the pool's column been observed."""
+    moment = level.gram[:, place]
+    return replace(level, moment=moment, log_base=level.log_base - 0.5 * float(moment[place]))
 
 
 def _simulated(
