@@ -1,0 +1,227 @@
+"""Every effect of the library, by its file, against what every effect must hold.
+
+Arms and a bench without an arm, force and displacement imposed.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.gap import effects
+from identification.gap.data import GapData
+from identification.gap.effects import NEED_ARM, WORDS
+from identification.gap.fit import fit
+from identification.gap.parts import Part
+from identification.gap.search import Explanation
+from tests.conformance.effect_benches import (
+    IN_JOINTS,
+    OUTSIDE,
+    PAIRS,
+    built,
+    module,
+    of,
+    quick_engine,
+    readings,
+)
+from tests.conformance.gap_designs import (
+    linear,
+)
+
+FILES = sorted(
+    p.stem
+    for p in Path(effects.__file__).parent.glob("*.py")
+    if p.stem not in ("__init__", "drift")  # drift: paths that two words share
+)
+
+# --- form --------------------------------------------------------------------------------------
+
+
+def test_every_word_has_a_file_and_every_file_a_word() -> None:
+    assert sorted(WORDS) == FILES
+
+
+_BOUNDS = "SCALES|SHARES|OFFSETS_M|ANGLES_RAD|DEPTHS_M|LAGS"
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_file_states_word_sizes_and_source(word: str) -> None:
+    """The word, public bounds as numbers, and in the docstring the size in nature with its unit
+    and where it is known from."""
+    mod, text = module(word), module(word).__doc__ or ""
+    assert word == mod.WORD
+    bounds = [v for k, v in vars(mod).items() if re.fullmatch(_BOUNDS, k)]
+    assert bounds
+    assert all(0 <= x < np.inf for group in bounds for x in group)
+    assert re.search(r"Prior: .*\w", text)
+    assert re.search(r"Size: .*\d", text)
+    assert re.search(r"Source: \w+", text)
+
+
+@pytest.mark.parametrize(("word", "design"), PAIRS)
+def test_variants_are_well_formed(word: str, design: str) -> None:
+    bench, variants, columns = of(word, design)
+    assert variants
+    assert np.isfinite(columns).all()
+    labels = [v.label for v in variants]
+    assert len(set(labels)) == len(labels)
+    for v in variants:
+        k = len(v.columns)
+        assert v.word == word
+        assert len(set(v.columns)) == k
+        assert all(0 <= c < len(bench.columns) for c in v.columns)
+        assert v.root.shape == (k, k)
+        assert np.linalg.cond(v.root) < 1e6
+        assert v.scales
+        assert all(0 < s < np.inf for s in v.scales)
+        assert 0 < v.prior < np.inf
+        assert v.positive is None or (v.positive.shape == (k,) and np.any(v.positive))
+        assert np.any(columns[:, list(v.columns)]), v.label
+
+
+@pytest.mark.parametrize(("word", "design"), PAIRS)
+def test_same_data_same_columns(word: str, design: str) -> None:
+    _, variants, columns = of(word, design)
+    again, others = built(linear(design), word)
+    assert np.array_equal(columns, np.column_stack(again.columns))
+    assert [(v.label, v.columns, v.scales, v.prior) for v in variants] == [
+        (v.label, v.columns, v.scales, v.prior) for v in others
+    ]
+
+
+# --- nothing in, nothing out -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("word", "design"), PAIRS)
+def test_null_coefficients_leave_the_springs_alone(word: str, design: str) -> None:
+    bench, variants, _ = of(word, design)
+    engine = quick_engine(bench)
+    for v in (variants[0], variants[-1]):
+        found = fit(engine, Explanation((Part(v, v.scales[0]),), 0.0, 0.0, (0.0,), 0.0))
+        nothing = replace(found, coefficients=np.zeros_like(found.coefficients))
+        assert np.all(nothing.contribution(engine, 0) == 0.0)
+
+
+# These move or show without a load: paths in time, datums, the amplifier, a joint that stands off.
+ANYTIME = ("thermal_drift", "zero_shift", "force_drift", "pose_error")
+
+
+@pytest.mark.parametrize("word", [w for w in WORDS if w not in ANYTIME])
+def test_without_a_load_only_drifts_and_shifts_move_the_target(word: str) -> None:
+    """What acts through the load, or on readings of it, is silent on an arm that nothing pushes."""
+    data = linear("medium")
+    still = replace(data, force=np.zeros_like(data.force))
+    bench, _ = built(still, word)
+    n = bench.rows.n
+    for column in bench.columns:
+        loose = word == "joint_backlash"  # lies anywhere in its play, by a free place
+        assert loose or not np.any(column[:n])
+
+
+# --- joints and readings -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("word", IN_JOINTS)
+@pytest.mark.parametrize("design", ["rich", "medium"])
+def test_joint_effects_show_in_their_own_joint_alone(word: str, design: str) -> None:
+    """The reading moves by the deflection, the laser by its lever times it."""
+    bench, variants, columns = of(word, design)
+    edges = np.flatnonzero(bench.rows.hold_starts)
+    for v in variants:
+        joints = v.info.get("joints", [v.info.get("joint")])
+        for c in v.columns:
+            if not np.any(columns[:, c]):
+                continue  # a form that this path never reaches
+            q = readings(bench, columns[:, [c]])[:, :, 0]
+            moved = np.flatnonzero(np.any(q != 0, axis=1))
+            assert len(moved) == 1, v.label
+            assert moved[0] in joints, v.label
+            u = columns[: bench.rows.n, c]
+            weight = bench.rows.weight
+            mean = np.add.reduceat(u * weight, edges) / np.add.reduceat(weight, edges)
+            np.testing.assert_allclose(
+                mean, bench.lever[edges, moved[0]] * q[moved[0]], rtol=1e-9, atol=1e-15
+            )
+
+
+@pytest.mark.parametrize("word", OUTSIDE)
+@pytest.mark.parametrize("design", ["rich", "medium"])
+def test_what_lies_outside_the_joints_leaves_their_readings(word: str, design: str) -> None:
+    bench, _, columns = of(word, design)
+    assert not np.any(columns[bench.layout.q.start :])
+
+
+@pytest.mark.parametrize("word", [w for w in WORDS if w in OUTSIDE or w in IN_JOINTS])
+def test_imposed_displacement_is_kept_whoever_gives_way(word: str) -> None:
+    """Laser imposed: motions of all joints and of what lies outside cancel; force pays."""
+    bench, _, columns = of(word, "arm imposed")
+    edges, n = np.flatnonzero(bench.rows.hold_starts), bench.rows.n
+    weight = bench.rows.weight
+    u = columns[:n] * weight[:, None]
+    response = np.add.reduceat(u, edges) / np.add.reduceat(weight, edges)[:, None]
+    q = readings(bench, columns)
+    moved = np.einsum("hj,jhk->hk", bench.lever[edges], q)
+    if word in IN_JOINTS:
+        np.testing.assert_allclose(moved, 0.0, atol=1e-9 * np.abs(columns).max())
+    else:  # the joints give back what force no longer bends
+        np.testing.assert_allclose(moved, response, rtol=1e-9, atol=1e-12 * np.abs(columns).max())
+
+
+# --- units -------------------------------------------------------------------------------------
+
+IN_NM = ("base_compliance", "base_slip")  # priors in rad/Nm: the units of nature, not of the data
+
+
+def more_newtons(data: GapData, a: float) -> GapData:
+    """The same rig with forces in another unit: all that holds newtons goes along."""
+    meter = replace(data.instruments, force=data.instruments.force * a)
+    setups = tuple(replace(s, links=s.links / a, gravity=s.gravity * a) for s in data.setups)
+    return replace(
+        data, force=data.force * a, compliance=data.compliance / a, instruments=meter,
+        setups=setups, tangential=None if data.tangential is None else data.tangential * a,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("word", "design"), PAIRS)
+def test_another_unit_of_force_changes_nothing_but_units(word: str, design: str) -> None:
+    """Prior columns (scale x column) stay in metres and radians, and grow as newtons do."""
+    a = 64.0  # exact in binary
+    bench, variants, columns = of(word, design)
+    other, others = built(more_newtons(linear(design), a), word)
+    scaled = np.column_stack(other.columns)
+    assert [v.label for v in variants] == [v.label for v in others]
+    grows = a if word in IN_NM else 1.0
+    force = np.ones(bench.layout.size)
+    force[bench.layout.q.stop :] = a
+    for v, w in list(zip(variants, others, strict=True))[:: max(1, len(variants) // 60)]:
+        assert v.columns == w.columns
+        expected = columns[:, list(v.columns)] * v.scales[0] * force[:, None] * grows
+        np.testing.assert_allclose(
+            scaled[:, list(w.columns)] * w.scales[0], expected, rtol=1e-9,
+            atol=1e-12 * (np.abs(expected).max() or 1.0),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("design", ["bench", "bench imposed"])
+@pytest.mark.parametrize("word", [w for w in WORDS if w not in NEED_ARM])
+def test_another_unit_of_length_changes_nothing_but_units(word: str, design: str) -> None:
+    """A bench has no absolute length: prior columns grow with the unit."""
+    b, data = 1 / 128.0, linear(design)
+    meter = replace(data.instruments, displacement=data.instruments.displacement * b)
+    small = replace(
+        data, displacement=data.displacement * b, compliance=data.compliance * b, instruments=meter
+    )
+    bench, variants, columns = of(word, design)
+    other, others = built(small, word)
+    length = np.ones(bench.layout.size)
+    length[: bench.rows.n] = b
+    for v, w in zip(variants, others, strict=True):
+        expected = columns[:, list(v.columns)] * v.scales[0] * length[:, None]
+        np.testing.assert_allclose(
+            np.column_stack(other.columns)[:, list(w.columns)] * w.scales[0], expected, rtol=1e-9,
+            atol=1e-12 * (np.abs(expected).max() or 1.0),
+        )  # fmt: skip
