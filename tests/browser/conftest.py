@@ -39,7 +39,7 @@ def driver(chrome: Chrome) -> Chrome:
     chrome.switch_to.window(chrome.window_handles[0])
     chrome.get("about:blank")
     theme(chrome, "light")
-    chrome.get_log("browser")
+    chrome.get_log("browser")  # type: ignore[no-untyped-call]
     return chrome
 
 

@@ -13,6 +13,7 @@ from rig.panel.state import (
     Displacement,
     Force,
     LimitState,
+    Phase,
     Plan,
     PlannedRun,
     PromptState,
@@ -96,7 +97,7 @@ def turning() -> State:
 
 def prompting(prompt: PromptState) -> State:
     """A question is open."""
-    phase = "paused" if prompt.kind == "paused" else "prompt"
+    phase: Phase = "paused" if prompt.kind == "paused" else "prompt"
     return replace(turning(), phase=phase, prompt=prompt, turn=None)
 
 

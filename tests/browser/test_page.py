@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
 
-from rig.panel.state import Displacement, Force, PromptState, Slots, Turn
+from rig.panel.state import Displacement, Force, PromptState, Slots, State, Turn
 from tests.browser import scenes
 from tests.browser.browser import resize, theme
 from tests.browser.feed import Feed
@@ -69,12 +70,12 @@ def test_force_below_and_above_along_a_pull(page: Viewer, feed: Feed) -> None:
 
 
 def test_stale_value_is_grey_with_its_age_and_stops_the_hand(page: Viewer, feed: Feed) -> None:
-    assert "old" not in page.element("force").get_attribute("class").split()
+    assert not page.looks_old("force")
     feed.show(force=Force(126.4, 3.2, 140.0, 1.4, stale=True), turn=None)
     page.wait_for("cue-word", "Stop turning")
-    assert "old" in page.element("force").get_attribute("class").split()
+    assert page.looks_old("force")
     assert page.text("force-age") == "3.2 s old"
-    assert "old" not in page.element("displacement").get_attribute("class").split()
+    assert not page.looks_old("displacement")
 
 
 def test_connection_lost_and_back(page: Viewer, feed: Feed) -> None:
@@ -84,15 +85,15 @@ def test_connection_lost_and_back(page: Viewer, feed: Feed) -> None:
     assert re.search(r"from \d\d:\d\d:\d\d, \d+ s ago", page.text("alarms"))
     assert page.text("cue-word") == "Stop turning"
     assert page.text("force-number") == "126.4", "the last value stays, grey"
-    assert "old" in page.element("force").get_attribute("class").split()
+    assert page.looks_old("force")
     assert not page.element("pause").is_enabled()
     assert page.text("limits") == seen_before
     feed.show(force=Force(139.9, 0.0, 140.0, 1.4, stale=False))
     feed.start(port)
     page.wait_for("force-number", "139.9")
     page.wait(lambda: page.text("alarms") == "", "no banner once values come")
-    assert "old" not in page.element("force").get_attribute("class").split()
-    assert "repetition 3: 30 samples" in page.element("curve").get_attribute("aria-label")
+    assert not page.looks_old("force")
+    assert "repetition 3: 30 samples" in page.attribute("curve", "aria-label")
 
 
 def test_silent_connection_looks_no_more_alive_than_a_lost_one(page: Viewer, feed: Feed) -> None:
@@ -108,15 +109,15 @@ def test_state_that_was_held_up_on_the_way_is_old(page: Viewer, feed: Feed) -> N
     time.sleep(0.5)  # some states that came in time, to compare with
     feed.late_s = 2.0
     page.wait_for("alarms", "No values arrive: the values are from ")
-    assert "old" in page.element("force").get_attribute("class").split()
+    assert page.looks_old("force")
 
 
 def test_reload_shows_the_whole_run_again(page: Viewer, feed: Feed) -> None:
     label = "repetition 1: 55 samples, repetition 2: 55 samples, repetition 3: 30 samples"
-    page.wait(lambda: label in page.element("curve").get_attribute("aria-label"), label)
+    page.wait(lambda: label in page.attribute("curve", "aria-label"), label)
     operator = feed.operator
     page.reload()
-    page.wait(lambda: label in page.element("curve").get_attribute("aria-label"), label)
+    page.wait(lambda: label in page.attribute("curve", "aria-label"), label)
     assert feed.operator == operator
     page.wait(lambda: page.seen("controls"), "still the operator after the reload")
 
@@ -124,8 +125,8 @@ def test_reload_shows_the_whole_run_again(page: Viewer, feed: Feed) -> None:
 def test_whole_run_over_time(page: Viewer) -> None:
     page.click("span-run")
     label = "the whole run, 140 samples"
-    page.wait(lambda: label in page.element("time").get_attribute("aria-label"), label)
-    assert page.element("span-run").get_attribute("aria-pressed") == "true"
+    page.wait(lambda: label in page.attribute("time", "aria-label"), label)
+    assert page.attribute("span-run", "aria-pressed") == "true"
 
 
 # Pixels of the curve in the colour of the repetition under way (light theme).
@@ -261,7 +262,7 @@ def test_device_fault_with_its_remedy(page: Viewer, feed: Feed) -> None:
     assert "FAULT" in page.text("devices")
     assert scenes.LASER_FAULT.remedy in page.text("devices")
     assert page.text("cue-word") == "Stop turning"
-    assert "old" in page.element("displacement").get_attribute("class").split()
+    assert page.looks_old("displacement")
     feed.state = scenes.turning()
     page.wait(lambda: page.text("alarms") == "", "the band has gone")
 
@@ -271,7 +272,7 @@ def test_end_is_said_and_nothing_looks_live(page: Viewer, feed: Feed) -> None:
     page.wait_for("cue-word", "Stopped")
     feed.end = {"phase": "aborted", "text": "The operator ended the measurement"}
     page.wait_for("alarms", "The operator ended the measurement. The values are from ")
-    assert "old" in page.element("force").get_attribute("class").split()
+    assert page.looks_old("force")
     page.wait(lambda: feed.viewers == 0, "the page has hung up")
 
 
@@ -318,13 +319,17 @@ def test_theme_follows_the_system_until_the_button_says_otherwise(page: Viewer) 
     assert background() == light, "the choice outlives a reload"
 
 
+def scene_shown(page: Viewer, state: State) -> bool:
+    return page.seen("prompt") == bool(state.prompt)
+
+
 @pytest.mark.parametrize("size", [(1920, 1080), (1024, 768), (390, 844)])
 def test_nothing_is_cut_off(page: Viewer, feed: Feed, size: tuple[int, int]) -> None:
     resize(page.here(), *size)
     try:
         for state in (scenes.turning(), scenes.prompting(scenes.MOUNT), scenes.laser_failed()):
             feed.state = state
-            page.wait(lambda s=state: page.seen("prompt") == bool(s.prompt), "the scene")
+            page.wait(partial(scene_shown, page, state), "the scene")
             time.sleep(0.3)
             assert page.script(CUT_OFF) == []
     finally:

@@ -66,6 +66,14 @@ class Viewer:
         code = "const e = document.activeElement; return e.id || e.innerText || e.tagName"
         return str(self.script(code))
 
+    def attribute(self, name: str, attribute: str) -> str:
+        """An attribute of an element; empty where there is none."""
+        return self.element(name).get_attribute(attribute) or ""
+
+    def looks_old(self, name: str) -> bool:
+        """Whether a value is shown as one that is not live."""
+        return "old" in self.attribute(name, "class").split()
+
     def wait(self, until: Callable[[], object], what: str, deadline_s: float = DEADLINE_S) -> None:
         """Until something is true; fails with `what` was awaited."""
         end = time.monotonic() + deadline_s
@@ -84,5 +92,6 @@ class Viewer:
 
     def errors(self) -> list[str]:
         """What scripts complain of; that a request failed is the test's own doing."""
-        log = [e for e in self.here().get_log("browser") if e["level"] == "SEVERE"]
+        everything = self.here().get_log("browser")  # type: ignore[no-untyped-call]
+        log = [e for e in everything if e["level"] == "SEVERE"]
         return [e["message"] for e in log if "Failed to load resource" not in e["message"]]

@@ -29,7 +29,7 @@ export class Bands {
     const emulated = state?.emulated ? state.banner || "EMULATED: no measurement of a real arm" : "";
     setHidden(byId("emulated"), !emulated);
     setText(byId("emulated"), emulated);
-    const list = [...connectionBand(connection), ...deviceBands(state)];
+    const list = [...connectionBand(connection, state), ...deviceBands(state)];
     if (state?.message && !connection.end) list.push({ kind: "warn", text: state.message });
     if (this.said && performance.now() < this.saidUntil) list.push({ kind: "warn", text: this.said });
     draw(list);
@@ -43,13 +43,19 @@ function deviceBands(state) {
 }
 
 /** `connection`: {connected, old, last (Date or null), end ({text} or null)}. */
-function connectionBand({ connected, old, last, age_s, end }) {
-  if (end) return [{ kind: "warn", text: `■ ${end.text}. The values are from ${at(last)}.` }];
+function connectionBand({ connected, old, last, age_s, end }, state) {
+  if (end) return [{ kind: "warn", text: `■ ${endWords(end, state)}. The values are from ${at(last)}.` }];
   if (!old) return [];
   if (last === null) return [{ kind: "warn", text: connected ? "Waiting for the first values." : "No connection to the measurement yet; trying again." }];
   const what = connected ? "No values arrive" : "Connection lost";
   const seconds = age(Math.floor(age_s) || 0).replace(".0", "");
   return [{ kind: "fault", text: `⚠ ${what}: the values are from ${at(last)}, ${seconds} ago`, remedy: "Stop turning. The page goes on by itself when values arrive; the terminal shows the same." }];
+}
+
+// A failed device has a band of its own that says why.
+function endWords(end, state) {
+  const told = deviceBands(state).length > 0;
+  return told ? "The measurement has ended" : end.text.replace(/\.$/, "");
 }
 
 const at = (date) => (date ? clock(date) : "earlier");

@@ -35,6 +35,7 @@ export function cueOf(state, old) {
   if (failed) return ["stop", "Stop turning", `${failed.name} has failed`];
   if (state.prompt && !state.turn) return ["ask", "Answer", "the question below"];
   if (["prompt", "turning"].includes(state.phase)) {
+    if (!isNumber(state.force.N)) return ["hands", "Wait", "no force yet"];
     return state.force.stale || !state.turn ? ["stop", "Stop turning", "the force is old"] : turnCue(state);
   }
   const [sign, word, far] = WAITING[state.phase] ?? ["hands", "Wait", ""];

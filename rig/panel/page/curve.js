@@ -30,7 +30,7 @@ export class CurvePlot {
     if (key !== this.key) this.#restart(key, range, model);
     this.#add(repetitions, repetition);
     this.surface.clear(this.surface.top);
-    if (!old) this.surface.dot(this.lane, state.force.N, state.displacement.mm, false);
+    if (!old && isNumber(state.force.N) && isNumber(state.displacement.mm)) this.surface.dot(this.lane, state.force.N, state.displacement.mm, false);
     const earlier = [...repetitions.keys()].some((r) => r !== repetition);
     legend({ repetition, earlier, model: model.length > 0 });
     this.#describe(repetitions, direction, model);

@@ -29,12 +29,12 @@ export class Readout {
     setText(byId("force-number"), text);
     byId("force").classList.toggle("long", text.length > 5);
     byId("force").classList.toggle("old", forceOld);
-    this.#age(byId("force-age"), forceOld, force.age_s, old_s);
+    this.#age(byId("force-age"), forceOld && isNumber(force.N), force.age_s, old_s);
     setText(byId("target"), this.#target(force));
     setText(byId("displacement-number"), number(displacement.mm, 3));
     const displacementOld = old || displacement.stale;
     byId("displacement").classList.toggle("old", displacementOld);
-    this.#age(byId("displacement-age"), displacementOld, displacement.age_s, old_s);
+    this.#age(byId("displacement-age"), displacementOld && isNumber(displacement.mm), displacement.age_s, old_s);
     byId("force-card").classList.toggle("stale", forceOld);
     this.#gauge(force, forceOld);
   }
@@ -77,9 +77,10 @@ export class Readout {
   }
 
   #word(force, range, old) {
-    if (old) return "values are old";
+    if (!isNumber(force.N)) return "no force yet";
+    if (old) return "the value is old";
     const zoom = range.fine ? "close-up · " : "";
-    if (!isNumber(force.N) || !isNumber(force.target_N) || !(force.band_N > 0)) return "";
+    if (!isNumber(force.target_N) || !(force.band_N > 0)) return "";
     const off = force.N - force.target_N;
     if (Math.abs(off) <= force.band_N) return `${zoom}● in the band`;
     // Below and above are meant along the load: −20 N is above a target of −10 N.

@@ -24,11 +24,9 @@ function device({ name, state, reason, remedy }) {
   const lamp = makeSvg("svg", { viewBox: "0 0 16 16", class: state, "aria-hidden": "true" });
   lamp.append(makeSvg("path", { d: path, fill: "currentColor", "fill-rule": "evenodd" }));
   item.append(lamp, make("span", "name", name), make("span", state === "ok" ? "spoken" : `state ${state}`, word));
-  const why = [reason, remedy].filter(Boolean).join(" ");
-  if (why) {
-    item.className = "said";
-    item.append(make("span", "why", why));
-  }
+  const why = [reason, remedy && `→ ${remedy}`].filter(Boolean);
+  if (why.length) item.className = "said";
+  item.append(...why.map((words) => make("span", "why", words)));
   return item;
 }
 
@@ -37,11 +35,12 @@ const limits = onChange((list) => {
 });
 
 function limit({ name, amount, fraction, action }) {
-  const item = make("li", fraction < NEAR ? "near" : "");
-  const [sign, then] = fraction < NEAR ? ["▲ ", ` → ${action}`] : ["", ""];
+  const near = fraction !== null && fraction < NEAR;
+  const item = make("li", near ? "near" : "");
+  const [sign, then] = near ? ["▲ ", ` → ${action}`] : ["", ""];
   const track = make("div", "track");
   const left = make("div", "left");
-  left.style.transform = `scaleX(${fraction})`;
+  left.style.transform = `scaleX(${fraction ?? 0})`;
   track.append(left);
   item.append(make("span", "name", `${sign}${name}`), make("span", "amount", amount + then), track);
   return item;
@@ -53,9 +52,9 @@ export function shownLimits(list) {
     .map(({ name, value, limit: max, unit, left_fraction, action }) => ({
       name, action,
       amount: `${isNumber(value) ? short(max - value) : "–"} of ${short(max)} ${UNITS[unit] ?? unit}`,
-      fraction: isNumber(left_fraction) ? Math.round(100 * Math.min(1, Math.max(0, left_fraction))) / 100 : 0,
+      fraction: isNumber(left_fraction) ? Math.round(100 * Math.min(1, Math.max(0, left_fraction))) / 100 : null,
     }))
-    .sort((a, b) => a.fraction - b.fraction);
+    .sort((a, b) => (a.fraction ?? 2) - (b.fraction ?? 2));
 }
 
 function slots({ missed, late_ms }) {

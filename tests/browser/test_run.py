@@ -1,0 +1,206 @@
+"""Whole emulated measurements with the operator's page, driven by its buttons."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from rig import dataset
+from tests.browser.feed import Feed
+from tests.browser.viewer import Viewer
+from tests.wire.short import HOME, write_files
+
+if TYPE_CHECKING:
+    from selenium.webdriver import Chrome
+
+pytestmark = pytest.mark.browser
+LINK = re.compile(r"http://127\.0\.0\.1:\d+/\?token=\S+")
+START_S, RUN_S = 30.0, 90.0
+
+
+class Measurement:
+    """`rig measure --panel` in a folder of its own; stopped in any case."""
+
+    def __init__(self, folder: Path, **station: object) -> None:
+        self.folder = folder
+        self._log = folder / "log.txt"
+        words = [sys.executable, "-m", "rig", *write_files(folder, **station), "--panel"]
+        with self._log.open("w") as log:
+            self._process = subprocess.Popen(
+                words,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, "PYTHONPATH": str(HOME)},
+            )
+
+    @property
+    def said(self) -> str:
+        """Everything on the terminal so far."""
+        return self._log.read_text(encoding="utf-8")
+
+    def link(self) -> str:
+        """The operator's, as the terminal says it."""
+        end = time.monotonic() + START_S
+        while (found := LINK.search(self.said)) is None:
+            assert self.running, self.said
+            assert time.monotonic() < end, self.said
+            time.sleep(0.05)
+        return found.group()
+
+    @property
+    def running(self) -> bool:
+        """Whether the measurement goes on."""
+        return self._process.poll() is None
+
+    def status(self) -> int:
+        """Exit status, once it is over."""
+        return self._process.wait(RUN_S)
+
+    def stop(self) -> None:
+        """Ends it, if it still runs."""
+        if self.running:
+            self._process.terminate()
+            try:
+                self._process.wait(15)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+
+
+@pytest.fixture
+def measurement(driver: Chrome, tmp_path: Path) -> Iterator[Measurement]:
+    """A short one at 30 times real time; the browser first, because it may skip."""
+    running = Measurement(tmp_path)
+    yield running
+    running.stop()
+
+
+def carry_on(page: Viewer, until: str) -> None:
+    """Answers questions by their first button until `until` is the word to the operator."""
+    first = "const b = document.querySelector('#prompt-choices .first'); if (b) b.click()"
+    end = time.monotonic() + RUN_S
+    while page.text("cue-word") != until:
+        assert time.monotonic() < end, page.text_of_all()
+        page.script(first)
+        time.sleep(0.1)
+
+
+def step(page: Viewer) -> int:
+    """The step under way, 0 between them."""
+    return int(page.text("step").split(" of ")[0].replace("–", "0"))
+
+
+def test_whole_run_by_the_buttons(driver: Chrome, measurement: Measurement) -> None:
+    page = Viewer(driver, measurement.link())
+    page.wait_for("prompt-text", "Bring the arm to pose P1")
+    assert page.text("emulated").startswith("EMULATED")
+    carry_on(page, until="Tighten")
+    page.click("pause")
+    page.wait_for("prompt-text", "Paused.")
+    page.click("pause")
+    carry_on(page, until="Tighten")
+    page.click("redo")
+    page.reload()
+    page.wait(lambda: page.seen("controls"), "still the operator after the reload")
+    carry_on(page, until="Done")
+    page.wait_for("alarms", "The values are from ")
+    assert page.looks_old("force")
+    assert "repetition 2: " in page.attribute("curve", "aria-label")
+    assert measurement.status() == 0, measurement.said
+    run = dataset.load(measurement.folder / "run.h5")
+    kinds = [event["kind"] for event in run.events]
+    assert run.complete
+    assert kinds.count("repetition_done") == 2
+    assert "pause" in kinds
+    # Going on after a pause and redoing measure the step under way from its start.
+    assert kinds.count("step_start") - kinds.count("step_done") == 2
+    assert page.errors() == []
+
+
+def test_abort_keeps_the_data_and_says_so(driver: Chrome, measurement: Measurement) -> None:
+    page = Viewer(driver, measurement.link())
+    carry_on(page, until="Tighten")
+    page.press("a")
+    page.press("\ue007")
+    page.wait_for("cue-word", "Stopped")
+    assert measurement.status() == 4
+    assert "--resume" in measurement.said
+    assert not page.seen("controls")
+
+
+def test_late_viewer_sees_the_whole_run_and_only_watches(
+    driver: Chrome, measurement: Measurement
+) -> None:
+    page = Viewer(driver, measurement.link())
+    carry_on(page, until="Tighten")
+    page.wait(lambda: step(page) >= 2, "the second step")
+    late = Viewer(driver, measurement.link(), new_tab=True)
+    late.wait(lambda: step(late) >= 2, "the late viewer is where the run is")
+    code = "return document.getElementById('curve').getAttribute('aria-label')"
+    late.wait(lambda: "repetition 1: " in late.script(code), "the samples before it came")
+    assert not late.seen("controls")
+    watching = Viewer(driver, measurement.link().split("?")[0], new_tab=True)
+    watching.wait_for("viewer-text", "somebody else is the operator")
+    assert not watching.seen("take"), "without the operator's link nobody takes over"
+
+
+def test_fault_shows_its_remedy_on_the_page(driver: Chrome, tmp_path: Path) -> None:
+    running = Measurement(
+        tmp_path, faults="[{device: laser, kind: silence, after_s: 40}]", speed=30
+    )
+    try:
+        page = Viewer(driver, running.link())
+        carry_on(page, until="Stop")
+        page.wait_for("alarms", "The measurement has ended")
+        assert running.status() == 3
+        remedy = "Check the sensor's power, its cable and the adapter, then start again."
+        assert remedy in running.said
+        assert remedy in page.text("alarms")
+        assert remedy in page.text("devices")
+        assert "FAULT" in page.text("devices")
+    finally:
+        running.stop()
+
+
+FOREIGN = """
+const done = arguments[arguments.length - 1];
+const [address, token] = [arguments[0], arguments[1]];
+const body = JSON.stringify({command: "abort"});
+const own = {"X-Panel-Token": token, "X-Panel-Client": "foreign-page-1"};
+const tries = [
+  {method: "POST", body, mode: "no-cors"},
+  {method: "POST", body, headers: {"Content-Type": "application/json", ...own}},
+  {method: "POST", body, headers: {"Content-Type": "text/plain"}, mode: "no-cors"},
+];
+Promise.allSettled(tries.map((t) => fetch(address + "command?token=" + token, t)))
+  .then((all) => done(all.map((r) => r.value?.status ?? "refused")));
+"""
+
+
+def test_foreign_page_cannot_press_abort(
+    driver: Chrome, feed: Feed, measurement: Measurement
+) -> None:
+    link = measurement.link()
+    page = Viewer(driver, link)
+    carry_on(page, until="Tighten")
+    foreign = Viewer(driver, feed.url, new_tab=True)
+    driver.set_script_timeout(20)
+    foreign.here()
+    address, token = link.split("?token=")
+    # Without the page's own policy, which would stop it before anything is sent.
+    driver.execute_cdp_cmd("Page.setBypassCSP", {"enabled": True})
+    foreign.reload()
+    answers = driver.execute_async_script(FOREIGN, address, token)
+    assert 200 not in answers
+    assert measurement.running
+    carry_on(page, until="Done")
+    assert measurement.status() == 0, measurement.said
