@@ -46,8 +46,9 @@ def measured(session: Session, data: Node, pictures: Pictures) -> Section:
 
 def _what(session: Session, data: Node) -> Iterator[tuple[str, Cell]]:
     meta, quality = data["meta"], data["quality"]
-    yield "Title", data["title"].value or NOTHING
-    yield "Begun", data["created"].value or NOTHING
+    imported = bool(data["imported"].value)
+    yield "Imported from" if imported else "Title", data["title"].value or NOTHING
+    yield "Imported on" if imported else "Begun", data["created"].value or NOTHING
     if quality["duration_s"]:
         yield "Took", quality["duration_s"].number(3, 1 / 60, "min")
     yield "Origin", _ORIGINS[session.dataset.origin]

@@ -112,7 +112,7 @@ def _overview(sessions: Sequence[Session], data: Node) -> Table:
         state = Word("complete", "good") if session.dataset.complete else Word("incomplete", "bad")
         where = one["created"].text()[:10]
         rows.append(row(session.label, where, one["origin"].text(), state, verdict, *cells))
-    header = ("data set", "begun", "origin", "state", "verdict", *(f"k in {k} N/mm" for k in keys))
+    header = ("data set", "date", "origin", "state", "verdict", *(f"k in {k} N/mm" for k in keys))
     return Table("The data sets", header, tuple(rows), 5)
 
 

@@ -1,0 +1,198 @@
+"""The page itself: text stays text, nothing comes from outside, marks stand where they must."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rig.dataset import load
+from rig.errors import InputError
+from rig.report.document import Document, Paragraph, Section, Word
+from rig.report.gather import Wishes
+from rig.report.html import escape, render
+from rig.report.report import Report, checked, make, write_figures, write_html
+from tests.unit.report_sets import META, SIMULATION, Page, bench, rewritten
+
+QUIET = Wishes(gap=False, made="2026-03-01T12:00:00+01:00")
+EVIL = "<script>alert(1)<script><img src=x onerror=alert(2)> $x^$ \\frac{ #panic() *b*"
+NAME = "<script>alert(1)<script><img src=x> $x^$ \\frac{ *b*"  # as long as names may be
+ALLOWED = {
+    "html", "head", "meta", "title", "style", "body", "header", "h1", "h2", "h3", "h4", "p", "nav",
+    "ol", "li", "a", "main", "section", "dl", "dt", "dd", "div", "figure", "figcaption", "svg",
+    "defs", "g", "path", "use", "clippath", "rect", "image", "pattern", "table", "caption", "thead",
+    "tbody", "tr", "th", "td", "data", "strong", "span", "code", "pre", "ul", "footer",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def evil(tmp_path_factory: pytest.TempPathFactory) -> Report:
+    """A data set with dangerous words wherever words may stand."""
+    folder = tmp_path_factory.mktemp("evil")
+    meta = META.replace("{x: ", f"{{'{NAME}': ")
+    path = bench(folder / "<b>&'x'.h5", meta=meta, comment=EVIL + "</pre></style>")
+    rewritten(
+        path,
+        title=EVIL,
+        origin="emulated",
+        complete=False,
+        stop_reason=EVIL,
+        devices={EVIL: {EVIL: EVIL, "serial_number": EVIL}},
+        calibration={EVIL: {EVIL: [EVIL]}},
+        events=[{"kind": "note", "text": EVIL, "sample": 0},
+                {"kind": "discard", "text": EVIL, "reason": EVIL, "first": 0, "last": 0,
+                 "sample": 3}],
+    )  # fmt: skip
+    return make([path, path], QUIET)
+
+
+def test_text_stays_text(evil: Report) -> None:
+    page = Page(evil.to_html())
+    assert {e.tag for e in page.elements} <= ALLOWED
+    names = {name for e in page.elements for name in e.attributes}
+    assert not [n for n in names if n.startswith("on")]
+    assert page.text.count(EVIL) >= 12
+    assert "<b>&'x'.h5" in page.text
+
+
+def test_scripts_and_requests_are_forbidden_as_well(evil: Report) -> None:
+    policies = [e.attributes.get("content", "") for e in Page(evil.to_html()).all("meta")]
+    assert any("default-src 'none'" in p for p in policies)
+
+
+def test_nothing_comes_from_outside(evil: Report) -> None:
+    page = Page(evil.to_html())
+    for element in page.elements:
+        for name in ("src", "href", "xlink:href", "action", "srcset"):
+            value = element.attributes.get(name)
+            assert value is None or value.startswith(("#", "data:image/")), (element.tag, value)
+    sheet = page.all("style")[0].text
+    assert "@import" not in sheet
+    assert "url(" not in sheet
+
+
+def test_ids_are_unique_and_references_meet_one(evil: Report) -> None:
+    html = evil.to_html()
+    page = Page(html)
+    ids = [e.attributes["id"] for e in page.elements if "id" in e.attributes]
+    assert len(ids) == len(set(ids))
+    wanted = {v[1:] for e in page.elements for n, v in e.attributes.items()
+              if n in ("href", "xlink:href") and v.startswith("#")}  # fmt: skip
+    wanted |= set(re.findall(r"url\(#([^)]+)\)", html))
+    assert len(wanted) > 100
+    assert wanted <= set(ids)
+
+
+def test_every_section_of_emulated_or_cut_off_data_says_so(evil: Report) -> None:
+    chapters = list(evil.document.sections)
+    inner = [b for s in chapters for b in s.blocks if isinstance(b, Section) and s.own_page]
+    assert len(inner) > 8
+    for section in (*chapters, *inner):
+        assert [b[:8] for b in section.banners] == ["EMULATED", "INCOMPLE"], section.title
+    html = evil.to_html()
+    assert 'content: "EMULATED · INCOMPLETE"' in html  # the head of every printed page
+    assert len([e for e in Page(html).all("p") if e.attributes["class"] == "mark"]) >= 2 * 10
+
+
+def test_measured_data_carry_no_mark(tmp_path: Path) -> None:
+    report = make([rewritten(bench(tmp_path / "m.h5"), origin="measured")], QUIET)
+    assert "EMULATED" not in report.to_html()
+    assert "INCOMPLETE" not in report.to_html()
+    assert not Page(report.to_html()).all("script")
+
+
+def test_characters_that_no_file_can_hold() -> None:
+    assert escape("a\x00b\ud800c\x1b") == "a\ufffdb\ufffdc\ufffd"
+    assert escape("\"'<>&") == "&quot;&#x27;&lt;&gt;&amp;"
+    section = Section("s", "\ud800", (Paragraph((Word("\x00", "code"),)),))
+    render(Document("\udcff", "", (), (section,), "")).encode("utf-8")
+
+
+def test_what_the_data_do_not_allow_is_said(tmp_path: Path) -> None:
+    zero = bench(tmp_path / "zero.h5", lambda f, r: 0.001 * r, forces=(0.0, 0.0), meta=META)
+    text = Page(make([zero], Wishes(made="now")).to_html()).text
+    assert "The stiffness is undefined: the force is 0 N throughout." in text
+    assert "Robot: none; joint stiffnesses need an arm." in text
+    assert "META names no simulation, so there is no gap to diagnose." in text
+    assert "No simulation is stated for this measurement." in text
+    assert "No device is named in this data set." in text
+
+
+def test_without_the_gap(tmp_path: Path) -> None:
+    page = Page(make([bench(tmp_path / "a.h5")], QUIET).to_html())
+    assert "Left out, as asked for (--no-gap)." in page.text
+    assert "Gap to the simulation" not in [e.text for e in page.all("h2")]
+
+
+def test_all_samples_discarded(tmp_path: Path) -> None:
+    path = bench(tmp_path / "d.h5")
+    columns = dict(load(path).columns)
+    columns["discarded"] = ~columns["discarded"]
+    text = Page(make([rewritten(path, columns=columns)], Wishes(made="now")).to_html()).text
+    assert "There are no samples to analyze." in text
+    assert "No sample in use" in text
+
+
+def test_figures_with_their_numbers(tmp_path: Path) -> None:
+    wishes = Wishes(gap=False, png=True)
+    report = make([rewritten(bench(tmp_path / "a.h5"), origin="emulated")], wishes)
+    written = {p.name for p in write_figures(report, tmp_path / "figures")}
+    for name in ("a_setup", "a_curve", "a_pointwise", "a_quality"):
+        assert {f"{name}.svg", f"{name}.png", f"{name}.csv"} <= written
+    table = (tmp_path / "figures" / "a_curve.csv").read_text("utf-8").splitlines()
+    assert table[:2] == ["# EMULATED", "direction,branch,step,force_N,displacement_mm,sd_mm,n"]
+    levels = report.to_json()["datasets"][0]["analyze"]["directions"]["x"]["curve"]
+    cells = [float(line.split(",")[4]) for line in table[2:]]
+    assert cells == [p["displacement_mm"] for p in levels]
+    assert (tmp_path / "figures" / "a_curve.png").read_bytes().startswith(b"\x89PNG")
+    assert "xmlns" in (tmp_path / "figures" / "a_curve.svg").read_text("utf-8")
+
+
+def test_same_data_same_page(tmp_path: Path) -> None:
+    path = bench(tmp_path / "a.h5")
+    assert make([path], QUIET).to_html() == make([path], QUIET).to_html()
+
+
+def test_two_files_of_one_name(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    paths = [bench(tmp_path / folder / "run.h5") for folder in "ab"]
+    report = make(paths, QUIET)
+    assert [s.label for s in report.gathered.sessions] == [str(p) for p in paths]
+    files = [p.name for p in write_figures(report, tmp_path / "figures")]
+    assert len({name.lower() for name in files}) == len(files)
+
+
+def test_wrong_names_of_files(tmp_path: Path) -> None:
+    page = tmp_path / "a.html"
+    assert checked(page, None) == page
+    with pytest.raises(InputError, match=r"a name that ends in \.html is wanted"):
+        checked(tmp_path / "arm.h5", None)
+    with pytest.raises(InputError, match=r"--pdf .*a name that ends in \.pdf is wanted"):
+        checked(page, tmp_path / "arm.h5")
+    with pytest.raises(InputError, match=r"does not exist\. Create it first"):
+        checked(tmp_path / "none" / "a.html", None)
+    with pytest.raises(InputError, match="give at least one data set"):
+        make([])
+
+
+def test_the_page_is_written_whole(tmp_path: Path) -> None:
+    report = make([bench(tmp_path / "a.h5")], QUIET)
+    write_html(report, tmp_path / "a.html")
+    assert (tmp_path / "a.html").read_text("utf-8") == report.to_html()
+    assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv", ".h5", ".html", ".yaml"]
+
+
+def test_one_process_beside_gives_the_same_page(tmp_path: Path) -> None:
+    path = bench(tmp_path / "a.h5", meta=META + SIMULATION)
+    beside, alone = (make([path], Wishes(made="now", processes=n)).to_html() for n in (1, 0))
+    assert beside == alone
+    assert "a_gap_curve" in alone
+
+
+def test_pdf_takes_dangerous_words_as_words(evil: Report) -> None:
+    pytest.importorskip("typst", reason="the PDF needs typst")
+    content = evil.to_pdf()
+    assert content.startswith(b"%PDF")
+    assert len(content) > 50_000
