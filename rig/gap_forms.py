@@ -69,6 +69,7 @@ _CONSTANTS: dict[str, Key] = {
 _SHAPES: dict[str, Key] = {
     "threshold": Key("threshold_Nm", "positive"),
     "returns_beyond": Key("returns_beyond_Nm", "positive"),
+    "ratchets_beyond": Key("ratchets_beyond_Nm", "positive"),
     "after": Key("after_Nm", "positive"),
     "strength": Key("friction_Nm", "positive"),
     "reach": Key("reach_Nm", "positive"),
@@ -126,7 +127,11 @@ class _Grammar:
     terms: tuple[tuple[str, tuple[str, ...]], ...]
 
 
-_PLAYS = (("compliance", ("threshold",)), ("compliance", ("returns_beyond", "after")))
+_PLAYS = (
+    ("compliance", ("threshold",)),
+    ("compliance", ("returns_beyond", "after")),
+    ("compliance", ("ratchets_beyond", "after")),
+)
 _PATHS = (
     ("drift", ("time_constant",)),
     ("drift_rate", ()),
