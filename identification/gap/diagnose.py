@@ -16,8 +16,9 @@ from identification.gap.evidence import Engine, eta_levels
 from identification.gap.fit import Fit, fit
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.locate import Where, locate
-from identification.gap.parameters import Parameter, parameters
-from identification.gap.search import Explanation, Found, refine_knees, search
+from identification.gap.parameters import Parameter
+from identification.gap.posterior import parameters_of
+from identification.gap.search import Explanation, Found, force, refine_knees, search
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
 
@@ -95,8 +96,11 @@ def diagnose_gap(
     found = search(engine, variants)
     tell("withheld data", 0.7)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
-    chosen = _chosen(found, verdict, forced)
-    result = _with_twins(_result(bench, engine, found, verdict, chosen), chosen, out)
+    if forced:
+        chosen = force(engine, variants, found.explanations, forced)
+    else:
+        chosen = _chosen(found, verdict)
+    result = _with_twins(_result(found, variants, verdict, chosen), chosen, out)
     tell("what to measure next", 0.9)
     result = replace(
         result, next_measurement=_next(found, variants, chosen, verdict, result.effects, others)
@@ -115,20 +119,16 @@ def _check_words(words: set[str] | frozenset[str]) -> None:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
 
 
-def _chosen(found: Found, verdict: str, forced: frozenset[str]) -> Explanation:
-    """The best explanation with the verdict as its main cause (or with the forced words)."""
-    empty = next(e for e in found.explanations if not e.parts)
-    if forced:
-        return next((e for e in found.explanations if forced <= e.words), empty)
+def _chosen(found: Found, verdict: str) -> Explanation:
+    """The best explanation with the verdict as its main cause."""
     if verdict in ("none", "unknown"):
-        return empty
+        return next(e for e in found.explanations if not e.parts)
     mine = [e for e in found.explanations if e.parts and e.parts[0].word == verdict]
     return next((e for e in mine if e.good), mine[0])
 
 
-def _result(
-    bench: Bench, engine: Engine, found: Found, verdict: str, chosen: Explanation
-) -> GapResult:
+def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explanation) -> GapResult:
+    engine, bench = found.engine, found.engine.bench
     n = bench.rows.n
     fitted = fit(engine, chosen)
     gap = bench.response - stated_prediction(engine)
@@ -137,11 +137,10 @@ def _result(
     held = tuple(held_out(engine, chosen, name, number) for name, number in ways.items())
     springs = fit(engine, next(e for e in found.explanations if not e.parts))
     structural = engine.target[:n] - springs.response
-    effects = _effects(bench, found, chosen, fitted)
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,
-        effects=effects,
+        effects=_effects(found, variants, chosen),
         where=locate(engine, fitted, structural),
         noise=_noise(bench),
         before=_sample_rms(bench, gap),
@@ -158,24 +157,23 @@ def _result(
     )
 
 
-def _effects(bench: Bench, found: Found, chosen: Explanation, fitted: Fit) -> tuple[Effect, ...]:
+def _effects(found: Found, variants: list[Variant], chosen: Explanation) -> tuple[Effect, ...]:
     weights = np.array([e.log_weight for e in found.explanations])
     share = np.exp(weights - weights.max())
     total = float(share.sum())
     squares = np.array(chosen.sizes) ** 2 if chosen.sizes else np.zeros(0)
+    power = float(squares.sum())
     out = []
     for i, part in enumerate(chosen.parts):
         present = sum(
             float(s) for e, s in zip(found.explanations, share, strict=True) if part.word in e.words
         )
-        w, cov = fitted.of(i)
-        power = float(squares.sum())
         out.append(
             Effect(
                 name=part.word,
                 label=part.variant.label,
                 probability=min(1.0, present / total),
-                parameters=parameters(bench, part, w, cov),
+                parameters=parameters_of(found.engine, variants, chosen, i),
                 indistinguishable_from=_alike(found, chosen, part.word),
                 share_of_gap=float(squares[i] / power) if power > 0 else 1.0 / len(squares),
                 size=float(chosen.sizes[i]),

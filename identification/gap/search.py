@@ -147,6 +147,26 @@ def refine_knees(engine: Engine, variants: list[Variant]) -> list[Variant]:
     return out
 
 
+def force(
+    engine: Engine, variants: list[Variant], pool: tuple[Explanation, ...], words: frozenset[str]
+) -> Explanation:
+    """The best explanation that contains all `words`, and what else it wants; where the search
+    found none, the words alone, one fitted after the other."""
+    with_all = [e for e in pool if words <= e.words]
+    if with_all:
+        return with_all[0]
+    parts: tuple[Part, ...] = ()
+    left, evidence = set(words), 0.0
+    while left:
+        levels, energy = conditioned(engine, parts)
+        scored = score(engine, levels, [v for v in variants if v.word in left], energy)
+        top = max(scored, key=lambda s: s.log_evidence)
+        parts = (*parts, Part(top.variant, top.scale))
+        left.discard(top.variant.word)
+        evidence = _marginal([s for s in scored if s.variant.word == top.variant.word])
+    return _polish(engine, variants, _explain(engine, parts, evidence))
+
+
 def _seeds(pool: dict[frozenset[str], Explanation]) -> list[Explanation]:
     """Where to look for a second effect: around all good ones; where the best explains the data
     down to the noise, around those within reach of it."""
@@ -205,7 +225,7 @@ def _with_one_more(
     known: dict[frozenset[str], Explanation],
 ) -> dict[frozenset[str], Explanation]:
     others = [v for v in variants if v.word not in start.words]
-    levels, energy = _conditioned(engine, start.parts)
+    levels, energy = conditioned(engine, start.parts)
     out: dict[frozenset[str], Explanation] = {}
     found_words = _by_word(score(engine, levels, others, energy))
     promising = sorted(found_words, key=lambda w: -_marginal(found_words[w]))[:_PROMISING]
@@ -226,7 +246,7 @@ def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Expl
     for index in range(len(start.parts)):
         rest = tuple(p for i, p in enumerate(best.parts) if i != index)
         word = best.parts[index].word
-        levels, energy = _conditioned(engine, rest)
+        levels, energy = conditioned(engine, rest)
         scored = score(engine, levels, [v for v in variants if v.word == word], energy)
         top = max(scored, key=lambda s: s.log_evidence)
         found = _explain(engine, (*rest, Part(top.variant, top.scale)), _marginal(scored))
@@ -235,7 +255,7 @@ def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Expl
     return best
 
 
-def _conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
+def conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
     """Levels with the parts integrated out, and the whitened energy of the parts."""
     levels = engine.levels
     for p in parts:
