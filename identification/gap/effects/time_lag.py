@@ -20,7 +20,7 @@ from identification.gap.history import delayed, half_sample, rests, retarded
 from identification.gap.variants import Variant, variant
 
 WORD = "time_lag"
-LAGS = (0.6, 1.0, 1.6, 2.5, 4.0, 7.0, 12.0)  # of the time between two samples
+LAGS = (0.3, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 4.0, 7.0, 12.0)  # of the time between two samples
 
 
 def variants(bench: Bench) -> list[Variant]:
