@@ -74,8 +74,8 @@ def compare(sets: Sequence[tuple[Dataset, Analysis]]) -> list[Pair]:
         for key, a in first.directions.items():
             b = _counterpart(key, a, analysis)
             if b is not None and a.result.k is not None and b.result.k is not None:
-                found.append(_pair(0, i, key, a.result, b.result, shared=shared))
-    return _adjusted(found)
+                found.append(paired(0, i, key, a.result, b.result, shared=shared))
+    return adjusted(found)
 
 
 def same_instruments(a: Dataset, b: Dataset) -> bool:
@@ -97,7 +97,8 @@ def _counterpart(key: str, a: Direction, other: Analysis) -> Direction | None:
     return other.directions.get(key)
 
 
-def _pair(first: int, second: int, key: str, a: Stiffness, b: Stiffness, *, shared: bool) -> Pair:
+def paired(first: int, second: int, key: str, a: Stiffness, b: Stiffness, *, shared: bool) -> Pair:
+    """k of b against k of a. shared: the same instruments, whose gains cancel."""
     assert a.k is not None
     assert b.k is not None
     difference = b.k.value - a.k.value
@@ -141,8 +142,9 @@ def probability(difference: Quantity) -> float:
     return float(2 * stdtr(difference.dof, -t))
 
 
-def _adjusted(pairs: list[Pair]) -> list[Pair]:
-    """Holm's step-down: the k-th smallest of m times m - k + 1, never below the ones before."""
+def adjusted(pairs: list[Pair]) -> list[Pair]:
+    """All comparisons of a report together, after Holm: the k-th smallest p of m is multiplied by
+    m - k + 1, and never falls below the ones before."""
     order = sorted(range(len(pairs)), key=lambda i: pairs[i].p)
     highest = 0.0
     out = list(pairs)

@@ -15,7 +15,7 @@ from identification.estimate import Choice
 from identification.stiffness import Stiffness
 from identification.uncertainty import Contribution, Quantity, combined
 from rig.dataset import Dataset, load
-from rig.report.compare import Pair, _adjusted, _pair, probability, same_instruments
+from rig.report.compare import Pair, adjusted, paired, probability, same_instruments
 from rig.report.gather import Wishes
 from rig.report.report import make
 from tests.unit.report_sets import Page, bench, linear, rewritten
@@ -41,7 +41,7 @@ def side(each: list[float], gain: float = 0.0) -> Stiffness:
 
 
 def pair(a: Stiffness, b: Stiffness, *, shared: bool = False) -> Pair:
-    return _pair(0, 1, "x", a, b, shared=shared)
+    return paired(0, 1, "x", a, b, shared=shared)
 
 
 def test_without_gains_it_is_welchs_test() -> None:
@@ -84,9 +84,9 @@ def test_a_real_difference_is_seen() -> None:
 def test_several_comparisons_are_adjusted_after_holm() -> None:
     quantity = Quantity(1.0, 1.0, math.inf, (0.0, 2.0))
     made = [Pair(0, i, "x", quantity, quantity, p, p, ()) for i, p in enumerate((0.04, 0.01, 0.03))]
-    adjusted = [p.adjusted for p in _adjusted(made)]
-    assert adjusted == pytest.approx([0.06, 0.03, 0.06])
-    assert [p.differs for p in _adjusted(made)] == [False, True, False]
+    found = [p.adjusted for p in adjusted(made)]
+    assert found == pytest.approx([0.06, 0.03, 0.06])
+    assert [p.differs for p in adjusted(made)] == [False, True, False]
 
 
 def test_probability_at_its_limits() -> None:
