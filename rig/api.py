@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from rig.dataset import Dataset
 
+_NO_PARAMETER: dict[str, Any] = {"value": None, "ci95": [None, None], "unit": ""}
+
 
 def load(path: str | Path) -> Run:
     """The data set of a file (or of the journal beside it). InputError for anything wrong."""
@@ -161,6 +163,8 @@ class Run:
             analysis.weighting(weighting), intercept, errors_in_variables, keep_after_knee
         )
         result = analysis.analyze(self.dataset, options)
+        if options == analysis.Options():
+            self._remember(result)
         out = Answer(result, answer(result), lambda folder: draw(result, folder))
         _analysis_tables(out)
         return out
@@ -187,6 +191,7 @@ class Run:
         from rig.diagnose import diagnose
         from rig.gap_figures import draw
 
+        add, withhold = tuple(add), tuple(withhold)
         result = diagnose(
             self.dataset,
             model=None if model is None else Path(model),
@@ -194,10 +199,19 @@ class Run:
             add=add,
             withhold=withhold,
         )
+        if not (model or simulation or add or withhold):
+            self._remember(result)
         headline = _first(result.to_text(), result.banners)
         out = Answer(result, headline, lambda folder: draw(result, folder, self.name))
         _gap_tables(out)
         return out
+
+    def _remember(self, result: Any) -> None:
+        """For `rig list`, as the command does."""
+        from rig.catalogue import remember_result
+
+        if self.dataset.path is not None:
+            remember_result(self.dataset.path, result)
 
     def _path(self) -> Path:
         from rig.errors import InputError
@@ -248,7 +262,7 @@ def _analysis_tables(out: Answer) -> None:
 def _joint_tables(out: Answer) -> None:
     found = out.json
     rows = [
-        (j + 1, q["value"], q["standard_uncertainty"], *q["ci95"], identified, share)
+        (j + 1, q["value"], q["standard_uncertainty"], *q["ci95"], identified, max(share, 0.0))
         for j, (q, identified, share) in enumerate(
             zip(found["joint_stiffness_Nm_per_rad"], found["identified"], found["share_of_data"],
                 strict=True)
@@ -276,7 +290,7 @@ def _gap_tables(out: Answer) -> None:
         (e["name"], e["probability"], e["share_of_gap"], name, p["value"], *p["ci95"], p["unit"],
          ", ".join(e["indistinguishable_from"]))
         for e in found["effects"]
-        for name, p in e["parameters"].items()
+        for name, p in (e["parameters"] or {"": _NO_PARAMETER}).items()
     ]  # fmt: skip
     names = ("effect", "probability", "share_of_gap", "parameter", "value", "ci95_low", "ci95_high",
              "unit", "indistinguishable_from")  # fmt: skip
