@@ -7,11 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData
 from identification.gap.effects import WORDS, library
 from identification.gap.effects.joint_yield import refined
-from identification.gap.forms import law_of, rows_of
+from identification.gap.evidence import Engine
+from identification.gap.forms import SESSION, Form, describe, law_of, lawful, realise, rows_of
+from identification.gap.forms.known import less_known
+from identification.gap.forms.law import Law, Term
+from identification.gap.parts import Part
+from identification.gap.twins import twin_of
 from tests.unit.test_gap_operators import bench_data
 
 
@@ -94,3 +100,137 @@ def test_every_shape_of_the_library_is_its_law_on_an_arm(bench: Bench, word: str
 @pytest.mark.parametrize("imposed", [None, "displacement"])
 def test_every_shape_of_the_library_is_its_law_on_a_bench(imposed: str | None) -> None:
     assert assert_same(bench_without_arm(imposed), WORDS) > 100
+
+
+def one(word: str, law: Law, *values: float) -> Form:
+    return Form(word, law, np.array(values), np.zeros((len(values),) * 2))
+
+
+def test_a_threshold_stays_where_it_was_when_the_loads_are_others() -> None:
+    """40 Nm at joint 1 are 40 Nm on any path: closed form of the first loading."""
+    terms = (Term("compliance", {"threshold": 40.0}),)
+    form = one("joint_yield", Law({"joint": 0, "memory": "kept", "flow_time": 0.0}, terms), 3e-5)
+    for stretch in (0.5, 1.0, 2.0):
+        bench = make_bench(arm_data(stretch=stretch))
+        first = (bench.rows.setup == 1) & (bench.rows.repetition == 1)
+        first &= (
+            np.cumsum(bench.rows.branch == 2)
+            == np.cumsum(bench.rows.branch == 2)[int(np.argmax(first))]
+        )
+        torque, lever = bench.torque[first, 0], bench.lever[first, 0]
+        beyond = np.sign(torque) * np.maximum(np.abs(torque) - 40.0, 0.0)
+        made = realise(bench, form)[: bench.rows.n][first]
+        np.testing.assert_allclose(made, lever * 3e-5 * beyond, atol=1e-12)
+    assert np.abs(made).max() > 1e-4  # the largest loads go far beyond the threshold
+
+
+def test_a_time_constant_is_seconds_on_any_clock() -> None:
+    law = Law({"path": "exponential", "quantity": "displacement"},
+              (Term("drift", {"time_constant": 500.0, "along": (0.0, 1.0, 0.0)}),))  # fmt: skip
+    for stretch in (1.0, 3.0):
+        bench = make_bench(arm_data(stretch=stretch))
+        made = realise(bench, one("thermal_drift", law, 4e-5))[: bench.rows.n]
+        t = bench.rows.session - bench.rows.session.min()
+        along_y = np.isin(bench.rows.setup, (1, 3))
+        np.testing.assert_allclose(made, np.where(along_y, 4e-5 * (1 - np.exp(-t / 500)), 0))
+
+
+def test_a_drift_counts_the_other_way_against_its_direction(bench: Bench) -> None:
+    terms = tuple(Term("drift_rate", {"along": (0.0, s, 0.0)}) for s in (1.0, -1.0))
+    here, against = (
+        realise(bench, one("thermal_drift", Law({"path": "linear"}, (t,)), 1e-8)) for t in terms
+    )
+    assert np.abs(here).max() > 0
+    np.testing.assert_allclose(here, -against)
+
+
+def test_what_belongs_to_a_session_is_left_behind(bench: Bench) -> None:
+    terms = (Term("width"), Term("rub"), Term("place", {"pose": "P1", "direction": "x",
+                                                        "first": True}))  # fmt: skip
+    law = Law({"joint": 0, "zone": 2.0, "crossing": "load", "kind": "free"}, terms)
+    form = Form("joint_backlash", law, np.array([1e-4, 0.0, 5e-5]), np.diag([1.0, 2.0, 3.0]))
+    kept = lawful(form)
+    assert [t.coefficient for t in kept.law.terms] == ["width", "rub"]
+    assert kept.covariance.tolist() == [[1.0, 0.0], [0.0, 2.0]]
+    assert np.abs(realise(bench, form) - realise(bench, kept)).max() > 0
+    assert "shift" in SESSION
+    shift = one("zero_shift", Law({}, (Term("shift", {"run": 1, "lasts": True}),)), 1e-5)
+    assert not realise(bench, lawful(shift)).any()
+
+
+def test_a_fitted_part_becomes_its_contribution(bench: Bench) -> None:
+    fresh = replace(bench, columns=[])
+    v = library(fresh, ("joint_creep",))[3]
+    w = np.linspace(0.1, 0.3, len(v.columns))
+    form = describe(fresh, Part(v, 1.0), w, np.diag(w**2))
+    pool = np.column_stack(fresh.columns)
+    np.testing.assert_allclose(realise(fresh, form), pool[:, list(v.columns)] @ w, atol=1e-15)
+    relative = np.sqrt(np.diag(form.covariance)) / form.values
+    np.testing.assert_allclose(relative, 1.0)  # a standard deviation scales with its value
+
+
+def test_a_variant_that_says_too_little_is_named(bench: Bench) -> None:
+    v = library(replace(bench, columns=[]), ("contact_seating",))[0]
+    with pytest.raises(ValueError, match=r"contact_seating, exponential .*: the library does not"):
+        law_of(bench, replace(v, info={}))
+
+
+YIELD = one(
+    "joint_yield",
+    Law({"joint": 0, "memory": "kept", "flow_time": 0.0},
+        (Term("compliance", {"threshold": 30.0}),)), 3e-5,
+)  # fmt: skip
+DRIFT = one(
+    "force_drift", Law({"path": "linear", "quantity": "force"}, (Term("drift_rate"),)), 1e-3
+)
+
+
+@pytest.mark.parametrize("known", [YIELD, DRIFT], ids=["yield", "drift"])
+def test_a_known_effect_leaves_every_channel(bench: Bench, known: Form) -> None:
+    """Data that are nothing but the effect: less the effect, nothing remains."""
+    count = bench.rows.weight.astype(int)
+    data = replace(arm_data(), force=np.repeat(bench.rows.force, count))
+    plain = replace(data, q=np.zeros((len(count.repeat(count)), 6)))
+    there = make_bench(plain)
+    total = realise(there, known)
+    n, holds = there.rows.n, np.add.reduceat(count, np.flatnonzero(there.rows.hold_starts))
+    zero = np.zeros(n)
+    zero[there.rows.zero] = total[there.layout.zero_force]
+    made = replace(
+        plain, displacement=np.repeat(total[:n], count),
+        q=np.repeat(total[there.layout.q].reshape(6, -1).T, holds, axis=0),
+        force=plain.force + np.repeat(zero, count),
+    )  # fmt: skip
+    left = less_known(made, [known])
+    assert np.abs(made.displacement).max() > 1e-5
+    for s in range(4):  # the laser is zeroed anew in every setup
+        assert np.ptp(left.displacement[data.setup == s]) < 1e-9
+    assert left.q is not None
+    assert np.abs(left.q).max() < 1e-12
+    np.testing.assert_allclose(left.force, plain.force, atol=1e-9)
+    assert known.word in left.notes[-1]
+    with pytest.raises(ValueError, match="displacement is imposed"):
+        less_known(replace(made, imposed="displacement"), [known])
+
+
+@pytest.mark.parametrize("readings", [True, False])
+def test_yield_of_joint_1_and_slip_about_the_vertical_are_twins_without_readings(
+    readings: bool,
+) -> None:
+    data = arm_data()
+    there = make_bench(data if readings else replace(data, q=None))
+    v = next(v for v in library(there, ("joint_yield",)) if v.label.startswith("joint 1 at 0.6 sh"))
+    there.columns[:] = [there.columns[c] for c in v.columns]
+    part = Part(replace(v, columns=tuple(range(len(v.columns)))), 1.0)
+    target = there.observed - prediction(there)
+    engine = Engine(there, base_columns(there), target, np.array([0.0, 1e-6]))
+    w = np.full(len(v.columns), 4.0)
+    twin = twin_of(engine, part, w, 0.0)
+    if readings:
+        assert twin is None
+        return
+    assert twin is not None
+    assert (twin.word, twin.constants["axis"]) == ("base_slip", "z")
+    own = engine.pool @ w
+    form = describe(there, part, w, np.eye(len(w)))
+    np.testing.assert_allclose(realise(there, twin.form(form)), own, atol=1e-9 * np.abs(own).max())
