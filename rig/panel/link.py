@@ -167,7 +167,15 @@ class PanelLink:
                 self._lost()
                 return
             if end is not None:
+                self._close_input()
                 return
+
+    def _close_input(self) -> None:
+        """No more comes: the process may end, which it can't while it still listens."""
+        assert self._child is not None
+        assert self._child.stdin is not None
+        with contextlib.suppress(OSError):
+            self._child.stdin.close()
 
     def _due(self) -> bool:
         fresh = self._state is not None and time.monotonic() >= self._next_state

@@ -63,8 +63,9 @@ class PanelClient:
             time.sleep(0.01)
 
     def wait_state(self, what: Callable[[dict[str, Any]], object], deadline_s: float = 30) -> None:
-        """Until something holds of the newest state."""
-        self.wait(lambda me: me.states and what(me.states[-1]), deadline_s)
+        """Until something has held of a state, from the newest one on: phases may be short."""
+        first = max(0, len(self.states) - 1)
+        self.wait(lambda me: any(what(state) for state in me.states[first:]), deadline_s)
 
     def command(self, command: str, **more: str) -> tuple[int, dict[str, Any]]:
         """Status and reply."""
