@@ -126,8 +126,16 @@ def test_whole_run_by_the_buttons(driver: Chrome, measurement: Measurement) -> N
     assert page.errors() == []
 
 
-def test_abort_keeps_the_data_and_says_so(driver: Chrome, measurement: Measurement) -> None:
+def test_viewers_a_foreign_page_and_abort(
+    driver: Chrome, feed: Feed, measurement: Measurement
+) -> None:
     page = Viewer(driver, measurement.link())
+    carry_on(page, until="Tighten")
+    page.wait(lambda: step(page) >= 2, "the second step")
+    late_viewers_see_the_whole_run(driver, measurement)
+    foreign_page_cannot_abort(driver, feed, measurement)
+    before = step(page)
+    page.wait(lambda: step(page) != before, "the measurement goes on")
     carry_on(page, until="Tighten")
     page.press("a")
     page.press("\ue007")
@@ -137,20 +145,43 @@ def test_abort_keeps_the_data_and_says_so(driver: Chrome, measurement: Measureme
     assert not page.seen("controls")
 
 
-def test_late_viewer_sees_the_whole_run_and_only_watches(
-    driver: Chrome, measurement: Measurement
-) -> None:
-    page = Viewer(driver, measurement.link())
-    carry_on(page, until="Tighten")
-    page.wait(lambda: step(page) >= 2, "the second step")
+def late_viewers_see_the_whole_run(driver: Chrome, measurement: Measurement) -> None:
     late = Viewer(driver, measurement.link(), new_tab=True)
-    late.wait(lambda: step(late) >= 2, "the late viewer is where the run is")
-    code = "return document.getElementById('curve').getAttribute('aria-label')"
-    late.wait(lambda: "repetition 1: " in late.script(code), "the samples before it came")
+    late.wait_for("viewer-text", "somebody else is the operator")
+    late.wait(lambda: "repetition 1: " in late.attribute("curve", "aria-label"), "earlier samples")
     assert not late.seen("controls")
     watching = Viewer(driver, measurement.link().split("?")[0], new_tab=True)
     watching.wait_for("viewer-text", "somebody else is the operator")
     assert not watching.seen("take"), "without the operator's link nobody takes over"
+
+
+FOREIGN = """
+const done = arguments[arguments.length - 1];
+const [address, token] = [arguments[0], arguments[1]];
+const body = JSON.stringify({command: "abort"});
+const own = {"X-Panel-Token": token, "X-Panel-Client": "foreign-page-1"};
+const tries = [
+  {method: "POST", body, mode: "no-cors"},
+  {method: "POST", body, headers: {"Content-Type": "application/json", ...own}},
+  {method: "POST", body, headers: {"Content-Type": "text/plain"}, mode: "no-cors"},
+];
+Promise.allSettled(tries.map((t) => fetch(address + "command?token=" + token, t)))
+  .then((all) => done(all.map((r) => r.value?.status ?? "refused")));
+"""
+
+
+def foreign_page_cannot_abort(driver: Chrome, feed: Feed, measurement: Measurement) -> None:
+    """The page of another port, with the token even, and without the page's own policy, which
+    would stop it before anything is sent."""
+    address, token = measurement.link().split("?token=")
+    foreign = Viewer(driver, feed.url, new_tab=True)
+    driver.execute_cdp_cmd("Page.setBypassCSP", {"enabled": True})
+    foreign.reload()
+    driver.set_script_timeout(20)
+    answers = foreign.here().execute_async_script(FOREIGN, address, token)
+    assert len(answers) == 3
+    assert 200 not in answers
+    assert measurement.running
 
 
 def test_fault_shows_its_remedy_on_the_page(driver: Chrome, tmp_path: Path) -> None:
@@ -169,38 +200,3 @@ def test_fault_shows_its_remedy_on_the_page(driver: Chrome, tmp_path: Path) -> N
         assert "FAULT" in page.text("devices")
     finally:
         running.stop()
-
-
-FOREIGN = """
-const done = arguments[arguments.length - 1];
-const [address, token] = [arguments[0], arguments[1]];
-const body = JSON.stringify({command: "abort"});
-const own = {"X-Panel-Token": token, "X-Panel-Client": "foreign-page-1"};
-const tries = [
-  {method: "POST", body, mode: "no-cors"},
-  {method: "POST", body, headers: {"Content-Type": "application/json", ...own}},
-  {method: "POST", body, headers: {"Content-Type": "text/plain"}, mode: "no-cors"},
-];
-Promise.allSettled(tries.map((t) => fetch(address + "command?token=" + token, t)))
-  .then((all) => done(all.map((r) => r.value?.status ?? "refused")));
-"""
-
-
-def test_foreign_page_cannot_press_abort(
-    driver: Chrome, feed: Feed, measurement: Measurement
-) -> None:
-    link = measurement.link()
-    page = Viewer(driver, link)
-    carry_on(page, until="Tighten")
-    foreign = Viewer(driver, feed.url, new_tab=True)
-    driver.set_script_timeout(20)
-    foreign.here()
-    address, token = link.split("?token=")
-    # Without the page's own policy, which would stop it before anything is sent.
-    driver.execute_cdp_cmd("Page.setBypassCSP", {"enabled": True})
-    foreign.reload()
-    answers = driver.execute_async_script(FOREIGN, address, token)
-    assert 200 not in answers
-    assert measurement.running
-    carry_on(page, until="Done")
-    assert measurement.status() == 0, measurement.said
