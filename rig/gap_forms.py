@@ -106,7 +106,7 @@ _COEFFICIENTS: dict[str, Key] = {
     "offset": Key("offset_mm", factor=1e3),
     "offset_product": Key("offset_product_mm2", factor=1e6),
     "angle": Key("angle_rad"),
-    "gain": Key("gain_minus_one"),
+    "gain": Key("excess_share_of_reading"),
     "share": Key("share"),
     "shift": Key("shift_mm", factor=1e3),
 }

@@ -19,6 +19,7 @@ from rig.protocol import MeasurementProtocol, Run
 
 # Act on what the instruments see of everything else: realised last.
 _LAST = ("displacement_scale", "time_lag")
+_LEAST_GAIN = 0.05
 # Samples of instruments that nothing here depends on: a prediction has no noise.
 _ANY = Instruments(0.1, 2e-6, 0.005, 0.003)
 
@@ -51,9 +52,12 @@ def predict(
     for f in kept:
         if f.word not in _LAST:
             moved += realise(bench, f)[: bench.rows.n]
+    # A gain is fitted as a share w of what the laser shows: shown = true + w shown.
+    share = sum(float(f.values.sum()) for f in kept if f.word == "displacement_scale")
+    moved = moved / max(1 - share, _LEAST_GAIN)
     seen = replace(bench, response=moved)
     for f in kept:
-        if f.word in _LAST:
+        if f.word == "time_lag":
             moved = moved + realise(seen, f)[: bench.rows.n]
     return _by_hold(bench, moved), (*_left_out(forms), *_beyond(bench, kept))
 

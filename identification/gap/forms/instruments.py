@@ -14,7 +14,7 @@ from identification.gap.variants import Variant
 
 
 def describe_gain(_: Bench, __: Variant) -> tuple[Law, Array]:
-    """One term: gain minus one."""
+    """One term: the share of what is shown that is too much, `1 - 1 / gain`."""
     return Law({}, (Term("gain"),)), np.ones(1)
 
 
