@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.gap.data import Array, Flags
 from identification.gap.evidence import Engine, Level
 from identification.gap.variants import Variant
 
@@ -59,12 +59,8 @@ def score(
 def _score_batch(
     engine: Engine, levels: list[Level], batch: list[Variant], already: float
 ) -> list[Scored]:
-    columns = np.array([v.columns for v in batch])  # (v, k)
-    root = np.stack([v.root for v in batch])
-    scales = np.array([v.scales for v in batch])  # (v, s)
-    plain = np.stack([raw_gram(engine, v) for v in batch])
+    columns, root, scales, plain, signs = _stacks(engine, batch)
     logs = np.empty((len(levels), *scales.shape))
-    etas = np.array([level.eta for level in levels])
     for i, level in enumerate(levels):
         gram = _rotate(level, columns, root)
         moment = np.einsum("vji,vj->vi", root, level.moment[columns])
@@ -75,10 +71,10 @@ def _score_batch(
         gain = 1 + s2 * values[:, None, :]
         mean = s2 * beta[:, None, :] / gain
         fit = 0.5 * np.sum(mean * beta[:, None, :], axis=2) - 0.5 * np.log(gain).sum(axis=2)
-        fit += _sign(batch, vectors, mean, s2 / gain, s2)
-        turned = np.einsum("vij,vsj->vsi", vectors, mean)
-        energy = np.einsum("vsi,vij,vsj->vs", turned, plain, turned)
-        logs[i] = level.log_base + fit + _log_level(etas, i, energy + already)
+        fit += _sign(signs, root, vectors, mean, s2 / gain, s2)
+        turned = mean @ np.swapaxes(vectors, 1, 2)
+        energy = np.sum((turned @ plain) * turned, axis=2)
+        logs[i] = level.log_base + fit + _log_level(engine.etas, i, energy + already)
     flat = logs.transpose(1, 0, 2).reshape(len(batch), -1)
     best = flat.argmax(axis=1)
     total = _logsumexp(flat) - np.log(scales.shape[1])
@@ -89,6 +85,43 @@ def _score_batch(
     ]
 
 
+@dataclass(frozen=True, eq=False)
+class _Signs:
+    """Of a batch: sums (v, k) that are wanted above least (v,), which want one, which want each
+    coefficient so; None of all: any sign will do."""
+
+    sums: Array
+    least: Array
+    wanted: Flags
+    each: Flags
+
+
+_Stacks = tuple[Array, Array, Array, Array, "_Signs | None"]
+
+
+def _stacks(engine: Engine, batch: list[Variant]) -> _Stacks:
+    """Columns (v, k), roots (v, k, k), scales (v, s), mean squares (v, k, k) and signs of a batch,
+    made once: batches come again with every effect that is added."""
+    key = ("batch", tuple(map(id, batch)))
+    if key not in engine.stacks:
+        k = len(batch[0].columns)
+        wanted = np.array([v.positive is not None for v in batch])
+        sums = [v.positive if v.positive is not None else np.zeros(k) for v in batch]
+        signs = _Signs(
+            np.stack(sums), np.array([v.least for v in batch]), wanted,
+            np.array([v.each for v in batch]) & (k > 1),
+        )  # fmt: skip
+        engine.stacks[key] = (
+            np.array([v.columns for v in batch]),
+            np.stack([v.root for v in batch]),
+            np.array([v.scales for v in batch]),
+            np.stack([raw_gram(engine, v) for v in batch]),
+            signs if wanted.any() else None,
+        )
+    found: _Stacks = engine.stacks[key]
+    return found
+
+
 def _rotate(level: Level, columns: Array, root: Array) -> Array:
     part = level.gram[columns[:, :, None], columns[:, None, :]]
     if len(level.taken):
@@ -97,32 +130,30 @@ def _rotate(level: Level, columns: Array, root: Array) -> Array:
     return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
 
 
-def _sign(batch: list[Variant], vectors: Array, mean: Array, variance: Array, s2: Array) -> Array:
+def _sign(
+    signs: _Signs | None, root: Array, vectors: Array, mean: Array, variance: Array, s2: Array
+) -> Array:
     """What the signs that physics wants add to the log evidence, (v, s); 0 where they are free.
 
     mean, variance, s2 (v, s, k or 1): of the coefficients in the eigenvectors, and their prior's.
     """
     from scipy.special import log_ndtr
 
-    if not any(v.positive is not None for v in batch):
+    if signs is None:
         return np.zeros(mean.shape[:2])
-    k = mean.shape[2]
-    wanted = [v.positive if v.positive is not None else np.zeros(k) for v in batch]
-    least = np.array([v.least for v in batch])[:, None]
-    root = np.stack([v.root for v in batch])
-    spread = np.einsum("vij,vjk->vik", root, vectors)  # of each coefficient, from the eigenvectors
-    turned = np.einsum("vi,vik->vk", np.stack(wanted), spread)
-    centre = np.einsum("vk,vsk->vs", turned, mean)
-    after = np.sqrt(np.einsum("vk,vsk->vs", turned**2, variance)) + 1e-300
+    spread = root @ vectors  # of each coefficient, from the eigenvectors
+    turned = (signs.sums[:, None, :] @ spread)[:, 0]
+    centre = (mean @ turned[:, :, None])[:, :, 0]
+    after = np.sqrt((variance @ (turned**2)[:, :, None])[:, :, 0]) + 1e-300
     before = np.sqrt(s2[:, :, 0] * np.sum(turned**2, axis=1)[:, None]) + 1e-300
+    least = signs.least[:, None]
     total = log_ndtr((centre - least) / after) - log_ndtr(-least / before)
-    want = np.array([v.positive is not None for v in batch])
-    out = np.where(want[:, None], total, 0.0)
-    each = np.array([v.each for v in batch])
-    if k > 1 and each.any():
-        centres = np.einsum("vik,vsk->vsi", spread[each], mean[each])
-        sds = np.sqrt(np.einsum("vik,vsk->vsi", spread[each] ** 2, variance[each])) + 1e-300
-        alone = np.minimum(log_ndtr(centres / sds) - np.log(0.5), 0.0)
+    out = np.where(signs.wanted[:, None], total, 0.0)
+    each = signs.each
+    if each.any():
+        across = np.swapaxes(spread[each], 1, 2)
+        sds = np.sqrt(variance[each] @ across**2) + 1e-300
+        alone = np.minimum(log_ndtr((mean[each] @ across) / sds) - np.log(0.5), 0.0)
         out[each] += alone.sum(axis=2)
     return np.asarray(out)
 
@@ -155,8 +186,7 @@ def moved_response(engine: Engine, response: Array) -> Array:
 
 def level_prior(engine: Engine, i: int, energy: float) -> float:
     """log prior of level i for an explanation of that mean square (m^2)."""
-    etas = np.array([level.eta for level in engine.levels])
-    return float(_log_level(etas, i, np.array(energy)))
+    return float(_log_level(engine.etas, i, np.array(energy)))
 
 
 def _log_level(etas: Array, i: int, energy: Array) -> Array:

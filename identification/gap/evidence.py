@@ -15,6 +15,7 @@ eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,7 @@ class Engine:
         self.pool = np.zeros((bench.layout.size, 0))
         self.sigma = row_noise(bench)
         self.cache: dict[object, Array] = {}
+        self.stacks: dict[object, Any] = {}  # of variants that are compared again and again
         self.structural = structural_rms(bench, base, target)
         n = bench.rows.n
         self._edges = np.flatnonzero(bench.rows.hold_starts)

@@ -226,6 +226,7 @@ def _with_one_more(
 ) -> dict[frozenset[str], Explanation]:
     others = [v for v in variants if v.word not in start.words]
     levels, energy = conditioned(engine, start.parts)
+    levels = _no_worse(levels)
     out: dict[frozenset[str], Explanation] = {}
     found_words = _by_word(score(engine, levels, others, energy))
     promising = sorted(found_words, key=lambda w: -_marginal(found_words[w]))[:_PROMISING]
@@ -247,12 +248,18 @@ def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Expl
         rest = tuple(p for i, p in enumerate(best.parts) if i != index)
         word = best.parts[index].word
         levels, energy = conditioned(engine, rest)
-        scored = score(engine, levels, [v for v in variants if v.word == word], energy)
+        family = [v for v in variants if v.word == word]
+        scored = score(engine, _no_worse(levels), family, energy)
         top = max(scored, key=lambda s: s.log_evidence)
         found = _explain(engine, (*rest, Part(top.variant, top.scale)), _marginal(scored))
         if found.log_weight > best.log_weight:
             best = found
     return best
+
+
+def _no_worse(levels: list[Level]) -> list[Level]:
+    """Levels up to the likeliest: with an effect more, no more imperfection is needed."""
+    return levels[: int(np.argmax([lv.log_base for lv in levels])) + 1]
 
 
 def conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
