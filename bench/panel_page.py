@@ -17,7 +17,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -90,7 +90,7 @@ def delays(page: Viewer, feed: Feed, count: int = 60) -> str:
 
 def live(feed: Feed, stop: threading.Event) -> None:
     """Values that move, and a sample each second."""
-    last: dict[str, Any] = dict(feed.items[-1])["sample"]  # type: ignore[arg-type]
+    last = cast("dict[str, Any]", feed.items[-1]["sample"])
     tick = 0
     while not stop.wait(0.1):
         tick += 1
