@@ -22,7 +22,7 @@ from rig.panel.guard import authority, is_loopback
 from rig.panel.state import State, to_json
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8321
-STATE_EVERY_S = 0.09  # ten a second and no more; a tick that comes a little early is not held back
+STATE_EVERY_S = 0.1  # as often as the procedure ticks in real time, however fast it runs
 START_S = 20.0
 MOST_WAITING = 20_000  # items that the page's process has not taken: by then it never will
 ENDING_S = 4.0
