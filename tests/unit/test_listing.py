@@ -129,6 +129,15 @@ def test_an_open_run_is_never_taken_from_the_catalogue(folder: Path) -> None:
     assert "UNFINISHED, EMULATED" in list_folder(folder).to_text()
 
 
+def test_what_a_journal_tells_is_not_remembered_of_the_older_file(folder: Path) -> None:
+    path = folder / "arm.h5"
+    write_journal(path, 2)
+    entry = next(e for e in list_folder(folder, analyze=True).entries if e.file == "arm.h5")
+    assert entry.stiffness is not None
+    journal_path(path).unlink()
+    assert next(e for e in list_folder(folder).entries if e.file == "arm.h5").stiffness is None
+
+
 @pytest.mark.parametrize("damage", ["catalogue.sqlite", "folder", "nothing kept", "old software"])
 def test_a_useless_catalogue_stops_nothing(
     damage: str, folder: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
@@ -205,7 +214,8 @@ def test_robot_and_directions_of_any_way_to_write_them(text: str) -> None:
 def test_seal_is_none_where_the_end_is_not_whole(folder: Path) -> None:
     whole = (folder / "arm.h5").read_bytes()
     assert len(seal_of(folder / "arm.h5")) == 64
-    for content in (b"", whole[:-1], whole + b"\n", whole[:40], b"x" + whole[1:]):
+    middle = whole[:5000] + whole[5001:]
+    for content in (b"", middle, whole[:-1], whole + b"\n", whole[:40], b"x" + whole[1:]):
         (folder / "part.h5").write_bytes(content)
         assert seal_of(folder / "part.h5") == ""
 
