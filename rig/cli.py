@@ -384,7 +384,11 @@ def blind(
         float, typer.Option(metavar="SECONDS", help="A later answer counts as wrong.", min=1)
     ] = 120.0,
     generator: Annotated[
-        str, typer.Option(help="hidden: worlds of this project; mujoco: another engine's.")
+        str,
+        typer.Option(
+            help="hidden: worlds of this project; mujoco: another engine's; mujoco-small-turns: "
+            "that one without the curvature that large turns make."
+        ),
     ] = "hidden",
     keep: Annotated[
         Path | None,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rig.errors import InputError, did_you_mean
 
 EMULATED = "# EMULATED: drawn by a simulated rig for a blind check; nothing was measured."
-GENERATORS = ("hidden", "mujoco")
+GENERATORS = ("hidden", "mujoco", "mujoco-small-turns")
 
 
 class Case(Protocol):
@@ -53,15 +53,17 @@ def generator(name: str) -> tuple[Draw, tuple[str, ...]]:
         from rig.worlds.hidden import draw
 
         return draw.draw_case, tuple(w for w in draw.WORDS if w not in ("none", "unknown"))
-    if name == "mujoco":
+    if name in ("mujoco", "mujoco-small-turns"):
         try:
             from rig.blind import mujoco_rig
         except ImportError:
             raise InputError(
-                "--generator mujoco needs the engine MuJoCo, which is not installed: "
+                f"--generator {name} needs the engine MuJoCo, which is not installed: "
                 'pip install "stiffness-rig[engines]". The generator "hidden" needs nothing.'
             ) from None
-        return mujoco_rig.draw_case, mujoco_rig.EFFECTS
+        if name == "mujoco":
+            return mujoco_rig.draw_case, mujoco_rig.EFFECTS
+        return mujoco_rig.draw_small_turns, mujoco_rig.EFFECTS
     raise InputError(f'--generator: "{name}" is not known.{did_you_mean(name, GENERATORS)}')
 
 

@@ -13,7 +13,7 @@ deflection per second, which is why the armature is large.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -59,11 +59,20 @@ class Hinge:
 
 
 class MujocoArm:
-    """The arm at q (6) rad with a point of load tool (3) m in the base frame."""
+    """The arm at q (6) rad with a point of load tool (3) m in the base frame.
 
-    def __init__(self, q: Array, tool: Array, hinges: Sequence[Hinge]) -> None:
-        self.q, self.hinges = np.asarray(q, dtype=float), tuple(hinges)
-        self._model = mujoco.MjModel.from_xml_string(_xml(self.q, tool, self.hinges))
+    turns: 1, or a factor by which forces, frictions and plays are made smaller for the engine and
+    what moves larger again: the laws stay what they are, and finite turns lose their effect.
+    """
+
+    def __init__(self, q: Array, tool: Array, hinges: Sequence[Hinge], turns: float = 1.0) -> None:
+        self.hinges, self._turns = tuple(hinges), turns
+        smaller = [
+            replace(h, friction_Nm=h.friction_Nm * turns, stop_rad=h.stop_rad * turns)
+            for h in hinges
+        ]
+        xml = _xml(np.asarray(q, dtype=float), tool, smaller)
+        self._model = mujoco.MjModel.from_xml_string(xml)
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
         self._body = self._model.body("joint6").id
@@ -77,13 +86,14 @@ class MujocoArm:
 
         A hinge that creeps does not come to rest; the wait ends after PATIENCE_S.
         """
+        new = self._turns * np.asarray(force, dtype=float)
         old, parts = self._force, round(RAMP_S / STEP_S / _AT_ONCE)
         for k in range(1, parts + 1):
-            self._push(old + (force - old) * k / parts)
-        self._force = np.asarray(force, dtype=float)
+            self._push(old + (new - old) * k / parts)
+        self._force = new
         self.hold(SETTLE_S)
         waited = SETTLE_S
-        while np.abs(self._data.qvel).max() > STILL_RAD_PER_S and waited < PATIENCE_S:
+        while np.abs(self._data.qvel).max() > self._turns * STILL_RAD_PER_S and waited < PATIENCE_S:
             self.hold(0.5)
             waited += 0.5
 
@@ -100,11 +110,11 @@ class MujocoArm:
 
     def displacement(self) -> Array:
         """(3,) m: of the point of load since the beginning."""
-        return np.asarray(self._data.site("tool").xpos - self._start)
+        return np.asarray(self._data.site("tool").xpos - self._start) / self._turns
 
     def turned(self) -> Array:
         """(number of hinges,) rad."""
-        return np.asarray(self._data.qpos[self._order])
+        return np.asarray(self._data.qpos[self._order]) / self._turns
 
     def _push(self, force: Array) -> None:
         """A few steps with the torques that the force makes on the arm as it stands now."""

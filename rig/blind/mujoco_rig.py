@@ -6,7 +6,8 @@ design. Mixtures and effects of the instruments are not drawn. `accept` holds th
 linear words that these data, without noise, can't tell from a linear truth.
 
 The engine turns hinges by finite angles: the lever changes as the arm gives way, which bends every
-curve by a few micrometres. No word stands for that, so a case with nothing else in it is `none`.
+curve by a few micrometres. No word stands for that, so a case with nothing else in it is `none`;
+`draw_small_turns` leaves it out, to judge the laws alone.
 """
 
 from __future__ import annotations
@@ -23,11 +24,12 @@ from rig.blind.mujoco_label import answers, structural_mm
 from rig.blind.mujoco_session import AXES, Design, Row, levers, session, true_mm
 from rig.worlds.arm import place
 
-__all__ = ["EFFECTS", "MujocoCase", "draw_case"]
+__all__ = ["EFFECTS", "MujocoCase", "draw_case", "draw_small_turns"]
 
 STATED = np.array([36000.0, 57000.0, 18000.0, 7200.0, 7500.0, 8000.0])  # Nm/rad, then varied
 START = np.deg2rad([13.4, -99.8, -108.1, -62.1, 90.0, -76.6])
 SNR = (1.5, 60.0)
+SMALL = 0.01
 _ATTEMPTS = 40
 _SHARE_NONE = 0.1
 
@@ -42,11 +44,11 @@ class MujocoCase:
     label: dict[str, Any]
 
 
-def draw_case(seed: int, number: int, *, word: str | None = None) -> MujocoCase:
+def draw_case(seed: int, number: int, *, word: str | None = None, turns: float = 1.0) -> MujocoCase:
     """Case `number` of a seed: one effect of the word, or one of any word or none (one in ten).
 
     The effect is drawn anew until its gap is 1.5 to 60 times the noise. RuntimeError if that does
-    not happen.
+    not happen. turns: of `MujocoArm`.
     """
     random = np.random.default_rng([seed, number, 4])
     if word is None:
@@ -55,13 +57,18 @@ def draw_case(seed: int, number: int, *, word: str | None = None) -> MujocoCase:
         design = _design(random)
         springs = design.stated * np.exp(design.relative_sd * random.standard_normal(6))
         hidden = None if word == "none" else _effect(word, design, springs, random)
-        rows = session(design, springs, hidden)
+        rows = session(design, springs, hidden, turns)
         columns, noise_mm = _instruments(rows, design, random)
         snr = float(np.sqrt(np.mean(structural_mm(rows, design) ** 2))) / noise_mm
         if hidden is None or SNR[0] <= snr <= SNR[1]:
             label = answers(hidden, rows, design, noise_mm)
             return MujocoCase(f"m{seed}-{number:04d}", columns, _meta(design), label)
     raise RuntimeError(f"no {word} of the wanted size in {_ATTEMPTS} draws (seed {seed})")
+
+
+def draw_small_turns(seed: int, number: int, *, word: str | None = None) -> MujocoCase:
+    """As `draw_case`, with turns so small that the arm's levers stay what they are."""
+    return draw_case(seed, number, word=word, turns=SMALL)
 
 
 def _design(random: Random) -> Design:
@@ -114,7 +121,9 @@ def _instruments(
     laser = np.round(laser + [scatter[run] for run in runs], 4)
     force_noise = design.noise_N * random.standard_normal((n, 3))
     measured = force * (1 + GAIN_FORCE * random.standard_normal()) + force_noise
-    measured += force @ (CROSS_TALK * random.standard_normal((3, 3)))
+    # Into the other two components only: along its axis it would be a gain.
+    cross = CROSS_TALK * random.standard_normal((3, 3)) * (1 - np.eye(3))
+    measured += force @ cross
     first = {setup: laser[setups.index(setup)] for setup in dict.fromkeys(setups)}
     columns: dict[str, Any] = {
         "time_s": np.round([row.time_s for row in rows], 3),

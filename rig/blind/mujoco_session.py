@@ -61,7 +61,7 @@ class Row:
     turned: Array
 
 
-def session(design: Design, springs: Array, hidden: Hidden | None) -> list[Row]:
+def session(design: Design, springs: Array, hidden: Hidden | None, turns: float = 1.0) -> list[Row]:
     """All runs, pose by pose and direction by direction; a new arm stands in every setup, since
     what has given way in one direction is not carried into another pose."""
     rows: list[Row] = []
@@ -69,7 +69,7 @@ def session(design: Design, springs: Array, hidden: Hidden | None) -> list[Row]:
     for pose, q in design.poses.items():
         for direction in design.forces:
             hinges = _hinges(q, springs, hidden)
-            arm = MujocoArm(q, place(q).tool(design.tool), hinges)
+            arm = MujocoArm(q, place(q).tool(design.tool), hinges, turns)
             clock += 180.0
             for repetition in range(1, design.repetitions + 1):
                 run = _Run(design, arm, pose, direction, repetition, clock, hidden)

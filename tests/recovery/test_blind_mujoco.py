@@ -46,6 +46,27 @@ def test_elastic_equilibrium_agrees_with_our_own_kinematics() -> None:
     assert engine.turned() == pytest.approx(turned, abs=2e-8)
 
 
+def test_small_turns_leave_the_laws_and_take_the_geometry_away() -> None:
+    force = np.array([150.0, 40.0, -60.0])
+    linear = place(Q).levers(TOOL).T @ (place(Q).levers(TOOL) @ force / SPRINGS)
+    spots = places(Q)
+    slip = in_joint1(20000.0, friction_Nm=20.0)
+    joints = [Hinge(f"joint{j + 1}", *spots[f"joint{j + 1}"], SPRINGS[j]) for j in range(6)]
+    small = MujocoArm(Q, TOOL, joints, turns=0.01)
+    small.load(force)
+    assert small.displacement() == pytest.approx(linear, abs=2e-7)
+    large = arm()
+    large.load(force)
+    assert np.abs(large.displacement() - linear).max() > 2e-6
+    slipped = []
+    for turns in (1.0, 0.01):
+        engine = MujocoArm(Q, TOOL, [*joints, slip], turns)
+        engine.load(60.0 * Y)
+        slipped.append(engine.turned()[6])
+    assert slipped[1] == pytest.approx(slipped[0], rel=5e-3)
+    assert slipped[0] > 1e-4
+
+
 def test_dry_friction_holds_below_its_threshold_and_keeps_what_slipped() -> None:
     lever = float((place(Q).levers(TOOL) @ Y)[0])
     engine = arm(in_joint1(20000.0, friction_Nm=40.0))
