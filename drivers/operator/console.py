@@ -79,9 +79,10 @@ class ConsoleOperator:
 
     name = "operator"
 
-    def __init__(self, settings: OperatorSettings, clock: Clock) -> None:
+    def __init__(self, settings: OperatorSettings, clock: Clock, *, emulated: bool = False) -> None:
         self._settings = settings
         self._clock = clock
+        self._emulated = emulated
         self._keys = Keys(self._on_key)
         self._lock = threading.Lock()
         self._view: LiveView | None = None
@@ -208,6 +209,7 @@ class ConsoleOperator:
                 prompt=question.prompt if question else None,
                 typed=question.typed if question else "",
                 complaint=question.complaint if question else "",
+                emulated=self._emulated,
             )
 
     def _print_view(self, view: LiveView, now: float) -> None:

@@ -32,6 +32,8 @@ GLYPHS = {
     " ": (" ", " ", " "),
 }
 KEYS = "p pause   r redo step   R redo repetition   s skip   a abort"
+NO_SAFETY = "Software monitoring is no safety function."
+EMULATED = " EMULATED: no real arm, no real measurement "
 HANDS_OFF = {
     "idle": "WAIT",
     "mounting": "SET UP",
@@ -133,6 +135,7 @@ def screen(
     prompt: Prompt | None = None,
     typed: str = "",
     complaint: str = "",
+    emulated: bool = False,
 ) -> RenderableType:
     """The whole screen. `age_s`: of the view; `stale_s`: how long devices have been stale."""
     parts: list[RenderableType] = []
@@ -146,7 +149,9 @@ def screen(
         parts.append(_question(prompt, typed, complaint))
     else:
         parts.append(Text(KEYS, style="dim"))
-    return Panel(Group(*parts), title=_title(view), border_style="grey50")
+    parts.append(Text(NO_SAFETY, style="dim"))
+    mark = Text(EMULATED, style="bold black on yellow") if emulated else None
+    return Panel(Group(*parts), title=_title(view), subtitle=mark, border_style="grey50")
 
 
 def _title(view: LiveView | None) -> str:
@@ -165,6 +170,7 @@ def _live(
     stale_s: Mapping[str, float],
     asked: str | None,
 ) -> list[RenderableType]:
+    age_s += max(view.force_age_s, view.displacement_age_s)
     old = age_s > 1.0 or bool(stale_s)
     style = "grey42" if old else "bold white"
     force = f"{view.force_N:.1f} N" if math.isfinite(view.force_N) else "--- N"
@@ -189,11 +195,12 @@ def _live(
         Align.center(Text(far or " ")),
         Text(),
         _facts(view, style),
+        *_limits(view),
     ]
     for device, seconds in stale_s.items():
         parts.append(Text(f"{device}: no fresh value for {seconds:.1f} s", style="bold red"))
     if age_s > 1.0:
-        parts.append(Text(f"the picture is {age_s:.0f} s old", style="bold red"))
+        parts.append(Text(f"the values are {age_s:.0f} s old", style="bold red"))
     if view.message:
         parts.append(Text(view.message, style="yellow"))
     return parts
@@ -213,6 +220,19 @@ def _facts(view: LiveView, style: str) -> Table:
         style=style,
     )
     return table
+
+
+def _limits(view: LiveView) -> list[RenderableType]:
+    """How much is left of each limit, the closest first; none while nothing is watched."""
+    watched = [level for level in view.limits if level.limit > 0]
+    if not watched:
+        return []
+    line = Text("left of the limits: ", style="dim")
+    for level in sorted(watched, key=lambda level: level.value / level.limit, reverse=True):
+        left = 1.0 - level.value / level.limit
+        style = "bold red" if left < 0.1 else "yellow" if left < 0.25 else "dim"
+        line.append(f"{level.quantity} {100 * left:.0f} %   ", style=style)
+    return [line]
 
 
 def _notice(level: str, text: str) -> Text:

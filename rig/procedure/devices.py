@@ -86,7 +86,7 @@ def make_loader(station: Station, clock: Clock) -> Loader:
     if station.operator.driver == "console":
         from drivers.operator.console import ConsoleOperator
 
-        return ConsoleOperator(station.operator, clock)
+        return ConsoleOperator(station.operator, clock, emulated=station.emulation is not None)
     from drivers.operator.scripted import ScriptedOperator
 
     return ScriptedOperator(station.operator, clock)

@@ -17,7 +17,7 @@ from rich.console import Console
 
 from drivers.clock import Clock
 from drivers.errors import DeviceError
-from drivers.interfaces import LiveView, Prompt
+from drivers.interfaces import LimitLevel, LiveView, Prompt
 from drivers.operator.console import ConsoleOperator
 from drivers.operator.screen import bar, hint, large, plain, screen
 from drivers.operator.settings import OperatorSettings
@@ -85,7 +85,44 @@ def test_old_values_do_not_look_live() -> None:
     assert "laser: no fresh value for 2.5 s" in text
     assert "TIGHTEN" not in text
     assert "STOP" in text
-    assert "the picture is 3 s old" in shown(known(40.0, 60.0), age_s=3.0)
+    assert "the values are 3 s old" in shown(known(40.0, 60.0), age_s=3.0)
+    # The view may be new and its values old all the same.
+    old = shown(known(40.0, 60.0, force_age_s=0.9), age_s=0.2)
+    assert "STOP" in old
+    assert "values are old" in old
+    assert "STOP" in shown(known(40.0, 60.0, displacement_age_s=1.1))
+    assert "STOP" not in shown(known(40.0, 60.0, force_age_s=0.7), age_s=0.2)
+
+
+def test_limits_show_how_much_is_left_the_closest_first() -> None:
+    levels = (
+        LimitLevel("force", 60.0, 240.0, "N", "stop"),
+        LimitLevel("displacement", 8.1, 9.0, "mm", "stop"),
+        LimitLevel("unlimited", 1.0, 0.0, "mm", "warn"),
+    )
+    text = shown(known(40.0, 60.0, limits=levels))
+    assert "left of the limits: displacement 10 %   force 75 %" in text
+    assert "left of the limits" not in shown(known(40.0, 60.0))
+
+
+def test_the_screen_says_what_it_is_not() -> None:
+    assert "Software monitoring is no safety function." in shown(known(40.0, 60.0))
+    assert "EMULATED: no real arm" in shown(known(40.0, 60.0), emulated=True)
+    assert "EMULATED" not in shown(known(40.0, 60.0))
+
+
+def test_an_answer_from_elsewhere_ends_the_question(
+    terminal: Terminal, operator: ConsoleOperator
+) -> None:
+    operator.answer("nobody has asked")
+    answers: list[str] = []
+    prompt = Prompt("paused", "Paused.", ("continue", "abort"))
+    thread = threading.Thread(target=lambda: answers.append(operator.ask(prompt)))
+    thread.start()
+    while thread.is_alive():
+        operator.answer("continue")
+        thread.join(0.05)
+    assert answers == ["continue"]
 
 
 def test_a_question_comes_before_turning() -> None:
