@@ -39,7 +39,8 @@ _MOST = 1e12
 @dataclass(frozen=True)
 class Key:
     """A key of the file: SI value times `factor`; kind: number, positive, count, text, vector,
-    flag. count: from 1 in the file, from 0 inside."""
+    flag, springs. count: from 1 in the file, from 0 inside; springs: six stiffnesses in the file,
+    six compliances inside."""
 
     name: str
     kind: str = "number"
@@ -64,6 +65,7 @@ _CONSTANTS: dict[str, Key] = {
     "channel": Key("channel", "text", options=("displacement", "force")),
     "lag": Key("lag_s", "positive"),
     "path": Key("path", "text", options=("linear", "root", "exponential", "free", "temperature")),
+    "about": Key("about_joint_stiffness_Nm_per_rad", "springs"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
 }
 _SHAPES: dict[str, Key] = {
@@ -118,10 +120,12 @@ for _name, _unit in _DRIFTS.items():
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
 
 
+_MAY_BE_MISSING = ("measured_to", "about")
+
+
 @dataclass(frozen=True)
 class _Grammar:
-    """What the laws of a word are written with: constants (all of them; the last ones may be
-    missing), and the kinds of terms: coefficient -> shape names."""
+    """What the laws of a word are written with: constants, and the kinds of terms: coefficient -> shape names."""
 
     constants: tuple[str, ...]
     terms: tuple[tuple[str, tuple[str, ...]], ...]
@@ -164,14 +168,14 @@ _GRAMMAR: dict[str, _Grammar] = {
     "link_flexibility": _Grammar((), (("over_nominal", ("segment",)),)),
     "base_compliance": _Grammar(("depth",), (("compliance", ("axis",)),)),
     "contact_seating": _Grammar((), (("depth", ("law", "force_scale")),)),
-    "load_misalignment": _Grammar((), (("tangent", ("along", "across")),)),
+    "load_misalignment": _Grammar(("about",), (("tangent", ("along", "across")),)),
     "pose_error": _Grammar(
-        (), (("offset", ("axis",)), ("offset_product", ("axes",)), ("angle", ("joint",)))
+        ("about",), (("offset", ("axis",)), ("offset_product", ("axes",)), ("angle", ("joint",)))
     ),
-    "force_scale": _Grammar((), (("gain", ()),)),
+    "force_scale": _Grammar(("about",), (("gain", ()),)),
     "displacement_scale": _Grammar((), (("gain", ()),)),
     "time_lag": _Grammar(("channel", "way", "lag"), (("share", ()),)),
-    "force_drift": _Grammar(("path", "quantity"), _PATHS),
+    "force_drift": _Grammar(("path", "quantity", "about"), _PATHS),
     "thermal_drift": _Grammar(
         ("path", "quantity"), tuple((c, (*shape, "along")) for c, shape in _PATHS)
     ),
@@ -194,7 +198,7 @@ def to_entry(form: Form, about: Mapping[str, Any]) -> dict[str, Any]:
     """The entry of a form, in the order in which a person reads it."""
     constants = form.law.constants
     out: dict[str, Any] = dict(about)
-    for name in _GRAMMAR[form.word].constants:
+    for name in (n for n in _GRAMMAR[form.word].constants if n in constants):
         out[_CONSTANTS[name].name] = _outward(_CONSTANTS[name], constants[name])
     keys = [_coefficient(t.coefficient, constants) for t in form.law.terms]
     factor = np.array([k.factor for k in keys])
@@ -223,6 +227,8 @@ def _outward(key: Key, value: Any) -> Any:
         return value
     if key.kind == "vector":
         return [float(v) for v in value]
+    if key.kind == "springs":
+        return [1 / float(v) for v in value]
     return float(value) * key.factor
 
 
@@ -235,7 +241,11 @@ def from_entry(entry: Mapping[str, Any]) -> Form:
     grammar = _GRAMMAR[word]
     allowed = [_CONSTANTS[n].name for n in grammar.constants]
     _only(entry, (*ABOUT, *allowed, "terms", "covariance"), ())
-    constants = {n: _inward(_CONSTANTS[n], entry, ()) for n in grammar.constants}
+    constants = {
+        n: _inward(_CONSTANTS[n], entry, ())
+        for n in grammar.constants
+        if n not in _MAY_BE_MISSING or _CONSTANTS[n].name in entry
+    }
     written = entry.get("terms")
     if not isinstance(written, list) or not written:
         raise FormError(("terms",) if "terms" in entry else (), "wants a list of terms.")
@@ -325,6 +335,8 @@ def _inward(key: Key, entry: Mapping[str, Any], place: tuple[str | int, ...]) ->
         if not isinstance(value, list | tuple) or len(value) != 3:
             raise FormError(at, "wants three numbers.")
         return tuple(_number(v, at) for v in value)
+    if key.kind == "springs":
+        return _springs(value, at)
     number = _number(value, at)
     if key.kind == "count":
         most = {"joint": 6, "segment": 2}.get(key.name, 1_000_000)
@@ -334,6 +346,15 @@ def _inward(key: Key, entry: Mapping[str, Any], place: tuple[str | int, ...]) ->
     if key.kind == "positive" and not number > 0:
         raise FormError(at, f"{number:g} is not allowed; allowed: above 0.")
     return number / key.factor
+
+
+def _springs(value: Any, at: tuple[str | int, ...]) -> tuple[float, ...]:
+    if not isinstance(value, list | tuple) or len(value) != 6:
+        raise FormError(at, "wants six joint stiffnesses in Nm/rad.")
+    numbers = [_number(v, at) for v in value]
+    if not min(numbers) > 0:
+        raise FormError(at, f"{min(numbers):g} Nm/rad is no spring; allowed: above 0.")
+    return tuple(1 / v for v in numbers)
 
 
 def _number(value: Any, at: tuple[str | int, ...]) -> float:

@@ -6,6 +6,7 @@ import json
 import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -54,9 +55,9 @@ def write_next(diagnosis: Diagnosis, dataset: Dataset, path: Path) -> str:
 
 def next_text(proposal: NextMeasurement, dataset: Dataset) -> str:
     """The protocol file. Loads are lowered until arm, laser and dynamometer can take them."""
-    design = proposal.design
-    assert design is not None
     old = _old_protocol(dataset)
+    assert proposal.design is not None
+    design = _as_aimed_at(proposal.design, old)
     station = "emulated" if dataset.origin == "emulated" else old.station if old else "ur10e_lab"
     for _ in range(_TRIES):
         text = "\n".join(_lines(proposal, design, dataset, old, station)) + "\n"
@@ -69,6 +70,24 @@ def next_text(proposal: NextMeasurement, dataset: Dataset) -> str:
         else:
             return text
     raise InputError(f"The proposed procedure can't be carried out: {refusal}")
+
+
+def _as_aimed_at(design: Design, old: MeasurementProtocol | None) -> Design:
+    """Hands stop short of a level: loads near one that the old protocol wanted are that one."""
+    if old is None:
+        return design
+    wanted = {(run.pose, run.direction): np.array(run.forces_N) for run in old.runs}
+    levels = []
+    for setup, loads in zip(design.setups, design.levels, strict=True):
+        targets = wanted.get((setup.pose, setup.direction))
+        if targets is None:
+            levels.append(loads)
+            continue
+        nearest = [float(targets[np.argmin(np.abs(targets - f))]) for f in loads]
+        near = all(abs(a - f) < 0.5 + 0.02 * a for a, f in zip(nearest, loads, strict=True))
+        rising = all(b > a for a, b in pairwise(nearest))
+        levels.append(tuple(nearest) if near and rising else loads)
+    return replace(design, levels=tuple(levels))
 
 
 def _old_protocol(dataset: Dataset) -> MeasurementProtocol | None:

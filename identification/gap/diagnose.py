@@ -102,9 +102,7 @@ def diagnose_gap(
         chosen = _chosen(found, verdict)
     result = _with_twins(_result(found, variants, verdict, chosen), chosen, out)
     tell("what to measure next", 0.9)
-    result = replace(
-        result, next_measurement=_next(found, variants, chosen, verdict, result.effects, others)
-    )
+    result = replace(result, next_measurement=_next(found, variants, chosen, result, others))
     tell("done", 1.0)
     return result
 
@@ -225,17 +223,17 @@ def _next(
     found: Found,
     variants: list[Variant],
     chosen: Explanation,
-    verdict: str,
-    effects: tuple[Effect, ...],
+    result: GapResult,
     others: Others | None,
 ) -> NextMeasurement | None:
-    """For the first pair that can't be told apart; for an unsure verdict, its nearest rival."""
+    """For the likeliest pair that can't be told apart; for an unsure verdict, its rival."""
+    verdict, effects, probabilities = result.verdict, result.effects, result.probabilities
     for e in effects:
-        for other in e.indistinguishable_from:
+        for other in sorted(e.indistinguishable_from, key=lambda w: -probabilities[w]):
             proposal = next_measurement(found, variants, chosen, (e.name, other), others)
             if proposal is not None:
                 return proposal
-    ranked = sorted(found.probabilities.items(), key=lambda i: -i[1])
+    ranked = sorted(probabilities.items(), key=lambda i: -i[1])
     words = [w for w, p in ranked[:2] if p > 0.02 and w in WORDS]
     if verdict in WORDS and len(words) == 2:
         return next_measurement(found, variants, chosen, (words[0], words[1]), others)

@@ -45,6 +45,11 @@ _TABLE: dict[str, tuple[Describe, Columns]] = {
 SESSION = frozenset({"place", "shift", "drift_knot", "drift_per_kelvin"})
 
 
+# What these do goes through the joints' springs: the law says which springs it counts from, so
+# that it stays the same beside other ones.
+_THROUGH_SPRINGS = frozenset({"load_misalignment", "pose_error", "force_scale", "force_drift"})
+
+
 @dataclass(frozen=True, eq=False)
 class Form:
     """An effect with numbers: values (k,) of the law's terms in SI units, covariance (k, k)."""
@@ -61,11 +66,15 @@ def law_of(bench: Bench, variant: Variant) -> tuple[Law, Array]:
     Raises ValueError for a variant that says too little of itself.
     """
     try:
-        return _TABLE[variant.word][0](bench, variant)
+        law, scale = _TABLE[variant.word][0](bench, variant)
     except KeyError as missing:
         raise ValueError(
             f"{variant.word}, {variant.label}: the library does not say {missing} of this shape"
         ) from missing
+    if variant.word in _THROUGH_SPRINGS:
+        about = tuple(float(c) for c in bench.compliance)
+        law = replace(law, constants={**law.constants, "about": about})
+    return law, scale
 
 
 def describe(bench: Bench, part: Part, w: Array, covariance: Array) -> Form:
@@ -76,8 +85,19 @@ def describe(bench: Bench, part: Part, w: Array, covariance: Array) -> Form:
 
 def rows_of(bench: Bench, word: str, law: Law) -> Array:
     """(size, k): stacked columns of the law's terms on this bench, per SI unit."""
+    about = law.constants.get("about")
+    if about is not None:
+        bench = _counted_from(bench, np.array(about))
     columns = _TABLE[word][1](bench, law)
     return np.column_stack(columns) if columns else np.zeros((bench.layout.size, 0))
+
+
+def _counted_from(bench: Bench, compliance: Array) -> Bench:
+    """The bench with these springs (m,)."""
+    return replace(
+        bench, compliance=compliance, elastic=bench.torque * compliance,
+        slope=np.asarray(bench.lever**2 @ compliance),
+    )  # fmt: skip
 
 
 def realise(bench: Bench, form: Form) -> Array:
