@@ -19,6 +19,10 @@ from rig.report.gather import Session
 from rig.report.results import NOTHING, Node
 
 _LEAST_PROBABILITY = 0.005
+_OTHERWISE = {
+    "none": "noise, gains and stiffnesses within their stated uncertainty explain all",
+    "unknown": "a gap that no effect of the library explains",
+}
 
 
 def gap(session: Session, data: Node) -> Section:
@@ -99,7 +103,7 @@ def _effects(found: Node) -> list[Block]:
 def _probabilities(found: Node) -> Table:
     ranked = sorted(found["probabilities"].items(), key=lambda i: -i[1].value)
     rows = tuple(
-        (word, MEANING.get(word, ""), p.percent(2))
+        (word, MEANING.get(word) or _OTHERWISE[word], p.percent(2))
         for word, p in ranked
         if p.value >= _LEAST_PROBABILITY
     )

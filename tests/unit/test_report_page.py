@@ -9,7 +9,18 @@ import pytest
 
 from rig.dataset import load
 from rig.errors import InputError
-from rig.report.document import Document, Paragraph, Section, Word
+from rig.report.document import (
+    Bullets,
+    Document,
+    Facts,
+    Figure,
+    Number,
+    Paragraph,
+    Section,
+    Table,
+    Verbatim,
+    Word,
+)
 from rig.report.gather import Wishes
 from rig.report.html import escape, render
 from rig.report.report import Report, checked, make, write_figures, write_html
@@ -107,6 +118,17 @@ def test_characters_that_no_file_can_hold() -> None:
     assert escape("\"'<>&") == "&quot;&#x27;&lt;&gt;&amp;"
     section = Section("s", "\ud800", (Paragraph((Word("\x00", "code"),)),))
     render(Document("\udcff", "", (), (section,), "")).encode("utf-8")
+
+
+def test_every_place_of_a_document_is_escaped() -> None:
+    bad = '"><i>'
+    figure = Figure(bad, bad, bad, "<svg></svg>")
+    table = Table(bad, (bad,), ((Number("1", 1.0, bad),), (Word(bad, "good"),)))
+    blocks = (Facts(((bad, bad),)), table, figure, Bullets((bad,)), Verbatim(bad, bad))
+    section = Section(bad, bad, (*blocks, Paragraph((bad,))), (bad,))
+    page = Page(render(Document(bad, bad, (bad,), (section,), bad)))
+    assert not page.all("i")
+    assert page.text.count(bad) == 18
 
 
 def test_what_the_data_do_not_allow_is_said(tmp_path: Path) -> None:
