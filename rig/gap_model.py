@@ -17,7 +17,8 @@ from rig.dataset import Dataset
 from rig.diagnose import Diagnosis
 from rig.diagnose_text import MEANING
 from rig.errors import InputError
-from rig.gap_forms import CONTAINED, SPRINGS, to_entry
+from rig.gap_forms import to_entry
+from rig.gap_keys import CONTAINED, SPRINGS
 from rig.storage.files import in_place_of
 
 _PLAIN = re.compile(r"(?!true|false|null)[a-z]{4,}(_[a-z]+)*")  # read as text by every YAML

@@ -1,0 +1,198 @@
+"""The keys of effects in a model file: what each is called, its unit, and which belong together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from identification.gap.forms.law import ACROSS, KEPT, LOST, WORKED
+
+# What an entry says besides its law; kept, not interpreted.
+ABOUT = (
+    "name",
+    "dataset",
+    "emulated",
+    "probability",
+    "share_of_gap",
+    "form",
+    "parameters",
+    "contained_in",
+)
+SPRINGS = "joint_stiffness_Nm_per_rad"
+CONTAINED = "contained_in"  # its numbers stand in another key of the model file
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of the file: SI value times `factor`; kind: number, positive, count, text, vector,
+    flag, springs. count: from 1 in the file, from 0 inside; springs: six stiffnesses in the file,
+    six compliances inside."""
+
+    name: str
+    kind: str = "number"
+    factor: float = 1.0
+    options: tuple[str, ...] = ()
+
+
+_MEMORY = Key("memory", "text", options=(KEPT, ACROSS, LOST, WORKED))
+_SIDES = ("x", "y", "z")
+CONSTANTS: dict[str, Key] = {
+    "joint": Key("joint", "count"),
+    "memory": _MEMORY,
+    "flow_time": Key("flow_time_s"),
+    "axis": Key("axis", "text", options=_SIDES),
+    "depth": Key("axis_below_base_mm", factor=1e3),
+    "law": Key("law", "text", options=("Iwan", "Dahl", "Bouc-Wen")),
+    "zone": Key("zone_Nm", "positive"),
+    "crossing": Key("crossing", "text", options=("weight", "load")),
+    "kind": Key("kind", "text", options=("free", "friction", "friction 3")),
+    "way": Key("kind", "text", options=("delay", "filter")),
+    "measured_to": Key("measured_to_Nm", "positive"),
+    "channel": Key("channel", "text", options=("displacement", "force")),
+    "lag": Key("lag_s", "positive"),
+    "path": Key("path", "text", options=("linear", "root", "exponential", "free", "temperature")),
+    "about": Key("about_joint_stiffness_Nm_per_rad", "springs"),
+    "quantity": Key("quantity", "text", options=("force", "displacement")),
+}
+SHAPES: dict[str, Key] = {
+    "threshold": Key("threshold_Nm", "positive"),
+    "returns_beyond": Key("returns_beyond_Nm", "positive"),
+    "ratchets_beyond": Key("ratchets_beyond_Nm", "positive"),
+    "after": Key("after_Nm", "positive"),
+    "strength": Key("friction_Nm", "positive"),
+    "reach": Key("reach_Nm", "positive"),
+    "beyond": Key("beyond_Nm", "positive"),
+    "retardation_time": Key("retardation_time_s", "positive"),
+    "joint": Key("joint", "count"),
+    "segment": Key("segment", "count"),
+    "run": Key("run", "count"),
+    "axis": Key("axis", "text", options=_SIDES),
+    "axes": Key("axes", "text", options=("xx", "xy", "xz", "yy", "yz", "zz")),
+    "law": Key("law", "text", options=("exponential", "hyperbolic")),
+    "force_scale": Key("force_scale_N", "positive"),
+    "along": Key("along", "vector"),
+    "across": Key("across", "vector"),
+    "time_constant": Key("time_constant_s", "positive"),
+    "at": Key("at_s"),
+    "sensor": Key("sensor", "text", options=("mean", "1", "2", "3", "4", "5", "6")),
+    "pose": Key("pose", "text"),
+    "direction": Key("direction", "text"),
+    "first": Key("first", "flag"),
+    "lasts": Key("lasts", "flag"),
+}
+_COEFFICIENTS: dict[str, Key] = {
+    "compliance": Key("compliance_rad_per_Nm"),
+    "compliance_quadratic": Key("compliance_rad_per_Nm2"),
+    "compliance_even": Key("even_compliance_rad_per_Nm2"),
+    "compliance_cubic": Key("compliance_rad_per_Nm3"),
+    "width": Key("width_rad"),
+    "rub": Key("rub_rad"),
+    "place": Key("place_rad"),
+    "over_nominal": Key("compliance_over_nominal"),
+    "depth": Key("depth_mm", factor=1e3),
+    "tangent": Key("tangent"),
+    "offset": Key("offset_mm", factor=1e3),
+    "offset_product": Key("offset_product_mm2", factor=1e6),
+    "angle": Key("angle_rad"),
+    "gain": Key("excess_share_of_reading"),
+    "share": Key("share"),
+    "shift": Key("shift_mm", factor=1e3),
+}
+_DRIFTS = {"drift": "", "drift_rate": "_per_s", "drift_per_root": "_per_sqrt_s", "drift_knot": "",
+           "drift_per_kelvin": "_per_K"}  # fmt: skip
+for _name, _unit in _DRIFTS.items():
+    _stem = "drift_at" if _name == "drift_knot" else "drift"
+    _COEFFICIENTS[f"{_name} force"] = Key(f"{_stem}_N{_unit}")
+    _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
+
+
+MAY_BE_MISSING = ("measured_to", "about")
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """What the laws of a word are written with: constants, and the kinds of terms, coefficient and
+    names of its shape."""
+
+    constants: tuple[str, ...]
+    terms: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+_PLAYS = (
+    ("compliance", ("threshold",)),
+    ("compliance", ("returns_beyond", "after")),
+    ("compliance", ("ratchets_beyond", "after")),
+)
+_PATHS = (
+    ("drift", ("time_constant",)),
+    ("drift_rate", ()),
+    ("drift_per_root", ()),
+    ("drift_knot", ("at",)),
+    ("drift_per_kelvin", ("sensor",)),
+)
+GRAMMAR: dict[str, Grammar] = {
+    "joint_yield": Grammar(("joint", "memory", "flow_time"), _PLAYS),
+    "base_slip": Grammar(("axis", "depth", "memory", "flow_time"), _PLAYS),
+    "joint_hysteresis": Grammar(
+        ("joint", "law", "memory"), (("compliance", ("strength",)), ("compliance", ("reach",)))
+    ),
+    "joint_backlash": Grammar(
+        ("joint", "zone", "crossing", "kind"),
+        (("width", ()), ("rub", ()), ("place", ("pose", "direction", "first"))),
+    ),
+    "joint_nonlinear_stiffness": Grammar(
+        ("joint", "measured_to"),
+        (
+            ("compliance", ("beyond",)),
+            ("compliance", ()),
+            ("compliance_quadratic", ()),
+            ("compliance_even", ()),
+            ("compliance_cubic", ()),
+        ),
+    ),
+    "joint_creep": Grammar(("joint",), (("compliance", ("retardation_time",)),)),
+    "joint_stiffness_error": Grammar((), (("compliance", ("joint",)),)),
+    "link_flexibility": Grammar((), (("over_nominal", ("segment",)),)),
+    "base_compliance": Grammar(("depth",), (("compliance", ("axis",)),)),
+    "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
+    "load_misalignment": Grammar(("about",), (("tangent", ("along", "across")),)),
+    "pose_error": Grammar(
+        ("about",), (("offset", ("axis",)), ("offset_product", ("axes",)), ("angle", ("joint",)))
+    ),
+    "force_scale": Grammar(("about",), (("gain", ()),)),
+    "displacement_scale": Grammar((), (("gain", ()),)),
+    "time_lag": Grammar(("channel", "way", "lag"), (("share", ()),)),
+    "force_drift": Grammar(("path", "quantity", "about"), _PATHS),
+    "thermal_drift": Grammar(
+        ("path", "quantity"), tuple((c, (*shape, "along")) for c, shape in _PATHS)
+    ),
+    "zero_shift": Grammar((), (("shift", ("run", "lasts")),)),
+}
+
+
+def coefficient_key(name: str, constants: Mapping[str, Any]) -> Key:
+    """The key of a coefficient; that of a drift depends on what drifts."""
+    return _COEFFICIENTS.get(name) or _COEFFICIENTS[f"{name} {constants['quantity']}"]
+
+
+_PATH_OF = {"drift": "exponential", "drift_rate": "linear", "drift_per_root": "root",
+            "drift_knot": "free", "drift_per_kelvin": "temperature"}  # fmt: skip
+
+
+def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """The kinds of terms that go with these constants."""
+    for coefficient, shape in grammar.terms:
+        path, law = _PATH_OF.get(coefficient), constants.get("law", "")
+        fits = path in (None, constants.get("path"))
+        if shape in (("strength",), ("reach",)):
+            fits = (law == "Iwan") == (shape == ("strength",))
+        if fits:
+            yield coefficient, shape
+
+
+def keys_of(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[str]:
+    """The keys of every kind of term, in words."""
+    for coefficient, shape in kinds(grammar, constants):
+        names = [SHAPES[n].name for n in shape]
+        yield "(" + ", ".join([*names, coefficient_key(coefficient, constants).name]) + ")"
