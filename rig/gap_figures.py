@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,15 @@ from identification.gap.data import BRANCH_NAMES
 from identification.gap.remainder import Remainder, remainder
 from rig.diagnose import Diagnosis
 from rig.errors import InputError
+from rig.gap_layout import (
+    blank,
+    first_column,
+    label_below,
+    log_axis,
+    panels,
+    set_title,
+    shared_legend,
+)
 from rig.gap_map import gap_map
 from rig.gap_points import (
     FALLING,
@@ -39,7 +47,6 @@ BLUE, ORANGE, GREEN = COLOURS[0], COLOURS[1], COLOURS[2]
 GREY = "0.45"
 LEAST_PROBABILITY = 0.005
 _SENSES = ((RISING, "loading", BLUE, BLUE, "o"), (FALLING, "unloading", ORANGE, "white", "s"))
-_MOST_PANELS = 12
 _MANY = 400  # points of a panel beyond which markers hide each other
 
 
@@ -109,17 +116,17 @@ def curve(r: GapResult, p: Points) -> Figure:
 
     Displacement over force; where the displacement was imposed, force over displacement.
     """
-    figure, grid, shown = _panels(r, below=True)
+    figure, grid, shown = panels(len(r.bench.data.setups), below=True)
     for (upper, lower), s in zip(grid, shown, strict=True):
         _curve_panel(r, p, upper, s)
         _gap_panel(r, p, lower, s)
         upper.set_title(setup_name(r, s), fontsize=10)
-    for upper, lower in _first_column(grid):
+    for upper, lower in first_column(grid):
         upper.set_ylabel("Force in N" if r.bench.imposed else "Displacement in mm")
         lower.set_ylabel("Gap in N" if r.bench.imposed else "Gap in mm")
-    _label_below(grid, "Displacement in mm" if r.bench.imposed else "Force in N")
-    _title(figure, f"Measured, and simulated before and after ({_after(r)})")
-    _shared_legend(figure, [axes for pair in grid for axes in pair])
+    label_below(grid, "Displacement in mm" if r.bench.imposed else "Force in N")
+    set_title(figure, f"Measured, and simulated before and after ({_after(r)})")
+    shared_legend(figure, [axes for pair in grid for axes in pair])
     return figure
 
 
@@ -164,7 +171,7 @@ def _gap_panel(r: GapResult, p: Points, axes: Any, s: int) -> None:
 
 def residual(r: GapResult, p: Points) -> Figure:
     """What the chosen explanation leaves, over force and over the session's time."""
-    figure = _figure(11.0, 4.6)
+    figure = blank(11.0, 4.6)
     left, right = figure.subplots(1, 2, sharey=True)
     band = 2 * float(np.median(p.noise))
     minutes, unit = session_clock(p)
@@ -176,12 +183,12 @@ def residual(r: GapResult, p: Points) -> Figure:
     assumed = not r.bench.rows.clock and len(np.unique(p.run)) > 1
     right.set_xlabel(f"Time in the session in {unit}" + ", rests assumed" * assumed)
     left.set_ylabel(_gap_label(r, "Left"))
-    _title(
+    set_title(
         figure,
         f"Left {_after(r)}: {r.after * MM:.3g} mm rms of single samples; the instruments alone "
         f"leave {r.noise * MM:.3g} mm",
     )
-    _shared_legend(figure, [left])
+    shared_legend(figure, [left])
     return figure
 
 
@@ -207,7 +214,7 @@ def probabilities(r: GapResult) -> Figure:
     """Probability of every word above half a percent of being the main cause; verdict marked."""
     ranked = _ranked(r, LEAST_PROBABILITY)
     alike = {w for e in r.effects if e.name == r.verdict for w in e.indistinguishable_from}
-    figure = _figure(7.5, 1.3 + 0.36 * max(len(ranked), 3))
+    figure = blank(7.5, 1.3 + 0.36 * max(len(ranked), 3))
     axes = figure.add_subplot()
     for i, (word, p) in enumerate(ranked.items()):
         chosen = word == r.verdict
@@ -238,7 +245,7 @@ def withheld(r: GapResult) -> Figure:
     for word, after in r.runners_up.items():
         entries.append((f"withheld {r.held_out[0].fold},\nwith {word} instead",
                         r.held_out[0].before, after, "", COLOURS[3]))  # fmt: skip
-    figure = _figure(8.5, 1.9 + 0.5 * len(entries))
+    figure = blank(8.5, 1.9 + 0.5 * len(entries))
     axes = figure.add_subplot()
     for i, (_, before, after, text, colour) in enumerate(entries):
         b, a = before * MM, after * MM
@@ -255,17 +262,17 @@ def withheld(r: GapResult) -> Figure:
     axes.axvline(r.noise * MM, color=BLUE, linestyle="--", label="noise of the instruments")
     axes.set_yticks(range(len(entries)), [e[0] for e in entries])
     axes.set_ylim(len(entries) - 0.5, -0.7)
-    _log_axis(axes)
+    log_axis(axes)
     axes.set_xlabel(_gap_label(r, "Gap", "rms in mm"))
     axes.set_title(f"How far the gap shrinks {_after(r)}", fontsize=11)
-    _shared_legend(figure, [axes])
+    shared_legend(figure, [axes])
     return figure
 
 
 def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
     """What repeats of the residual, as a smooth curve with its uncertainty, over the residuals of
     all runs, setup by setup."""
-    figure, grid, shown = _panels(r)
+    figure, grid, shown = panels(len(r.bench.data.setups))
     for (axes,), s in zip(grid, shown, strict=True):
         axes.axhline(0, color="0.4", linewidth=0.8)
         for sense, label, edge, fill, marker in _SENSES:
@@ -281,10 +288,10 @@ def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
             axes.fill_between(x, mean - 2 * sd, mean + 2 * sd, color=edge, alpha=0.2, linewidth=0)
             axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
         axes.set_title(setup_name(r, s), fontsize=10)
-    _label_below(grid, "Displacement in mm" if r.bench.imposed else "Force in N")
+    label_below(grid, "Displacement in mm" if r.bench.imposed else "Force in N")
     figure.supylabel(_gap_label(r, "Left unexplained"), fontsize=10)
-    _title(figure, _remainder_title(r, m))
-    _shared_legend(figure, [axes for (axes,) in grid])
+    set_title(figure, _remainder_title(r, m))
+    shared_legend(figure, [axes for (axes,) in grid])
     return figure
 
 
@@ -328,69 +335,6 @@ def _unrepeated(m: Remainder) -> str:
     return f"another {m.unrepeated_rms * MM:.2g} mm rms is finer or does not repeat"
 
 
-def _panels(r: GapResult, *, below: bool = False) -> tuple[Figure, list[list[Any]], list[int]]:
-    """One panel per setup (a second one below it, if asked), up to `_MOST_PANELS`; their axes; the
-    setups shown. All lower panels, or all panels, share their y axis."""
-    shown = list(range(min(len(r.bench.data.setups), _MOST_PANELS)))
-    columns = min(len(shown), 3 if len(shown) > 4 or len(shown) == 3 else 2)
-    lines = -(-len(shown) // columns)
-    figure = _figure(7.5 if columns == 1 else 4.2 * columns + 0.6,
-                     1.4 + (4.4 if below else 3.3) * lines)  # fmt: skip
-    heights = [3.0, 1.3] * lines if below else None
-    deep = 2 if below else 1
-    axes = figure.subplots(lines * deep, columns, squeeze=False, height_ratios=heights,
-                           sharey=False if below else "all")  # fmt: skip
-    grid = []
-    for i in range(lines * columns):
-        line, column = divmod(i, columns)
-        stack = list(axes[line * deep : (line + 1) * deep, column])
-        for one in stack:
-            one.set_visible(i < len(shown))
-        if below:
-            stack[0].sharex(stack[1])
-            stack[0].tick_params(labelbottom=False)
-            stack[1].sharey(axes[1, 0]) if i else None
-        grid.append(stack)
-    return figure, grid[: len(shown)], shown
-
-
-def _first_column(grid: list[list[Any]]) -> list[list[Any]]:
-    return [stack for stack in grid if stack[0].get_subplotspec().is_first_col()]
-
-
-def _label_below(grid: list[list[Any]], label: str) -> None:
-    """The x label below the last panel of every column."""
-    for i, stack in enumerate(grid):
-        column = stack[-1].get_subplotspec().colspan.start
-        after = (other[-1].get_subplotspec().colspan.start for other in grid[i + 1 :])
-        if column not in after:
-            stack[-1].set_xlabel(label)
-
-
-def _title(figure: Figure, text: str) -> None:
-    """Over the whole figure, in as many lines as its width asks for."""
-    figure.suptitle("\n".join(wrap(text, int(10.5 * figure.get_size_inches()[0]))), fontsize=11)
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def _shared_legend(figure: Figure, panels: list[Any]) -> None:
-    """One legend below, every label once."""
-    found: dict[str, Any] = {}
-    for axes in panels:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    if found:
-        # about 13 characters an inch at that size, six for the handle and the space between
-        fitting = int(13 * figure.get_size_inches()[0] / (max(map(len, found)) + 6))
-        figure.legend(list(found.values()), list(found), loc="outside lower center", frameon=False,
-                      fontsize=8, ncols=max(1, min(len(found), fitting)))  # fmt: skip
-
-
 def _ranked(r: GapResult, least: float) -> dict[str, float]:
     ranked = sorted(r.probabilities.items(), key=lambda item: -item[1])
     return {word: p for word, p in ranked if p >= least or word == r.verdict}
@@ -405,13 +349,3 @@ def _after(r: GapResult) -> str:
 
 def _gap_label(r: GapResult, what: str, unit: str = "in mm") -> str:
     return f"{what} {unit}" + (" (force over simulated stiffness)" if r.bench.imposed else "")
-
-
-def _log_axis(axes: Any) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.margins(x=0.12)
