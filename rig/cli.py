@@ -103,7 +103,7 @@ def measure(
     if panel or panel_host is not None or panel_port is not None:
         page = PanelOptions(panel_host or DEFAULT_HOST, panel_port)
     if resume is not None:
-        path = measuring.resume(resume, say, page)
+        path = measuring.resume(resume, say, page, speed)
     else:
         assert protocol is not None
         path = measuring.measure(protocol, station, output, say, page, speed)

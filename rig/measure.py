@@ -91,7 +91,9 @@ def measure(
         return _carry_out(Job(path, protocol, station, journal, Progress()), rig, say)
 
 
-def resume(path: Path, say: Say, panel: PanelOptions | None = None) -> Path:
+def resume(
+    path: Path, say: Say, panel: PanelOptions | None = None, speed: float | None = None
+) -> Path:
     """Goes on with an interrupted measurement at the step where it stopped."""
     journal_file = journal_path(path)
     if not journal_file.exists():
@@ -103,6 +105,8 @@ def resume(path: Path, say: Say, panel: PanelOptions | None = None) -> Path:
     start = records[0].data
     protocol = parse_protocol(start["protocol"], path)
     station = parse_station(start["station"], path)
+    if speed is not None:
+        station = _at_speed(station, speed)
     progress = read_progress(records)
     with _opened(protocol, station, progress, say, panel) as rig:
         for record in records:  # the page shows the whole run, not only what is still to come
@@ -181,7 +185,7 @@ def _watched(
     try:
         yield onlooker
         phase, text = "done", "all runs done"
-    except MeasurementStopped as stop:
+    except (MeasurementStopped, InputError) as stop:
         text = str(stop)
         raise
     except DeviceError as error:
