@@ -33,7 +33,6 @@ from rig.model import ArmModel
 from rig.model_schema import ModelFile
 from rig.yamlfile import read_document
 
-
 _MOST = 1e12
 
 
