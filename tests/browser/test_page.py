@@ -41,9 +41,9 @@ def test_values_are_on_the_page(page: Viewer, feed: Feed) -> None:
     assert "Software monitoring is no safety function" in page.text("safety")
     assert page.text("limits").splitlines()[:2] == ["▲ joint temperature", "9 of 60 °C → stop"]
     assert "114 of 240 N" in page.text("limits")
-    assert page.text("slots") == "no sample missed, last one 3 ms late"
+    assert page.text("slots") == "Samples: none missed, last 3 ms late"
     feed.show(slots=Slots(2, 250.0))
-    page.wait_for("slots", "▲ 2 samples missed, last one 250 ms late")
+    page.wait_for("slots", "Samples: ▲ 2 missed, last 250 ms late")
 
 
 def test_cue_says_which_way_and_when_to_take_the_hands_off(page: Viewer, feed: Feed) -> None:
@@ -143,6 +143,7 @@ def test_discarded_rows_leave_the_curve(page: Viewer, feed: Feed) -> None:
     page.wait(lambda: page.script(INKED) > 500, "the curve of repetition 3 in its own colour")
     feed.items.append({"discard": {"first": 110, "last": 139, "reason": "repetition redone"}})
     page.wait(lambda: page.script(INKED) == 0, "no curve of repetition 3")
+    assert "repetition 3: 0 samples" in page.attribute("curve", "aria-label")
 
 
 def test_pause_redo_and_abort_by_mouse(page: Viewer, feed: Feed) -> None:
@@ -165,7 +166,7 @@ def test_question_is_answered_once_by_its_button(page: Viewer, feed: Feed) -> No
     page.wait_for("prompt-text", "Paused. The arm may be under load.")
     assert page.text("pause-word") == "Go on"
     feed.on_command = lambda _: feed.show(phase="turning", prompt=None)
-    page.here().find_element("css selector", "#prompt-choices button:nth-child(3)").click()
+    page.script("const b = document.querySelectorAll('.choice')[2]; b.click(); b.click()")
     page.wait(lambda: not page.seen("prompt"), "the question has gone")
     assert feed.commands == [{"command": "answer", "prompt_id": "7", "key": "redo_repetition"}]
 
@@ -240,6 +241,11 @@ def test_refused_command_says_why(page: Viewer, feed: Feed) -> None:
     feed.refusal = "The measurement is over."
     page.click("pause")
     page.wait_for("alarms", "The measurement is over.")
+    feed.state = scenes.prompting(scenes.PAUSED)
+    page.wait(lambda: page.seen("prompt"), "the question")
+    page.press("1")
+    page.wait(lambda: len(feed.commands) == 2, "an answer")
+    page.wait(lambda: page.press("1") or len(feed.commands) == 3, "it may be given again")
 
 
 def test_two_viewers_and_one_operator(page: Viewer, feed: Feed) -> None:

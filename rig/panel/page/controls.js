@@ -50,6 +50,7 @@ export class Controls {
     this.link = link;
     this.say = say;
     this.state = null;
+    this.answered = null;
     this.showPrompt = onChange((prompt) => this.#prompt(prompt));
     byId("pause").addEventListener("click", () => this.pause());
     byId("redo").addEventListener("click", () => this.command("redo"));
@@ -95,9 +96,12 @@ export class Controls {
     return this.#send(name);
   }
 
-  answer(key) {
+  /** Once per question, unless it is refused: a double click is no second answer. */
+  async answer(key) {
     const prompt = this.state?.prompt;
-    if (prompt && key) this.#send("answer", { prompt_id: prompt.id, key });
+    if (!prompt || !key || this.answered === prompt.id) return;
+    this.answered = prompt.id;
+    if (!(await this.#send("answer", { prompt_id: prompt.id, key }))) this.answered = null;
   }
 
   /** The n-th answer of the question, counted from 1, as on the buttons. */
@@ -131,6 +135,7 @@ export class Controls {
   async #send(command, extra = {}) {
     const refused = await this.link.send(command, extra);
     if (refused) this.say(refused);
+    return !refused;
   }
 
   #viewer(operator) {

@@ -84,7 +84,7 @@ export class CurvePlot {
   }
 
   #describe(repetitions, direction, model) {
-    const counts = [...repetitions].map(([r, rows]) => `repetition ${r}: ${rows.length} samples`);
+    const counts = [...repetitions].map(([r, rows]) => `repetition ${r}: ${rows.samples} samples`);
     const simulated = model.length ? "; with the simulation's prediction" : "";
     const text = `Displacement over force along ${direction || "no direction"}: ${counts.join(", ") || "no samples yet"}${simulated}`;
     if (this.label !== text) byId("curve").setAttribute("aria-label", text);

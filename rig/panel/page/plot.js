@@ -3,6 +3,8 @@
  * only a change of range, size, theme or data draws everything again, thinned to what pixels show.
  */
 
+const SLACK = 0.05; // of a step of the range
+
 /** Ticks at 1, 2 or 5 times a power of ten, about `count` of them within [from, to]. */
 export function ticks(from, to, count) {
   const span = to - from;
@@ -22,7 +24,8 @@ export function roundRange(from, to, least) {
   const span = Math.max(to - from, least);
   const [low, high] = to - from < least ? [middle - span / 2, middle + span / 2] : [from, to];
   const step = 10 ** Math.floor(Math.log10(span)) / 2;
-  return [Math.floor(low / step + 1e-9) * step, Math.ceil(high / step - 1e-9) * step];
+  // What lies a hair beyond a round number, as noise about zero does, opens no further step.
+  return [Math.floor(low / step + SLACK) * step, Math.ceil(high / step - SLACK) * step];
 }
 
 /** Smallest and largest finite value of rows [from, to) of a column; [Infinity, -Infinity] if none. */

@@ -61,8 +61,8 @@ function slots({ missed, late_ms }) {
   const element = byId("slots");
   const late = isNumber(late_ms) && late_ms > LATE_MS;
   element.classList.toggle("late", missed > 0 || late);
-  const words = missed > 0 ? `▲ ${missed} samples missed` : "no sample missed";
-  setText(element, `${words}, last one ${number(late_ms, 0)} ms late`);
+  const words = missed > 0 ? `▲ ${missed} missed` : "none missed";
+  setText(element, `Samples: ${words}, last ${number(late_ms, 0)} ms late`);
 }
 
 export function drawSide(state) {

@@ -34,8 +34,33 @@ export class Columns {
 const COLUMNS = ["force_N", "displacement_mm"];
 const number = (value) => (typeof value === "number" ? value : NaN);
 
+/** One repetition. `samples` counts those that are to be used; rows also hold gaps. */
+export class Curve extends Columns {
+  constructor() {
+    super(COLUMNS);
+    this.samples = 0;
+    this.branch = "";
+  }
+
+  /** Adds a sample and returns its row. */
+  add(force_N, displacement_mm, branch) {
+    // Back at zero load the screw has been turned back: no line leads there from the last step.
+    if (branch === "zero" && !["", "zero"].includes(this.branch)) this.push(NaN, NaN);
+    this.branch = branch;
+    this.push(force_N, displacement_mm);
+    this.samples += 1;
+    return this.length - 1;
+  }
+
+  /** The sample in this row is not to be used. */
+  discard(row) {
+    for (const name of COLUMNS) this[name][row] = NaN;
+    this.samples -= 1;
+  }
+}
+
 /**
- * `curves`: Map "pose|direction" -> Map repetition -> Columns of COLUMNS.
+ * `curves`: Map "pose|direction" -> Map repetition -> Curve.
  * `run`: all samples on the session's clock; `live`: states on the server's clock.
  * `version` changes whenever earlier points are no longer valid and all must be drawn again.
  */
@@ -52,7 +77,7 @@ export class Store {
     this.live = new Columns(["t_s", ...COLUMNS]);
     this.predictions = new Map();
     this.plan = null;
-    this.rows = []; // by row number: where its values lie
+    this.rows = []; // by row number: where its values lie; null once discarded
   }
 
   /** One item of the stream. */
@@ -82,16 +107,15 @@ export class Store {
   #sample(sample) {
     if (this.rows[sample.row] !== undefined) return; // told twice: after a reconnection
     const curve = this.#curve(`${sample.pose}|${sample.direction}`, sample.repetition);
-    this.rows[sample.row] = { curve, at: curve.length, run: this.run.length };
     const values = [number(sample.force_N), number(sample.displacement_mm)];
-    curve.push(...values);
+    this.rows[sample.row] = { curve, at: curve.add(...values, sample.branch) };
     this.run.push(number(sample.session_s), ...values);
   }
 
   #curve(where, repetition) {
     if (!this.curves.has(where)) this.curves.set(where, new Map());
     const repetitions = this.curves.get(where);
-    if (!repetitions.has(repetition)) repetitions.set(repetition, new Columns(COLUMNS));
+    if (!repetitions.has(repetition)) repetitions.set(repetition, new Curve());
     return repetitions.get(repetition);
   }
 
@@ -99,7 +123,8 @@ export class Store {
   #discard({ first, last }) {
     for (let row = first; row <= last; row += 1) {
       const place = this.rows[row];
-      if (place) for (const name of COLUMNS) place.curve[name][place.at] = NaN;
+      if (place) place.curve.discard(place.at);
+      this.rows[row] = null;
     }
     this.version += 1;
   }
