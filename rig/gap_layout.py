@@ -12,8 +12,8 @@ _MOST_PANELS = 12
 
 
 def panels(setups: int, *, below: bool = False) -> tuple[Figure, list[list[Any]], list[int]]:
-    """One panel per setup (a second one below it, if asked), up to `_MOST_PANELS`; their axes; the
-    setups shown. setups: how many there are. All lower panels, or all panels, share their y axis."""
+    """One panel for each of so many setups (a second one below it, if asked), up to `_MOST_PANELS`;
+    their axes; the setups shown. All lower panels, or all panels, share their y axis."""
     shown = list(range(min(setups, _MOST_PANELS)))
     columns = min(len(shown), 3 if len(shown) > 4 or len(shown) == 3 else 2)
     lines = -(-len(shown) // columns)
