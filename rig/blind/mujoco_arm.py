@@ -32,7 +32,7 @@ PATIENCE_S = 15.0
 _AT_ONCE = 5  # steps under one set of torques
 _OPTION = (
     f'<option timestep="{STEP_S}" gravity="0 0 0" integrator="implicitfast" '
-    'iterations="100" tolerance="1e-13"/>'
+    'iterations="30" tolerance="1e-22"/>'
 )
 
 

@@ -67,6 +67,21 @@ def test_small_turns_leave_the_laws_and_take_the_geometry_away() -> None:
     assert slipped[0] > 1e-4
 
 
+@pytest.mark.parametrize("turns", [1.0, 0.01])
+def test_sliders_in_series_follow_their_play_operators(turns: float) -> None:
+    lever = float((place(Q).levers(TOOL) @ Y)[0])
+    spots, k, strengths = places(Q), 4e5, np.array([2.0, 8.0, 25.0])
+    joints = [Hinge(f"joint{j + 1}", *spots[f"joint{j + 1}"], SPRINGS[j]) for j in range(6)]
+    sliders = [in_joint1(k, friction_Nm=f) for f in strengths]
+    engine = MujocoArm(Q, TOOL, [*joints, *sliders], turns)
+    state = np.zeros(3)
+    for force in (30.0, 90.0, 30.0, 0.0, 60.0):
+        engine.load(force * Y)
+        torque = lever * force
+        state = np.clip(state, (torque - strengths) / k, (torque + strengths) / k)
+        assert engine.turned()[6:] == pytest.approx(state, abs=2e-6)
+
+
 def test_dry_friction_holds_below_its_threshold_and_keeps_what_slipped() -> None:
     lever = float((place(Q).levers(TOOL) @ Y)[0])
     engine = arm(in_joint1(20000.0, friction_Nm=40.0))
