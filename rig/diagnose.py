@@ -61,6 +61,7 @@ class Diagnosis:
             "remainder_mm": r.remainder * MM,
             "runners_up": {w: {"held_out_after_rms_mm": v * MM} for w, v in r.runners_up.items()},
             "notes": list(r.notes),
+            "known_effects": [e["name"] for e in self.known_effects],
             "banners": list(self.banners),
         }
 
@@ -68,7 +69,9 @@ class Diagnosis:
         """What the terminal shows."""
         from rig.diagnose_text import render
 
-        return "\n\n".join([*self.banners, render(self.result)])
+        names = ", ".join(dict.fromkeys(str(e["name"]) for e in self.known_effects))
+        known = [f"The simulation has these effects already: {names}."] if names else []
+        return "\n\n".join([*self.banners, *known, render(self.result)])
 
 
 def diagnose(

@@ -33,14 +33,12 @@ def less_known(data: GapData, forms: Sequence[Form]) -> GapData:
         across = across - np.repeat(parts, holds, axis=0)
     zero = np.zeros(bench.rows.n)
     zero[bench.rows.zero] = total[layout.zero_force]
-    words = ", ".join(dict.fromkeys(f.word for f in forms))
     return replace(
         data,
         force=data.force - np.repeat(zero, count),
         displacement=data.displacement - np.repeat(_from_datum(bench, total), count),
         q=q,
         tangential=across,
-        notes=(*data.notes, f"Part of the simulation already: {words}."),
     )
 
 
