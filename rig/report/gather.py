@@ -25,8 +25,11 @@ SCHEMA = "rig.report/1"
 
 @dataclass(frozen=True, eq=False)
 class Session:
-    """One data set and what the commands say of it. stem: what the names of its figures begin
-    with; missing: part -> why it is not there."""
+    """One data set and what the commands say of it.
+
+    stem: what the names of its figures begin with. sha256: of the file, or of the journal beside
+    it where that is the truth (from_journal). missing: part -> why it is not there.
+    """
 
     path: Path
     label: str
@@ -37,6 +40,7 @@ class Session:
     diagnosed: Diagnosed
     quality: Quality
     sha256: str
+    from_journal: bool
     missing: dict[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
@@ -46,6 +50,7 @@ class Session:
             "label": self.label,
             "file": str(self.path),
             "sha256": self.sha256,
+            "sha256_of": "journal" if self.from_journal else "file",
             "uuid": d.uuid,
             "title": d.title,
             "created": d.created,
@@ -183,6 +188,7 @@ def _session(path: Path, label: str, stem: str, dataset: Dataset) -> Session:
         diagnosed=Diagnosed(None, reason=TURNED_OFF),
         quality=assess(dataset),
         sha256=_sha256(path),
+        from_journal=journal_path(path).exists(),
         missing=missing,
     )
 

@@ -19,6 +19,11 @@ from rig.report.gather import Session
 from rig.report.pictures import Pictures
 from rig.report.results import NOTHING, Node, quantity
 
+_CHECKED = {
+    "file": "the checksums of all columns and texts, when it was read",
+    "journal": "the checksum of every record, when it was read",
+}
+
 
 def in_short(session: Session, data: Node) -> Section:
     """The answers first."""
@@ -167,7 +172,8 @@ def provenance(session: Session, data: Node, made: str, software: str) -> Sectio
     commands = ["rig analyze", "rig identify", *(["rig diagnose"] if diagnosed else [])]
     rows: list[tuple[str, Cell]] = [
         ("File", Word(data["file"].text(), "code")),
-        ("SHA-256", Word(data["sha256"].text(), "code")),
+        (f"SHA-256 of the {data['sha256_of'].text()}", Word(data["sha256"].text(), "code")),
+        ("Checked", _CHECKED[data["sha256_of"].text()]),
         ("UUID", Word(data["uuid"].text(), "code")),
         ("Written by", data["software"].text()),
         ("Evaluated by", software),

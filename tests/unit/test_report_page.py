@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from rig.dataset import load
 from rig.errors import InputError
+from rig.journal import journal_path
 from rig.report.document import (
     Bullets,
     Document,
@@ -24,6 +26,7 @@ from rig.report.document import (
 from rig.report.gather import Wishes
 from rig.report.html import escape, render
 from rig.report.report import Report, checked, make, write_figures, write_html
+from tests.unit.example_data import write_journal
 from tests.unit.report_sets import META, SIMULATION, Page, bench, rewritten
 
 QUIET = Wishes(gap=False, made="2026-03-01T12:00:00+01:00")
@@ -154,6 +157,18 @@ def test_all_samples_discarded(tmp_path: Path) -> None:
     text = Page(make([rewritten(path, columns=columns)], Wishes(made="now")).to_html()).text
     assert "There are no samples to analyze." in text
     assert "No sample in use" in text
+
+
+def test_a_measurement_that_was_cut_off(tmp_path: Path) -> None:
+    """There is a journal only; it is the truth, and the checksum is of it."""
+    path = tmp_path / "cut.h5"
+    write_journal(path, 4)
+    report = make([path], Wishes(made="now"))
+    text = Page(report.to_html()).text
+    assert "INCOMPLETE: the measurement did not reach its end (it was cut off)." in text
+    digest = hashlib.sha256(journal_path(path).read_bytes()).hexdigest()
+    assert report.to_json()["datasets"][0]["sha256"] == digest
+    assert "SHA-256 of the journal" in text
 
 
 def test_figures_with_their_numbers(tmp_path: Path) -> None:
