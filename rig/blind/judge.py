@@ -20,7 +20,6 @@ SHARED = {
     ("joint_yield", "threshold_Nm"): "threshold",
     ("base_slip", "threshold_Nm"): "threshold",
     ("joint_backlash", "width_rad"): "width",
-    ("joint_hysteresis", "friction_Nm"): "friction",
     ("joint_creep", "creep_fraction"): "creep_fraction",
     ("contact_seating", "depth_mm"): "depth",
     ("force_scale", "factor"): "factor",
