@@ -120,14 +120,14 @@ def _word(entry: Mapping[str, Any]) -> str:
             "an effect without a name is none that rig simulate can compute; wanted: `name`, one "
             f"of {', '.join(WORDS)}. With `effects: []` the springs alone are simulated.",
         )
-    if name not in GRAMMAR:
+    if not isinstance(name, str) or name not in GRAMMAR:
         raise FormError(
             ("name",),
             f'the effect "{name}" is none that rig simulate can compute.'
             f"{did_you_mean(str(name), WORDS)} Known: {', '.join(WORDS)}. With `effects: []` the "
             "springs alone are simulated.",
         )
-    return str(name)
+    return name
 
 
 def _term(
@@ -163,12 +163,21 @@ def _inward(key: Key, entry: Mapping[str, Any], place: tuple[str | int, ...]) ->
         return tuple(_number(v, at) for v in value)
     if key.kind == "springs":
         return _springs(value, at)
+    return _counted(key, value, at) if key.kind == "count" else _sized(key, value, at)
+
+
+def _counted(key: Key, value: Any, at: tuple[str | int, ...]) -> int:
+    most = {"joint": 6, "segment": 2}.get(key.name, 1_000_000)
     number = _number(value, at)
-    if key.kind == "count":
-        most = {"joint": 6, "segment": 2}.get(key.name, 1_000_000)
-        if number != int(number) or not 1 <= number <= most:
-            raise FormError(at, f"{value!r} is not allowed; allowed: whole numbers, 1 to {most}.")
-        return int(number) - 1
+    if number != int(number) or not 1 <= number <= most:
+        raise FormError(at, f"{value!r} is not allowed; allowed: whole numbers, 1 to {most}.")
+    return int(number) - 1
+
+
+def _sized(key: Key, value: Any, at: tuple[str | int, ...]) -> float:
+    number = _number(value, at)
+    if key.kind == "size" and number < 0:
+        raise FormError(at, f"{number:g} is not allowed; allowed: 0 or more.")
     if key.kind == "positive" and not number > 0:
         raise FormError(at, f"{number:g} is not allowed; allowed: above 0.")
     return number / key.factor

@@ -25,9 +25,9 @@ CONTAINED = "contained_in"  # its numbers stand in another key of the model file
 
 @dataclass(frozen=True)
 class Key:
-    """A key of the file: SI value times `factor`; kind: number, positive, count, text, vector,
-    flag, springs. count: from 1 in the file, from 0 inside; springs: six stiffnesses in the file,
-    six compliances inside."""
+    """A key of the file: SI value times `factor`; kind: number, positive, size (0 or more), count,
+    text, vector, flag, springs. count: from 1 in the file, from 0 inside; springs: six stiffnesses
+    in the file, six compliances inside."""
 
     name: str
     kind: str = "number"
@@ -40,7 +40,7 @@ _SIDES = ("x", "y", "z")
 CONSTANTS: dict[str, Key] = {
     "joint": Key("joint", "count"),
     "memory": _MEMORY,
-    "flow_time": Key("flow_time_s"),
+    "flow_time": Key("flow_time_s", "size"),
     "axis": Key("axis", "text", options=_SIDES),
     "depth": Key("axis_below_base_mm", factor=1e3),
     "law": Key("law", "text", options=("Iwan", "Dahl", "Bouc-Wen")),

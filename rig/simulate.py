@@ -168,7 +168,10 @@ def _with_effects(
 ) -> tuple[tuple[PredictedCurve, ...], tuple[str, ...]]:
     """The curves with the effects along the path, and what was left out."""
     compliance = np.array([1 / c.stiffness for c in curves])
-    path, notes = predict(model, forms, procedure, compliance)
+    try:
+        path, notes = predict(model, forms, procedure, compliance)
+    except ValueError as error:
+        raise InputError(f"{model.name}: effects: {error}.") from error
     out = []
     for s, curve in enumerate(curves):
         mine = np.flatnonzero(path.setup == s)

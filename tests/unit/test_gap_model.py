@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from identification.gap.bench import Bench, make_bench
 from identification.gap.effects import WORDS, library
@@ -141,6 +144,39 @@ def test_all_problems_of_a_file_come_at_once(tmp_path: Path) -> None:
     assert len(lines) == 2
     assert all(line.startswith(f"{path}:") for line in lines)
     assert "effects[0].joint: 9 is not allowed" in lines[0]
+
+
+JUNK = st.one_of(
+    st.none(), st.booleans(), st.integers(-10, 10), st.floats(), st.text(max_size=5),
+    st.lists(st.integers(-3, 3), max_size=6), st.dictionaries(st.text(max_size=3), st.integers()),
+)  # fmt: skip
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(word=st.sampled_from(WORDS), pick=st.integers(0, 10**6), junk=JUNK, deep=st.booleans())
+def test_damaged_entries_are_refused_or_work(word: str, pick: int, junk: Any, deep: bool) -> None:
+    """One value of a good entry replaced by anything: a message, or an effect that can be used."""
+    there = small_bench()
+    fresh = replace(there, columns=[])
+    v = library(fresh, (word,))[0]
+    form = describe(fresh, Part(v, 1.0), np.full(len(v.columns), 0.01), np.eye(len(v.columns)))
+    entry = to_entry(form, {"name": word})
+    target: Any = entry["terms"][pick % len(entry["terms"])] if deep else entry
+    target[sorted(target)[pick % len(target)]] = junk
+    try:
+        read = from_entry(entry)
+        made = realise(there, read)
+    except FormError as error:
+        assert len(str(error)) > 10  # noqa: PT017
+    except ValueError as error:
+        assert "segment" in str(error)  # noqa: PT017
+    else:
+        assert np.isfinite(made).all()
+
+
+@cache
+def small_bench() -> Bench:
+    return make_bench(arm_data())
 
 
 # --- prediction ----------------------------------------------------------------------------------

@@ -88,6 +88,11 @@ def describe_links(_: Bench, v: Variant) -> tuple[Law, Array]:
 def links(bench: Bench, law: Law) -> list[Array]:
     """Compliance of the segment along the direction times the load."""
     each = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]
+    most = max(t.shape["segment"] for t in law.terms)
+    if most >= each.shape[1]:
+        raise ValueError(
+            f"link_flexibility of segment {most + 1}: the robot has {each.shape[1]} of them"
+        )
     return [bench.outside_column(each[:, t.shape["segment"]] * bench.load) for t in law.terms]
 
 

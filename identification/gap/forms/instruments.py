@@ -125,7 +125,7 @@ def _moved(bench: Bench, law: Law, term: Term) -> Array:
     if path == "exponential":
         return np.asarray(1 - np.exp(-t / term.shape["time_constant"]))
     if path == "free":
-        places = [x.shape["at"] for x in law.terms if _twin(x, term)]
+        places = sorted({x.shape["at"] for x in law.terms if _twin(x, term)})
         hat = np.equal(places, term.shape["at"]).astype(float)
         return np.asarray(np.interp(t, places, hat))
     values = bench.rows.temperature
