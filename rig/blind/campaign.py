@@ -71,10 +71,14 @@ class Outcome:
 
 @dataclass(eq=False)
 class Campaign:
-    """What was diagnosed, in the order of the draw; interrupted: the rest was not."""
+    """What was diagnosed, in the order of the draw; interrupted: the rest was not.
+
+    undrawn: number and reason of cases that the generator could not make; they are not scored.
+    """
 
     plan: Plan
     outcomes: list[Outcome] = field(default_factory=list)
+    undrawn: list[tuple[int, str]] = field(default_factory=list)
     interrupted: bool = False
 
 
@@ -158,7 +162,12 @@ class _Sweep:
 
     def _submit(self, number: int) -> None:
         withheld = self._plan.withheld(number, self._words)
-        case = self._draw(self._plan.seed, number, word=self._plan.drawn(number, self._words))
+        word = self._plan.drawn(number, self._words)
+        try:
+            case = self._draw(self._plan.seed, number, word=word)
+        except InputError as error:  # no such case of a physical size
+            self.campaign.undrawn.append((number, str(error)))
+            return
         path = self._folder / f"{number:04d}.h5"  # says nothing of seed or word
         write_dataset(case, path)
         future = self._pool.submit(path, () if withheld is None else (withheld,))

@@ -22,6 +22,7 @@ from rig.blind.mujoco_arm import Array
 from rig.blind.mujoco_effects import EFFECTS, Hidden, Random, Rig, draw_effect
 from rig.blind.mujoco_label import answers, structural_mm
 from rig.blind.mujoco_session import AXES, Design, Row, levers, session, true_mm
+from rig.errors import InputError
 from rig.worlds.arm import place
 
 __all__ = ["EFFECTS", "MujocoCase", "draw_case", "draw_small_turns"]
@@ -47,7 +48,7 @@ class MujocoCase:
 def draw_case(seed: int, number: int, *, word: str | None = None, turns: float = 1.0) -> MujocoCase:
     """Case `number` of a seed: one effect of the word, or one of any word or none (one in ten).
 
-    The effect is drawn anew until its gap is 1.5 to 60 times the noise. RuntimeError if that does
+    The effect is drawn anew until its gap is 1.5 to 60 times the noise. InputError if that does
     not happen. turns: of `MujocoArm`.
     """
     random = np.random.default_rng([seed, number, 4])
@@ -63,7 +64,10 @@ def draw_case(seed: int, number: int, *, word: str | None = None, turns: float =
         if hidden is None or SNR[0] <= snr <= SNR[1]:
             label = answers(hidden, rows, design, noise_mm)
             return MujocoCase(f"m{seed}-{number:04d}", columns, _meta(design), label)
-    raise RuntimeError(f"no {word} of the wanted size in {_ATTEMPTS} draws (seed {seed})")
+    raise InputError(
+        f"{word}: no gap of {SNR[0]:g} to {SNR[1]:g} times the noise in {_ATTEMPTS} draws "
+        f"(seed {seed}, number {number}). Take another seed."
+    )
 
 
 def draw_small_turns(seed: int, number: int, *, word: str | None = None) -> MujocoCase:

@@ -40,6 +40,7 @@ def report(campaign: Campaign) -> dict[str, Any]:
              "reason": c.outcome.reply.reason}
             for c in judged if c.outcome.reply.status != "answered"
         ],
+        "undrawn": [{"number": n, "reason": reason} for n, reason in campaign.undrawn],
         "cases": [j.case_json(c) for c in judged],
     }  # fmt: skip
 

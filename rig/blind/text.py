@@ -20,7 +20,7 @@ def terminal(report: dict[str, Any]) -> str:
     for title, rows in breakdowns(report["tables"], report["summary"]):
         if len(rows) > 1:
             parts.append(f"{title}\n{_table(rows)}")
-    if report["failures"]:
+    if report["failures"] or report["undrawn"]:
         parts.append(_failures(report))
     parts.append(f"The same cases again: {report['command']}")
     return "\n\n".join(parts)
@@ -38,7 +38,7 @@ def markdown(report: dict[str, Any], level: int = 2) -> str:
     for title, rows in breakdowns(report["tables"], report["summary"]):
         if len(rows) > 1:
             parts += [f"{hashes} {title}", _markdown(rows)]
-    if report["failures"]:
+    if report["failures"] or report["undrawn"]:
         parts.append(_failures(report))
     return "\n\n".join(parts)
 
@@ -149,8 +149,14 @@ def _coverage(groups: dict[str, Any]) -> list[Row]:
 
 
 def _failures(report: dict[str, Any]) -> str:
-    rows = [f"  {f['name']}: {f['status']}, {f['reason']}" for f in report["failures"]]
-    return "\n".join(["Cases without an answer (counted as wrong)", *rows])
+    parts = []
+    if report["failures"]:
+        rows = [f"  {f['name']}: {f['status']}, {f['reason']}" for f in report["failures"]]
+        parts += ["Cases without an answer (counted as wrong)", *rows]
+    if report["undrawn"]:
+        rows = [f"  number {u['number']}: {u['reason']}" for u in report["undrawn"]]
+        parts += ["Cases that could not be drawn (not counted)", *rows]
+    return "\n".join(parts)
 
 
 def _number(value: float | None) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rig import cli
-from rig.blind import command
+from rig.blind import command, text
 from rig.blind.campaign import Campaign, Plan, run
 from rig.blind.case import generator, plain, write_dataset
 from rig.blind.diagnosers import Diagnoser, Reply
@@ -84,6 +84,26 @@ def test_a_word_that_is_not_drawn_is_refused() -> None:
     )
 
 
+def test_what_could_not_be_drawn_is_listed_and_not_scored() -> None:
+    def fails_once(seed: int, number: int, *, word: str | None = None) -> FakeCase:
+        if number == 1:
+            raise InputError("snr: out of reach.")
+        return draw(seed, number, word=word)
+
+    out = report(instantly(Plan(cases=3, seed=1), draw=fails_once))
+    assert out["undrawn"] == [{"number": 1, "reason": "snr: out of reach."}]
+    assert [c["number"] for c in out["cases"]] == [0, 2]
+    assert "number 1: snr: out of reach." in text.terminal(out)
+
+
+def test_the_worlds_of_the_project_end_to_end() -> None:
+    made, words = generator("hidden")
+    out = report(run(Plan(cases=2, seed=1), made, words))
+    assert [c["status"] for c in out["cases"]] == ["answered"] * 2
+    assert out["summary"]["right_all_kinds"]["n"] <= 2
+    assert {c["answers"]["design"] for c in out["cases"]} <= {"rich", "medium", "paper"}
+
+
 # ------------------------------------------------------------------------- answers stay outside
 
 
@@ -143,6 +163,17 @@ def test_the_data_set_holds_no_trace_of_the_answers(tmp_path: Path) -> None:
     open_book = FakeCase(case.name, {**case.columns, "note": note}, case.meta, case.label)
     write_dataset(open_book, tmp_path / "open.h5")
     assert secret in traces(tmp_path / "open.h5", open_book)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_the_worlds_of_the_project_leave_no_trace(number: int, tmp_path: Path) -> None:
+    case, path = generator("hidden")[0](2, number), tmp_path / "a.h5"
+    keys = ("truth", "forms", "parameters", "true_joint_stiffness", "snr", "snr_each")
+    secrets = {key: case.label[key] for key in keys}
+    for parameters in secrets["parameters"]:
+        parameters.pop("session_s", None)  # the last value of a column
+    write_dataset(case, path)
+    assert traces(path, FakeCase(case.name, {}, {}, secrets)) == []
 
 
 def test_the_data_set_is_marked_and_keeps_every_digit(tmp_path: Path) -> None:
