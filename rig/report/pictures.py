@@ -32,6 +32,7 @@ class Pictures:
     def setup(self, session: Session, pose: str, loads: Sequence[Load]) -> Figure:
         """The arm in one pose with its directions of load; a rig without an arm: its springs."""
         meta = session.dataset.meta
+        marked = partial(figures.watermark, banners=session.dataset.banners())
         header: tuple[str, ...] = ("point", "x_mm", "y_mm", "z_mm")
         rows: Rows
         if meta.poses:
@@ -39,12 +40,12 @@ class Pictures:
             names = ("base", *(f"frame {i}" for i in range(1, 6)), "flange", "point of load")
             rows = tuple((n, *map(float, p)) for n, p in zip(names, points, strict=True))
             words = f"The arm in pose {pose}: where the screw pushes and where the laser looks."
-            plot: Callable[[], Plot] = lambda: setup_drawing.arm_setup(meta, pose, loads)  # noqa: E731
+            plot: Callable[[], Plot] = lambda: marked(setup_drawing.arm_setup(meta, pose, loads))  # noqa: E731
         else:
             header = ("direction", "x", "y", "z")
             rows = tuple((one.name, *one.vector) for one in loads)
             words = "One spring a direction: force and displacement are taken along it."
-            plot = lambda: setup_drawing.bench_setup(loads)  # noqa: E731
+            plot = lambda: marked(setup_drawing.bench_setup(loads))  # noqa: E731
         caption = f"{words} Distances of screw and laser are schematic."
         return self._draw(f"setup_{pose}" if pose else "setup", session, caption, words, plot,
                           header, rows)  # fmt: skip

@@ -82,8 +82,6 @@ def _arm(axes: Any, x: Array, y: Array) -> None:
     if np.hypot(x[7] - x[6], y[7] - y[6]) > 1:
         axes.plot(x[6:], y[6:], color=_ARM, linewidth=3, zorder=2)
     axes.plot(x[0], y[0], "s", color="black", markersize=13, zorder=3)
-    axes.annotate("base", (x[0], y[0]), xytext=(-11, 0), textcoords="offset points",
-                  ha="right", va="center", fontsize=8)  # fmt: skip
     axes.plot(x[7], y[7], "o", color="white", markeredgecolor="black", markersize=8, zorder=6)
 
 
@@ -129,6 +127,7 @@ def _legend(figure: Figure, loads: Sequence[Load]) -> None:
         for i, load in enumerate(loads)
     ]  # fmt: skip
     marks += [
+        Line2D([], [], color="black", marker="s", linestyle="", markersize=9, label="base"),
         Line2D([], [], color=_LASER, marker="D", linestyle=":", label="laser"),
         Line2D([], [], color="white", marker="o", markeredgecolor="black", label="point of load"),
     ]

@@ -22,6 +22,7 @@ from rig.report.document import (
     Table,
     Verbatim,
     Word,
+    figures,
 )
 from rig.report.gather import Wishes
 from rig.report.html import escape, render
@@ -104,6 +105,9 @@ def test_every_section_of_emulated_or_cut_off_data_says_so(evil: Report) -> None
     assert len(inner) > 8
     for section in (*chapters, *inner):
         assert [b[:8] for b in section.banners] == ["EMULATED", "INCOMPLE"], section.title
+    drawn = figures(evil.document.sections)
+    assert len(drawn) > 8
+    assert not [f.name for f in drawn if "<!-- EMULATED · INCOMPLETE -->" not in f.svg]
     html = evil.to_html()
     assert 'content: "EMULATED · INCOMPLETE"' in html  # the head of every printed page
     assert len([e for e in Page(html).all("p") if e.attributes["class"] == "mark"]) >= 2 * 10
@@ -222,10 +226,12 @@ def test_the_page_is_written_whole(tmp_path: Path) -> None:
 
 
 def test_one_process_beside_gives_the_same_page(tmp_path: Path) -> None:
-    path = bench(tmp_path / "a.h5", meta=META + SIMULATION)
-    beside, alone = (make([path], Wishes(made="now", processes=n)).to_html() for n in (1, 0))
-    assert beside == alone
-    assert "a_gap_curve" in alone
+    path = rewritten(bench(tmp_path / "a.h5", meta=META + SIMULATION), origin="emulated")
+    beside, alone = (make([path], Wishes(made="now", processes=n)) for n in (1, 0))
+    assert beside.to_html() == alone.to_html()
+    drawn = {f.name: f.svg for f in figures(alone.document.sections)}
+    assert {"a_gap_curve", "a_gap_map", "a_gap_withheld", "a_gap_remainder"} <= drawn.keys()
+    assert not [name for name, svg in drawn.items() if "<!-- EMULATED -->" not in svg]
 
 
 def test_pdf_takes_dangerous_words_as_words(evil: Report) -> None:
