@@ -110,8 +110,11 @@ def test_with_nobody_on_the_page_the_scripted_hand_answers(page: Page, hand: Fak
 def test_with_an_operator_on_the_page_he_answers(page: Page, hand: FakeLoader) -> None:
     page.attended = True
     asking = Asking(beside(page, hand), ASK)
-    page.say("answer", prompt_id="q0", key="record")  # an earlier question's
-    page.say("answer", prompt_id=page.question(), key="continue")
+    question = page.question()
+    page.say("answer", prompt_id="q0", key="record")  # a late click on an earlier question
+    assert page._question is not None
+    assert not page._question.done.is_set()
+    page.say("answer", prompt_id=question, key="continue")
     assert asking.outcome() == "continue"
     assert hand.asked == []
 
