@@ -17,8 +17,8 @@ for line in sys.stdin:
     path = json.loads(line)["path"]
     if path == "crash":
         raise RuntimeError("it broke")
-    if path == "silent":
-        time.sleep(600)
+    if path == "slow":
+        time.sleep(10)
     if path == "refuse":
         print(json.dumps({"refused": "no simulation"}), flush=True)
         continue
@@ -64,7 +64,7 @@ def test_refusals_keep_their_reason(diagnoser: Diagnoser) -> None:
 def test_a_late_answer_is_given_up_and_the_process_with_it() -> None:
     diagnoser = Diagnoser(0.5, [sys.executable, "-c", STAND_IN])
     try:
-        reply = diagnoser.diagnose(Path("silent"), ())
+        reply = diagnoser.diagnose(Path("slow"), ())
         assert (reply.status, reply.reason) == ("late", "not done after 0.5 s")
     finally:
         diagnoser.close()

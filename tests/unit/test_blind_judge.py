@@ -72,6 +72,19 @@ def test_the_set_counts_only_the_verdicts_own_words() -> None:
     found["effects"][0]["indistinguishable_from"] = ["joint_yield"]
     assert judge(outcome(answers, found)).in_set
     assert not judge(outcome(answers, found)).right
+    beside = said("base_slip", "base_slip", "zero_shift")
+    beside["effects"][1]["indistinguishable_from"] = ["joint_yield"]
+    assert not judge(outcome(answers, beside)).in_set
+
+
+def test_recall_of_unknown_counts_only_cases_without_a_stand_in() -> None:
+    alone = label("joint_yield")
+    replaced = label("joint_yield", accept=["joint_yield", "base_slip"])
+    outcomes = [outcome(answers, said("base_slip"), "joint_yield") for answers in (alone, replaced)]
+    out = report(Campaign(Plan(cases=2, seed=1, withhold="joint_yield"), outcomes))
+    recall, marks = out["summary"]["unknown_recall"], out["tables"]["by_withheld"]["joint_yield"]
+    assert (recall["hits"], recall["n"]) == (0, 1)
+    assert (marks["right"]["hits"], marks["right"]["n"]) == (1, 2)
 
 
 def test_a_withheld_word_is_unknown_or_what_stands_in() -> None:
