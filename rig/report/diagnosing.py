@@ -6,6 +6,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -104,13 +105,30 @@ def diagnosing(jobs: Sequence[Job], processes: int) -> Iterator[list[Waiting]]:
         min(processes, len(jobs)), multiprocessing.get_context("spawn"), _deaf_to_ctrl_c
     )
     try:
-        yield [Waiting(job, pool.submit(run, job)) for job in jobs]
+        with _ctrl_c_ignored():  # which the children inherit, from their first moment on
+            begun = [Waiting(job, pool.submit(run, job)) for job in jobs]
+        yield begun
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         for child in set(multiprocessing.active_children()) - others:
             child.terminate()
 
 
+@contextmanager
+def _ctrl_c_ignored() -> Iterator[None]:
+    """Only the main thread may say so; elsewhere, or under a handler that is not Python's, nothing
+    changes."""
+    earlier = signal.getsignal(signal.SIGINT)
+    if earlier is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, earlier)
+
+
 def _deaf_to_ctrl_c() -> None:
-    """The parent hears it, and ends the children."""
+    """The parent hears it, and ends the children. Needed where nothing is inherited."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

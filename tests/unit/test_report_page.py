@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -239,3 +240,9 @@ def test_pdf_takes_dangerous_words_as_words(evil: Report) -> None:
     content = evil.to_pdf()
     assert content.startswith(b"%PDF")
     assert len(content) > 50_000
+
+
+def test_without_typst_there_is_a_hint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "typst", None)
+    with pytest.raises(InputError, match=r"--pdf needs the package typst, which is not installed"):
+        make([bench(tmp_path / "a.h5")], QUIET).to_pdf()
