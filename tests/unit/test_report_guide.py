@@ -17,7 +17,7 @@ from tests.recovery.emulated_sets import PAPER_C, REFERENCE_Q, measure, protocol
 HOME = Path(__file__).parents[2]
 GUIDE = (HOME / "docs" / "guide_analyst.md").read_text("utf-8")
 BLOCK = re.compile(r"^```(\w+)(?: file=(\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-SLOW = ("rig diagnose", "rig report arm.h5 -o", "rig couple")  # seconds each
+SLOW = ("rig diagnose", "rig report arm.h5 -o", "rig report arm.h5 --no-gap --couple", "rig couple")
 
 
 def follow(folder: Path, monkeypatch: pytest.MonkeyPatch, *, skip: tuple[str, ...] = ()) -> None:
@@ -47,7 +47,7 @@ def run(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_quick_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     follow(tmp_path, monkeypatch, skip=SLOW)
-    for name in ("line.json", "arm.yaml", "next.yaml", "coupled.html", "report.json",
+    for name in ("line.json", "arm.yaml", "next.yaml",
                  "compared.html", "bench.h5", "bench.html", "arm.csv"):  # fmt: skip
         assert (tmp_path / name).is_file(), name
 
@@ -55,7 +55,8 @@ def test_the_quick_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.slow
 def test_all_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     follow(tmp_path, monkeypatch)
-    assert (tmp_path / "arm.html").is_file()
+    for name in ("arm.html", "coupled.html", "report.json"):
+        assert (tmp_path / name).is_file(), name
     assert list((tmp_path / "figures").glob("gap_*.svg"))
 
 
