@@ -13,6 +13,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from identification.gap.base import base_columns, prediction
@@ -28,9 +29,9 @@ Array = NDArray[np.float64]
 RUN_SCATTER_M = 1e-6
 
 
-def seating(rows: object, lever: Array) -> tuple[Array, Array]:
+def seating(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
     """30 um, arctangent of the force."""
-    force = np.asarray(rows["force_N"], dtype=float)  # type: ignore[index]
+    force = rows["force_N"].to_numpy(float)
     return 3e-5 * 2 / np.pi * np.arctan(force / 12.0), np.zeros_like(lever)
 
 

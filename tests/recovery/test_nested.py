@@ -1,0 +1,54 @@
+"""Evidence against nested sampling on five small cases (with -m slow; needs dynesty).
+
+Only contenders count: models within 20 nats of the best by either route. What lies further below
+has no probability by both.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+pytest.importorskip("dynesty", reason="dynesty is not installed (extra `engines`)")
+
+from bench.nested_sampling import CASES, Line, compare
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
+WITHIN = 20.0
+MODELS = ("none", "joint_yield", "contact_seating")
+# Found by this test: steps by 2.5 in the size of the imperfection cost up to 7 nats where an effect
+# is so large that its least imperfection lies between two steps; signs of correlated coefficients
+# count as if they were independent. docs/gap_evidence.md has the figures.
+COARSE = ("yield", "friction", "yield, no readings")
+SIGNS = ("none", "seating")
+
+
+@cache
+def lines(name: str, signs: bool, fine: bool) -> tuple[Line, ...]:
+    return tuple(compare(name, 300, MODELS, signs, fine)[0])
+
+
+def apart(name: str, signs: bool, fine: bool) -> dict[str, float]:
+    """Contender -> our evidence less the sampled one, nats."""
+    found = lines(name, signs, fine)
+    ours, theirs = max(x.ours for x in found), max(x.sampled for x in found)
+    return {
+        x.model: x.ours - x.sampled
+        for x in found
+        if x.ours > ours - WITHIN or x.sampled > theirs - WITHIN
+    }
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_gaussian_evidence_is_right_where_the_imperfection_is_finely_stepped(name: str) -> None:
+    for model, difference in apart(name, signs=False, fine=True).items():
+        assert abs(difference) < 1.0, model
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_evidence_as_the_diagnosis_takes_it(name: str, request: pytest.FixtureRequest) -> None:
+    if name in COARSE + SIGNS:
+        request.applymarker(pytest.mark.xfail(reason="coarse steps, or joint signs", strict=False))
+    for model, difference in apart(name, signs=True, fine=False).items():
+        assert abs(difference) < 1.0, model
