@@ -1,0 +1,53 @@
+"""Expected discrimination: on one engine as on many, and the worse of the two cases counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.gap.base import base_columns
+from identification.gap.bench import Bench, make_bench
+from identification.gap.designs import present_design
+from identification.gap.discriminate import _discrimination, _Rival, _told
+from identification.gap.effects import library
+from identification.gap.evidence import Engine
+from identification.gap.forms import Form, law_of
+from tests.unit.test_gap_forms import arm_data
+
+
+def test_a_truth_in_the_pool_is_a_measurement_of_it() -> None:
+    bench = make_bench(arm_data())
+    library(bench, ("contact_seating",))
+    truth = 3e-5 * np.sin(np.arange(bench.layout.size))
+    place = bench.add(truth)
+    base, etas = base_columns(bench), np.array([0.0, 3e-6, 2e-5])
+    nothing = Engine(bench, base, np.zeros(bench.layout.size), etas)
+    measured = Engine(bench, base, truth, etas)
+    for level, wanted in zip(nothing.levels, measured.levels, strict=True):
+        told = _told(level, place)
+        np.testing.assert_allclose(told.moment, wanted.moment, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(told.log_base, wanted.log_base, rtol=1e-9)
+
+
+def rival(bench: Bench, word: str, size: float) -> _Rival:
+    fresh = replace(bench, columns=[])
+    v = library(fresh, (word,))[0]
+    law, unit = law_of(fresh, v)
+    values = np.full(len(v.columns), size) * unit
+    form = Form(word, law, values, np.diag(values**2))
+    return _Rival(word, (form,), {}, ((v, law, unit, 0.0),))
+
+
+def test_an_effect_too_small_to_be_seen_is_told_from_nothing() -> None:
+    """If the large effect is true the data would say so at once; if the invisible one is, they
+    would say little: the second case is what may be expected."""
+    bench = make_bench(arm_data())
+    design = present_design(bench)
+    large, small = rival(bench, "contact_seating", 1e-4), rival(bench, "joint_creep", 1e-6)
+    as_large = rival(bench, "joint_creep", 0.5)
+    both_seen = _discrimination(bench, design, (large, as_large))
+    one_hidden = _discrimination(bench, design, (large, small))
+    assert both_seen > 20
+    assert one_hidden < 12
+    assert one_hidden == _discrimination(bench, design, (small, large))
