@@ -22,7 +22,6 @@ pytestmark = [
 ]
 SCENES = {
     "turning": scenes.turning(),
-    "settling": scenes.settling(),
     "question": scenes.prompting(scenes.PAUSED),
     "fault": scenes.laser_failed(),
 }

@@ -62,7 +62,7 @@ function slots({ missed, late_ms }) {
   const late = isNumber(late_ms) && late_ms > LATE_MS;
   element.classList.toggle("late", missed > 0 || late);
   const words = missed > 0 ? `▲ ${missed} missed` : "none missed";
-  setText(element, `Samples: ${words}, last ${number(late_ms, 0)} ms late`);
+  setText(element, `Samples: ${words}, ${number(late_ms, 0)} ms late`);
 }
 
 export function drawSide(state) {
