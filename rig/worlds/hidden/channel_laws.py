@@ -1,4 +1,4 @@
-"""Laws of instruments and geometry: drifts, gains, shifts, lags, where the arm and the load stand."""
+"""Laws of instruments and geometry: drifts, gains, shifts, lags, wrong leverage."""
 
 from __future__ import annotations
 
@@ -131,11 +131,11 @@ def jumping_datum(law: str) -> Callable[[Scene, Generator], Drawn]:
 
 
 def wrong_gain(channel: str, high: bool, bent: bool) -> Callable[[Scene, Generator], Drawn]:
-    """One channel reads high or low by `size`, evenly or (`bent`) more at one end of its range."""
+    """One channel reads high or low by `size`, evenly or (`bent`) a little more at full range."""
 
     def draw(scene: Scene, random: Generator) -> Drawn:
         sign = 1.0 if high else -1.0
-        bend = random.uniform(0.1, 0.3) if bent else 0.0
+        bend = random.uniform(0.03, 0.08) if bent else 0.0
         top = float(np.abs(scene.elastic).max())
         most = max(s.top_N for s in scene.plan.setups)
 
@@ -170,7 +170,8 @@ def lagging(channel: str, law: str) -> Callable[[Scene, Generator], Drawn]:
                 return np.asarray(np.interp(time - size, time, signal))
             if law == "window":  # mean over the last 2 x size seconds
                 shares = (np.arange(24) + 0.5) / 24
-                return np.mean([np.interp(time - 2 * size * s, time, signal) for s in shares], 0)
+                past = [np.interp(time - 2 * size * s, time, signal) for s in shares]
+                return np.asarray(np.mean(past, axis=0))
             return _filtered(time, signal, size, law, damping)
 
         def change(size: float) -> Change:
@@ -222,7 +223,8 @@ def aslant(law: str) -> Callable[[Scene, Generator], Drawn]:
                     tangent[s] = side / np.linalg.norm(side) * 0.2
         path = tangent[scene.history.setup]
         if law == "turns_with_load":  # the screw's tip walks as the arm gives way
-            path = path * (np.abs(scene.history.load) / scene.history.load.max())[:, None]
+            share = np.abs(scene.history.load) / scene.history.load.max()
+            path = path * (1.0 + random.uniform(-0.4, 0.4) * share)[:, None]
 
         def parameters(size: float) -> dict[str, Any]:
             return {

@@ -27,6 +27,7 @@ __all__ = ["WORDS", "HiddenCase", "draw_case"]
 
 SNR = (1.5, 60.0)
 _SHARE_NONE, _SHARE_UNKNOWN, _SHARE_MIXTURE = 0.1, 0.1, 0.2
+_LEAST_MIXTURE = 4.0  # structural gap over noise in which two effects can both be seen
 _TRIES = 60  # of plan and effect until the size asked for is physical
 
 FORMS: dict[str, tuple[Form, ...]] = (
@@ -128,7 +129,8 @@ def _try_case(
     noise = draw_noise(scene, random)
     floor = noise_rms_mm(scene, noise)
     warmth = _warmth(scene, random)
-    wanted = float(np.exp(random.uniform(*np.log(snr))))
+    least = snr[0] if len(words) == 1 else max(snr[0], min(_LEAST_MIXTURE, snr[1] / 1.5))
+    wanted = float(np.exp(random.uniform(np.log(least), np.log(snr[1]))))
     effects: list[tuple[Effect, float]] = []
     if words != ("none",):
         try:
@@ -136,6 +138,8 @@ def _try_case(
         except Unsuited:
             return None
     answers = label.answers(scene, effects, floor)
+    if answers is None:
+        return None
     if effects and not 0.98 * snr[0] <= answers["snr"] <= 1.02 * snr[1]:
         return None
     changes = [effect.change(size) for effect, size in effects]
@@ -198,4 +202,4 @@ def _warmth(scene: Scene, random: Generator) -> Array:
     time = scene.history.time[scene.history.sample]
     rise = random.choice([0.0, random.uniform(0.5, 6.0)])
     warm = 27.0 + 0.7 * np.arange(6) - rise * np.exp(-time / random.uniform(900, 3000))[:, None]
-    return np.round(warm + 0.05 * random.standard_normal((len(time), 6)), 2)
+    return np.asarray(np.round(warm + 0.05 * random.standard_normal((len(time), 6)), 2))

@@ -55,7 +55,7 @@ class Drawn:
     onset_N: dict[str, float] | None = field(default=None)
 
 
-def one_joint(scene: Scene, joint: int, rad: Array) -> Array:
+def one_joint(joint: int, rad: Array) -> Array:
     """(n, 6) rad: the path of one joint (from 0), the others still."""
     out = np.zeros((len(rad), 6))
     out[:, joint] = rad

@@ -67,7 +67,7 @@ def leftover(scene: Scene, moved_mm: Array, force_N: Array) -> Array:
     columns = spring_columns(scene, force_N) / plan.believed
     low, high = 1 / (1 + bound), 1 / max(1 - bound, 0.05)
     # the triangle of a QR decomposition stands for all rows
-    triangle = np.linalg.qr(np.column_stack([columns, moved_mm]), mode="r")
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, moved_mm]), mode="r"), dtype=float)
     factors = lsq_linear(triangle[:, :6], triangle[:, 6], (low, high), tol=1e-12).x
     return np.asarray(moved_mm - columns @ factors)
 

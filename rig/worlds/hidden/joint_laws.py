@@ -34,7 +34,7 @@ def _in_joint(
     onset_N: dict[str, float] | None = None,
 ) -> Drawn:
     """An effect whose path is given in units of torque, of which size over stiffness is seen."""
-    rad = one_joint(scene, joint, path_Nm / scene.plan.springs[joint])
+    rad = one_joint(joint, path_Nm / scene.plan.springs[joint])
     return Drawn(lambda size: Change(joints=size * rad), parameters, sizes, (joint + 1,), onset_N)
 
 
@@ -270,7 +270,7 @@ def lost_motion(law: str) -> Callable[[Scene, Generator], Drawn]:
         joint = int(random.choice(able))
         zone = float(top[joint] * np.exp(random.uniform(np.log(0.004), np.log(0.06))))
         x = net[:, joint]
-        rad = one_joint(scene, joint, _taken_up(law, x, zone, scene, random))
+        rad = one_joint(joint, _taken_up(law, x, zone, scene, random))
 
         def parameters(size: float) -> dict[str, Any]:
             return {"width_rad": size, "zone_Nm": zone, "crossing_N": _crossing(scene, joint)}

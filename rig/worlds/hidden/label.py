@@ -10,7 +10,7 @@ import numpy as np
 from rig.worlds.arm import Array
 from rig.worlds.hidden.effect import Effect, rounded
 from rig.worlds.hidden.gap import along, displacement, rms, structural_gap, tared
-from rig.worlds.hidden.rules import accepted
+from rig.worlds.hidden.rivals import WITHIN_NOISE, accepted, left_over
 from rig.worlds.hidden.scene import BRANCHES, Scene, observe
 from rig.worlds.hidden.words import IN_JOINTS, OUTSIDE_JOINTS
 
@@ -19,13 +19,25 @@ _SHOWS = 0.15  # of the largest: from here on an effect counts as showing somewh
 
 def answers(
     scene: Scene, effects: Sequence[tuple[Effect, float]], noise_mm: float
-) -> dict[str, Any]:
-    """The label, JSON-able. `noise_mm`: rms of what is random."""
+) -> dict[str, Any] | None:
+    """The label, JSON-able. `noise_mm`: rms of what is random.
+
+    None when the case is no fair question: springs, gains and datum within what is stated explain
+    an effect, or a word of the library explains what none should.
+    """
     changes = [effect.change(size) for effect, size in effects]
     gap_mm = structural_gap(scene, changes)
     each = [rms(structural_gap(scene, [c])) / noise_mm for c in changes]
     words = [effect.word for effect, _ in effects] or ["none"]
-    sets = [accepted(scene, effect) for effect, _ in effects]
+    left = [
+        left_over(scene, [change], noise_mm, effect.word)
+        for (effect, _), change in zip(effects, changes, strict=True)
+    ]
+    sets = [
+        accepted(rest, e.word, snr) for rest, (e, _), snr in zip(left, effects, each, strict=True)
+    ]
+    if any(_unfair(e.word, rest, s) for (e, _), rest, s in zip(effects, left, sets, strict=True)):
+        return None
     recorded = scene.plan.recorded
     return {
         "truth": words,
@@ -33,10 +45,11 @@ def answers(
         "laws": ["fitted" if effect.fitted else "foreign" for effect, _ in effects],
         "parameters": [rounded(effect.parameters(size)) for effect, size in effects],
         "verdict": "mixture" if len(words) > 1 else words[0],
-        "accept": sorted({*words} if len(words) > 1 else set().union(*sets, words)),
+        "accept": sorted(set().union(*sets, words)),
         "accept_each": [sorted(s) for s in sets],
         "snr": rounded(rms(gap_mm) / noise_mm) if effects else 0.0,
         "snr_each": rounded(each),
+        "textbook_left_each": [rounded(r.get(w, 0.0)) for r, w in zip(left, words, strict=False)],
         "noise_rms_mm": rounded(noise_mm),
         "structural_rms_mm": rounded(rms(gap_mm)),
         "gap_before_rms_mm": rounded(_before(scene, effects)),
@@ -51,6 +64,11 @@ def answers(
         },
         "where": _where(scene, effects, gap_mm) if effects else None,
     }
+
+
+def _unfair(word: str, left: dict[str, float], equals: set[str]) -> bool:
+    """Nothing at all explains the effect as well, or something explains what nothing should."""
+    return left["none"] <= WITHIN_NOISE or (word == "unknown" and len(equals) > 1)
 
 
 def _before(scene: Scene, effects: Sequence[tuple[Effect, float]]) -> float:

@@ -175,15 +175,47 @@ def bristles(load: Array, reach: float, power: float, gamma: float, fresh: Index
 def retarded(time: Array, load: Array, times_s: Array, weights: Array) -> Array:
     """Sum of Kelvin elements `T y' = x - y` with weights; the load runs straight between instants,
     for which the step is exact. The clock goes on through rests."""
-    out = np.empty_like(load)
+    return np.asarray(retarded_each(time, load, times_s) @ weights)
+
+
+def plays(load: Array, widths: Array, fresh: Index) -> Array:
+    """(n, c) `play` of many at once: loads (n, c) with a width (c) each."""
+    begins = np.diff(fresh, prepend=fresh[0]) != 0
+    moves = np.any(np.diff(load, axis=0, prepend=np.inf) != 0.0, axis=1) | begins
+    at = np.flatnonzero(moves)
+    low, high = load[at] - widths, load[at] + widths
+    out = np.empty((len(at), load.shape[1]))
+    state = np.zeros(load.shape[1])
+    for k, i in enumerate(at):
+        if begins[i]:
+            state = np.zeros(load.shape[1])
+        state = np.minimum(np.maximum(state, low[k]), high[k])
+        out[k] = state
+    return np.asarray(out[np.cumsum(moves) - 1])
+
+
+def retarded_each(time: Array, load: Array, times_s: Array) -> Array:
+    """(n, times) the Kelvin elements of `retarded`, each by itself."""
     dt = np.diff(time, prepend=time[0])[:, None]
     decay = np.exp(-dt / times_s)
     ramp = np.where(dt > 0, times_s / np.maximum(dt, 1e-12) * (1 - decay), 1.0)
     rise = np.diff(load, prepend=0.0)
-    y = np.zeros(len(times_s))
-    last = 0.0
+    # what is missing to the load decays, and grows by what the load rises
+    gain = rise[:, None] * ramp
+    out = np.empty((len(load), len(times_s)))
+    missing = np.zeros(len(times_s))
     for i in range(len(load)):
-        y = last + (y - last) * decay[i] + rise[i] * (1.0 - ramp[i])
-        last = load[i]
-        out[i] = y @ weights
+        missing = missing * decay[i] + gain[i]
+        out[i] = missing
+    return np.asarray(load[:, None] - out)
+
+
+def late_by(time: Array, states: Array, time_s: float) -> Array:
+    """(n, c) states (n, c) reached with a first-order lag of `time_s` seconds."""
+    decay = np.exp(-np.diff(time, prepend=time[0]) / time_s)
+    out = np.empty_like(states)
+    y = np.zeros(states.shape[1])
+    for i in range(len(states)):
+        y = states[i] + (y - states[i]) * decay[i]
+        out[i] = y
     return out

@@ -13,9 +13,9 @@ from rig.worlds.hidden.scene import Scene
 
 _SCATTER = 0.4  # of the stated uncertainty: whole runs sit a little higher or lower
 _VIBRATION = 0.3
-_Q_NOISE_RAD = 1.0e-5
+Q_NOISE_RAD = 1.0e-5
 _Q_DIGIT_RAD = 1.0e-6
-_CROSSTALK = 0.003
+CROSSTALK = 0.003
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,11 @@ def draw_noise(scene: Scene, random: Generator) -> Noise:
     scatter = _SCATTER * u * random.standard_normal(runs)
     moved = white * random.standard_normal(count) + scatter[history.run[history.sample]]
     moved += _VIBRATION * u * _ringing(random, count)
-    crosstalk = np.eye(3) + _CROSSTALK * random.standard_normal((3, 3)) * (1 - np.eye(3))
+    crosstalk = np.eye(3) + CROSSTALK * random.standard_normal((3, 3)) * (1 - np.eye(3))
     return Noise(
         displacement_mm=moved,
         force_N=plan.instruments.force_N * random.standard_normal((count, 3)),
-        q=_Q_NOISE_RAD * random.standard_normal((count, 6)),
+        q=Q_NOISE_RAD * random.standard_normal((count, 6)),
         displacement_gain=1 + plan.instruments.displacement_gain * random.standard_normal(),
         force_gain=1 + plan.instruments.force_gain * random.standard_normal(),
         crosstalk=crosstalk,

@@ -40,6 +40,11 @@ def _bends(scene: Scene, setup: int, link: int, twist: float, taper: float) -> f
     return float(np.sum(_GAUSS_WEIGHTS / 2 * length * (bending + along**2 / twist) / stiff))
 
 
+def beam_compliance(scene: Scene, setup: int, link: int) -> float:
+    """m/N along the direction for an even tube of EI 1 N m2 as upper arm (0) or forearm (1)."""
+    return _bends(scene, setup, link, twist=0.75, taper=0.0)
+
+
 def beams(which: str) -> Callable[[Scene, Generator], Drawn]:
     """Segments bend and twist; size is 1e4 N m2 over EI of the upper arm."""
 
@@ -50,7 +55,7 @@ def beams(which: str) -> Callable[[Scene, Generator], Drawn]:
         parts = {
             "upper_arm": (1.0, 0.0, 0.0),
             "forearm": (0.0, 1.0, 0.0),
-            "wrist": (0.0, 0.0, 20.0 * random.uniform(0.5, 2.0)),
+            "with_wrist": (1.0, softer, softer * random.uniform(1.0, 3.0)),
         }.get(which, (1.0, softer, 0.0))
         unit = np.array(
             [
@@ -76,7 +81,7 @@ def beams(which: str) -> Callable[[Scene, Generator], Drawn]:
 # mounting
 
 
-def _moments(scene: Scene, depth: float) -> Array:
+def moments(scene: Scene, depth: float) -> Array:
     """(s, 3) m: moment per newton along the direction about axes `depth` m below the base."""
     return np.cross(scene.tool + np.array([0.0, 0.0, depth]), scene.unit)
 
@@ -86,7 +91,7 @@ def turning_base(which: str) -> Callable[[Scene, Generator], Drawn]:
 
     def draw(scene: Scene, random: Generator) -> Drawn:
         depth = random.uniform(0.0, 0.8)
-        moments = _moments(scene, 0.0 if which == "yaw" else depth)
+        moment = moments(scene, 0.0 if which == "yaw" else depth)
         soft = random.uniform(0.5, 1.0, 3)
         if which == "tilt":
             soft[2] = 0.0
@@ -95,9 +100,9 @@ def turning_base(which: str) -> Callable[[Scene, Generator], Drawn]:
         if which == "oblique":  # one soft edge of the stand
             angle = random.uniform(0, np.pi)
             edge = np.array([np.cos(angle), np.sin(angle), 0.0])
-            compliance = (moments @ edge) ** 2
+            compliance = (moment @ edge) ** 2
         else:
-            compliance = moments**2 @ soft
+            compliance = moment**2 @ soft
         if which == "feet":  # and sinks on its feet
             compliance = compliance + random.uniform(0.05, 0.2) * scene.unit[:, 2] ** 2 + 0.01
         path = 1e-6 * compliance[scene.history.setup] * scene.history.load
@@ -120,7 +125,7 @@ def slipping_base(axis: str, law: str) -> Callable[[Scene, Generator], Drawn]:
         if axis == "tilt":
             angle = random.choice([0.0, np.pi / 2]) if law == "sharp" else random.uniform(0, np.pi)
             turn = np.array([np.cos(angle), np.sin(angle), 0.0])
-        lever = _moments(scene, depth) @ turn
+        lever = moments(scene, depth) @ turn
         moment = lever[scene.history.setup] * scene.history.load
         top = float(np.abs(moment).max())
         if top < 10.0:
@@ -138,7 +143,9 @@ def slipping_base(axis: str, law: str) -> Callable[[Scene, Generator], Drawn]:
             return {"threshold_Nm": limit, "stiffness_after_Nm_per_rad": 1e6 / size,
                     "axis": turn, "axis_depth_m": depth, **extra}  # fmt: skip
 
-        change = lambda size: Change(outside=size * moved)  # noqa: E731
+        def change(size: float) -> Change:
+            return Change(outside=size * moved)
+
         return Drawn(change, parameters, (0.3, 1000.0), (), onset)
 
     return draw
@@ -147,24 +154,28 @@ def slipping_base(axis: str, law: str) -> Callable[[Scene, Generator], Drawn]:
 # fixture
 
 
+def _seated(law: str, x: Array, random: Generator) -> Array:
+    """(n) 0 to 1: how far the fixture has seated itself at a load x (n) over its scale."""
+    if law == "exponential":
+        return np.asarray(-np.expm1(-x))
+    if law == "hyperbolic":
+        return np.asarray(x / (1 + x))
+    if law == "arctan":
+        return np.asarray(np.arctan(x) * 2 / np.pi)
+    return np.asarray(np.minimum(x / 3.0, 1.0) ** random.uniform(0.35, 0.65))
+
+
 def seating(law: str) -> Callable[[Scene, Generator], Drawn]:
     """The fixture seats itself at low force; size is the depth in mm."""
 
     def draw(scene: Scene, random: Generator) -> Drawn:
         load = np.abs(scene.history.load)
         scale = float(load.max() * np.exp(random.uniform(np.log(0.03), np.log(0.2))))
-        x = load / scale
-        shape = {
-            "exponential": lambda: -np.expm1(-x),
-            "hyperbolic": lambda: x / (1 + x),
-            "arctan": lambda: np.arctan(x) * 2 / np.pi,
-            "power": lambda: np.minimum(x / 3.0, 1.0) ** random.uniform(0.35, 0.65),
-        }[law]()
+        path = 1e-3 * _seated(law, load / scale, random)
 
         def parameters(size: float) -> dict[str, Any]:
             return {"depth_mm": size, "force_scale_N": scale}
 
-        path = np.asarray(shape) * 1e-3
         return Drawn(lambda size: Change(outside=size * path), parameters, (0.002, 0.15))
 
     return draw
@@ -176,7 +187,7 @@ FORMS: dict[str, tuple[Form, ...]] = {
         Form("forearm", True, beams("forearm")),
         Form("both_arms", True, beams("both_arms")),
         Form("tapered", False, beams("tapered")),
-        Form("wrist", False, beams("wrist")),
+        Form("with_wrist", False, beams("with_wrist")),
     ),
     "base_compliance": (
         Form("tilt", True, turning_base("tilt")),

@@ -129,6 +129,13 @@ def make_scene(plan: Plan, random: Generator) -> Scene:
 
 def observe(scene: Scene, changes: Sequence[Change] = ()) -> Reading:
     """What ideal instruments read at the samples when the arm is changed so."""
+    path = observe_path(scene, changes)
+    pick = scene.history.sample
+    return Reading(path.displacement_mm[pick], path.force_N[pick], path.q[pick])
+
+
+def observe_path(scene: Scene, changes: Sequence[Change] = ()) -> Reading:
+    """The same at every instant (n) of the history."""
     history, plan = scene.history, scene.plan
     setup, levers, springs = history.setup, scene.levers, plan.springs
     load = scene.unit[setup] * history.load[:, None]
@@ -148,9 +155,8 @@ def observe(scene: Scene, changes: Sequence[Change] = ()) -> Reading:
     for change in changes:
         moved = moved if change.laser is None else change.laser(moved)
         load = load if change.force is None else change.force(load)
-    pick = history.sample
-    seen = joints[pick] if plan.recorded.encoder == "output" else 0.0
-    return Reading(1e3 * moved[pick], load[pick], stands[setup[pick]] + seen)
+    seen = joints if plan.recorded.encoder == "output" else np.zeros(6)
+    return Reading(1e3 * moved, load, stands[setup] + seen)
 
 
 class _Clock:
