@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from rig.blind.campaign import EACH
 from rig.blind.targets import Line, lines
 
 Row = tuple[str, ...]
@@ -51,7 +52,8 @@ def head(report: dict[str, Any]) -> str:
     if report["interrupted"]:
         out += f" (interrupted; {asked} were asked for)"
     if report["withhold"]:
-        out += f", with {report['withhold']} taken out of the library"
+        word = "every word in turn" if report["withhold"] == EACH else report["withhold"]
+        out += f", with {word} taken out of the library"
     out += f". Figures count cases whose gap is at least {report['snr_min']:g} times the noise"
     judged = s["right_all_kinds"]
     out += f", and those without a gap: {judged['hits']} of {judged['n']} verdicts are right."
