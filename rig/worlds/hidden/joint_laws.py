@@ -18,6 +18,8 @@ from rig.worlds.hidden import memory
 from rig.worlds.hidden.effect import Drawn, Form, Unsuited, draw_joint, one_joint, share_of_joints
 from rig.worlds.hidden.scene import Change, Scene
 
+_STEEPEST = 12.0  # of a curve that may also take deflection away
+
 Parameters = Callable[[float], dict[str, Any]]
 
 
@@ -118,7 +120,9 @@ def friction(law: str) -> Callable[[Scene, Generator], Drawn]:
             def parameters(size: float) -> dict[str, Any]:
                 return {"friction_Nm": size * most, "reach_rad": reach / stiffness}
 
-            return _in_joint(scene, joint, -most * state, parameters, (0.003, 1.0))
+            # bristles and spring side by side: at most as stiff as the spring itself
+            limit = min(1.0, 0.5 * reach / most)
+            return _in_joint(scene, joint, -most * state, parameters, (0.003, limit))
         path, extra = _loop_path(scene, torque, top, law, random)
         return _in_joint(scene, joint, path, lambda size: {"share": size, **extra}, (0.005, 1.5))
 
@@ -219,13 +223,17 @@ def curved(law: str) -> Callable[[Scene, Generator], Drawn]:
         joint = draw_joint(scene, random)
         top = _top(scene, joint)
         shape, extra = _curve(law, random)
-        sense = float(random.choice([-1.0, 1.0]))
+        grid = np.linspace(0.0, 1.0, 2001)
+        steepest = float(np.diff(shape(grid)).max() / grid[1])
+        sense = float(random.choice([-1.0, 1.0])) if steepest < _STEEPEST else 1.0
+        # deflection never falls as the torque grows
+        most = 0.6 if sense > 0 else min(0.6, 0.8 / steepest)
         path = sense * top * shape(scene.torque[:, joint] / top)
 
         def parameters(size: float) -> dict[str, Any]:
             return {"extra_share_at_top": sense * size, "torque_top_Nm": top, **extra}
 
-        return _in_joint(scene, joint, path, parameters, (0.005, 0.6))
+        return _in_joint(scene, joint, path, parameters, (0.005, most))
 
     return draw
 

@@ -210,12 +210,17 @@ def retarded_each(time: Array, load: Array, times_s: Array) -> Array:
     return np.asarray(load[:, None] - out)
 
 
-def late_by(time: Array, states: Array, time_s: float) -> Array:
-    """(n, c) states (n, c) reached with a first-order lag of `time_s` seconds."""
-    decay = np.exp(-np.diff(time, prepend=time[0]) / time_s)
-    out = np.empty_like(states)
-    y = np.zeros(states.shape[1])
-    for i in range(len(states)):
-        y = states[i] + (y - states[i]) * decay[i]
-        out[i] = y
+def flows(time: Array, load: Array, limits: Array, time_s: float, fresh: Index) -> Array:
+    """(n, c) `flow` of power 1 of many at once: loads (n, c) with a limit (c) each."""
+    grow = -np.expm1(-np.diff(time, prepend=time[0]) / time_s)
+    begins = np.diff(fresh, prepend=fresh[0]) != 0
+    out = np.empty(load.shape)
+    state = np.zeros(load.shape[1])
+    for i in range(len(load)):
+        if begins[i]:
+            state = np.zeros(load.shape[1])
+        ahead = load[i] - state
+        over = ahead - np.minimum(np.maximum(ahead, -limits), limits)
+        state = state + over * grow[i]
+        out[i] = state
     return out

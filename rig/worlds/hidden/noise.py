@@ -15,7 +15,7 @@ _SCATTER = 0.4  # of the stated uncertainty: whole runs sit a little higher or l
 _VIBRATION = 0.3
 Q_NOISE_RAD = 1.0e-5
 _Q_DIGIT_RAD = 1.0e-6
-CROSSTALK = 0.003
+CROSSTALK = 0.005  # at most, of a channel into another
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def draw_noise(scene: Scene, random: Generator) -> Noise:
     scatter = _SCATTER * u * random.standard_normal(runs)
     moved = white * random.standard_normal(count) + scatter[history.run[history.sample]]
     moved += _VIBRATION * u * _ringing(random, count)
-    crosstalk = np.eye(3) + CROSSTALK * random.standard_normal((3, 3)) * (1 - np.eye(3))
+    crosstalk = np.eye(3) + CROSSTALK * random.uniform(-1, 1, (3, 3)) * (1 - np.eye(3))
     return Noise(
         displacement_mm=moved,
         force_N=plan.instruments.force_N * random.standard_normal((count, 3)),

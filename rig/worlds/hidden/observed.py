@@ -199,7 +199,10 @@ def nuisances(seen: Observed) -> tuple[list[Array], list[Bounds]]:
     columns.append(seen.joints(elastic))
     bounds.append((-gain, gain))
     gain = SPRING_BOUND * plan.instruments.displacement_gain
-    columns.append(seen.stack(seen.displacement))
+    # of what is expected, not of what was seen: the latter would explain anything
+    lever = np.einsum("sij,sj->si", seen.scene.levers, seen.scene.unit)
+    moved = np.sum(lever[seen.scene.history.setup] * elastic, axis=1)
+    columns.append(seen.outside(moved))
     bounds.append((-gain, gain))
     history = seen.scene.history
     group = history.run if plan.recorded.datum == "repetition" else history.setup
@@ -209,7 +212,7 @@ def nuisances(seen: Observed) -> tuple[list[Array], list[Bounds]]:
     if plan.recorded.components:
         for column in _crosstalk(seen):
             columns.append(column)
-            bounds.append((-SPRING_BOUND * CROSSTALK, SPRING_BOUND * CROSSTALK))
+            bounds.append((-CROSSTALK, CROSSTALK))
     return columns, bounds
 
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from rig.worlds.arm import Array
 from rig.worlds.hidden.effect import share_of_joints
-from rig.worlds.hidden.memory import late_by, plays, retarded_each
+from rig.worlds.hidden.memory import flows, plays, retarded_each
 from rig.worlds.hidden.observed import Bounds, Observed, tared_path
 from rig.worlds.hidden.outer_laws import beam_compliance, moments
 
 THRESHOLDS = np.array([0.25, 0.33, 0.41, 0.48, 0.55, 0.61, 0.67, 0.73, 0.79, 0.85, 0.9, 0.95])
-FLOWS_S = (2.0, 8.0, 40.0)  # of a yield that is reached late
+FLOWS_S = (1.5, 4.0, 12.0, 40.0)  # of a yield that is reached late
 _FREE: Bounds = (-np.inf, np.inf)
 _POSITIVE: Bounds = (0.0, np.inf)
 _LEAST_SHARE = 0.02
@@ -61,14 +61,14 @@ def _knees(
     widths = (tops[:, None] * THRESHOLDS).ravel()
     many = np.repeat(loads, count, axis=1)
     out = []
-    states = plays(many, widths, seen.scene.standing)
+    standing = seen.scene.standing
+    states = plays(many, widths, standing)
+    late = [flows(seen.scene.history.time, many[:, ::2], widths[::2], s, standing) for s in FLOWS_S]
+    half = count // 2
     for c in range(loads.shape[1]):
-        mine = slice(c * count, (c + 1) * count)
-        out += _pairs([column(c, x) for x in states[:, mine].T])
-        late = [late_by(seen.scene.history.time, states[:, mine][:, ::2], s) for s in FLOWS_S]
-        flowing = [[column(c, x) for x in (states[:, mine][:, 2 * k], *(y[:, k] for y in late))]
-                   for k in range(count // 2)]  # fmt: skip
-        out += [_form([*x, *y], _POSITIVE) for x, y in pairwise(flowing)]
+        out += _pairs([column(c, x) for x in states[:, c * count : (c + 1) * count].T])
+        for y in late:
+            out += _pairs([column(c, x) for x in y[:, c * half : (c + 1) * half].T])
     states = plays(many, widths, seen.scene.history.run)
     for c in range(loads.shape[1]):
         out += _pairs([column(c, x) for x in states[:, c * count : (c + 1) * count].T])
@@ -252,9 +252,10 @@ def _shift(seen: Observed) -> list[Explanation]:
 
 def _lag(seen: Observed) -> list[Explanation]:
     """The laser behind the force, or the force behind what it does: then the load was ahead."""
-    time, out = seen.scene.history.time, []
-    lever = np.einsum("sij,sj->si", seen.scene.levers, seen.scene.unit)
-    elastic = np.sum(lever[seen.scene.history.setup] * seen.pushed(seen.force), axis=1)
+    scene, out = seen.scene, []
+    time = scene.history.time
+    lever = np.einsum("sij,sj->si", scene.levers, scene.unit)
+    elastic = np.sum(lever[scene.history.setup] * seen.pushed(seen.force), axis=1)
     lags = np.array([0.4, 0.6, 0.9, 1.3, 1.9, 2.8, 4.0, 6.0, 8.5])
     slow = retarded_each(time, elastic, lags)
     behind: list[list[Array]] = [[], []]
@@ -264,7 +265,10 @@ def _lag(seen: Observed) -> list[Explanation]:
             behind[kind].append(seen.outside(moved - elastic))
         shifted = np.interp(time + lag, time, seen.force)
         for kind, force in enumerate((shifted, _unfiltered(time, seen.force, float(lag)))):
-            ahead[kind].append(seen.joints(seen.pushed(force - seen.force)))
+            early = force - seen.force
+            channel = -scene.unit[seen.setup] * early[seen.instants][:, None]
+            column = seen.joints(seen.pushed(early)) + seen.stack(components=channel)
+            ahead[kind].append(column)
     for columns in (*behind, *ahead):  # lags in between by two neighbours
         out += [_form([a, b], (0.0, 1.3)) for a, b in pairwise(columns)]
     return out
