@@ -51,11 +51,14 @@ class Watched:
 def command(folder: Path, samples: int, speed: float, *, page: bool) -> list[str]:
     """`rig measure` with so many slots in one step."""
     folder.mkdir()
-    station = station_text().replace("speed: 1\n", f"speed: {speed:g}\n")
+    station = station_text()
+    if speed != 1.0:  # the full data rates are those of real time
+        station = station.replace("output_rate_Hz: 10000", "output_rate_Hz: 2500")
     (folder / "bench-station.yaml").write_text(station, encoding="utf-8")
     (folder / "bench.yaml").write_text(PROTOCOL.format(samples=samples), encoding="utf-8")
     words = [sys.executable, "-m", "rig", "measure", str(folder / "bench.yaml")]
     words += ["--station", str(folder / "bench-station.yaml"), "-o", str(folder / "bench.h5")]
+    words += ["--speed", f"{speed:g}"]
     return [*words, *(["--panel"] if page else [])]
 
 
