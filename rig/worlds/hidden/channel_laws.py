@@ -47,12 +47,11 @@ def drifting_force(law: str) -> Callable[[Scene, Generator], Drawn]:
         channels = random.choice([-1.0, 1.0]) * np.ones(3)
         if each:
             channels = random.choice([-1.0, 1.0], 3) * random.uniform(0.3, 1.0, 3)
-        else:  # channels follow the sense in which each direction counts
+        else:  # alike along every direction that has no opposite
             channels = channels * np.sign(scene.unit.sum(axis=0) + 1e-9)
-        sense = 1.0 if each else _senses(scene)
 
         def change(size: float) -> Change:
-            added = size * (path * sense)[:, None] * channels
+            added = size * path[:, None] * channels
             return Change(force=lambda force: force + added)
 
         def parameters(size: float) -> dict[str, Any]:
@@ -63,12 +62,6 @@ def drifting_force(law: str) -> Callable[[Scene, Generator], Drawn]:
         return Drawn(change, parameters, (0.03, 15.0))
 
     return draw
-
-
-def _senses(scene: Scene) -> Array:
-    """(n) +1 or -1 so that a common drift counts alike along reversed directions."""
-    total = np.sign(scene.unit.sum(axis=0) + 1e-9)
-    return np.asarray(np.sign(scene.unit @ total)[scene.history.setup])
 
 
 def drifting_target(law: str) -> Callable[[Scene, Generator], Drawn]:

@@ -1,0 +1,149 @@
+"""Drawing hidden cases: the same again, as asked for, and in the format that goes out."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from rig.errors import InputError
+from rig.meta import Meta
+from rig.worlds.hidden import draw
+from rig.worlds.hidden.draw import WORDS, HiddenCase, draw_case
+
+
+@pytest.fixture(scope="module")
+def cases() -> list[HiddenCase]:
+    return [draw_case(21, k) for k in range(7)]
+
+
+def test_the_same_seed_and_number_give_the_same_case(cases: list[HiddenCase]) -> None:
+    again = draw_case(21, 1)
+    assert again.name == cases[1].name
+    assert again.label == cases[1].label
+    assert again.meta == cases[1].meta
+    assert again.columns.keys() == cases[1].columns.keys()
+    for name, column in again.columns.items():
+        assert np.array_equal(column, cases[1].columns[name])
+
+
+def test_other_numbers_and_seeds_give_other_cases(cases: list[HiddenCase]) -> None:
+    assert len({json.dumps(c.meta) for c in cases}) == len(cases)
+    assert draw_case(22, 1).meta != cases[1].meta
+
+
+def test_labels_are_json_and_meta_is_valid(cases: list[HiddenCase]) -> None:
+    for case in cases:
+        assert json.loads(json.dumps(case.label)) == case.label
+        meta = Meta.model_validate(case.meta)
+        names = set(zip(case.columns["pose"], case.columns["direction"], strict=True))
+        assert names == {(p, d) for p in meta.poses for d in meta.directions}
+
+
+def test_columns_are_the_contracted_ones_and_of_one_length(cases: list[HiddenCase]) -> None:
+    known = {"time_s", "session_s", "pose", "direction", "repetition", "branch", "step", "force_N",
+             "force_x_N", "force_y_N", "force_z_N", "displacement_mm",
+             *(f"q{j}_rad" for j in range(1, 7)),
+             *(f"temperature{j}_C" for j in range(1, 7))}  # fmt: skip
+    for case in cases:
+        assert set(case.columns) <= known
+        assert {len(c) for c in case.columns.values()} == {case.label["samples"]}
+        recorded = case.label["recorded"]
+        assert ("q1_rad" in case.columns) == recorded["q"]
+        assert ("force_x_N" in case.columns) == recorded["components"]
+
+
+def test_clocks_run_forward_and_the_laser_starts_at_zero(cases: list[HiddenCase]) -> None:
+    for case in cases:
+        run = case.columns["time_s"]
+        starts = np.flatnonzero(np.diff(run, prepend=np.inf) < 0)
+        assert len(starts) % len(case.meta["directions"]) == 0
+        if "session_s" in case.columns:
+            assert np.all(np.diff(case.columns["session_s"]) > 0.9)
+        assert case.columns["displacement_mm"][0] == 0.0
+
+
+def test_only_answers_hold_answers(cases: list[HiddenCase]) -> None:
+    for case in cases:
+        told = json.dumps(case.meta)
+        assert not any(word in told for word in WORDS if word not in ("none", "unknown"))
+
+
+@pytest.mark.parametrize(("word", "snr"), [("joint_yield", (8.0, 8.2)), ("time_lag", (2.0, 2.05)),
+                                           ("zero_shift", (30.0, 31.0))])  # fmt: skip
+def test_the_gap_is_as_large_as_asked_for(word: str, snr: tuple[float, float]) -> None:
+    case = draw_case(5, 3, word=word, design="medium", snr=snr)
+    assert case.label["truth"] == [word]
+    assert 0.97 * snr[0] <= case.label["snr"] <= 1.03 * snr[1]
+
+
+def test_noise_in_the_table_is_what_the_label_says() -> None:
+    """Of a case without an effect, six free springs leave the noise, and nothing else."""
+    case = draw_case(6, 2, word="none", design="rich")
+    moved, force = case.columns["displacement_mm"], case.columns["force_N"]
+    columns = []
+    setups = list(zip(case.columns["pose"], case.columns["direction"], strict=True))
+    for setup in dict.fromkeys(setups):
+        mine = np.array([s == setup for s in setups], dtype=float)
+        columns += [mine, mine * force]
+    matrix = np.stack(columns, axis=1)
+    rest = moved - matrix @ np.linalg.lstsq(matrix, moved, rcond=None)[0]
+    assert np.sqrt(np.mean(rest**2)) == pytest.approx(case.label["noise_rms_mm"], rel=0.15)
+    assert case.label["snr"] == 0.0
+    assert case.label["where"] is None
+
+
+def test_mixtures_hold_both() -> None:
+    case = draw_case(7, 1, word="joint_creep", second="zero_shift", design="medium")
+    assert case.label["truth"] == ["joint_creep", "zero_shift"]
+    assert case.label["verdict"] == "mixture"
+    assert len(case.label["accept_each"]) == len(case.label["snr_each"]) == 2
+    assert min(case.label["snr_each"]) > 1.0
+
+
+@pytest.mark.parametrize("laws", ["fitted", "foreign"])
+def test_laws_can_be_asked_for(laws: str) -> None:
+    for number in range(3):
+        case = draw_case(8, number, word="joint_nonlinear_stiffness", design="paper", laws=laws)
+        assert case.label["laws"] == [laws]
+
+
+def test_words_are_mixed_as_planned() -> None:
+    drawn = [draw._words(np.random.default_rng([1, k, 0]), None, None) for k in range(3000)]
+    kinds = Counter(words[0] if words[0] in ("none", "unknown") else len(words) for words in drawn)
+    assert kinds["none"] == pytest.approx(300, abs=60)
+    assert kinds["unknown"] == pytest.approx(300, abs=60)
+    assert kinds[2] == pytest.approx(600, abs=80)
+    single = Counter(words[0] for words in drawn if len(words) == 1)
+    assert min(single[w] for w in draw.EFFECTS) > 60
+    assert all(len(set(words)) == len(words) for words in drawn)
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(InputError, match='word: "joint_yeild" is not known') as caught:
+        draw_case(1, 1, word="joint_yeild")
+    assert "joint_yield" in str(caught.value)
+    with pytest.raises(InputError, match="second"):
+        draw_case(1, 1, word="none", second="joint_yield")
+    with pytest.raises(InputError, match="design"):
+        draw_case(1, 1, design="poor")
+
+
+def test_sizes_beyond_physics_are_refused() -> None:
+    with pytest.raises(InputError, match="out of reach for contact_seating"):
+        draw_case(1, 1, word="contact_seating", design="paper", snr=(4000.0, 5000.0))
+
+
+def test_nothing_of_identification_is_imported() -> None:
+    code = (
+        "import sys, rig.worlds.hidden.draw as d; d.draw_case(1, 1, word='none', design='paper');"
+        "print([m for m in sys.modules if m.split('.')[0] in ('identification', 'drivers')])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout.strip() == "[]"
