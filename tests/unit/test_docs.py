@@ -1,0 +1,100 @@
+"""What README and docs say of files and commands holds: links lead somewhere, options exist."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+from typer.core import TyperGroup
+
+from rig.cli import app
+
+HOME = Path(__file__).parents[2]
+PAGES = sorted([HOME / "README.md", HOME / "CHANGELOG.md", *HOME.glob("docs/**/*.md")])
+LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
+FENCE = re.compile(r"^```(?:sh)?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SPAN = re.compile(r"`(rig [^`]+)`")
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(HOME))
+
+
+def commands(text: str) -> list[str]:
+    """Command lines `rig ...` in blocks and in running text, without their comments."""
+    lines = [line.removeprefix("$ ") for block in FENCE.findall(text) for line in block.split("\n")]
+    found = [line for line in lines if re.match(r"rig [a-z-]", line)] + SPAN.findall(text)
+    return [line.split("  #")[0].strip() for line in found]
+
+
+def complaint(line: str) -> str:
+    """What `rig` does not know of a command line; empty where all of it is known."""
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    words = shlex.split(line)[1:]
+    params = group.params
+    if words and not words[0].startswith("-"):
+        if words[0] not in group.commands:
+            return f"no command {words[0]}"
+        params = group.commands[words[0]].params
+    known = {o for p in params for o in (*p.opts, *p.secondary_opts)} | {"--help", "-h"}
+    asked = [w.split("=")[0] for w in words if w.startswith("-") and w != "-"]
+    return ", ".join(f"no option {o}" for o in asked if o not in known)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_somewhere(page: Path) -> None:
+    links = [link for link in LINK.findall(page.read_text("utf-8")) if "://" not in link]
+    assert [link for link in links if not (page.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_commands_and_options_exist(page: Path) -> None:
+    found = {line: complaint(line) for line in commands(page.read_text("utf-8"))}
+    assert {line: what for line, what in found.items() if what} == {}
+
+
+def test_the_check_sees_what_is_wrong() -> None:
+    assert commands("a `rig list .` and\n```\n$ rig check x.yaml  # plan\n```\n") == [
+        "rig check x.yaml", "rig list .",
+    ]  # fmt: skip
+    assert complaint("rig diagnose a.h5 --figurs out") == "no option --figurs"
+    assert complaint("rig diagnos a.h5") == "no command diagnos"
+    assert complaint("rig measure --resume a.h5 -o b.h5") == ""
+
+
+def test_every_command_stands_in_the_readme_and_the_changelog() -> None:
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    for page in ("README.md", "CHANGELOG.md"):
+        named = {line.split()[1] for line in commands((HOME / page).read_text("utf-8"))}
+        missing = set(group.commands) - named
+        assert missing <= ({"emulate"} if page == "README.md" else set()), page
+
+
+def test_the_architecture_names_modules_that_exist() -> None:
+    text = (HOME / "docs" / "architecture.md").read_text("utf-8")
+    dotted = re.findall(r"`((?:rig|identification|drivers)(?:\.\w+)+)`", text)
+    assert len(dotted) > 20
+    for name in dotted:
+        path = HOME.joinpath(*name.split("."))
+        inside = path.parent.with_suffix(".py")  # a class or function of a module
+        last = name.rsplit(".", 1)[1]
+        assert (
+            path.is_dir()
+            or path.with_suffix(".py").is_file()
+            or (
+                inside.is_file()
+                and re.search(rf"^(?:class|def) {last}\b", inside.read_text(), re.M)
+            )
+        ), name
+    listing = text.split("```\nrows ")[1].split("```")[0]
+    modules = ["rows", *re.findall(r"^(\w+)/?\s{2,}\S|^(discriminate) ", listing, re.M)]
+    names = {m if isinstance(m, str) else m[0] or m[1] for m in modules}
+    gap = HOME / "identification" / "gap"
+    for name in names:
+        assert (gap / name).is_dir() or (gap / f"{name}.py").is_file(), name
+    assert len(names) > 12
