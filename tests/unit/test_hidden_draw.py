@@ -97,6 +97,17 @@ def test_noise_in_the_table_is_what_the_label_says() -> None:
     assert case.label["where"] is None
 
 
+def test_noise_is_as_large_as_stated() -> None:
+    for number in range(4):
+        case = draw_case(9, number, word="none", design="rich")
+        instruments = case.meta["instruments"]
+        stated = instruments["displacement"]["standard_uncertainty_mm"]
+        force = instruments["force"]["standard_uncertainty_N"]
+        # the arm turns a newton of noise into 5 to 40 um
+        assert stated * 0.85 < case.label["noise_rms_mm"]
+        assert case.label["noise_rms_mm"] < 1.15 * np.hypot(stated, 0.04 * force)
+
+
 def test_mixtures_hold_both() -> None:
     case = draw_case(7, 1, word="joint_creep", second="zero_shift", design="medium")
     assert case.label["truth"] == ["joint_creep", "zero_shift"]

@@ -46,11 +46,11 @@ def test_every_law_is_seen_and_grows_with_its_size(scene: Scene, word: str, form
     seen = [contribution(scene, drawn, s) for s in sizes]
     sums = [rms(moved) + rms(0.01 * force) + rms(1e3 * q) for moved, force, q in seen]
     assert np.all(np.diff(sums) > 0)
+    assert json.dumps(rounded(drawn.parameters(float(sizes[1]))))
     if form == "yaw":  # to the laser a softer joint 1; only encoders tell them apart
         return
     # beyond the noise of the best instrument when it is as large as physics allows
     assert rms(structural_gap(scene, [drawn.change(drawn.sizes[1])])) > 1.5e-3
-    assert json.dumps(rounded(drawn.parameters(float(sizes[1]))))
 
 
 @pytest.mark.parametrize(("word", "form"), _forms(ELASTIC))
@@ -140,8 +140,9 @@ def test_creep_goes_on_while_the_load_is_held_and_recovers(scene: Scene) -> None
     assert np.all(np.diff(signed[zero]) < 0)
 
 
-def test_backlash_makes_its_step_where_the_net_torque_turns(scene: Scene) -> None:
-    drawn = effect_of(scene, "joint_backlash", "smooth", seed=2)
+@pytest.mark.parametrize("seed", range(6))
+def test_backlash_makes_its_step_where_the_net_torque_turns(scene: Scene, seed: int) -> None:
+    drawn = effect_of(scene, "joint_backlash", "smooth", seed=seed)
     size = 3e-4
     _, _, q = contribution(scene, drawn, size)
     joint = drawn.joints[0] - 1
@@ -150,6 +151,12 @@ def test_backlash_makes_its_step_where_the_net_torque_turns(scene: Scene) -> Non
     assert q[net > 4 * zone, joint] == pytest.approx(size / 2, rel=0.01)
     if np.any(net < -4 * zone):
         assert q[net < -4 * zone, joint] == pytest.approx(-size / 2, rel=0.01)
+
+
+def test_pushing_up_takes_the_weight_off_the_shoulder(scene: Scene) -> None:
+    """Weight turns the joints as a load downward at the tool does, never as one upward."""
+    pushed_up = scene.levers[:, 1:3] @ np.array([0.0, 0.0, 1.0])
+    assert np.all(pushed_up * scene.weight[:, 1:3] < 0)
 
 
 def test_seating_is_the_same_in_every_direction_and_pose(scene: Scene) -> None:

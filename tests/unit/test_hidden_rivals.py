@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from rig.worlds.hidden.draw import draw_case
+from rig.worlds.hidden.effect import Effect
+from rig.worlds.hidden.label import answers
 from rig.worlds.hidden.rivals import accepted, left_over
 from rig.worlds.hidden.words import EFFECTS
 from tests.unit.hidden_scenes import effect_of, scene_of
@@ -52,6 +54,32 @@ def test_the_own_textbook_form_explains_its_word(
     assert left["none"] > 2.0
     assert left[word] < most
     assert set(left) == {*EFFECTS, "none"}
+
+
+@pytest.mark.parametrize(("word", "form", "size"), [("joint_yield", "sharp", 2.0),
+                                                    ("joint_backlash", "smooth", 1.5e-3),
+                                                    ("base_slip", "yaw_sharp", 20.0)])  # fmt: skip
+def test_the_right_shape_is_found_among_many_without_readings(
+    word: str, form: str, size: float
+) -> None:
+    left = _left("rich", word, form, size, q=False, components=False)
+    assert left["none"] > 3.0
+    assert left[word] < 1.0
+
+
+def test_a_late_force_is_not_zero_where_the_load_is() -> None:
+    left = _left("rich", "time_lag", "force_first_order", 2.0, q=False, components=False)
+    assert left["time_lag"] < 1.0
+    assert min(left[w] for w in EFFECTS if w != "time_lag") > 5.0
+
+
+def test_what_is_stated_as_uncertain_is_no_effect() -> None:
+    """A gain within its uncertainty makes no case: nothing at all explains it as well."""
+    scene = scene_of("medium")
+    for form, size in (("reads_high", 0.005), ("reads_high", 0.2)):
+        drawn = effect_of(scene, "force_scale", form)
+        effect = Effect("force_scale", form, True, drawn.change, drawn.parameters, drawn.sizes)
+        assert (answers(scene, [(effect, size)], NOISE_MM) is None) == (size < 0.1)
 
 
 def test_readings_separate_what_no_laser_can() -> None:
