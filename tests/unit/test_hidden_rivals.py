@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rig.worlds.hidden.draw import draw_case
 from rig.worlds.hidden.effect import Effect
+from rig.worlds.hidden.gap import rms
 from rig.worlds.hidden.label import answers
+from rig.worlds.hidden.observed import look, nuisances
 from rig.worlds.hidden.rivals import accepted, left_over
 from rig.worlds.hidden.words import EFFECTS
 from tests.unit.hidden_scenes import effect_of, scene_of
@@ -67,6 +70,17 @@ def test_the_right_shape_is_found_among_many_without_readings(
     assert left[word] < 1.0
 
 
+def test_nuisances_explain_no_knee_even_without_bounds() -> None:
+    """Shapes are chosen before bounds count: a nuisance must not hold the answer."""
+    scene = scene_of("rich", q=False, components=False)
+    drawn = effect_of(scene, "joint_yield", "sharp")
+    seen = look(scene, [drawn.change(2.0)], NOISE_MM)
+    base = np.stack(nuisances(seen)[0], axis=1)
+    target = seen.stack(seen.displacement)
+    rest = target - base @ np.linalg.lstsq(base, target, rcond=None)[0]
+    assert rms(rest[: len(seen.rows)]) > 3.0
+
+
 def test_a_late_force_is_not_zero_where_the_load_is() -> None:
     left = _left("rich", "time_lag", "force_first_order", 2.0, q=False, components=False)
     assert left["time_lag"] < 1.0
@@ -110,6 +124,8 @@ def test_a_poor_textbook_form_does_not_open_the_door() -> None:
     left = dict.fromkeys(EFFECTS, 4.0) | {"none": 10.0}
     assert accepted(left, "joint_yield", 10.0) == {"joint_yield"}
     assert accepted(left, "joint_yield", 100.0) == set(EFFECTS)
+    # nor what explains hardly more than nothing at all does
+    assert accepted(left | {"none": 5.0}, "joint_yield", 100.0) == {"joint_yield"}
 
 
 def test_nothing_in_the_library_explains_what_is_unknown() -> None:

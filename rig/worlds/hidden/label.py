@@ -10,7 +10,7 @@ import numpy as np
 from rig.worlds.arm import Array
 from rig.worlds.hidden.effect import Effect, rounded
 from rig.worlds.hidden.gap import along, displacement, rms, structural_gap, tared
-from rig.worlds.hidden.rivals import WITHIN_NOISE, accepted, left_over
+from rig.worlds.hidden.rivals import NO_CASE, accepted, left_over
 from rig.worlds.hidden.scene import BRANCHES, Scene, observe
 from rig.worlds.hidden.words import IN_JOINTS, OUTSIDE_JOINTS
 
@@ -68,7 +68,7 @@ def answers(
 
 def _unfair(word: str, left: dict[str, float], equals: set[str]) -> bool:
     """Nothing at all explains the effect as well, or something explains what nothing should."""
-    return left["none"] <= WITHIN_NOISE or (word == "unknown" and len(equals) > 1)
+    return left["none"] <= NO_CASE or (word == "unknown" and len(equals) > 1)
 
 
 def _before(scene: Scene, effects: Sequence[tuple[Effect, float]]) -> float:

@@ -15,6 +15,7 @@ _SCATTER = 0.4  # of the stated uncertainty: whole runs sit a little higher or l
 _VIBRATION = 0.3
 Q_NOISE_RAD = 1.0e-5
 _Q_DIGIT_RAD = 1.0e-6
+GAIN_BOUND = 2.0  # stated standard deviations
 CROSSTALK = 0.005  # at most, of a channel into another
 
 
@@ -45,10 +46,15 @@ def draw_noise(scene: Scene, random: Generator) -> Noise:
         displacement_mm=moved,
         force_N=plan.instruments.force_N * random.standard_normal((count, 3)),
         q=Q_NOISE_RAD * random.standard_normal((count, 6)),
-        displacement_gain=1 + plan.instruments.displacement_gain * random.standard_normal(),
-        force_gain=1 + plan.instruments.force_gain * random.standard_normal(),
+        displacement_gain=1 + plan.instruments.displacement_gain * _gain(random),
+        force_gain=1 + plan.instruments.force_gain * _gain(random),
         crosstalk=crosstalk,
     )
+
+
+def _gain(random: Generator) -> float:
+    """Standard deviations by which a gain is off."""
+    return float(np.clip(random.standard_normal(), -GAIN_BOUND, GAIN_BOUND))
 
 
 def _ringing(random: Generator, count: int) -> Array:

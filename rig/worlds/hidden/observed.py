@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rig.worlds.arm import Array
 from rig.worlds.hidden.gap import SPRING_BOUND, zeroed
-from rig.worlds.hidden.noise import CROSSTALK, Q_NOISE_RAD
+from rig.worlds.hidden.noise import CROSSTALK, GAIN_BOUND, Q_NOISE_RAD
 from rig.worlds.hidden.scene import Change, History, Index, Reading, Scene, observe_path
 
 Bounds = tuple[float, float]
@@ -195,10 +195,10 @@ def nuisances(seen: Observed) -> tuple[list[Array], list[Bounds]]:
     for j in range(6):
         columns.append(seen.joints(elastic * (np.arange(6) == j)))
         bounds.append((1 / (1 + bound) - 1, 1 / max(1 - bound, 0.05) - 1))
-    gain = SPRING_BOUND * plan.instruments.force_gain
+    gain = GAIN_BOUND * plan.instruments.force_gain
     columns.append(seen.joints(elastic))
     bounds.append((-gain, gain))
-    gain = SPRING_BOUND * plan.instruments.displacement_gain
+    gain = GAIN_BOUND * plan.instruments.displacement_gain
     # of what is expected, not of what was seen: the latter would explain anything
     lever = np.einsum("sij,sj->si", seen.scene.levers, seen.scene.unit)
     moved = np.sum(lever[seen.scene.history.setup] * elastic, axis=1)

@@ -19,6 +19,8 @@ from rig.worlds.hidden.words import EFFECTS
 WITHIN_NOISE = 0.5
 NO_WORSE = 1.1
 MOST_LEFT = 0.3
+WORTH_MORE = 0.7
+NO_CASE = 1.0  # what springs, gains and datum must leave, for there to be a question
 _CLOSER_LOOKS = 4  # of the best forms of a word, once bounds are left aside
 _OFFSET_M, _ANGLE_RAD = 0.4, 0.12
 
@@ -47,8 +49,9 @@ def left_over(
 def accepted(left: dict[str, float], word: str, snr: float) -> set[str]:
     """The true word and its equals. `snr`: the effect's structural gap over the noise, of which a
     word has to explain most: where the true one's textbook form is poor, a poor rival is no
-    equal."""
+    equal; and a word that explains little beyond springs, gains and datum explains nothing."""
     limit = max(WITHIN_NOISE, min(NO_WORSE * left.get(word, 0.0), MOST_LEFT * snr))
+    limit = min(limit, WORTH_MORE * left["none"])
     return {word} | {w for w in EFFECTS if left[w] <= limit}
 
 
