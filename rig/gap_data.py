@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,7 @@ from rig.errors import InputError
 from rig.model import load_robot
 
 MM = 1e-3
+_WIDE_STEP_RAD = 1e-3  # of second derivatives
 _STEP_RAD = 1e-5  # central differences of levers: error below 1e-9
 
 
@@ -137,11 +140,12 @@ def arm_setup(arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Arra
     (3,) of length 1."""
     tool, tangents = tool_offset(tcp), _tangents(n)
     J = arm.jacobian(q, tool)[:3]
-    point = arm.fk(q, tool)[:3, 3]
+    flange = arm.fk(q, tool)
+    point, R = flange[:3, 3], flange[:3, :3]
     frames = arm.frames(q)
     axes = frames[:6, :3, 2]
-    # lever = z x (p - o) . n, so a shift d of the tool changes it by z x d . n = d . (n x z)
-    offset = np.cross(n, axes)
+    # lever = z x (p - o) . n, so a shift R d of the tool changes it by R d . (n x z)
+    offset = np.cross(n, axes) @ R
     return Setup(
         pose=pose,
         direction=direction,
@@ -153,8 +157,10 @@ def arm_setup(arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Arra
         turned_lever=_turned(arm, q, tool, n),
         moment=np.cross(point, n),
         links=np.array([_link(arm, link, q, tool, n) for link in arm.links]),
-        gravity=arm.gravity_torques(q),
-    )
+        gravity=-arm.gravity_torques(q),  # what the weight does, not what holds it
+        bent_lever=_bent(arm, q, tool, n),
+        turned_offset=_turned_offset(axes, n) @ R,
+    )  # fmt: skip
 
 
 def _bench_setup(dataset: Dataset, direction: str, n: Array, tangents: Array) -> Setup:
@@ -172,7 +178,7 @@ def _bench_setup(dataset: Dataset, direction: str, n: Array, tangents: Array) ->
         offset_lever=np.zeros((m, 3)),
         turned_lever=np.zeros((m, m)),
         moment=np.zeros(3),
-        links=np.zeros(0),
+        links=np.zeros((0, 2)),
         gravity=np.zeros(m),
     )
 
@@ -196,8 +202,32 @@ def _turned(arm: Arm, q: Array, tool: Array, n: Array) -> Array:
     return out
 
 
-def _link(arm: Arm, link: Beam, q: Array, tool: Array, n: Array) -> float:
-    """Compliance of one nominal link along n, m/N."""
+def _turned_offset(axes: Array, n: Array) -> Array:
+    """(6, 6, 3): change, per radian of joint j, of what a shift of the tool along the base axes
+    does to lever i: the joint turns the shift, and the axes behind it."""
+    across = np.cross(n, axes)
+    shift = np.cross(across[:, None], axes[None, :])
+    behind = np.tril(np.ones((6, 6)), -1)[:, :, None]  # joint j before axis i
+    return np.asarray(shift + behind * np.cross(n, np.cross(axes[None, :], axes[:, None])))
+
+
+def _bent(arm: Arm, q: Array, tool: Array, n: Array) -> Array:
+    """(6, 6, 6): change of `_turned` per radian of joint k, the last index."""
+    out = np.empty((6, 6, 6))
+    for k in range(6):
+        step = np.zeros(6)
+        step[k] = _WIDE_STEP_RAD
+        change = _turned(arm, q + step, tool, n) - _turned(arm, q - step, tool, n)
+        out[:, :, k] = change / (2 * _WIDE_STEP_RAD)
+    return out
+
+
+def _link(arm: Arm, link: Beam, q: Array, tool: Array, n: Array) -> tuple[float, float]:
+    """Compliance of one nominal link along n by bending and by twist, m/N."""
     stiff = arm.with_stiffness(np.full(6, 1e30))
-    C = stiff.compliance(q, tool, links=[link])
-    return float(n @ C[:3, :3] @ n)
+    untwisted = replace(link, section=replace(link.section, torsion=1e3 * link.section.torsion))
+    whole, bent = (
+        float(n @ stiff.compliance(q, tool, links=[part])[:3, :3] @ n) for part in (link, untwisted)
+    )
+    twist = (whole - bent) / (1 - 1e-3)
+    return whole - twist, twist

@@ -74,7 +74,7 @@ def _outward(key: Key, value: Any) -> Any:
         return int(value) + 1
     if key.kind in ("text", "flag"):
         return value
-    if key.kind == "vector":
+    if key.kind in ("vector", "six"):
         return [float(v) for v in value]
     if key.kind == "springs":
         return [1 / float(v) for v in value]
@@ -157,9 +157,10 @@ def _inward(key: Key, entry: Mapping[str, Any], place: tuple[str | int, ...]) ->
         if not isinstance(value, bool):
             raise FormError(at, f"{value!r} is not allowed; allowed: true or false.")
         return value
-    if key.kind == "vector":
-        if not isinstance(value, list | tuple) or len(value) != 3:
-            raise FormError(at, "wants three numbers.")
+    if key.kind in ("vector", "six"):
+        wanted = 3 if key.kind == "vector" else 6
+        if not isinstance(value, list | tuple) or len(value) != wanted:
+            raise FormError(at, f"wants {'three' if wanted == 3 else 'six'} numbers.")
         return tuple(_number(v, at) for v in value)
     if key.kind == "springs":
         return _springs(value, at)

@@ -26,7 +26,7 @@ CONTAINED = "contained_in"  # its numbers stand in another key of the model file
 @dataclass(frozen=True)
 class Key:
     """A key of the file: SI value times `factor`; kind: number, positive, size (0 or more), count,
-    text, vector, flag, springs. count: from 1 in the file, from 0 inside; springs: six stiffnesses
+    text, vector, six (numbers), flag, springs. count: from 1 in the file, from 0 inside; springs: six stiffnesses
     in the file, six compliances inside."""
 
     name: str
@@ -46,13 +46,18 @@ CONSTANTS: dict[str, Key] = {
     "law": Key("law", "text", options=("Iwan", "Dahl", "Bouc-Wen")),
     "zone": Key("zone_Nm", "positive"),
     "crossing": Key("crossing", "text", options=("weight", "load")),
-    "kind": Key("kind", "text", options=("free", "friction", "friction 3")),
-    "way": Key("kind", "text", options=("delay", "filter")),
+    "kind": Key("kind", "text", options=("free", "friction", "friction 3", "soft")),
+    "weight_factor": Key("weight_over_stated", "positive"),
+    "way": Key("kind", "text", options=("delay", "filter", "window")),
     "measured_to": Key("measured_to_Nm", "positive"),
     "channel": Key("channel", "text", options=("displacement", "force")),
     "lag": Key("lag_s", "positive"),
-    "path": Key("path", "text", options=("linear", "root", "exponential", "free", "temperature")),
+    "path": Key(
+        "path", "text", options=("linear", "root", "exponential", "rates", "free", "temperature")
+    ),
     "about": Key("about_joint_stiffness_Nm_per_rad", "springs"),
+    "about_offset": Key("about_offset_m", "vector"),
+    "about_angles": Key("about_angles_rad", "six"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
 }
 SHAPES: dict[str, Key] = {
@@ -66,13 +71,14 @@ SHAPES: dict[str, Key] = {
     "retardation_time": Key("retardation_time_s", "positive"),
     "joint": Key("joint", "count"),
     "segment": Key("segment", "count"),
+    "strain": Key("strain", "text", options=("bending", "twist")),
     "run": Key("run", "count"),
     "axis": Key("axis", "text", options=_SIDES),
-    "axes": Key("axes", "text", options=("xx", "xy", "xz", "yy", "yz", "zz")),
     "law": Key("law", "text", options=("exponential", "hyperbolic")),
     "force_scale": Key("force_scale_N", "positive"),
     "along": Key("along", "vector"),
     "across": Key("across", "vector"),
+    "at_load": Key("at_N", "positive"),
     "time_constant": Key("time_constant_s", "positive"),
     "at": Key("at_s"),
     "sensor": Key("sensor", "text", options=("mean", "1", "2", "3", "4", "5", "6")),
@@ -93,7 +99,6 @@ _COEFFICIENTS: dict[str, Key] = {
     "depth": Key("depth_mm", factor=1e3),
     "tangent": Key("tangent"),
     "offset": Key("offset_mm", factor=1e3),
-    "offset_product": Key("offset_product_mm2", factor=1e6),
     "angle": Key("angle_rad"),
     "gain": Key("excess_share_of_reading"),
     "share": Key("share"),
@@ -138,7 +143,7 @@ GRAMMAR: dict[str, Grammar] = {
         ("joint", "law", "memory"), (("compliance", ("strength",)), ("compliance", ("reach",)))
     ),
     "joint_backlash": Grammar(
-        ("joint", "zone", "crossing", "kind"),
+        ("joint", "zone", "crossing", "kind", "weight_factor"),
         (("width", ()), ("rub", ()), ("place", ("pose", "direction", "first"))),
     ),
     "joint_nonlinear_stiffness": Grammar(
@@ -153,17 +158,24 @@ GRAMMAR: dict[str, Grammar] = {
     ),
     "joint_creep": Grammar(("joint",), (("compliance", ("retardation_time",)),)),
     "joint_stiffness_error": Grammar((), (("compliance", ("joint",)),)),
-    "link_flexibility": Grammar((), (("over_nominal", ("segment",)),)),
+    "link_flexibility": Grammar((), (("over_nominal", ("segment", "strain")),)),
     "base_compliance": Grammar(("depth",), (("compliance", ("axis",)),)),
     "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
-    "load_misalignment": Grammar(("about",), (("tangent", ("along", "across")),)),
+    "load_misalignment": Grammar(
+        ("about",),
+        (("tangent", ("along", "across")), ("tangent", ("along", "across", "at_load"))),
+    ),
     "pose_error": Grammar(
-        ("about",), (("offset", ("axis",)), ("offset_product", ("axes",)), ("angle", ("joint",)))
+        ("about", "about_offset", "about_angles"),
+        (("offset", ("axis",)), ("angle", ("joint",))),
     ),
     "force_scale": Grammar(("about",), (("gain", ()),)),
     "displacement_scale": Grammar((), (("gain", ()),)),
     "time_lag": Grammar(("channel", "way", "lag"), (("share", ()),)),
-    "force_drift": Grammar(("path", "quantity", "about"), _PATHS),
+    "force_drift": Grammar(
+        ("path", "quantity", "about"),
+        (*_PATHS, *((c, (*shape, "along")) for c, shape in _PATHS)),
+    ),
     "thermal_drift": Grammar(
         ("path", "quantity"), tuple((c, (*shape, "along")) for c, shape in _PATHS)
     ),
@@ -185,6 +197,8 @@ def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[tuple[str,
     for coefficient, shape in grammar.terms:
         path, law = _PATH_OF.get(coefficient), constants.get("law", "")
         fits = path in (None, constants.get("path"))
+        if constants.get("path") == "rates":
+            fits = coefficient in ("drift", "drift_rate")
         if shape in (("strength",), ("reach",)):
             fits = (law == "Iwan") == (shape == ("strength",))
         if fits:

@@ -37,6 +37,7 @@ def base_columns(bench: Bench) -> Base:
     """The columns common to all hypotheses."""
     parts: list[tuple[str, Array, float]] = []
     parts += _springs(bench)
+    parts += _geometry(bench)
     parts += _gains(bench)
     parts += _datums(bench)
     parts += _offsets(bench)
@@ -58,6 +59,17 @@ def _springs(bench: Bench) -> list[tuple[str, Array, float]]:
         column = bench.joint_column(j, bench.elastic[:, j])
         out.append((f"spring{j + 1}", column, float(data.compliance_relative_sd[j] * scale[j])))
     return out
+
+
+def _geometry(bench: Bench) -> list[tuple[str, Array, float]]:
+    """What the levers change as the joints give way, `1.5 F^2 d' T d` with d the deflection per
+    newton and T the change of levers per deflection: some micrometres. Coefficient 1 for stiff
+    links and a load that keeps its direction; simulators that stay linear leave it out."""
+    turned = np.stack([s.turned_lever for s in bench.data.setups])[bench.rows.setup]
+    bends = np.einsum("nij,nj->ni", turned, bench.lever * bench.compliance)
+    response = 1.5 * bench.load**2 * np.sum(bench.lever * bench.compliance * bends, axis=1)
+    q = bends * bench.compliance * bench.load[:, None] ** 2
+    return [("geometry", bench.stacked(bench.sense * response, q), 1.0)]
 
 
 def _gains(bench: Bench) -> list[tuple[str, Array, float]]:
@@ -96,14 +108,19 @@ def _datums(bench: Bench) -> list[tuple[str, Array, float]]:
 
 
 def _tares(bench: Bench) -> list[tuple[str, Array, float]]:
-    """The force's zero, taken from a few samples: acts on every force after it."""
-    rows = bench.rows
+    """The zero of each force component, taken from a few samples: acts on every force after."""
+    rows, setups = bench.rows, bench.data.setups
+    unit = np.stack([s.unit_vector for s in setups])[rows.setup]
+    across = np.stack([s.tangents for s in setups])[rows.setup]  # (n, 2, 3)
     groups = np.unique(rows.run) if bench.data.tare == "run" else np.array([-1])
     out = []
     for g in groups:
-        mine = np.ones(rows.n) if g < 0 else (rows.run == g).astype(float)
-        column = bench.force_column(-mine) + bench.stacked(zero_force=mine)
-        out.append((f"tare {g}", column, bench.noise.force))
+        mine = rows.run == g if g >= 0 else np.ones(rows.n, dtype=bool)
+        for k, axis in enumerate("xyz"):
+            d = np.where(mine, unit[:, k], 0.0)
+            beside = np.where(mine[:, None], across[:, :, k], 0.0)
+            column = bench.force_column(-d) + bench.stacked(zero_force=d, tangential=beside)
+            out.append((f"tare {g} {axis}", column, bench.noise.force))
     return out
 
 

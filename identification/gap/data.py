@@ -28,10 +28,12 @@ class Setup:
 
     lever (m,) m (1 for a bench): torque of each joint, and motion of the target per its deflection.
     tangents (2, 3): unit vectors across the direction; tangent_lever (2, m): torques of a newton
-    along them. offset_lever (m, 3): change of lever per metre of tool offset in the base frame.
+    along them. offset_lever (m, 3): change of lever per metre of tool offset in the flange frame.
     turned_lever (m, m): change of lever i per radian of joint j. moment (3,) m: moment about the
-    base origin of a newton along the direction. links (l,) m/N: compliance along the direction of
-    each nominal link. gravity (m,) Nm: torques of the arm's own weight.
+    base origin of a newton along the direction. links (l, 2) m/N: compliance along the direction
+    of each nominal link by bending and by twist. gravity (m,) Nm: torques of the arm's own weight.
+    Second order, 0 where there is none: bent_lever (m, m, m), change of turned_lever per radian;
+    turned_offset (m, m, 3), change of offset_lever i per radian of joint j.
     """
 
     pose: str
@@ -45,6 +47,8 @@ class Setup:
     moment: Array
     links: Array
     gravity: Array
+    bent_lever: Array | float = 0.0
+    turned_offset: Array | float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from identification.gap.heldout import HeldOut, folds, held_out, stated_predicti
 from identification.gap.locate import Where, locate
 from identification.gap.parameters import Parameter
 from identification.gap.posterior import parameters_of
-from identification.gap.search import Explanation, Found, force, refine_knees, search
+from identification.gap.search import Explanation, Found, force, refine, search
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
 
@@ -89,7 +89,7 @@ def diagnose_gap(
     tell("comparing effects", 0.2)
     etas = eta_levels(bench, base, target)
     engine = Engine(bench, base, target, etas)
-    finer = refine_knees(engine, variants)
+    finer = refine(engine, variants)
     if finer:
         variants += finer
         engine.extend()

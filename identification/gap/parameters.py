@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effects.link_flexibility import STRAINS
 from identification.gap.parts import Part
 
 
@@ -117,8 +118,9 @@ def _gain(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Parameter]:
 
 def _links(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
     return {
-        f"compliance_over_nominal_segment{k + 1}": _one(w, cov, i, "1")
+        f"{strain}_compliance_over_nominal_segment{k + 1}": _one(w, cov, 2 * i + s, "1")
         for i, k in enumerate(part.variant.info["segments"])
+        for s, strain in enumerate(STRAINS)
     }
 
 
@@ -138,29 +140,34 @@ def _seating(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]
 
 
 def _misalignment(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    names = part.variant.info["directions"]
+    """Tangents at the largest load."""
+    names, turns = part.variant.info["directions"], part.variant.info["at_N"] is not None
+    per = 4 if turns else 2
+    rows = np.eye(len(w))
     return {
-        f"tangent_{name}_{k + 1}": _one(w, cov, 2 * i + k, "1")
+        f"tangent_{name}_{k + 1}": _linear(
+            rows[per * i + k] + (rows[per * i + k + 2] if turns else 0.0), w, cov, "1"
+        )
         for i, name in enumerate(names)
         for k in range(2)
     }
 
 
-def _drift(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    """Change from start to end of the session, per coefficient of a path, or of a free one."""
-    force = part.word == "force_drift"
-    unit, scale = ("N", 1.0) if force else ("mm", 1e3)
-    names = [""] if force else [
-        f"_{d}" for d in dict.fromkeys(s.direction for s in bench.data.setups)
-    ]  # fmt: skip
+def _drift(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    """Change from start to end of the session, per direction where it has its own."""
+    unit, scale = ("N", 1.0) if part.word == "force_drift" else ("mm", 1e3)
+    names, path = part.variant.info["names"], part.variant.info["path"]
     per = len(w) // len(names)
     out = {}
     for i, name in enumerate(names):
         f = np.zeros(len(w))
-        f[(i + 1) * per - 1] = 1.0
-        if per > 1:
-            f[i * per] = -1.0
-        out[f"drift_over_session{name}"] = _linear(f, w, cov, unit, scale)
+        mine = slice(i * per, (i + 1) * per)
+        if path == "free":
+            f[mine.start], f[mine.stop - 1] = -1.0, 1.0
+        else:
+            f[mine] = 1.0
+        key = "drift_over_session" + (f"_{name}" if name else "")
+        out[key] = _linear(f, w, cov, unit, scale)
     return out
 
 
@@ -177,9 +184,15 @@ def _lag(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
 
 
 def _pose(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    if part.variant.info["kind"] == "tool":
-        return {f"offset_{a}": _one(w, cov, i, "mm", 1e3) for i, a in enumerate("xyz")}
-    return {f"angle_joint{j + 1}": _one(w, cov, j, "rad") for j in range(len(w))}
+    """Tool offset and angles of the joints."""
+    kind = part.variant.info["kind"]
+    out: dict[str, Parameter] = {}
+    if kind in ("tool", "both"):
+        out |= {f"offset_{a}": _one(w, cov, i, "mm", 1e3) for i, a in enumerate("xyz")}
+    if kind in ("joints", "both"):
+        first = 3 if kind == "both" else 0
+        out |= {f"angle_joint{i - first + 1}": _one(w, cov, i, "rad") for i in range(first, len(w))}
+    return out
 
 
 _TABLE: dict[str, Callable[[Bench, Part, Array, Array], dict[str, Parameter]]] = {

@@ -7,6 +7,7 @@ odds 1:20, a third again 1:20. Within a count all words (or sets of words) are e
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import comb, log
 
 import numpy as np
@@ -31,6 +32,8 @@ WORD_COUNT = 18
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
 REMAINDER = 0.25
+# Nor can a law be met better than to a few percent of what it does.
+LAW_REMAINDER = 0.03
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
 # Mechanisms of the same kind mimic parts of each other: rate-dependent flow looks like creep.
@@ -51,7 +54,7 @@ FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 TEMPER = 0.25
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 _REFINED = 2  # joints, or axes, at which it is refined
-_LEADING = 4  # words among which a knee has to be for its threshold to be refined
+_LEADING = 6  # words that are refined
 _PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
@@ -126,25 +129,54 @@ def search(engine: Engine, variants: list[Variant], deepest: int = 3) -> Found:
     return _conclude(engine, pool, alone, none)
 
 
-def refine_knees(engine: Engine, variants: list[Variant]) -> list[Variant]:
-    """Finer thresholds where a knee stands out: thresholds make the evidence piecewise smooth, and
-    the grid of the library may miss a sharp one."""
-    from identification.gap.effects.joint_yield import refined
+def refine(engine: Engine, variants: list[Variant]) -> list[Variant]:
+    """Finer shapes of the words that stand out and that a grid meets badly: thresholds and zones
+    make the evidence piecewise smooth, offsets act by their squares."""
+    from identification.gap.effects import joint_backlash, joint_yield, pose_error
 
     by_word = _by_word(score(engine, engine.levels, variants))
-    none = engine.levels[0].log_base
+    least = engine.levels[0].log_base + _WINDOW
     ranked = sorted(by_word, key=lambda w: -_marginal(by_word[w]))[:_LEADING]
     out: list[Variant] = []
-    for word in ("joint_yield", "base_slip"):
-        if word not in ranked or _marginal(by_word[word]) < none + _WINDOW:
+    for word in ranked:
+        if _marginal(by_word[word]) < least:
             continue
-        places: dict[object, Scored] = {}
-        sharp = [s for s in by_word[word] if s.variant.info["knee"] == "sharp"]
-        for s in sorted(sharp, key=lambda s: -s.log_evidence):
-            places.setdefault((s.variant.info.get("joint"), s.variant.info.get("axis")), s)
-        for s in list(places.values())[:_REFINED]:
-            out += refined(engine.bench, s.variant)
+        found = sorted(by_word[word], key=lambda s: -s.log_evidence)
+        if word in ("joint_yield", "base_slip"):
+            sharp = [s for s in found if s.variant.info["knee"] == "sharp"]
+            for s in _places(sharp):
+                out += joint_yield.refined(engine.bench, s.variant)
+        elif word == "joint_backlash":
+            for s in _places(found):
+                out += joint_backlash.refined(engine.bench, s.variant)
+        elif word == "pose_error":
+            kinds = {str(s.variant.info["kind"]): s for s in reversed(found)}
+            for s in kinds.values():
+                out += pose_error.refined(engine.bench, s.variant, partial(_estimate, engine))
     return out
+
+
+def _estimate(engine: Engine, variant: Variant) -> tuple[Array, Array]:
+    """Most probable coefficients of a variant whose columns the engine may not know yet, and
+    relative changes of the springs' compliance with it."""
+    from identification.gap.fit import fit
+
+    engine.extend()
+    eta = engine.levels[score(engine, engine.levels, [variant])[0].level].eta
+    alone = Explanation((Part(variant, 1.0),), 0.0, eta, (0.0,), 0.0)
+    fitted = fit(engine, alone)
+    softer = np.zeros(engine.bench.data.joints)
+    for i in engine.base.index("spring"):
+        softer[int(engine.base.names[i].removeprefix("spring")) - 1] = fitted.base[i]
+    return fitted.coefficients, softer
+
+
+def _places(found: list[Scored]) -> list[Scored]:
+    """The best of the _REFINED best joints, or axes."""
+    places: dict[object, Scored] = {}
+    for s in found:
+        places.setdefault((s.variant.info.get("joint"), s.variant.info.get("axis")), s)
+    return list(places.values())[:_REFINED]
 
 
 def force(
@@ -284,6 +316,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     least = max(
         0.6 * engine.bench.noise.stated,
         REMAINDER * engine.structural / max(len(parts), 1),
+        LAW_REMAINDER * float(each.max(initial=0.0)),
     )
     good = np.array([lv.eta <= least for lv in levels])
     share = np.exp(logs - logs.max())

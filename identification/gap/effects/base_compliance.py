@@ -19,7 +19,15 @@ from identification.gap.data import Array
 from identification.gap.variants import Variant, variant
 
 WORD = "base_compliance"
-DEPTHS_M = (0.0, 0.35, 0.7)  # of the tilt axes below the base: flange, table, stand on the floor
+DEPTHS_M = (
+    0.0,
+    0.15,
+    0.3,
+    0.45,
+    0.6,
+    0.8,
+    1.0,
+)  # of tilt axes below the base: flange, table, floor
 SCALES = (3e-7, 1e-6, 3e-6)  # rad/Nm
 
 

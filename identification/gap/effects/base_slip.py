@@ -14,11 +14,12 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.base_compliance import DEPTHS_M, moments
+from identification.gap.effects.base_compliance import moments
 from identification.gap.effects.joint_yield import knee_variants
 from identification.gap.variants import Variant
 
 WORD = "base_slip"
+DEPTHS_M = (0.0, 0.35, 0.7)  # coarser than elastic ones: a knee is told by where it bends
 _NATURAL = 1 / 1.5e5  # rad/Nm, so that the scales of the knees (0.3 to 20) span 2e-6 to 1.3e-4
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 
+RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
 PIECES = 7  # of a free smooth path: slower than a run, faster than the session
 
 
@@ -14,7 +15,7 @@ def warm_ups(bench: Bench) -> dict[str, Array]:
     """Named paths (n,), 0 at the start, about 1 at the end: line, exponentials, root of time."""
     t = (bench.rows.session - bench.rows.session.min()) / bench.session_span
     out = {"linear": t, "root": np.sqrt(t)}
-    for share in (0.03, 0.08, 0.2, 0.5):
+    for share in RATES:
         out[f"T {share:g}"] = (1 - np.exp(-t / share)) / (1 - np.exp(-1 / share))
     return out
 

@@ -22,26 +22,56 @@ SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Warm-up paths, each alone, and a free smooth path."""
+    """Warm-up paths, alike in all directions or per component, several
+    rates at once, and a free smooth path."""
     top = float(np.abs(bench.rows.measured_force).max())
     scales = tuple(s * top for s in SHARES)
     if not top > 0:
         return []
 
+    axes = _axes(bench)
+
     def column(path: Array) -> int:
         return bench.add(drifting(bench, _tared(bench, path)))
 
-    out = [
-        variant(WORD, label, [column(path)], scales, positive=False, path=label)
-        for label, path in warm_ups(bench).items()
-    ]
+    out, common = [], {}
+    for label, path in warm_ups(bench).items():
+        common[label] = column(path)
+        out.append(variant(WORD, label, [common[label]], scales, positive=False, path=label,
+                           names=("",)))  # fmt: skip
+        if len(axes) > 1:
+            each = [bench.add(component(bench, axis, path)) for axis in axes.values()]
+            out.append(variant(WORD, f"{label}, each component", each, scales, positive=False,
+                               path=label, names=tuple(axes)))  # fmt: skip
+    rates = [c for label, c in common.items() if label != "root"]
+    out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",
+                       names=("",)))  # fmt: skip
     if not has_runs(bench):
         return out
     hats = free_path(bench)
     columns = [column(hats[:, k]) for k in range(PIECES)]
     out.append(variant(WORD, "free path", columns, scales, path_root(), positive=False, prior=2.0,
-                       path="free"))  # fmt: skip
+                       path="free", names=("",)))  # fmt: skip
     return out
+
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def _axes(bench: Bench) -> dict[str, tuple[float, float, float]]:
+    """Components of the force that some direction loads."""
+    units = np.stack([s.unit_vector for s in bench.data.setups])
+    return {name: a for name, a in AXES.items() if np.any(np.abs(units @ np.array(a)) > 0.1)}
+
+
+def component(bench: Bench, axis: tuple[float, ...], path: Array) -> Array:
+    """(size,): one component of the force drifts along a path (n,): every component has a charge
+    amplifier of its own, and shows in what is recorded across as well."""
+    setups = bench.data.setups
+    unit = np.stack([s.unit_vector for s in setups])[bench.rows.setup] @ np.array(axis)
+    across = np.stack([s.tangents for s in setups])[bench.rows.setup] @ np.array(axis)
+    tared = _tared(bench, path)
+    return drifting(bench, unit * tared) + bench.stacked(tangential=across * tared[:, None])
 
 
 def drifting(bench: Bench, d: Array) -> Array:

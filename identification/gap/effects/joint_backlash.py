@@ -22,6 +22,7 @@ from identification.gap.data import Array, Flags
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
+KINDS = ("free", "friction", "friction 3", "soft")
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
@@ -31,32 +32,65 @@ _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an ar
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: zone, with and without friction, crossing where weight and load balance."""
     out = []
-    weight = np.stack([s.gravity for s in bench.data.setups])[bench.rows.setup]
-    scales = SCALES if bench.data.arm else tuple(s * bench.reach for s in _SHARES)
     for j in bench.moving_joints():
-        torque, g = bench.torque[:, j], weight[:, j]
+        torque, g = bench.torque[:, j], _weight(bench, j)
         span = bench.reach_of(torque)
         if not span > 0:
             continue
         # a joint that its weight preloads beyond the load never crosses zero
-        net = torque + g
-        crossings = {"weight": net} if _crosses(net, torque) else {}
+        crossings = {"weight": torque + g} if _crosses(torque + g, torque) else {}
         if np.abs(g).max() < 0.5 * span:
             crossings["load"] = torque
         places: dict[bytes, list[int]] = {}
         for name, x in crossings.items():
             for zone in ZONES:
-                info: dict[str, Any] = {"joint": j, "zone_Nm": zone * span}
-                floating = _floating(bench, j, np.abs(x) < zone * span, places)
-                for kind, shape in _shapes(bench, x, zone * span).items():
-                    columns = [bench.add_joint(j, bench.sense * part) for part in shape[:2]]
-                    columns += floating
-                    label = f"joint {j + 1} {name} {kind} zone {zone:g}"
-                    root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
-                    out.append(
-                        variant(WORD, label, columns, scales, root,
-                                positive=np.eye(len(columns))[0], crossing=name, kind=kind, **info)
-                    )  # fmt: skip
+                info: dict[str, Any] = {"joint": j, "zone_Nm": zone * span, "crossing": name,
+                                        "weight_factor": 1.0}  # fmt: skip
+                label = f"joint {j + 1} {name}"
+                out += _zone(bench, x, KINDS, label, f"{zone:g}", 1.0, info, places)
+    return out
+
+
+def refined(bench: Bench, found: Variant) -> list[Variant]:
+    """Zones about one that was found; where the weight decides about the crossing, at weights that
+    are a few percent off: they are known no better, and the zone is small beside them."""
+    info, j = dict(found.info), int(found.info["joint"])
+    torque, g = bench.torque[:, j], _weight(bench, j)
+    weighty = info["crossing"] == "weight" and np.any(g)
+    factors = np.linspace(0.92, 1.08, 9) if weighty else np.ones(1)
+    zones = float(info["zone_Nm"]) * np.array([0.6, 0.8, 1.0, 1.25, 1.6])
+    kinds, out = tuple(dict.fromkeys([info["kind"], "soft"])), []
+    share = 4.0 / (len(factors) * len(zones) * len(kinds))
+    places: dict[bytes, list[int]] = {}
+    for factor in factors:
+        x = torque + factor * g if info["crossing"] == "weight" else torque
+        for zone in zones:
+            exact = info | {"zone_Nm": float(zone), "weight_factor": float(factor)}
+            label = f"joint {j + 1} {info['crossing']} x {factor:.2f}"
+            out += _zone(bench, x, kinds, label, f"{zone:.3g} Nm fine", share, exact, places)
+    return out
+
+
+def _weight(bench: Bench, joint: int) -> Array:
+    return np.asarray(np.stack([s.gravity for s in bench.data.setups])[bench.rows.setup, joint])
+
+
+def _zone(
+    bench: Bench, x: Array, kinds: tuple[str, ...], label: str, zone: str, prior: float,
+    info: dict[str, Any], places: dict[bytes, list[int]],
+) -> list[Variant]:  # fmt: skip
+    """Variants of one zone, per kind, on the net torque x (n,)."""
+    scales = SCALES if bench.data.arm else tuple(s * bench.reach for s in _SHARES)
+    j, width, out = int(info["joint"]), float(info["zone_Nm"]), []
+    floating = _floating(bench, j, np.abs(x) < width, places)
+    shapes = _shapes(bench, x, width)
+    for kind in kinds:
+        columns = [bench.add_joint(j, bench.sense * part) for part in shapes[kind]] + floating
+        root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
+        out.append(
+            variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
+                    np.eye(len(columns))[0], prior, **(info | {"kind": kind}))
+        )  # fmt: skip
     return out
 
 
@@ -74,6 +108,7 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
         "free": [np.tanh(x / zone) / 2, rub],
         "friction": [np.clip(state[:, 0] / zone, -1, 1) / 2, rub],
         "friction 3": [np.tanh(state[:, 1] / zone) / 2, rub],
+        "soft": [-np.sign(x) * np.expm1(-np.abs(x) / zone) / 2, rub],
     }
 
 

@@ -26,6 +26,7 @@ from identification.gap.variants import Variant, smooth_root, variant
 WORD = "joint_hysteresis"
 RADII = (0.012, 0.03, 0.07, 0.13, 0.22, 0.35, 0.55, 0.85)  # of the joint's range of torque
 REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
+NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # Without unloading no loop is seen: what then bends at a large load is a knee, not friction.
 _SMALL = 4
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
@@ -58,6 +59,7 @@ def _spectrum(
     torque, c = bench.torque[:, joint], bench.compliance[joint]
     radius = span * np.array(RADII if bench.unloads else RADII[:_SMALL])
     radius = bench.radii(torque, radius) if bench.unloads else radius
+    radius = np.append(radius, NEVER * span)
     if path is None:
         states = bench.plays(torque, radius, fresh)
     else:
@@ -71,7 +73,7 @@ def _spectrum(
     out = [variant(WORD, f"{name} spectrum", columns, SCALES, root, prior=0.25, each=True,
                    joint=joint, radius=radius, law="Iwan")]  # fmt: skip
     # friction acts from the first load on: one strength alone is a small one
-    alone = len(columns) - 1 if bench.imposed else min(_SMALL + 1, len(columns) - 1)
+    alone = len(columns) - 2 if bench.imposed else min(_SMALL + 1, len(columns) - 2)
     for k in range(alone):
         out.append(
             variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES,

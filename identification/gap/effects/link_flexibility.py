@@ -19,15 +19,25 @@ WORD = "link_flexibility"
 SCALES = (0.15, 0.5, 1.5)
 
 
+STRAINS = ("bending", "twist")
+ALIKE = 0.9  # correlation of the two in one segment: both go with its wall and material
+
+
 def variants(bench: Bench) -> list[Variant]:
-    """Each link, and both."""
-    links = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]
-    columns = []
-    for k in range(links.shape[1]):
-        columns.append(bench.add(bench.outside_column(links[:, k] * bench.load)))
-    out = [
-        variant(WORD, f"segment {k + 1}", [c], SCALES, segments=[k]) for k, c in enumerate(columns)
+    """Each link, and both; bending and twist of one are alike, but not the same."""
+    links = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]  # (n, l, 2)
+    count = links.shape[1]
+    columns = [
+        bench.add(bench.outside_column(links[:, k, i] * bench.load))
+        for k in range(count)
+        for i in range(2)
     ]
-    if len(columns) > 1:
-        out.append(variant(WORD, "both arms", columns, SCALES, segments=list(range(len(columns)))))
+    root = np.array([[1.0, 0.0], [ALIKE, np.sqrt(1 - ALIKE**2)]])
+    out = [
+        variant(WORD, f"segment {k + 1}", columns[2 * k : 2 * k + 2], SCALES, root, segments=[k])
+        for k in range(count)
+    ]
+    if count > 1:
+        both = np.kron(np.eye(count), root).astype(float)
+        out.append(variant(WORD, "both arms", columns, SCALES, both, segments=list(range(count))))
     return out

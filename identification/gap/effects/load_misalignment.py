@@ -20,16 +20,17 @@ SCALES = (0.03, 0.1, 0.25)
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Two tangents per direction; each direction alone, and all."""
+    """Two tangents per direction, constant or turning as the load grows; one direction, and all."""
     rows, data = bench.rows, bench.data
     across = np.stack([s.tangent_lever for s in data.setups])[rows.setup]  # (n, 2, m)
     names = [s.direction for s in data.setups]
+    top = float(np.abs(bench.load).max()) or 1.0
     out, every = [], []
     for name in dict.fromkeys(names):
         mine = np.array([n == name for n in names])[rows.setup]
         pair = []
-        for k in range(2):
-            load = np.where(mine, bench.load, 0.0)
+        for k, power in ((0, 1), (1, 1), (0, 2), (1, 2)):
+            load = np.where(mine, bench.load * np.abs(bench.load / top) ** (power - 1), 0.0)
             q = across[:, k, :] * bench.compliance * load[:, None]
             tangential = np.zeros((rows.n, 2))
             tangential[:, k] = load
@@ -37,12 +38,22 @@ def variants(bench: Bench) -> list[Variant]:
             pair.append(bench.add(bench.stacked(response, q, tangential)))
         every += pair
         out.append(
-            variant(WORD, f"direction {name}", pair, SCALES, positive=False, prior=0.5,
-                    directions=[name])
+            variant(WORD, f"direction {name}", pair[:2], SCALES, positive=False, prior=0.3,
+                    directions=[name], at_N=None)
         )  # fmt: skip
-    if len(out) > 1:
         out.append(
-            variant(WORD, "all directions", every, SCALES, positive=False,
-                    directions=list(dict.fromkeys(names)))
+            variant(WORD, f"direction {name}, turning", pair, SCALES, positive=False, prior=0.2,
+                    directions=[name], at_N=top)
+        )  # fmt: skip
+    if len(every) > 4:
+        named = list(dict.fromkeys(names))
+        straight = [c for i, c in enumerate(every) if i % 4 < 2]
+        out.append(
+            variant(WORD, "all directions", straight, SCALES, positive=False, prior=0.6,
+                    directions=named, at_N=None)
+        )  # fmt: skip
+        out.append(
+            variant(WORD, "all directions, turning", every, SCALES, positive=False, prior=0.4,
+                    directions=named, at_N=top)
         )  # fmt: skip
     return out

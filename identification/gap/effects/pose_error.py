@@ -1,8 +1,8 @@
 """The arm stands, or the tool is, elsewhere than simulated: wrong leverage.
 
-Tool offset d in the base frame changes every lever by `d . (n x z)`; a joint that stands elsewhere
-by e changes them by `dJ/dq e`, and its reading at zero load shows e. First and second order, the
-second with its own coefficients. Offsets of 5 to 300 mm, angles of 0.2 to 5 degrees.
+Tool offset d in the flange frame changes every lever by `R d . (n x z)`; a joint that stands off
+by e changes them by `dJ/dq e`, and its reading at zero load shows e. The target moves with the
+square of the levers. Offsets of 5 to 300 mm, angles of 0.2 to 5 degrees.
 
 Size: tools 5 to 300 mm off, joints 0.2 to 5 degrees.
 Prior: either sign, sd out of OFFSETS_M or ANGLES_RAD, equally likely.
@@ -11,7 +11,8 @@ Source: wrong tool frames and zero positions of joints.
 
 from __future__ import annotations
 
-from itertools import combinations_with_replacement
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,43 +26,83 @@ ANGLES_RAD = (0.005, 0.02, 0.06)
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Tool offset, and joints standing elsewhere."""
-    return _tool(bench) + _joints(bench)
-
-
-def _tool(bench: Bench) -> list[Variant]:
-    change = np.stack([s.offset_lever for s in bench.data.setups])[bench.rows.setup]  # (n, m, 3)
-    first = [_column(bench, change[:, :, k]) for k in range(3)]
-    second = []
-    for a, b in combinations_with_replacement(range(3), 2):
-        product = change[:, :, a] * change[:, :, b] * (1.0 if a == b else 2.0)
-        response = (product @ bench.compliance) * bench.load
-        second.append(bench.add(bench.stacked(response)))
+    """Tool offset, joints standing elsewhere, and both; to first order."""
+    at = np.zeros(3), np.zeros(bench.data.joints)
+    columns = [bench.add(c) for c in secants(bench, *at, bench.compliance)]
     out = []
     for size in OFFSETS_M:
-        root = np.diag([size] * 3 + [size**2] * 6)
-        out.append(
-            variant(WORD, f"tool {size * 1e3:g} mm", [*first, *second], (1.0,), root,
-                    positive=False, kind="tool")
-        )  # fmt: skip
+        out.append(_variant(f"tool {size * 1e3:g} mm", columns[:3], [size] * 3, 1.0, "tool"))
+    joints = bench.data.joints
+    for size in ANGLES_RAD:
+        out.append(_variant(f"joints {size:g} rad", columns[3:], [size] * joints, 1.0, "joints"))
+    for offset, angle in BOTH:
+        label = f"tool {offset * 1e3:g} mm, joints {angle:g} rad"
+        sizes = [offset] * 3 + [angle] * joints
+        out.append(_variant(label, columns, sizes, 0.5, "both"))
     return out
 
 
-def _joints(bench: Bench) -> list[Variant]:
-    turned = np.stack([s.turned_lever for s in bench.data.setups])[bench.rows.setup]
-    columns = []
+BOTH = ((0.04, 0.02), (0.15, 0.05))
+_STEPS = 5
+
+
+def refined(
+    bench: Bench, found: Variant, estimate: Callable[[Variant], tuple[Array, Array]]
+) -> list[Variant]:
+    """The same with secants through where arm and tool are found to be, and with the springs that
+    go with it, in a few steps. estimate: most probable coefficients of a variant, and relative
+    changes (m,) of the springs' compliance."""
+    kind, out = str(found.info["kind"]), found
+    offset, angles = np.zeros(3), np.zeros(bench.data.joints)
+    for _ in range(_STEPS):
+        w, softer = estimate(out)
+        offset = w[:3] if kind != "joints" else offset
+        angles = w[-len(angles) :] if kind != "tool" else angles
+        compliance = bench.compliance * np.maximum(1 + softer, 0.1)
+        columns = secants(bench, offset, angles, compliance)
+        used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
+        out = replace(
+            found, label=f"{found.label}, as they are", prior=3.0,
+            columns=tuple(bench.add(c) for c in used),
+            info={**found.info, "offset_m": offset, "angles_rad": angles,
+                  "compliance": compliance},
+        )  # fmt: skip
+    return [out]
+
+
+def secants(bench: Bench, offset: Array, angles: Array, compliance: Array) -> list[Array]:
+    """Stacked columns per metre of tool offset (3) and radian of each joint that stands elsewhere.
+
+    With levers l + dl the target moves by `c ((l + dl)^2 - l^2) F = 2 c (l + dl/2) dl F`: linear in
+    the change with dl/2 held at where it is (offset (3,) m, angles (m,) rad), exact there. So is
+    dl, to second order in both; compliance (m,) is that of the springs as they are. The
+    readings see c dl F, and where the joints stand.
+    """
+    setups, m = bench.data.setups, bench.data.joints
+    shifts, turns = [], []  # per setup: change of the levers per metre (m, 3) and radian (m, m)
+    for s in setups:
+        across = np.broadcast_to(s.turned_offset, (m, m, 3))
+        bent = np.broadcast_to(s.bent_lever, (m, m, m))
+        shifts.append(s.offset_lever + 0.5 * np.einsum("ijk,j->ik", across, angles))
+        turns.append(s.turned_lever + 0.5 * (bent @ angles + across @ offset))
+    moved, turned = np.stack(shifts)[bench.rows.setup], np.stack(turns)[bench.rows.setup]
+    middle = bench.lever + 0.5 * (moved @ offset + turned @ angles)
+    elastic = compliance * bench.load[:, None]
+    out = []
+    for change in [moved[:, :, k] for k in range(3)]:
+        out.append(bench.stacked(2 * np.sum(middle * change * elastic, axis=1), change * elastic))
     for j in range(bench.data.joints):
-        stands = np.zeros((bench.rows.n, bench.data.joints))
-        stands[:, j] = 1.0
-        columns.append(_column(bench, turned[:, :, j], stands))
-    return [
-        variant(WORD, f"joints {size:g} rad", columns, (size,), positive=False, kind="joints")
-        for size in ANGLES_RAD
-    ]
+        q = turned[:, :, j] * elastic
+        q[:, j] += 1.0
+        response = 2 * np.sum(middle * turned[:, :, j] * elastic, axis=1)
+        out.append(bench.stacked(response, q))
+    return out
 
 
-def _column(bench: Bench, change: Array, stands: Array | None = None) -> int:
-    """What a change (n, m) of the levers does: twice in the laser, once in the readings."""
-    deflection = change * bench.compliance * bench.load[:, None]
-    response = 2 * np.sum(bench.lever * deflection, axis=1)
-    return bench.add(bench.stacked(response, deflection if stands is None else deflection + stands))
+def _variant(
+    label: str, columns: list[int], sizes: list[float], prior: float, kind: str
+) -> Variant:
+    return variant(
+        WORD, label, columns, (1.0,), np.diag(sizes), positive=False, prior=prior, kind=kind,
+        offset_m=np.zeros(3), angles_rad=np.zeros(6),
+    )  # fmt: skip

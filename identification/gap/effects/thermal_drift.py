@@ -29,10 +29,16 @@ def variants(bench: Bench) -> list[Variant]:
         np.array([n == name for n in names])[bench.rows.setup].astype(float)
         for name in dict.fromkeys(names)
     ]
-    out = []
+    named = tuple(dict.fromkeys(names))
+    out, rates = [], []
     for label, path in {**warm_ups(bench), **_temperatures(bench)}.items():
         columns = [bench.add(bench.outside_column(m * path)) for m in masks]
-        out.append(variant(WORD, label, columns, scales, positive=False, path=label))
+        out.append(variant(WORD, label, columns, scales, positive=False, path=label, names=named))
+        if label.startswith("T ") or label == "linear":
+            rates.append(columns)
+    every = [c for columns in zip(*rates, strict=True) for c in columns]
+    out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
+                       names=named))  # fmt: skip
     if not has_runs(bench):
         return out
     hats = free_path(bench)
@@ -41,7 +47,7 @@ def variants(bench: Bench) -> list[Variant]:
     ]
     root: Array = np.kron(np.eye(len(masks)), path_root()).astype(float)
     out.append(variant(WORD, "free path", columns, scales, root, positive=False, prior=2.0,
-                       path="free"))  # fmt: skip
+                       path="free", names=named))  # fmt: skip
     return out
 
 

@@ -27,24 +27,67 @@ def variants(bench: Bench) -> list[Variant]:
     """Lags of laser or force, as delays and as filters; coefficient 1 is the lag itself."""
     sample = 2 * half_sample(bench.rows) if not bench.rows.continuous else _typical_step(bench)
     out = []
-    rest, line = rests(bench.rows), bench.line
     for multiple in LAGS:
         lag = multiple * sample
-        late = delayed(line, lag, bench.rows) - line
-        slow = retarded(line[:, None], np.array([lag]), bench.rows, rest)[:, 0] - line
-        for kind, change in (("delay", late), ("filter", slow)):
-            if not np.any(change):
-                continue
-            info: dict[str, Any] = {"lag_s": lag, "kind": kind}
-            stiff = np.where(bench.slope > 0, change / bench.slope, 0.0)
-            laser = bench.add(bench.stacked(bench.sense * change))
-            force = bench.add(bench.force_column(-bench.sense * stiff))
-            for channel, column in (("displacement", laser), ("force", force)):
-                out.append(
-                    variant(WORD, f"{channel} {kind} {lag:.3g} s", [column], (0.5, 1.0),
-                            channel=channel, **info)
-                )  # fmt: skip
+        for channel in ("displacement", "force"):
+            pair = []
+            for kind in ("delay", "filter"):
+                change = late(bench, channel, kind, lag)
+                if not np.any(change):
+                    continue
+                pair.append(bench.add(change))
+                info: dict[str, Any] = {"lag_s": lag, "kind": kind, "channel": channel}
+                out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", pair[-1:], (0.5, 1.0),
+                                   **info))  # fmt: skip
+            if len(pair) > 1:
+                info = {"lag_s": lag, "kind": "window", "channel": channel}
+                out.append(variant(WORD, f"{channel} window {lag:.3g} s", pair, (0.5,), prior=0.5,
+                                   **info))  # fmt: skip
     return out
+
+
+def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
+    """(size,) what a lag of a channel does: the laser shows the response of earlier loads; a force
+    that lags was in truth ahead of what was read."""
+    if channel == "displacement":
+        return bench.stacked(bench.sense * (_behind(bench, bench.line[:, None], kind, lag)[:, 0]
+                                            - bench.line))  # fmt: skip
+    if bench.rows.continuous:
+        ahead = bench.load - _behind(bench, bench.load[:, None], kind, lag)[:, 0]
+    else:
+        ahead = _true_force(bench, kind, lag) - bench.load
+    return bench.force_column(bench.sense * ahead)
+
+
+def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
+    """Values (n, k) as a channel shows them that lags."""
+    if kind == "delay":
+        return np.column_stack([delayed(v, lag, bench.rows) for v in values.T])
+    times = np.full(values.shape[1], lag)
+    return retarded(values, times, bench.rows, rests(bench.rows))
+
+
+def _true_force(bench: Bench, kind: str, lag: float) -> Array:
+    """(n,) force that stands still in every hold and that, read with the lag, gives the readings
+    best (least squares in every run; a hold that the readings hardly see keeps what was read)."""
+    rows = bench.rows
+    first = rows.hold[rows.starts][np.cumsum(rows.starts) - 1]
+    within = rows.hold - first  # number of the hold in its run
+    holds = np.eye(int(within.max()) + 1)[within]
+    shown, out = _behind(bench, holds, kind, lag), bench.load.copy()
+    for run in np.unique(rows.run):
+        mine = rows.run == run
+        used = np.unique(within[mine])
+        A, root = shown[mine][:, used], np.sqrt(rows.weight[mine])
+        mean = np.array([out[mine][within[mine] == h].mean() for h in used])
+        left = bench.load[mine] - A @ mean
+        weighted = np.vstack([A * root[:, None], _HOLDS_BACK * np.eye(len(used))])
+        change = np.linalg.lstsq(weighted, np.append(left * root, np.zeros(len(used))), rcond=None)
+        out[mine] = holds[mine][:, used] @ (mean + change[0])
+    return out
+
+
+_HOLDS_BACK = 0.05  # of a sample's weight: keeps what nobody saw from running away
 
 
 def _typical_step(bench: Bench) -> float:

@@ -72,7 +72,7 @@ def law_of(bench: Bench, variant: Variant) -> tuple[Law, Array]:
             f"{variant.word}, {variant.label}: the library does not say {missing} of this shape"
         ) from missing
     if variant.word in _THROUGH_SPRINGS:
-        about = tuple(float(c) for c in bench.compliance)
+        about = tuple(float(c) for c in variant.info.get("compliance", bench.compliance))
         law = replace(law, constants={**law.constants, "about": about})
     return law, scale
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import moments
+from identification.gap.effects.link_flexibility import STRAINS
 from identification.gap.forms.law import Law, Term, along, scaled
 from identification.gap.history import rests, retarded
 from identification.gap.variants import Variant
@@ -80,8 +81,12 @@ def springs(bench: Bench, law: Law) -> list[Array]:
 
 
 def describe_links(_: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: segments, as multiples of the nominal tube of the robot file."""
-    terms = tuple(Term("over_nominal", {"segment": int(k)}) for k in v.info["segments"])
+    """Terms: segments, how they strain, as multiples of the nominal tube of the robot file."""
+    terms = tuple(
+        Term("over_nominal", {"segment": int(k), "strain": strain})
+        for k in v.info["segments"]
+        for strain in STRAINS
+    )
     return Law({}, terms), np.ones(len(terms))
 
 
@@ -93,7 +98,12 @@ def links(bench: Bench, law: Law) -> list[Array]:
         raise ValueError(
             f"link_flexibility of segment {most + 1}: the robot has {each.shape[1]} of them"
         )
-    return [bench.outside_column(each[:, t.shape["segment"]] * bench.load) for t in law.terms]
+    return [
+        bench.outside_column(
+            each[:, t.shape["segment"], STRAINS.index(t.shape["strain"])] * bench.load
+        )
+        for t in law.terms
+    ]
 
 
 def describe_base(_: Bench, v: Variant) -> tuple[Law, Array]:
@@ -130,13 +140,20 @@ def seating(bench: Bench, law: Law) -> list[Array]:
 
 
 def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: shares of the load across the nominal direction, as vectors in the base frame."""
+    """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
+    shares reached at a load, in proportion to it."""
     terms = []
     for name in v.info["directions"]:
         s = next(s for s in bench.data.setups if s.direction == name)
-        for k in range(2):
-            shape = {"along": _triple(s.unit_vector), "across": _triple(s.tangents[k])}
-            terms.append(Term("tangent", shape))
+        for growth in (False, True) if v.info["at_N"] is not None else (False,):
+            for k in range(2):
+                shape: dict[str, Any] = {
+                    "along": _triple(s.unit_vector),
+                    "across": _triple(s.tangents[k]),
+                }
+                if growth:
+                    shape["at_load"] = float(v.info["at_N"])
+                terms.append(Term("tangent", shape))
     return Law({}, tuple(terms)), np.ones(len(terms))
 
 
@@ -146,6 +163,8 @@ def misalignment(bench: Bench, law: Law) -> list[Array]:
     out = []
     for t in law.terms:
         load = np.where(along(bench, t.shape["along"]) > 0, bench.load, 0.0)
+        if "at_load" in t.shape:
+            load = load * np.abs(load) / t.shape["at_load"]
         parts = np.stack([s.tangents @ np.array(t.shape["across"]) for s in data.setups])
         lever = np.stack([p @ s.tangent_lever for p, s in zip(parts, data.setups, strict=True)])
         q = lever[rows.setup] * bench.compliance * load[:, None]
@@ -155,39 +174,27 @@ def misalignment(bench: Bench, law: Law) -> list[Array]:
 
 
 def describe_pose(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: offset of the tool in the base frame (and its products), or angles of the joints."""
-    if v.info["kind"] == "joints":
-        terms = [Term("angle", {"joint": j}) for j in range(bench.data.joints)]
-        return Law({}, tuple(terms)), np.ones(len(terms))
-    terms = [Term("offset", {"axis": a}) for a in "xyz"]
-    pairs = combinations_with_replacement("xyz", 2)
-    terms += [Term("offset_product", {"axes": a + b}) for a, b in pairs]
-    return Law({}, tuple(terms)), np.ones(len(terms))
+    """Terms: offset of the tool in the flange frame, angles of the joints; about where they are."""
+    terms = []
+    if v.info["kind"] in ("tool", "both"):
+        terms += [Term("offset", {"axis": a}) for a in "xyz"]
+    if v.info["kind"] in ("joints", "both"):
+        terms += [Term("angle", {"joint": j}) for j in range(bench.data.joints)]
+    about = {
+        "about_offset": _triple(v.info["offset_m"]),
+        "about_angles": tuple(float(a) for a in v.info["angles_rad"]),
+    }
+    return Law(about, tuple(terms)), np.ones(len(terms))
 
 
 def pose(bench: Bench, law: Law) -> list[Array]:
-    """Change of the levers: twice in the laser, once in the joint readings."""
-    setup, data = bench.rows.setup, bench.data
-    offset = np.stack([s.offset_lever for s in data.setups])[setup]
-    turned = np.stack([s.turned_lever for s in data.setups])[setup]
-    out = []
-    for t in law.terms:
-        if t.coefficient == "offset_product":
-            a, b = ("xyz".index(x) for x in t.shape["axes"])
-            product = offset[:, :, a] * offset[:, :, b] * (1.0 if a == b else 2.0)
-            out.append(bench.stacked((product @ bench.compliance) * bench.load))
-        elif t.coefficient == "angle":
-            stands = np.zeros((bench.rows.n, data.joints))
-            stands[:, t.shape["joint"]] = 1.0
-            out.append(_leverage(bench, turned[:, :, t.shape["joint"]], stands))
-        else:
-            out.append(_leverage(bench, offset[:, :, "xyz".index(t.shape["axis"])], 0.0))
-    return out
-
-
-def _leverage(bench: Bench, change: Array, stands: Any) -> Array:
-    deflection = change * bench.compliance * bench.load[:, None]
-    return bench.stacked(2 * np.sum(bench.lever * deflection, axis=1), deflection + stands)
+    """Change of the levers, by the secants of the library."""
+    at = np.array(law.constants["about_offset"]), np.array(law.constants["about_angles"])
+    columns = pose_error.secants(bench, *at, bench.compliance)
+    return [
+        columns["xyz".index(t.shape["axis"]) if t.coefficient == "offset" else 3 + t.shape["joint"]]
+        for t in law.terms
+    ]
 
 
 def _triple(vector: Array) -> tuple[float, float, float]:

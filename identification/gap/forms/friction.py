@@ -50,6 +50,7 @@ def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
         "zone": float(info["zone_Nm"]),
         "crossing": str(info["crossing"]),
         "kind": str(info["kind"]),
+        "weight_factor": float(info["weight_factor"]),
     }
     terms = [Term("width"), Term("rub")]
     law = Law(constants, ())
@@ -88,7 +89,7 @@ def _net(bench: Bench, law: Law) -> Array:
     if law.constants["crossing"] == "load":
         return torque
     weight = np.array([s.gravity[joint] for s in bench.data.setups])
-    return np.asarray(torque + weight[bench.rows.setup])
+    return np.asarray(torque + law.constants["weight_factor"] * weight[bench.rows.setup])
 
 
 def _places(bench: Bench, law: Law) -> list[tuple[int, bool]]:

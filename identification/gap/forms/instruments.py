@@ -6,10 +6,9 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects import force_drift
-from identification.gap.effects.drift import PIECES
+from identification.gap.effects import force_drift, time_lag
+from identification.gap.effects.drift import PIECES, RATES
 from identification.gap.forms.law import Law, Term, along
-from identification.gap.history import delayed, rests, retarded
 from identification.gap.variants import Variant
 
 
@@ -31,33 +30,32 @@ def displacement_gain(bench: Bench, _: Law) -> list[Array]:
 
 
 def describe_lag(_: Bench, v: Variant) -> tuple[Law, Array]:
-    """One term: 1 where the lag is as long as stated."""
+    """One term: 1 where the lag is as long as stated; of a window half delay, half filter."""
     constants = {
         "channel": str(v.info["channel"]),
         "way": str(v.info["kind"]),
         "lag": float(v.info["lag_s"]),
     }
-    return Law(constants, (Term("share"),)), np.ones(1)
+    terms = (Term("share"),) * len(v.columns)
+    return Law(constants, terms), np.ones(len(terms))
 
 
 def lag(bench: Bench, law: Law) -> list[Array]:
     """The channel shows where the load was a little earlier."""
-    line, time = bench.line, law.constants["lag"]
-    if law.constants["way"] == "delay":
-        change = delayed(line, time, bench.rows) - line
-    else:
-        slow = retarded(line[:, None], np.array([time]), bench.rows, rests(bench.rows))
-        change = slow[:, 0] - line
-    if law.constants["channel"] == "displacement":
-        return [bench.stacked(bench.sense * change)]
-    stiff = np.where(bench.slope > 0, change / np.where(bench.slope > 0, bench.slope, 1.0), 0.0)
-    return [bench.force_column(-bench.sense * stiff)]
+    c = law.constants
+    kinds = ("delay", "filter") if c["way"] == "window" else (c["way"],)
+    return [time_lag.late(bench, c["channel"], kind, c["lag"]) for kind in kinds]
 
 
 def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms of the path."""
     constants, terms, scale = _path(bench, str(v.info["path"]))
-    return Law(constants | {"quantity": "force"}, terms), scale
+    law = constants | {"quantity": "force"}
+    if v.info["names"] == ("",):
+        return Law(law, terms), scale
+    each = [{**t.shape, "along": force_drift.AXES[name]} for name in v.info["names"] for t in terms]
+    named = tuple(Term(terms[0].coefficient, shape) for shape in each)
+    return Law(law, named), np.tile(scale, len(v.info["names"]))
 
 
 def describe_thermal(bench: Bench, v: Variant) -> tuple[Law, Array]:
@@ -77,6 +75,9 @@ def drift_of_force(bench: Bench, law: Law) -> list[Array]:
     """Measured = true + d(t), less what was tared away; zero plateaus show d itself."""
     out = []
     for t in law.terms:
+        if "along" in t.shape:
+            out.append(force_drift.component(bench, t.shape["along"], _moved(bench, law, t)))
+            continue
         d = force_drift._tared(bench, _moved(bench, law, t))
         out.append(force_drift.drifting(bench, d))
     return out
@@ -102,6 +103,10 @@ def _path(bench: Bench, label: str) -> tuple[dict[str, object], tuple[Term, ...]
         rise = 1 / (1 - np.exp(-1 / share))
         term = Term("drift", {"time_constant": share * span})
         return {"path": "exponential"}, (term,), np.array([rise])
+    if label == "rates":
+        rises = [1 / (1 - np.exp(-1 / r)) for r in RATES]
+        terms = (Term("drift_rate"), *(Term("drift", {"time_constant": r * span}) for r in RATES))
+        return {"path": "rates"}, terms, np.array([1 / span, *rises])
     if label == "free":
         places = np.linspace(0, span, PIECES)
         terms = tuple(Term("drift_knot", {"at": float(t)}) for t in places)
@@ -118,11 +123,11 @@ def _moved(bench: Bench, law: Law, term: Term) -> Array:
     """(n,): the path per unit of the coefficient, 0 at the start of the session."""
     t = bench.rows.session - bench.rows.session.min()
     path = law.constants["path"]
-    if path == "linear":
+    if path == "linear" or term.coefficient == "drift_rate":
         return np.asarray(t)
     if path == "root":
         return np.asarray(np.sqrt(t))
-    if path == "exponential":
+    if path in ("exponential", "rates"):
         return np.asarray(1 - np.exp(-t / term.shape["time_constant"]))
     if path == "free":
         places = sorted({x.shape["at"] for x in law.terms if _twin(x, term)})
