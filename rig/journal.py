@@ -52,8 +52,10 @@ class Journal:
         self.path = path
         self.records: list[Record] = []  # what `reopen` found
         self._fd = descriptor
-        self._next = 0
-        self._size = 0
+        # Records, and bytes of them: acknowledged, and with the one being written. Each pair is
+        # assigned as one, for a signal may raise KeyboardInterrupt between any two statements.
+        self._done = (0, 0)
+        self._begun = (0, 0)
         self._failed = ""
 
     @classmethod
@@ -108,10 +110,10 @@ class Journal:
         self.records, good = _parse(content, self.path)
         os.ftruncate(self._fd, good)
         os.lseek(self._fd, good, os.SEEK_SET)
-        self._next = len(self.records)
-        self._size = good
         if content[good - 1 : good] != b"\n":  # killed between the record and its line end
             self._write(b"\n")
+            good += 1
+        self._begun = self._done = (len(self.records), good)
 
     def append(self, kind: str, data: Mapping[str, Any]) -> int:
         """Writes one record and returns its number once it is on disk.
@@ -124,10 +126,24 @@ class Journal:
             raise ValueError(f'record kind "{kind}" is not one of {", ".join(KINDS)}')
         if self._failed:
             raise JournalError(self._failed)
-        number = self._next
-        self._write(_line(number, kind, data))
-        self._next += 1
+        number, size = self._settled()
+        line = _line(number, kind, data)
+        self._begun = (number + 1, size + len(line))
+        self._write(line)
+        self._done = self._begun
         return number
+
+    def _settled(self) -> tuple[int, int]:
+        """Records and bytes so far. A record that a signal interrupted counts where it was written
+        whole, and is cut off where it was not; else the next one would bear its number too."""
+        if self._begun != self._done:
+            if os.lseek(self._fd, 0, os.SEEK_CUR) >= self._begun[1]:
+                self._done = self._begun
+            else:
+                os.ftruncate(self._fd, self._done[1])
+                os.lseek(self._fd, self._done[1], os.SEEK_SET)
+                self._begun = self._done
+        return self._done
 
     def close(self) -> None:
         """Releases the lock; may be called twice."""
@@ -151,16 +167,15 @@ class Journal:
             os.fsync(self._fd)
         except OSError as error:
             raise self._give_up(error) from error
-        self._size += len(line)
 
     def _give_up(self, error: OSError) -> JournalError:
         self._failed = (
-            f"{self.path}: record {self._next} could not be written: {error.strerror or error}. "
-            f"Everything up to record {self._next - 1} is kept. Unload the arm, make room "
+            f"{self.path}: record {self._done[0]} could not be written: {error.strerror or error}. "
+            f"Everything up to record {self._done[0] - 1} is kept. Unload the arm, make room "
             "or repair the disk, and go on with --resume."
         )
         try:
-            os.ftruncate(self._fd, self._size)
+            os.ftruncate(self._fd, self._done[1])
         except OSError:
             self._failed += " (Its torn last line will be dropped then.)"
         return JournalError(self._failed)

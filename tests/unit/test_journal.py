@@ -213,6 +213,29 @@ def test_a_full_disk_ends_at_the_last_whole_record(
         assert again.append("event", {"kind": "note", "text": "z"}) == 6
 
 
+@pytest.mark.parametrize(("call", "kept"), [("write", 0), ("half", 0), ("fsync", 1)])
+def test_an_interrupted_record_leaves_the_next_one_its_number(
+    path: Path, monkeypatch: pytest.MonkeyPatch, call: str, kept: int
+) -> None:
+    """Ctrl-C or SIGTERM may strike anywhere in `append`; what comes then is still readable."""
+    write = os.write
+
+    def strike(fd: int, data: memoryview | None = None) -> int:
+        monkeypatch.undo()
+        if call == "half" and data is not None:
+            write(fd, data[: len(data) // 2])
+        raise KeyboardInterrupt
+
+    before = len(replay(path))
+    with Journal.reopen(path) as journal:
+        monkeypatch.setattr(os, "fsync" if call == "fsync" else "write", strike)
+        with pytest.raises(KeyboardInterrupt):
+            journal.append("event", {"kind": "note", "text": "struck"})
+        assert journal.append("event", {"kind": "note", "text": "next"}) == before + kept
+        journal.append("stop", {"reason": "interrupted"})
+    assert [r.number for r in replay(path)] == list(range(before + kept + 2))
+
+
 def test_wrong_kinds_and_values_are_the_programs_fault(path: Path) -> None:
     with Journal.reopen(path) as journal:
         with pytest.raises(ValueError, match="record kind"):
