@@ -10,6 +10,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.noise import ENCODER_OFFSET_RAD
 
+HALF = 0.5  # of the geometry is expected, and as much may be missing or there
 CROSSTALK = 0.005  # of a piezoelectric dynamometer, relative; data sheets allow 2 % at most
 
 
@@ -30,14 +31,14 @@ def prediction(bench: Bench) -> Array:
     """Stacked: what springs of `bench.compliance` predict."""
     if bench.rows.simulated is not None:
         return bench.stacked(bench.rows.simulated)
-    return bench.stacked(bench.slope * bench.load, bench.elastic)
+    return bench.stacked(bench.slope * bench.load, bench.elastic) + HALF * _geometry(bench)
 
 
 def base_columns(bench: Bench) -> Base:
     """The columns common to all hypotheses."""
     parts: list[tuple[str, Array, float]] = []
     parts += _springs(bench)
-    parts += _geometry(bench)
+    parts.append(("geometry", _geometry(bench), HALF))
     parts += _gains(bench)
     parts += _datums(bench)
     parts += _offsets(bench)
@@ -61,15 +62,15 @@ def _springs(bench: Bench) -> list[tuple[str, Array, float]]:
     return out
 
 
-def _geometry(bench: Bench) -> list[tuple[str, Array, float]]:
+def _geometry(bench: Bench) -> Array:
     """What the levers change as the joints give way, `1.5 F^2 d' T d` with d the deflection per
     newton and T the change of levers per deflection: some micrometres. Coefficient 1 for stiff
-    links and a load that keeps its direction; simulators that stay linear leave it out."""
+    links and a load that keeps its direction; a rig that is simulated linearly has none."""
     turned = np.stack([s.turned_lever for s in bench.data.setups])[bench.rows.setup]
     bends = np.einsum("nij,nj->ni", turned, bench.lever * bench.compliance)
     response = 1.5 * bench.load**2 * np.sum(bench.lever * bench.compliance * bends, axis=1)
     q = bends * bench.compliance * bench.load[:, None] ** 2
-    return [("geometry", bench.stacked(bench.sense * response, q), 1.0)]
+    return bench.stacked(bench.sense * response, q)
 
 
 def _gains(bench: Bench) -> list[tuple[str, Array, float]]:

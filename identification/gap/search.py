@@ -21,6 +21,7 @@ from identification.gap.compare import (
     score,
 )
 from identification.gap.data import Array
+from identification.gap.effects import WORDS
 from identification.gap.evidence import Engine, Level
 from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
 from identification.gap.variants import Variant
@@ -28,7 +29,6 @@ from identification.gap.variants import Variant
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
 LOG_ONE = log(0.37)
 LOG_MORE = log(0.05)
-WORD_COUNT = 18
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
 REMAINDER = 0.25
@@ -104,7 +104,7 @@ def prior_of(words: frozenset[str]) -> float:
     if not words:
         return LOG_NONE
     rare = sum(LOG_RARE.get(w, 0.0) for w in words)
-    return LOG_ONE + (len(words) - 1) * LOG_MORE - log(comb(WORD_COUNT, len(words))) + rare
+    return LOG_ONE + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(words))) + rare
 
 
 def search(engine: Engine, variants: list[Variant], deepest: int = 3) -> Found:
@@ -115,7 +115,7 @@ def search(engine: Engine, variants: list[Variant], deepest: int = 3) -> Found:
     alone = {w: _marginal(s) for w, s in by_word.items()}
     pool: dict[frozenset[str], Explanation] = {}
     for word, scored in by_word.items():
-        top = max(scored, key=lambda s: s.log_evidence)
+        top = _closest(scored)
         part = Part(top.variant, top.scale)
         pool[frozenset([word])] = _explain(engine, (part,), alone[word])
     none = log_mean([levels[0].log_base, levels[1].log_base], [0.95, 0.05])
@@ -223,6 +223,17 @@ def _marginal(scored: list[Scored]) -> float:
     return log_mean(values, weights)
 
 
+def _closest(scored: list[Scored]) -> Scored:
+    """Of the shapes of a word that are about equally likely, the one that needs least
+    imperfection: a word is judged by how well it can explain, not by its crudest shape."""
+    best = max(s.log_evidence for s in scored)
+    near = [s for s in scored if s.log_evidence > best - _ABOUT_EQUAL]
+    return min(near, key=lambda s: (s.level, -s.log_evidence))
+
+
+_ABOUT_EQUAL = 3.0  # nats
+
+
 def _deepen(
     engine: Engine,
     variants: list[Variant],
@@ -265,7 +276,7 @@ def _with_one_more(
     for word in promising:
         scored = found_words[word]
         words = start.words | {word}
-        top = max(scored, key=lambda s: s.log_evidence)
+        top = _closest(scored)
         parts = (*start.parts, Part(top.variant, top.scale))
         found = _explain(engine, parts, _marginal(scored))
         if words not in known or known[words].log_weight < found.log_weight:
@@ -282,7 +293,7 @@ def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Expl
         levels, energy = conditioned(engine, rest)
         family = [v for v in variants if v.word == word]
         scored = score(engine, _no_worse(levels), family, energy)
-        top = max(scored, key=lambda s: s.log_evidence)
+        top = _closest(scored)
         found = _explain(engine, (*rest, Part(top.variant, top.scale)), _marginal(scored))
         if found.log_weight > best.log_weight:
             best = found
@@ -392,8 +403,6 @@ def _conclude(
     none: float,
 ) -> Found:
     """Posterior over words as main cause; what leaves a large remainder counts as unknown."""
-    from identification.gap.effects import WORDS
-
     strange = [lv for lv in engine.levels if lv.eta > 0.6 * engine.bench.noise.stated]
     unknown = log_mean([lv.log_base for lv in strange]) + LOG_UNKNOWN
     eta = max(strange, key=lambda lv: lv.log_base).eta

@@ -52,6 +52,12 @@ def variants(bench: Bench) -> list[Variant]:
     columns = [column(hats[:, k]) for k in range(PIECES)]
     out.append(variant(WORD, "free path", columns, scales, path_root(), positive=False, prior=2.0,
                        path="free", names=("",)))  # fmt: skip
+    if len(axes) > 1:
+        each = [bench.add(component(bench, axis, hats[:, k]))
+                for axis in axes.values() for k in range(PIECES)]  # fmt: skip
+        root = np.kron(np.eye(len(axes)), path_root()).astype(float)
+        out.append(variant(WORD, "free path, each component", each, scales, root, positive=False,
+                           path="free", names=tuple(axes)))  # fmt: skip
     return out
 
 

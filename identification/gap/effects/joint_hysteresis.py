@@ -24,11 +24,23 @@ from identification.gap.history import Path, bristles, play, worked_in
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_hysteresis"
-RADII = (0.012, 0.03, 0.07, 0.13, 0.22, 0.35, 0.55, 0.85)  # of the joint's range of torque
+RADII = (
+    0.012,
+    0.03,
+    0.06,
+    0.1,
+    0.15,
+    0.2,
+    0.27,
+    0.36,
+    0.5,
+    0.7,
+    1.0,
+)  # of the joint's range of torque
 REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # Without unloading no loop is seen: what then bends at a large load is a knee, not friction.
-_SMALL = 4
+_SMALL = 5
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 
 

@@ -56,7 +56,8 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
         ahead = bench.load - _behind(bench, bench.load[:, None], kind, lag)[:, 0]
     else:
         ahead = _true_force(bench, kind, lag) - bench.load
-    return bench.force_column(bench.sense * ahead)
+    # unloaded, a force that lags still shows what is over
+    return bench.force_column(bench.sense * ahead) + bench.stacked(zero_force=-ahead)
 
 
 def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
