@@ -158,9 +158,9 @@ def _inward(key: Key, entry: Mapping[str, Any], place: tuple[str | int, ...]) ->
             raise FormError(at, f"{value!r} is not allowed; allowed: true or false.")
         return value
     if key.kind in ("vector", "six"):
-        wanted = 3 if key.kind == "vector" else 6
-        if not isinstance(value, list | tuple) or len(value) != wanted:
-            raise FormError(at, f"wants {'three' if wanted == 3 else 'six'} numbers.")
+        count = 3 if key.kind == "vector" else 6
+        if not isinstance(value, list | tuple) or len(value) != count:
+            raise FormError(at, f"wants {'three' if count == 3 else 'six'} numbers.")
         return tuple(_number(v, at) for v in value)
     if key.kind == "springs":
         return _springs(value, at)

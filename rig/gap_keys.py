@@ -26,8 +26,8 @@ CONTAINED = "contained_in"  # its numbers stand in another key of the model file
 @dataclass(frozen=True)
 class Key:
     """A key of the file: SI value times `factor`; kind: number, positive, size (0 or more), count,
-    text, vector, six (numbers), flag, springs. count: from 1 in the file, from 0 inside; springs: six stiffnesses
-    in the file, six compliances inside."""
+    text, vector, six (numbers), flag, springs. count: from 1 in the file, from 0 inside; springs:
+    six stiffnesses in the file, six compliances inside."""
 
     name: str
     kind: str = "number"

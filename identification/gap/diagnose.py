@@ -96,6 +96,8 @@ def diagnose_gap(
     found = search(engine, variants)
     tell("withheld data", 0.7)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
+    if not forced:
+        found, verdict = _earned(found, verdict)
     if forced:
         chosen = force(engine, variants, found.explanations, forced)
     else:
@@ -115,6 +117,30 @@ def _check_words(words: set[str] | frozenset[str]) -> None:
     for word in words:
         if word not in WORDS:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
+
+
+DEEP = 3  # effects of an explanation from which on withheld data must confirm it
+_FAILS = 2.5  # times what is fitted, or the noise: then a repetition was not foreseen
+
+
+def _earned(found: Found, verdict: str) -> tuple[Found, str]:
+    """A third effect must earn its place on withheld repetitions: where they are missed by far,
+    the explanation is a fit of this session, and most of its probability goes to `unknown`."""
+    chosen = _chosen(found, verdict)
+    fold = folds(found.engine).get("repetition")
+    if len(chosen.parts) < DEEP or fold is None:
+        return found, verdict
+    bench = found.engine.bench
+    left = found.engine.target[: bench.rows.n] - fit(found.engine, chosen).response
+    fitted = max(_sample_rms(bench, left), _noise(bench))
+    if held_out(found.engine, chosen, "repetition", fold).after < _FAILS * fitted:
+        return found, verdict
+    probabilities = dict(found.probabilities)
+    moved = 2 / 3 * probabilities[verdict]
+    probabilities[verdict] -= moved
+    probabilities["unknown"] += moved
+    verdict = max(probabilities, key=lambda w: probabilities[w])
+    return replace(found, probabilities=probabilities), verdict
 
 
 def _chosen(found: Found, verdict: str) -> Explanation:

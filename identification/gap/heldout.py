@@ -17,7 +17,6 @@ from identification.gap.fit import fit
 from identification.gap.search import Explanation
 
 BLOCKS = 5
-_DRAWS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +76,13 @@ def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) ->
         name,
         _rms(before[judged], bench.rows.weight[judged]),
         _rms(after[judged], bench.rows.weight[judged]),
-        _bootstrap(before[judged], after[judged], blocks[judged], bench.rows.weight[judged]),
+        _interval(
+            before[judged],
+            after[judged],
+            blocks[judged],
+            bench.rows.setup[judged],
+            bench.rows.weight[judged],
+        ),
     )
 
 
@@ -115,12 +120,27 @@ def _rms(values: Array, weight: Array) -> float:
     return float(np.sqrt(weight @ values**2 / weight.sum())) if weight.size else 0.0
 
 
-def _bootstrap(before: Array, after: Array, blocks: Ints, weight: Array) -> tuple[float, float]:
-    """95 % interval of the ratio over resampled blocks (runs, or blocks of time)."""
+def _interval(
+    before: Array, after: Array, blocks: Ints, setup: Ints, weight: Array
+) -> tuple[float, float]:
+    """95 % interval of the ratio from the scatter of its parts between the blocks of one setup
+    (runs, or blocks of time): linearised log ratio, Student's t. So few blocks can't be
+    bootstrapped, and blocks of different setups are no draws of one kind."""
+    from scipy.stats import t as student
+
     names, number = np.unique(blocks, return_inverse=True)
-    a = np.bincount(number, weights=weight * before**2, minlength=len(names))
-    b = np.bincount(number, weights=weight * after**2, minlength=len(names))
-    draw = np.random.default_rng(0).integers(0, len(names), (_DRAWS, len(names)))
-    ratio = np.sqrt(a[draw].sum(axis=1) / np.maximum(b[draw].sum(axis=1), 1e-300))
-    low, high = np.quantile(ratio, [0.025, 0.975])
-    return float(low), float(high)
+    of = setup[np.unique(number, return_index=True)[1]]
+    a = np.bincount(number, weights=weight * before**2)
+    b = np.bincount(number, weights=weight * after**2)
+    ratio = float(np.sqrt(a.sum() / max(float(b.sum()), 1e-300)))
+    part = 0.5 * (a / max(float(a.sum()), 1e-300) - b / max(float(b.sum()), 1e-300))
+    variance, freedom = 0.0, 0
+    for s in np.unique(of):
+        mine = part[of == s]
+        if len(mine) > 1:
+            variance += len(mine) * float(mine.var(ddof=1))
+            freedom += len(mine) - 1
+    if not freedom:
+        return 0.0, np.inf
+    half = float(student.ppf(0.975, freedom)) * variance**0.5
+    return ratio * float(np.exp(-half)), ratio * float(np.exp(min(half, 700.0)))

@@ -381,6 +381,24 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     return same or not engine.bench.has_q
 
 
+# Of 164 verdicts of the blind check on cases with foreign laws whose posterior was above 0.97, 150
+# were right: the families are not all that nature has, and the posterior does not know that.
+TRUST = 0.9
+
+
+def trusted(probabilities: dict[str, float], library: set[str]) -> dict[str, float]:
+    """Probabilities in which effects keep the share TRUST of theirs; the rest goes to `unknown`,
+    one half, and to all effects of the library alike. What says `none` or `unknown` stays."""
+    given = {w: p for w, p in probabilities.items() if w in library}
+    kept = 1.0 if len(given) < 2 else TRUST
+    doubt = (1 - kept) * sum(given.values())
+    out = {w: kept * p if w in given else p for w, p in probabilities.items()}
+    out["unknown"] += 0.5 * doubt
+    for w in given:
+        out[w] += 0.5 * doubt / len(given)
+    return out
+
+
 def _heir(explanation: Explanation, ranked: list[Explanation]) -> str:
     """Who gets the weight of an explanation that leaves too much for its number of effects: the
     best one with fewer of the same effects that explains enough for itself, else unknown."""
@@ -417,7 +435,7 @@ def _conclude(
     if engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
     total = sum(mass.values())
-    probabilities = {w: m / total for w, m in mass.items()}
+    probabilities = trusted({w: m / total for w, m in mass.items()}, set(alone))
     return Found(
         engine=engine,
         explanations=tuple(ranked),

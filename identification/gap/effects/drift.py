@@ -8,7 +8,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
-PIECES = 7  # of a free smooth path: slower than a run, faster than the session
+PIECES = 10  # of a free smooth path: slower than a run, faster than the session
 
 
 def warm_ups(bench: Bench) -> dict[str, Array]:
