@@ -128,7 +128,7 @@ def _interval(
     bootstrapped, and blocks of different setups are no draws of one kind."""
     from scipy.stats import t as student
 
-    names, number = np.unique(blocks, return_inverse=True)
+    _, number = np.unique(blocks, return_inverse=True)
     of = setup[np.unique(number, return_index=True)[1]]
     a = np.bincount(number, weights=weight * before**2)
     b = np.bincount(number, weights=weight * after**2)
@@ -140,7 +140,10 @@ def _interval(
         if len(mine) > 1:
             variance += len(mine) * float(mine.var(ddof=1))
             freedom += len(mine) - 1
-    if not freedom:
-        return 0.0, np.inf
+    if not freedom:  # one run alone: blocks of its time
+        if len(blocks) < 2 * BLOCKS:
+            return ratio, ratio
+        pieces = (np.arange(len(blocks)) * BLOCKS // len(blocks)).astype(np.int64)
+        return _interval(before, after, pieces, np.zeros_like(setup), weight)
     half = float(student.ppf(0.975, freedom)) * variance**0.5
     return ratio * float(np.exp(-half)), ratio * float(np.exp(min(half, 700.0)))

@@ -63,10 +63,13 @@ def _knee(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter
 
 
 def _hysteresis(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+    """Of the strengths that slip within the range."""
     radius = np.asarray(part.variant.info["radius"])
+    load = bench.torque[:, int(part.variant.info["joint"])]
+    slips = (radius < float(np.ptp(np.append(load, 0.0)))).astype(float)
     return {
-        "friction": _linear(radius, w, cov, _torque_unit(bench)),
-        "share_through_friction": _linear(np.ones(len(w)), w, cov, "1"),
+        "friction": _linear(slips * radius, w, cov, _torque_unit(bench)),
+        "share_through_friction": _linear(slips, w, cov, "1"),
     }
 
 

@@ -43,14 +43,18 @@ def parameters_of(
 
 
 def _likeliest(scored: list[Scored], part: Part) -> tuple[list[Scored], Array]:
-    """The chosen shape first, then others of its element, with their shares of the posterior."""
+    """The chosen shape first, then others of its element that meet the data as closely, with their
+    shares of the posterior."""
     mine = next(s for s in scored if s.variant is part.variant)
     place = _place(part.variant)
-    others = [s for s in scored if s is not mine and _place(s.variant) == place]
+    near = [s for s in scored if s is not mine and s.level <= mine.level]
+    others = [s for s in near if _place(s.variant) == place]
     ranked = [mine, *sorted(others, key=lambda s: -s.log_evidence)[: _MOST - 1]]
     weight = np.array([s.log_evidence for s in ranked])
     share = np.exp(weight - weight.max())
     share /= share.sum()
+    if share[0] < _LEAST_SHARE:  # chosen for its place beside the other effects
+        return [mine], np.ones(1)
     kept = np.flatnonzero((share >= _LEAST_SHARE) | (np.arange(len(ranked)) == 0))
     return [ranked[i] for i in kept], share[kept] / share[kept].sum()
 
