@@ -53,7 +53,9 @@ CONSTANTS: dict[str, Key] = {
     "channel": Key("channel", "text", options=("displacement", "force")),
     "lag": Key("lag_s", "positive"),
     "path": Key(
-        "path", "text", options=("linear", "root", "exponential", "rates", "free", "temperature")
+        "path",
+        "text",
+        options=("linear", "root", "exponential", "rates", "free", "temperature", "each run"),
     ),
     "about": Key("about_joint_stiffness_Nm_per_rad", "springs"),
     "about_offset": Key("about_offset_m", "vector"),
@@ -174,7 +176,7 @@ GRAMMAR: dict[str, Grammar] = {
     "time_lag": Grammar(("channel", "way", "lag"), (("share", ()),)),
     "force_drift": Grammar(
         ("path", "quantity", "about"),
-        (*_PATHS, *((c, (*shape, "along")) for c, shape in _PATHS)),
+        (*_PATHS, *((c, (*shape, "along")) for c, shape in _PATHS), ("drift_rate", ("run",))),
     ),
     "thermal_drift": Grammar(
         ("path", "quantity"), tuple((c, (*shape, "along")) for c, shape in _PATHS)
@@ -199,6 +201,8 @@ def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[tuple[str,
         fits = path in (None, constants.get("path"))
         if constants.get("path") == "rates":
             fits = coefficient in ("drift", "drift_rate")
+        if constants.get("path") == "each run":
+            fits = coefficient == "drift_rate" and shape == ("run",)
         if shape in (("strength",), ("reach",)):
             fits = (law == "Iwan") == (shape == ("strength",))
         if fits:

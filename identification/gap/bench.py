@@ -31,6 +31,9 @@ class Layout:
     size: int
 
 
+_DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
+
+
 @dataclass(frozen=True, eq=False)
 class Bench:
     """Rows, layout, noise, and what effects are built from.
@@ -102,6 +105,38 @@ class Bench:
             if power > 0:
                 out[mine] = max(float(weight @ (x * self.response[mine])) / power, 0.0)
         return out * self.load
+
+    @property
+    def zero_line(self) -> Array:
+        """(n,) N: what the force shows at zero load before and after a run, straight in between; 0
+        where it stands still within its noise, or was not read at both ends. A threshold is met
+        by the force less this; springs alone would not mind."""
+        rows, out = self.rows, np.zeros(self.rows.n)
+        if self.imposed:
+            return out
+        for run in np.unique(rows.run):
+            mine = np.flatnonzero(rows.run == run)
+            pushed = mine[~rows.zero[mine]]
+            if not pushed.size:
+                continue
+            ends = [mine[rows.zero[mine] & (mine < pushed[0])],
+                    mine[rows.zero[mine] & (mine > pushed[-1])]]  # fmt: skip
+            if not all(e.size for e in ends):
+                continue
+            weight = [rows.weight[e] for e in ends]
+            force = [np.average(rows.measured_force[e], weights=w)
+                     for e, w in zip(ends, weight, strict=True)]  # fmt: skip
+            time = [np.average(rows.session[e], weights=w)
+                    for e, w in zip(ends, weight, strict=True)]  # fmt: skip
+            sd = self.noise.force * float(np.sqrt(sum(1 / w.sum() for w in weight)))
+            if abs(force[1] - force[0]) > _DRIFTS * sd:
+                out[mine] = np.interp(rows.session[mine], time, force)
+        return out
+
+    @property
+    def true_load(self) -> Array:
+        """(n,) N: the load without the drift of its reading."""
+        return self.load - self.zero_line
 
     def reach_of(self, load: Array) -> float:
         """Range of a load with zero in it. Where the displacement is imposed: of what the rig

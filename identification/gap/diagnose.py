@@ -120,6 +120,7 @@ def _check_words(words: set[str] | frozenset[str]) -> None:
 
 
 DEEP = 3  # effects of an explanation from which on withheld data must confirm it
+_CLOSED = 0.1  # of the gap: if no more is left of it, it was explained all the same
 _FAILS = 2.5  # times what is fitted, or the noise: then a repetition was not foreseen
 
 
@@ -133,7 +134,8 @@ def _earned(found: Found, verdict: str) -> tuple[Found, str]:
     bench = found.engine.bench
     left = found.engine.target[: bench.rows.n] - fit(found.engine, chosen).response
     fitted = max(_sample_rms(bench, left), _noise(bench))
-    if held_out(found.engine, chosen, "repetition", fold).after < _FAILS * fitted:
+    held = held_out(found.engine, chosen, "repetition", fold)
+    if held.after < _FAILS * fitted or held.after < _CLOSED * held.before:
         return found, verdict
     probabilities = dict(found.probabilities)
     moved = 2 / 3 * probabilities[verdict]

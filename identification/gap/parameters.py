@@ -52,9 +52,12 @@ def _knee(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter
     near = np.sort(np.abs(radius - centre))
     # the grid's neighbours bound it; of the fine grid, one step
     half = float(near[1]) if len(near) > 1 else 0.017 * centre
+    slope = _linear(np.ones(len(w)), w, cov, "1")
+    least = part.variant.least  # what bends less does not give way
+    value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
     out = {
         "threshold": Parameter(centre, centre - half, centre + half, _torque_unit(bench)),
-        "slope_beyond_over_elastic": _linear(np.ones(len(w)), w, cov, "1"),
+        "slope_beyond_over_elastic": Parameter(value, low, high, "1"),
     }
     if info["flow_s"]:
         flow = float(info["flow_s"])

@@ -81,6 +81,8 @@ def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.
     """The result as if one shape of the word had been found; its contribution (n,)."""
     bench = replace(result.bench, columns=[])
     variants = library(bench, (word,))
+    if word == "time_lag":  # a lag of the force is undone from its readings; a plan has none
+        variants = [v for v in variants if v.info["channel"] == "displacement"]
     v: Variant = variants[pick * (len(variants) - 1) // 4]
     columns = np.column_stack([bench.columns[c] for c in v.columns])
     top = np.abs(columns[: bench.rows.n]).max(axis=0)

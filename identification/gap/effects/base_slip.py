@@ -37,5 +37,5 @@ def variants(bench: Bench) -> list[Variant]:
 
             name = f"axis {'xyz'[axis]} {depth:g} m below"
             info = {"axis": axis, "depth_m": depth}
-            out += knee_variants(bench, lever * bench.load, column, WORD, name, info)
+            out += knee_variants(bench, lever * bench.true_load, column, WORD, name, info)
     return out

@@ -43,6 +43,7 @@ def variants(bench: Bench) -> list[Variant]:
             each = [bench.add(component(bench, axis, path)) for axis in axes.values()]
             out.append(variant(WORD, f"{label}, each component", each, scales, positive=False,
                                path=label, names=tuple(axes)))  # fmt: skip
+    out += _each_run(bench, scales)
     rates = [c for label, c in common.items() if label != "root"]
     out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
@@ -59,6 +60,21 @@ def variants(bench: Bench) -> list[Variant]:
         out.append(variant(WORD, "free path, each component", each, scales, root, positive=False,
                            path="free", names=tuple(axes)))  # fmt: skip
     return out
+
+
+def _each_run(bench: Bench, scales: tuple[float, ...]) -> list[Variant]:
+    """An amplifier that is reset before every run drifts on at another rate each time."""
+    rows = bench.rows
+    runs = np.unique(rows.run)
+    if bench.data.tare != "run" or len(runs) < 2:
+        return []
+    columns = []
+    for r in runs:
+        mine = rows.run == r
+        t = np.where(mine, rows.session - rows.session[mine].min(), 0.0)
+        columns.append(bench.add(drifting(bench, t / max(float(t.max()), 1e-9))))
+    return [variant(WORD, "each run", columns, scales, positive=False, path="each run",
+                    names=tuple(f"run{r + 1}" for r in runs))]  # fmt: skip
 
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

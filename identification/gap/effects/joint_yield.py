@@ -49,7 +49,7 @@ def variants(bench: Bench) -> list[Variant]:
             return bench.add_joint(j, bench.sense * c * state)
 
         out += knee_variants(
-            bench, bench.torque[:, j], column, WORD, f"joint {j + 1}", {"joint": j}
+            bench, bench.lever[:, j] * bench.true_load, column, WORD, f"joint {j + 1}", {"joint": j}
         )
     return out
 

@@ -49,6 +49,11 @@ def lag(bench: Bench, law: Law) -> list[Array]:
 
 def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms of the path."""
+    if v.info["path"] == "each run":
+        runs = [int(name.removeprefix("run")) - 1 for name in v.info["names"]]
+        spans = [float(np.ptp(bench.rows.session[bench.rows.run == r])) or 1.0 for r in runs]
+        each_run = tuple(Term("drift_rate", {"run": r}) for r in runs)
+        return Law({"path": "each run", "quantity": "force"}, each_run), 1 / np.array(spans)
     constants, terms, scale = _path(bench, str(v.info["path"]))
     law = constants | {"quantity": "force"}
     if v.info["names"] == ("",):
@@ -75,6 +80,12 @@ def drift_of_force(bench: Bench, law: Law) -> list[Array]:
     """Measured = true + d(t), less what was tared away; zero plateaus show d itself."""
     out = []
     for t in law.terms:
+        if "run" in t.shape:
+            mine = bench.rows.run == t.shape["run"]
+            begin = bench.rows.session[mine].min() if mine.any() else 0.0
+            since = np.where(mine, bench.rows.session - begin, 0.0)
+            out.append(force_drift.drifting(bench, since))
+            continue
         if "along" in t.shape:
             out.append(force_drift.component(bench, t.shape["along"], _moved(bench, law, t)))
             continue

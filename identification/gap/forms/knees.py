@@ -47,10 +47,10 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     """Column of every play: state of radius `threshold` on the torque (or moment), lagging."""
     c = law.constants
     if "joint" in c:
-        load = bench.torque[:, c["joint"]]
+        load = bench.lever[:, c["joint"]] * bench.true_load
     else:
         lever = moments(bench, c["depth"])[:, "xyz".index(c["axis"])]
-        load = lever * bench.load
+        load = lever * bench.true_load
     out = []
     for state in _states(bench, law, load):
         if "joint" in c:
