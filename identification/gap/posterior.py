@@ -73,7 +73,9 @@ def _mixture(each: list[Parameter], share: Array) -> Parameter:
     ends = np.array([[p.value, p.low, p.high] for p in each])
     # what spans factors (a time constant, a force scale) is mixed by its logarithm
     factors = np.all(ends > 0) and np.any(ends[:, 2] > 1.5 * ends[:, 1])
-    skewed = bool(factors and np.allclose(ends[:, 2] * ends[:, 1], ends[:, 0] ** 2, rtol=0.1))
+    skewed = bool(
+        factors and np.allclose(ends[:, 2] * ends[:, 1], ends[:, 0] ** 2, rtol=0.1, atol=0)
+    )
     mean, low, high = (np.log(ends) if skewed else ends).T
     sd = np.maximum(high - low, 0.0) / (2 * _TWO_SIDED) + 1e-300
     out = [float(share @ mean), *(_quantile(mean, sd, share, q) for q in (0.025, 0.975))]

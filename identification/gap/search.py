@@ -383,16 +383,19 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
 
 # Of 164 verdicts of the blind check on cases with foreign laws whose posterior was above 0.97, 150
 # were right: the families are not all that nature has, and the posterior does not know that.
-TRUST = 0.9
+DOUBT = 0.1
 
 
 def trusted(probabilities: dict[str, float], library: set[str]) -> dict[str, float]:
-    """Probabilities in which effects keep the share TRUST of theirs; the rest goes to `unknown`,
-    one half, and to all effects of the library alike. What says `none` or `unknown` stays."""
+    """Probabilities in which an effect gives up to DOUBT of its own away, the more the surer it
+    is; half of that goes to `unknown`, half to all effects of the library alike. What says `none`
+    or `unknown` stays."""
     given = {w: p for w, p in probabilities.items() if w in library}
-    kept = 1.0 if len(given) < 2 else TRUST
-    doubt = (1 - kept) * sum(given.values())
-    out = {w: kept * p if w in given else p for w, p in probabilities.items()}
+    if len(given) < 2:
+        return probabilities
+    lost = {w: DOUBT * p**2 for w, p in given.items()}
+    doubt = sum(lost.values())
+    out = {w: p - lost.get(w, 0.0) for w, p in probabilities.items()}
     out["unknown"] += 0.5 * doubt
     for w in given:
         out[w] += 0.5 * doubt / len(given)
