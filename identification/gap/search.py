@@ -387,13 +387,13 @@ DOUBT = 0.1
 
 
 def trusted(probabilities: dict[str, float], library: set[str]) -> dict[str, float]:
-    """Probabilities in which an effect gives up to DOUBT of its own away, the more the surer it
-    is; half of that goes to `unknown`, half to all effects of the library alike. What says `none`
+    """Probabilities in which an effect that is likelier than not gives up to DOUBT of its own away,
+    the more the surer it is; half of that goes to `unknown`, half to all effects of the library alike. What says `none`
     or `unknown` stays."""
     given = {w: p for w, p in probabilities.items() if w in library}
     if len(given) < 2:
         return probabilities
-    lost = {w: DOUBT * p**2 for w, p in given.items()}
+    lost = {w: DOUBT * p * max(0.0, 2 * p - 1) for w, p in given.items()}
     doubt = sum(lost.values())
     out = {w: p - lost.get(w, 0.0) for w, p in probabilities.items()}
     out["unknown"] += 0.5 * doubt
