@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import GapData
-from identification.gap.diagnose import Effect, GapResult, diagnose_gap
+from identification.gap.data import BRANCH_NAMES, GapData
+from identification.gap.diagnose import Effect, GapResult, check_words, diagnose_gap
 from identification.gap.forms.known import less_known
 from identification.gap.heldout import HeldOut
 from identification.gap.parameters import Parameter
@@ -59,6 +59,7 @@ class Diagnosis:
                 "alternatives": [asdict(o) for o in r.next_measurement.alternatives],
             },
             "remainder_mm": r.remainder * MM,
+            "remainder": _remainder(r),
             "runners_up": {w: {"held_out_after_rms_mm": v * MM} for w, v in r.runners_up.items()},
             "notes": list(r.notes),
             "known_effects": [e["name"] for e in self.known_effects],
@@ -93,16 +94,18 @@ def diagnose(
         data, known = _believing(dataset, model)
     if simulation is not None:
         data = _with_curves(data, simulation)
+    out, forced = tuple(withhold), tuple(add)
     try:
-        result = diagnose_gap(
-            data,
-            withhold=withhold,
-            add=add,
-            others=lambda: elsewhere(dataset),
-            progress=progress,
-        )
+        check_words({*out, *forced})
     except ValueError as error:
         raise InputError(f"{dataset.path or 'data set'}: {error}.") from error
+    result = diagnose_gap(
+        data,
+        withhold=out,
+        add=forced,
+        others=lambda: elsewhere(dataset),
+        progress=progress,
+    )
     return Diagnosis(dataset.uuid, result, dataset.banners(), known)
 
 
@@ -216,6 +219,24 @@ def _gap(r: GapResult) -> dict[str, Any]:
         "shrink_factor": r.before / r.after if r.after > 0 else 1.0,
         "held_out": held[0] if held else None,
         "held_out_other": held[1:],
+    }
+
+
+def _remainder(r: GapResult) -> dict[str, Any]:
+    """How large what nobody explains is, and where: a flexible curve over what the fit leaves."""
+    from identification.gap.remainder import remainder
+
+    rest = remainder(r.engine, r.fit)
+    largest = None
+    if rest.largest is not None:
+        at = rest.largest
+        largest = {"pose": at.pose, "direction": at.direction, "branch": BRANCH_NAMES[at.branch],
+                   "force_N": at.force, "mean_mm": at.mean * MM, "sd_mm": at.sd * MM}  # fmt: skip
+    return {
+        "rms_mm": rest.rms * MM,
+        "ci95": [v * MM for v in rest.ci95],
+        "unrepeated_rms_mm": rest.unrepeated_rms * MM,
+        "largest": largest,
     }
 
 

@@ -176,7 +176,7 @@ GRAMMAR: dict[str, Grammar] = {
     "time_lag": Grammar(("channel", "way", "lag"), (("share", ()),)),
     "force_drift": Grammar(
         ("path", "quantity", "about"),
-        (*_PATHS, *((c, (*shape, "along")) for c, shape in _PATHS), ("drift_rate", ("run",))),
+        (*_PATHS, *((c, (*shape, "along")) for c, shape in _PATHS), ("drift", ("run", "along"))),
     ),
     "thermal_drift": Grammar(
         ("path", "quantity"), tuple((c, (*shape, "along")) for c, shape in _PATHS)
@@ -202,7 +202,7 @@ def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[tuple[str,
         if constants.get("path") == "rates":
             fits = coefficient in ("drift", "drift_rate")
         if constants.get("path") == "each run":
-            fits = coefficient == "drift_rate" and shape == ("run",)
+            fits = coefficient == "drift" and shape == ("run", "along")
         if shape in (("strength",), ("reach",)):
             fits = (law == "Iwan") == (shape == ("strength",))
         if fits:

@@ -80,7 +80,7 @@ def diagnose_gap(
     unknown words."""
     tell = progress or _silent
     out, forced = set(withhold), frozenset(add)
-    _check_words(out | forced)
+    check_words(out | forced)
     tell("preparing", 0.0)
     bench = make_bench(data)
     base = base_columns(bench)
@@ -113,7 +113,8 @@ def _silent(_: str, __: float) -> None:
     """Progress that nobody looks at."""
 
 
-def _check_words(words: set[str] | frozenset[str]) -> None:
+def check_words(words: set[str] | frozenset[str]) -> None:
+    """Raises ValueError for a word that is no effect."""
     for word in words:
         if word not in WORDS:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')

@@ -172,7 +172,8 @@ def _drift(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
             f[mine.start], f[mine.stop - 1] = -1.0, 1.0
         else:
             f[mine] = 1.0
-        key = "drift_over_session" + (f"_{name}" if name else "")
+        over = "drift" if path == "each run" else "drift_over_session"
+        key = over + (f"_{name}" if name else "")
         out[key] = _linear(f, w, cov, unit, scale)
     return out
 

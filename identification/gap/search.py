@@ -388,8 +388,8 @@ DOUBT = 0.1
 
 def trusted(probabilities: dict[str, float], library: set[str]) -> dict[str, float]:
     """Probabilities in which an effect that is likelier than not gives up to DOUBT of its own away,
-    the more the surer it is; half of that goes to `unknown`, half to all effects of the library alike. What says `none`
-    or `unknown` stays."""
+    the more the surer it is; half of that goes to `unknown`, half to all effects of the library
+    alike. What says `none` or `unknown` stays."""
     given = {w: p for w, p in probabilities.items() if w in library}
     if len(given) < 2:
         return probabilities

@@ -63,18 +63,25 @@ def variants(bench: Bench) -> list[Variant]:
 
 
 def _each_run(bench: Bench, scales: tuple[float, ...]) -> list[Variant]:
-    """An amplifier that is reset before every run drifts on at another rate each time."""
-    rows = bench.rows
-    runs = np.unique(rows.run)
+    """Amplifiers that are reset before every run drift on at another rate each time."""
+    runs = np.unique(bench.rows.run)
     if bench.data.tare != "run" or len(runs) < 2:
         return []
-    columns = []
-    for r in runs:
-        mine = rows.run == r
-        t = np.where(mine, rows.session - rows.session[mine].min(), 0.0)
-        columns.append(bench.add(drifting(bench, t / max(float(t.max()), 1e-9))))
+    axes = AXES if bench.rows.tangential is not None else _axes(bench)
+    places = [(int(r), name) for r in runs for name in axes]
+    columns = [bench.add(component(bench, AXES[name], since(bench, r))) for r, name in places]
+    names = tuple(f"{name}_run{r + 1}" for r, name in places)
     return [variant(WORD, "each run", columns, scales, positive=False, path="each run",
-                    names=tuple(f"run{r + 1}" for r in runs))]  # fmt: skip
+                    names=names, places=places)]  # fmt: skip
+
+
+def since(bench: Bench, run: int) -> Array:
+    """(n,): share of a run that is over, 0 in other runs."""
+    mine = bench.rows.run == run
+    if not mine.any():
+        return np.zeros(bench.rows.n)
+    t = np.where(mine, bench.rows.session - bench.rows.session[mine].min(), 0.0)
+    return np.asarray(t / (float(t.max()) or 1.0))
 
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

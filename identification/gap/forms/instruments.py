@@ -50,10 +50,11 @@ def lag(bench: Bench, law: Law) -> list[Array]:
 def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms of the path."""
     if v.info["path"] == "each run":
-        runs = [int(name.removeprefix("run")) - 1 for name in v.info["names"]]
-        spans = [float(np.ptp(bench.rows.session[bench.rows.run == r])) or 1.0 for r in runs]
-        each_run = tuple(Term("drift_rate", {"run": r}) for r in runs)
-        return Law({"path": "each run", "quantity": "force"}, each_run), 1 / np.array(spans)
+        each_run = tuple(
+            Term("drift", {"run": r, "along": force_drift.AXES[name]})
+            for r, name in v.info["places"]
+        )
+        return Law({"path": "each run", "quantity": "force"}, each_run), np.ones(len(each_run))
     constants, terms, scale = _path(bench, str(v.info["path"]))
     law = constants | {"quantity": "force"}
     if v.info["names"] == ("",):
@@ -81,10 +82,8 @@ def drift_of_force(bench: Bench, law: Law) -> list[Array]:
     out = []
     for t in law.terms:
         if "run" in t.shape:
-            mine = bench.rows.run == t.shape["run"]
-            begin = bench.rows.session[mine].min() if mine.any() else 0.0
-            since = np.where(mine, bench.rows.session - begin, 0.0)
-            out.append(force_drift.drifting(bench, since))
+            path = force_drift.since(bench, t.shape["run"])
+            out.append(force_drift.component(bench, t.shape["along"], path))
             continue
         if "along" in t.shape:
             out.append(force_drift.component(bench, t.shape["along"], _moved(bench, law, t)))
