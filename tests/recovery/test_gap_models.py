@@ -108,7 +108,9 @@ def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.
     return found, np.column_stack([plain, columns[:n] @ (w * kept)])
 
 
-@pytest.mark.parametrize("pick", [0, 2, 4])
+@pytest.mark.parametrize(
+    "pick", [0, pytest.param(2, marks=pytest.mark.slow), pytest.param(4, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("word", WORDS)
 def test_a_model_predicts_on_its_own_procedure_what_was_fitted(
     planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path, word: str, pick: int
