@@ -12,14 +12,11 @@ Messages are one JSON object a line. In: the rig to emulate, then {"fault": {"de
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import select
 import signal
-import subprocess
 import sys
-import tempfile
 import textwrap
 import threading
 import time
@@ -27,9 +24,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 from drivers.errors import CannotConnect, DeviceError
+from rig.child_process import ChildProcess
 from rig.emulation_child import ENDING_S, Child
 from rig.errors import InputError
 
@@ -68,9 +66,8 @@ class EmulatedRig:
             "programs": {name: list(q) for name, q in (programs or {}).items()},
             "zero_after_s": zero_after_s,
         }
-        self._child: subprocess.Popen[bytes] | None = None
+        self._child: ChildProcess | None = None
         self._lines: _Lines | None = None
-        self._log: IO[bytes] | None = None
 
     def start(self, deadline_s: float = 20.0) -> Station:
         """Starts the child; returns the station with every "emulated" replaced by an address.
@@ -102,18 +99,10 @@ class EmulatedRig:
         child, self._child = self._child, None
         if child is None:
             return
-        assert child.stdin is not None
-        with contextlib.suppress(OSError):  # it has ended already
-            child.stdin.close()  # tells it to end
-        try:
-            child.wait(timeout=ENDING_S + 1.0)
-        except subprocess.TimeoutExpired:
-            child.kill()
-            child.wait(timeout=ENDING_S)
-        if child.stdout is not None:
-            child.stdout.close()
-        if self._log is not None:
-            self._log.close()
+        child.close_input()  # tells it to end
+        if not child.ended_within(ENDING_S + 1.0):
+            child.kill(ENDING_S)
+        child.close()
 
     def __enter__(self) -> Station:
         return self.start()
@@ -134,29 +123,14 @@ class EmulatedRig:
     def _spawn(self) -> None:
         if self._child is not None:
             raise RuntimeError("the emulated rig is running already")
-        root = str(Path(__file__).resolve().parent.parent)
-        inherited = os.environ.get("PYTHONPATH")
-        path = os.pathsep.join([root, inherited] if inherited else [root])
-        # What libraries print must not reach the terminal; `stop` closes it.
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115
-        self._child = subprocess.Popen(
-            [sys.executable, "-m", "rig.emulation"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._log,
-            env={**os.environ, "PYTHONPATH": path},
-            start_new_session=True,  # Ctrl-C is for the measuring process, which ends this one
-        )
-        assert self._child.stdout is not None
-        self._lines = _Lines(self._child.stdout.fileno())
+        self._child = ChildProcess("rig.emulation")
+        self._lines = _Lines(self._child.output.fileno())
 
     def _ask(self, message: Mapping[str, Any], deadline_s: float) -> dict[str, Any]:
         if self._child is None or self._lines is None:
             raise RuntimeError("the emulated rig is not running")
-        assert self._child.stdin is not None
         try:
-            self._child.stdin.write(json.dumps(message).encode() + b"\n")
-            self._child.stdin.flush()
+            self._child.send(json.dumps(message).encode() + b"\n")
             line = self._lines.next(deadline_s)
         except (BrokenPipeError, EOFError):
             raise CannotConnect("emulation", self._how_it_ended(), REMEDY) from None
@@ -172,15 +146,10 @@ class EmulatedRig:
 
     def _how_it_ended(self) -> str:
         assert self._child is not None
-        assert self._log is not None
-        try:
-            code: object = self._child.wait(timeout=1.0)
-        except subprocess.TimeoutExpired:
-            code = "unknown"
-        self._log.seek(0)
-        last = self._log.read().decode(errors="replace").strip().splitlines()[-1:]
-        words = "".join(f": {line.rstrip('.')}" for line in last)
-        return f"the process of the emulators has ended, status {code}{words}"
+        ending = self._child.ending()
+        status = "unknown" if ending.status is None else ending.status
+        words = f": {ending.line.rstrip('.')}" if ending.line else ""
+        return f"the process of the emulators has ended, status {status}{words}"
 
 
 class _Lines:

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import secrets
 import socket
-import subprocess
-import sys
-import tempfile
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
+from rig.child_process import ChildProcess
 from rig.panel.guard import authority, is_loopback
 from rig.panel.state import State, to_json
 
@@ -60,8 +56,7 @@ class PanelLink:
 
     def __init__(self, receive: Receive) -> None:
         self._receive = receive
-        self._child: subprocess.Popen[bytes] | None = None
-        self._log: IO[bytes] | None = None
+        self._child: ChildProcess | None = None
         self._ready = threading.Event()
         self._first: Mapping[str, Any] = {}
         self._wake = threading.Condition()
@@ -83,7 +78,7 @@ class PanelLink:
             "operator_token": secrets.token_urlsafe(24),
             "viewer_token": secrets.token_urlsafe(24),
         }
-        self._spawn()
+        self._child = ChildProcess("rig.panel")
         self._reader.start()
         with contextlib.suppress(OSError):  # it has ended already; the lack of a reply says so
             self._send(json.dumps(settings).encode() + b"\n")
@@ -121,30 +116,14 @@ class PanelLink:
             self._end = {"phase": phase, "text": text}
             self._wake.notify()
         self._writer.join(ENDING_S)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            if self._child is not None and not self._writer.is_alive():
-                self._child.wait(ENDING_S)
+        if self._child is not None and not self._writer.is_alive():
+            self._child.ended_within(ENDING_S)
         self._kill()
 
     @property
     def alive(self) -> bool:
         """Whether the page is still being served."""
         return not self.trouble and self._end is None
-
-    def _spawn(self) -> None:
-        root = str(Path(__file__).resolve().parents[2])
-        inherited = os.environ.get("PYTHONPATH")
-        path = os.pathsep.join([root, inherited] if inherited else [root])
-        # What libraries print must not reach the terminal; `_kill` closes it.
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115
-        self._child = subprocess.Popen(
-            [sys.executable, "-m", "rig.panel"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._log,
-            env={**os.environ, "PYTHONPATH": path},
-            start_new_session=True,  # Ctrl-C is for the measuring process, which ends this one
-        )
 
     def _write(self) -> None:
         while True:
@@ -167,15 +146,9 @@ class PanelLink:
                 self._lost()
                 return
             if end is not None:
-                self._close_input()
+                assert self._child is not None
+                self._child.close_input()  # the process can't end while it still listens
                 return
-
-    def _close_input(self) -> None:
-        """No more comes: the process may end, which it can't while it still listens."""
-        assert self._child is not None
-        assert self._child.stdin is not None
-        with contextlib.suppress(OSError):
-            self._child.stdin.close()
 
     def _due(self) -> bool:
         fresh = self._state is not None and time.monotonic() >= self._next_state
@@ -187,15 +160,12 @@ class PanelLink:
 
     def _send(self, data: bytes) -> None:
         assert self._child is not None
-        assert self._child.stdin is not None
-        self._child.stdin.write(data)
-        self._child.stdin.flush()
+        self._child.send(data)
 
     def _read(self) -> None:
         assert self._child is not None
-        assert self._child.stdout is not None
         with contextlib.suppress(ValueError):  # closed by _kill
-            for line in self._child.stdout:
+            for line in self._child.output:
                 message = json.loads(line)
                 if not self._ready.is_set():
                     self._first = message
@@ -219,32 +189,17 @@ class PanelLink:
 
     def _how_it_ended(self) -> str:
         assert self._child is not None
-        assert self._log is not None
-        try:
-            code: object = self._child.wait(timeout=1.0)
-        except subprocess.TimeoutExpired:
+        ending = self._child.ending()
+        if ending.status is None:
             return "its process does not answer"
-        with contextlib.suppress(ValueError):  # closed already
-            self._log.seek(0)
-            last = self._log.read().decode(errors="replace").strip().splitlines()[-1:]
-            return f"its process has ended, status {code}" + "".join(f": {line}" for line in last)
-        return f"its process has ended, status {code}"
+        return f"its process has ended, status {ending.status}" + f": {ending.line}" * bool(ending.line)
 
     def _kill(self) -> None:
-        child = self._child
-        if child is None:
+        if self._child is None:
             return
-        assert child.stdin is not None
-        assert child.stdout is not None
-        if child.poll() is None:
-            child.kill()
-            child.wait()
-        for pipe in (child.stdin, child.stdout):
-            with contextlib.suppress(OSError):
-                pipe.close()
-        self._reader.join(1.0)
-        if self._log is not None:
-            self._log.close()
+        self._child.kill()
+        self._reader.join(1.0)  # it has read to the end
+        self._child.close()
 
 
 def _links(settings: Mapping[str, Any], port: int) -> Links:

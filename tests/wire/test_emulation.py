@@ -318,8 +318,11 @@ def test_the_child_by_hand_with_a_wrong_file() -> None:
 
 def test_rig_emulate_shows_all_and_ends_by_ctrl_c() -> None:
     code = (
+        "import signal\n"
         "from rig.emulation import serve_by_hand\n"
         "from rig.station import load_station\n"
+        # a test run in the background of a shell hands down that Ctrl-C is ignored
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "serve_by_hand(load_station('emulated'))"
     )
     process = subprocess.Popen(
