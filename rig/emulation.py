@@ -101,7 +101,7 @@ class EmulatedRig:
             return
         child.close_input()  # tells it to end
         if not child.ended_within(ENDING_S + 1.0):
-            child.kill(ENDING_S)
+            child.kill()
         child.close()
 
     def __enter__(self) -> Station:

@@ -192,7 +192,8 @@ class PanelLink:
         ending = self._child.ending()
         if ending.status is None:
             return "its process does not answer"
-        return f"its process has ended, status {ending.status}" + f": {ending.line}" * bool(ending.line)
+        words = f": {ending.line}" if ending.line else ""
+        return f"its process has ended, status {ending.status}{words}"
 
     def _kill(self) -> None:
         if self._child is None:
