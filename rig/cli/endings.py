@@ -1,0 +1,58 @@
+"""Every ending of the command and its exit status; no traceback for users."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import traceback
+from types import TracebackType
+
+import typer
+
+from rig.cli.commands import app
+from rig.cli.options import say
+
+
+def main() -> None:
+    """Runs the command and turns every ending into its exit status; no traceback for users."""
+    from rig.errors import InputError, MeasurementStopped
+    from rig.intruders import refuse_intruders
+
+    sys.excepthook = _report_bug
+    try:
+        refuse_intruders()
+        _run()
+    except InputError as error:
+        _end(2, str(error))
+    except MeasurementStopped as error:
+        _end(4, f"Stopped: {error}")
+
+
+def _run() -> None:
+    # Only now: another distribution's `drivers` would fail here before it could be named.
+    from drivers.errors import DeviceError, SafetyStop
+
+    try:
+        # Ends the process itself: 0 done, 2 wrong arguments, 130 interrupted. Calling `app`
+        # would put typer's hook, which prints tracebacks, in place of ours.
+        typer.main.get_command(app)()
+    except SafetyStop as error:
+        _end(4, f"Stopped for safety. {error}")
+    except DeviceError as error:
+        _end(3, str(error))
+
+
+def _end(status: int, message: str) -> None:
+    say(message)
+    sys.exit(status)
+
+
+def _report_bug(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """What nobody foresaw: the traceback goes to a file, one message to the user."""
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="rig-bug-", suffix=".txt", delete=False, encoding="utf-8"
+    ) as file:
+        traceback.print_exception(kind, error, trace, file=file)
+    say(f"This is a bug in rig ({kind.__name__}: {error}). Please report it with {file.name}.")

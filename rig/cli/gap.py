@@ -1,0 +1,148 @@
+"""Commands about the sim-to-real gap: diagnose, blind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rig.cli.options import DatasetArgument, FiguresOption, JsonOption, give, list_written, say
+
+if TYPE_CHECKING:
+    from rig.dataset import Dataset
+    from rig.diagnose import Diagnosis
+
+_Model = Annotated[
+    Path | None,
+    typer.Option(metavar="MODEL.yaml", help="Springs and effects to believe, not META's."),
+]
+_Simulation = Annotated[
+    Path | None,
+    typer.Option(metavar="CURVES.csv", help="Curves of another simulator, instead of META's."),
+]
+_Add = Annotated[
+    list[str] | None,
+    typer.Option(metavar="WORD", help="An effect that the explanation must contain."),
+]
+_Withhold = Annotated[
+    list[str] | None, typer.Option(metavar="WORD", help="An effect to take out of the library.")
+]
+_WriteModel = Annotated[
+    Path | None,
+    typer.Option(metavar="MODEL.yaml", help="Write the simulation with the effects found."),
+]
+_Next = Annotated[
+    Path | None,
+    typer.Option("--next", metavar="PROTOCOL.yaml", help="Write what to measure next."),
+]
+_Cases = Annotated[int, typer.Option(metavar="N", help="How many are drawn.", min=1)]
+_Seed = Annotated[int, typer.Option(metavar="S", help="The same seed, the same cases.", min=0)]
+_WithholdInHalf = Annotated[
+    str,
+    typer.Option(
+        metavar="WORD",
+        help="Take this effect out of the library and draw it in every second case: then "
+        "`unknown` is right; each: every word in turn.",
+    ),
+]
+_Jobs = Annotated[
+    int | None,
+    typer.Option(metavar="J", help="Diagnoses at a time; left out: all cores.", min=1),
+]
+_SnrMin = Annotated[
+    float, typer.Option(help="Score gaps from so many times the noise; all are drawn.", min=0)
+]
+_Deadline = Annotated[
+    float, typer.Option(metavar="SECONDS", help="A later answer counts as wrong.", min=1)
+]
+_Generator = Annotated[
+    str,
+    typer.Option(
+        help="hidden: worlds of this project; mujoco: another engine's; mujoco-small-turns: "
+        "that one without the curvature that large turns make."
+    ),
+]
+_Keep = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Keep data sets and answers in this new folder."),
+]
+
+
+def diagnose(
+    dataset: DatasetArgument,
+    model: _Model = None,
+    simulation: _Simulation = None,
+    add: _Add = None,
+    withhold: _Withhold = None,
+    write_model: _WriteModel = None,
+    next_file: _Next = None,
+    figures: FiguresOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """The sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
+    from rig.dataset import load
+    from rig.diagnose import diagnose as run_diagnose
+    from rig.terminal import terminal_progress
+
+    with terminal_progress() as progress:
+        measured = load(dataset)
+        result = run_diagnose(
+            measured, model=model, simulation=simulation,
+            add=add or (), withhold=withhold or (), progress=progress,
+        )  # fmt: skip
+    give(result, json_file)
+    if not (model or simulation or add or withhold):
+        from rig.catalogue import remember_result
+
+        remember_result(dataset, result)
+    _write(result, measured, write_model, next_file)
+    if figures is not None:
+        from rig.gap_figures import draw
+
+        list_written(draw(result, figures, dataset.name))
+
+
+def _write(result: Diagnosis, measured: Dataset, model: Path | None, protocol: Path | None) -> None:
+    """The model with its effects and the next protocol, where asked for."""
+    if model is not None:
+        from rig.gap_model import write_model
+
+        write_model(result, measured, model)
+        say(f"{model}: written. Next: rig simulate {model} PROTOCOL.yaml")
+    if protocol is not None:
+        from rig.next_protocol import write_next
+
+        say(write_next(result, measured, protocol))
+
+
+def blind(
+    cases: _Cases = 100,
+    seed: _Seed = 1,
+    withhold: _WithholdInHalf = "",
+    jobs: _Jobs = None,
+    snr_min: _SnrMin = 3.0,
+    deadline: _Deadline = 120.0,
+    generator: _Generator = "hidden",
+    keep: _Keep = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Draw measurements with hidden effects, diagnose them, open the answers, score."""
+    from rig.blind import command
+    from rig.blind.campaign import Plan
+    from rig.terminal import terminal_progress
+
+    plan = Plan(
+        cases=cases,
+        seed=seed,
+        withhold=withhold,
+        jobs=jobs or command.all_cores(),
+        deadline_s=deadline,
+        generator=generator,
+        snr_min=snr_min,
+    )
+    with terminal_progress() as progress:
+        result = command.blind(plan, keep=keep, progress=progress)
+    give(result, json_file)
+    if result.interrupted:
+        raise typer.Exit(130)

@@ -1,0 +1,85 @@
+"""Commands about models: couple, simulate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.options import (
+    FiguresOption,
+    JsonOption,
+    ModelArgument,
+    MujocoOption,
+    ProtocolArgument,
+    UrdfOption,
+    give,
+    list_written,
+    say,
+)
+
+_Path = Annotated[
+    Path | None,
+    typer.Option(metavar="PATH.csv", help="When to couple along a path with requirements."),
+]
+_DeadBand = Annotated[
+    float, typer.Option(help="Relative dead band against chatter along the path.", min=0)
+]
+_Samples = Annotated[int, typer.Option(help="Samples of the Monte Carlo workspace.", min=1000)]
+_BestPlacement = Annotated[
+    bool, typer.Option(help="Look for the base distance and angle that meet `required` best.")
+]
+_Curves = Annotated[
+    Path | None, typer.Option(metavar="CURVES.csv", help="Write the curves as a table.")
+]
+
+
+def couple(
+    model: ModelArgument,
+    path: _Path = None,
+    dead_band: _DeadBand = 0.0,
+    samples: _Samples = 1_000_000,
+    best_placement: _BestPlacement = False,
+    figures: FiguresOption = None,
+    export_mujoco: MujocoOption = None,
+    export_urdf: UrdfOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Coupled state of two arms: workspace, compound stiffness, when to couple."""
+    from rig import model_export
+    from rig.couple import couple as run_couple
+    from rig.coupling_task import best_for
+    from rig.model import load_model
+    from rig.terminal import terminal_progress
+
+    with terminal_progress() as progress:
+        told = lambda share: progress("sampling the workspace", share)  # noqa: E731
+        result = run_couple(model, samples=samples, path=path, dead_band=dead_band, progress=told)
+    give(result, json_file)
+    placement = best_for(model) if best_placement else None
+    if placement is not None and json_file != "-":
+        typer.echo(placement.to_text())
+    if figures is not None:
+        from rig.coupling_figures import draw
+
+        list_written(draw(result, figures, placement))
+    written = model_export.write(load_model(model), mujoco=export_mujoco, urdf_file=export_urdf)
+    list_written(written)
+
+
+def simulate(
+    model: ModelArgument,
+    protocol: ProtocolArgument,
+    csv: _Curves = None,
+    json_file: JsonOption = None,
+) -> None:
+    """The curves that a model predicts for a procedure."""
+    from rig.simulate import simulate as run_simulate
+    from rig.simulate import write_csv
+
+    result = run_simulate(model, protocol)
+    give(result, json_file)
+    if csv is not None:
+        write_csv(result, csv)
+        say(f"{csv}: written")

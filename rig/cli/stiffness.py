@@ -1,0 +1,121 @@
+"""Commands about the stiffness of the measured arm: analyze, identify."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from rig.cli.options import (
+    DatasetArgument,
+    DatasetsArgument,
+    FiguresOption,
+    JsonOption,
+    MujocoOption,
+    UrdfOption,
+    give,
+    list_written,
+    say,
+)
+
+_Weighting = Annotated[
+    str,
+    typer.Option(
+        help="proportional, 1/s^2 or none: how the points are weighted; "
+        "auto: proportional where levels were held and a zero was measured."
+    ),
+]
+_Intercept = Annotated[
+    bool | None,
+    typer.Option(
+        "--intercept/--through-origin",
+        help="Let the line miss the origin, or not; left out: as the data allow.",
+    ),
+]
+_ErrorsInVariables = Annotated[
+    bool, typer.Option(help="Count the force's uncertainty as well as the displacement's.")
+]
+_KeepAfterKnee = Annotated[bool, typer.Option(help="Count the steps after a knee towards k.")]
+_JointReadings = Annotated[
+    bool, typer.Option(help="Use the joint readings where they see the deflection.")
+]
+_Prior = Annotated[
+    Path | None,
+    typer.Option(metavar="MODEL.yaml", help="Prior stiffnesses, instead of the robot file's."),
+]
+_Proposals = Annotated[int, typer.Option(help="How many next poses to look for.", min=0)]
+_Criterion = Annotated[
+    Literal["A", "D", "E"], typer.Option(help="What the next poses make smallest.")
+]
+_WriteModel = Annotated[
+    Path | None, typer.Option(metavar="MODEL.yaml", help="Write the arm as a model file.")
+]
+_WriteProtocol = Annotated[
+    Path | None, typer.Option(metavar="PROTOCOL.yaml", help="Write the next measurement.")
+]
+
+
+def analyze(
+    dataset: DatasetArgument,
+    weighting: _Weighting = "auto",
+    intercept: _Intercept = None,
+    errors_in_variables: _ErrorsInVariables = False,
+    keep_after_knee: _KeepAfterKnee = False,
+    figures: FiguresOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Curve, stiffness k, pointwise k and anisotropy, with uncertainties."""
+    from rig import analyze as analysis
+    from rig.dataset import load
+
+    options = analysis.Options(
+        weighting=analysis.weighting(weighting),
+        intercept=intercept,
+        errors_in_variables=errors_in_variables,
+        keep_after_knee=keep_after_knee,
+    )
+    result = analysis.analyze(load(dataset), options)
+    give(result, json_file)
+    if options == analysis.Options():
+        from rig.catalogue import remember_result
+
+        remember_result(dataset, result)
+    if figures is not None:
+        from rig.figures import draw
+
+        list_written(draw(result, figures))
+
+
+def identify(
+    datasets: DatasetsArgument,
+    joint_readings: _JointReadings = True,
+    prior: _Prior = None,
+    proposals: _Proposals = 6,
+    criterion: _Criterion = "A",
+    write_model: _WriteModel = None,
+    write_protocol: _WriteProtocol = None,
+    export_mujoco: MujocoOption = None,
+    export_urdf: UrdfOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Joint torsional stiffnesses, and what the data can and cannot tell about them."""
+    from rig import identify_text, model_export
+    from rig.identify import identify as run_identify
+    from rig.identify import prior_of
+
+    result = run_identify(
+        datasets,
+        prior=None if prior is None else prior_of(prior),
+        joint_readings=joint_readings,
+        proposals=proposals,
+        criterion=criterion,
+    )
+    give(result, json_file)
+    if write_model is not None:
+        identify_text.write_model(result, write_model)
+        say(f"{write_model}: written")
+    if write_protocol is not None:
+        identify_text.write_protocol(result, write_protocol)
+        say(f"{write_protocol}: written")
+    list_written(model_export.write(result, mujoco=export_mujoco, urdf_file=export_urdf))
