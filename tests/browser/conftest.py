@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Known also where the project's own list of markers does not have it."""
-    config.addinivalue_line("markers", "browser: drives the operator's page in headless Chromium")
-
-
 @pytest.fixture(scope="session")
 def chrome() -> Iterator[Chrome]:
     """Skips, with the reason, where no browser can be driven."""
