@@ -34,7 +34,9 @@ def start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
 
 
 def test_it_hears_answers_and_ends_when_its_input_closes(start: Start) -> None:
-    child = start("import sys, rig.errors\nfor line in sys.stdin: print(line.upper(), end='', flush=True)")
+    child = start(
+        "import sys, rig.errors\nfor line in sys.stdin: print(line.upper(), end='', flush=True)"
+    )
     child.send(b"one\n")
     assert child.output.readline() == b"ONE\n"
     child.close_input()
