@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rig.errors import InputError, did_you_mean
 
 EMULATED = "# EMULATED: drawn by a simulated rig for a blind check; nothing was measured."
-GENERATORS = ("hidden", "mujoco", "mujoco-small-turns")
+GENERATORS = ("hidden", "benches", "mujoco", "mujoco-small-turns")
 
 
 class Case(Protocol):
@@ -53,6 +53,10 @@ def generator(name: str) -> tuple[Draw, tuple[str, ...]]:
         from rig.worlds.hidden import draw
 
         return draw.draw_case, tuple(w for w in draw.WORDS if w not in ("none", "unknown"))
+    if name == "benches":
+        from rig.worlds.benches import draw as benches
+
+        return benches.draw_case, benches.EFFECTS
     if name in ("mujoco", "mujoco-small-turns"):
         try:
             from rig.blind import mujoco_rig
