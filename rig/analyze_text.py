@@ -9,6 +9,7 @@ from textwrap import wrap
 from identification.stiffness import Exclusion, Stiffness
 from identification.uncertainty import Quantity
 from rig.analyze import MM, N_PER_MM, Analysis, Direction
+from rig.digits import number
 
 WIDTH = 100
 
@@ -38,18 +39,6 @@ def answer(analysis: Analysis) -> str:
     for (a, b), ratio in analysis.anisotropy.items():
         parts.append(f"{a} is {_with_interval(ratio)} times as stiff as {b}")
     return "; ".join(parts) + " (in brackets: 95 % intervals)."
-
-
-def number(value: float, digits: int = 4) -> str:
-    """`digits` significant digits, without exponent where that stays readable; `-` for nan."""
-    if not math.isfinite(value):
-        return "inf" if math.isinf(value) else "-"
-    if value == 0.0:
-        return "0"
-    if not 1e-4 <= abs(value) < 1e7:
-        return f"{value:.{digits - 1}e}"
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
-    return f"{value:.{decimals}f}"
 
 
 def _with_interval(q: Quantity, scale: float = 1.0) -> str:

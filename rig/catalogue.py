@@ -17,7 +17,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
-from rig.dataset import software_version
+from rig.software import software_version
 
 _TABLE = """CREATE TABLE IF NOT EXISTS found (
     sha256 TEXT, kind TEXT, software TEXT, value TEXT, PRIMARY KEY (sha256, kind))"""
@@ -75,7 +75,7 @@ def remember_result(dataset: Path, result: Any) -> None:
     """Keeps what `rig list` shows of an analysis or a diagnosis made with default options, unless a
     journal says that the file is not the last word."""
     from rig.journal import journal_path
-    from rig.storage.hdf5read import seal_of
+    from rig.storage.seal import seal_of
 
     with suppress(OSError):
         if journal_path(dataset).exists():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -12,6 +11,7 @@ import numpy as np
 from rig.errors import InputError
 from rig.journal import Record, journal_path, replay
 from rig.meta import Meta
+from rig.software import software_version
 from rig.storage.columns import Values
 from rig.yamlfile import load_yaml_text
 
@@ -78,14 +78,6 @@ class Dataset:
             reason = f" ({self.stop_reason})" if self.stop_reason else ""
             lines.append(f"INCOMPLETE: the measurement did not reach its end{reason}.")
         return tuple(lines)
-
-
-def software_version() -> str:
-    """`stiffness-rig 0.1.0`, as stored in every file."""
-    try:
-        return f"stiffness-rig {version('stiffness-rig')}"
-    except PackageNotFoundError:
-        return "stiffness-rig (not installed)"
 
 
 def from_records(records: list[Record], path: Path | None = None) -> Dataset:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analyze import MM, N_PER_MM, Analysis, Direction
-from rig.analyze_text import number
+from rig.digits import number
 from rig.plotting import COLOURS, MARKERS, write_figures
 
 if TYPE_CHECKING:

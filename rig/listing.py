@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rig.analyze_text import number
 from rig.catalogue import recall, remember, stiffness_of
+from rig.digits import number
 from rig.errors import InputError
 from rig.journal import journal_path
-from rig.storage.hdf5read import seal_of
+from rig.storage.seal import seal_of
 from rig.storage.summary import Summary, journal_summary, read_summary
 
 SCHEMA = "rig.list/1"

@@ -30,6 +30,7 @@ from rig.procedure.progress_bar import LoaderWithBar
 from rig.procedure.recorder import Recorder
 from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
 from rig.runner import Runner
+from rig.software import software_version
 from rig.station import Station, load_station, parse_station
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def measure(
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "origin": "emulated" if station.emulation else "measured",
         "title": protocol.title,
-        "software": datasets.software_version(),
+        "software": software_version(),
         "protocol": protocol.text,
         "station": station.text,
         "meta": measured_meta(protocol, station).model_dump_json(indent=2, exclude_none=True),

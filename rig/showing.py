@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analyze_text import number
+from rig.digits import number
 
 if TYPE_CHECKING:
     import pandas as pd

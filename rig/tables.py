@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.dataset import Dataset, Origin, software_version, write
+from rig.dataset import Dataset, Origin, write
 from rig.errors import InputError, did_you_mean
 from rig.journal import journal_path
 from rig.meta import Meta
+from rig.software import software_version
 from rig.storage import csvcells
 from rig.storage.columns import (
     BRANCHES,

@@ -10,7 +10,7 @@ from rig.blind import judge as j
 from rig.blind.campaign import Campaign
 from rig.blind.judge import Judged
 from rig.blind.rates import auroc, ece, quantiles, rate, reliability
-from rig.dataset import software_version
+from rig.software import software_version
 
 SCHEMA = "rig.blind/1"
 BINS = ((0.0, 1.5), (1.5, 3.0), (3.0, 10.0), (10.0, float("inf")))

@@ -10,7 +10,7 @@ from typing import Any
 
 from rig.analyze import Analysis, analyze
 from rig.couple import CouplingResult
-from rig.dataset import Dataset, load, software_version
+from rig.dataset import Dataset, load
 from rig.errors import InputError
 from rig.identify import IdentifyResult, identify
 from rig.journal import journal_path
@@ -18,6 +18,7 @@ from rig.protocol import parse_protocol
 from rig.report.compare import Pair, compare, same_instruments
 from rig.report.diagnosing import TURNED_OFF, Diagnosed, Job, Waiting, diagnosing, without_name
 from rig.report.quality import Quality, assess
+from rig.software import software_version
 from rig.terminal import Progress, silent
 
 SCHEMA = "rig.report/1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from rig.analyze_text import number
+from rig.digits import number
 from rig.report.document import Inline, Number, Rich
 
 NOTHING = "-"

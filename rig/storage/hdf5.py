@@ -32,12 +32,11 @@ import numpy as np
 from rig.dataset import TEXTS, Dataset
 from rig.storage.columns import Values
 from rig.storage.files import in_place_of
+from rig.storage.seal import SCHEMA, SEAL
 
-SCHEMA = "rig.dataset"
 SCHEMA_VERSION = 1
 SAMPLES = "entry/samples"
 MANIFEST = "entry/manifest"
-SEAL = b"\n# rig.dataset sha256 "
 _CHUNK_ROWS = 65_536
 _LONGEST_FIXED_TEXT = 64
 _MOST_STRINGS = 200_000

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import h5py
 import numpy as np
@@ -16,13 +15,9 @@ from rig.dataset import ORIGINS, Dataset
 from rig.errors import InputError
 from rig.meta import Meta
 from rig.storage.columns import Values
-from rig.storage.hdf5 import MANIFEST, SAMPLES, SCHEMA, SCHEMA_VERSION, SEAL, content_of, digest_of
+from rig.storage.hdf5 import MANIFEST, SAMPLES, SCHEMA_VERSION, content_of, digest_of
+from rig.storage.seal import BROKEN, SCHEMA, check_bytes, damaged
 from rig.yamlfile import load_yaml_text
-
-_MAGIC = b"\x89HDF\r\n\x1a\n"
-# What h5py raises on files that are damaged in one way or another.
-BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError,
-          OverflowError, MemoryError, RecursionError)  # fmt: skip
 
 
 def read_uuid(path: Path) -> str:
@@ -51,77 +46,11 @@ def read_file(path: Path) -> Dataset:
             return _Reading(file, path).dataset()
     except BROKEN as error:
         words = _first_line(error)
-        raise _damaged(path, f"the HDF5 library says: {words}.") from error
+        raise damaged(path, f"the HDF5 library says: {words}.") from error
 
 
 def _first_line(error: BaseException) -> str:
     return str(error).splitlines()[0] if str(error) else type(error).__name__
-
-
-def _damaged(path: Path, what: str) -> InputError:
-    return InputError(
-        f"{path}: damaged: {what} Restore it from a copy, or build it anew from its journal."
-    )
-
-
-def check_bytes(path: Path) -> None:
-    """Magic number and seal, before the HDF5 library sees the file; InputError where they fail."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(len(_MAGIC))
-            if head == _MAGIC and (wrong := _check_seal(file)):
-                raise _damaged(path, wrong)
-    except OSError as error:
-        reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
-        raise InputError(f"{path}: cannot be read: {reason}.") from error
-    if head != _MAGIC:
-        found = "an empty file" if not head else "no HDF5 file"
-        hint = " A table comes in with `rig import`." if path.suffix in (".csv", ".txt") else ""
-        raise InputError(f"{path}: {found}; a data set (.h5) is wanted.{hint}")
-
-
-def seal_of(path: Path) -> str:
-    """SHA-256 of the bytes as the file's last line states it, unchecked; "" where there is none, or
-    where something was cut off or added. OSError if the file can't be read."""
-    length = len(SEAL) + 65
-    with path.open("rb") as file:
-        head = file.read(48)
-        size = file.seek(0, os.SEEK_END)
-        if len(head) < 48 or not head.startswith(_MAGIC) or head[8] != 0 or size < length:
-            return ""
-        end = file.seek(size - length)
-        line = file.read()
-    stated = int.from_bytes(head[40:48], "little")
-    if end != stated or not line.startswith(SEAL):
-        return ""
-    return line[len(SEAL) : -1].decode("ascii", "replace")
-
-
-def _check_seal(file: BinaryIO) -> str:
-    """What is wrong with the bytes, "" for nothing.
-
-    The file knows where its HDF5 data end (layout of the superblock: HDF5 File Format
-    Specification, II.A, version 0, which `write_file` asks for). Behind there stands the seal, or
-    nothing if another program has changed the file.
-    """
-    file.seek(0)
-    head = file.read(48)
-    size = file.seek(0, os.SEEK_END)
-    if len(head) < 48 or head[8] != 0:  # another version of the superblock: another program's file
-        return ""
-    end = int.from_bytes(head[40:48], "little")
-    if size < end:
-        return f"{size} bytes are left of {end}: cut off while copying?"
-    file.seek(0)
-    sha = hashlib.sha256()
-    rest = end
-    while rest and (piece := file.read(min(rest, 1 << 20))):
-        sha.update(piece)
-        rest -= len(piece)
-    seal = SEAL + sha.hexdigest().encode() + b"\n"
-    if size == end or file.read(len(seal) + 1) == seal:
-        return ""
-    return "its bytes have changed since it was written."
 
 
 class _Reading:
@@ -142,7 +71,7 @@ class _Reading:
         texts = {n: self._text(f"entry/texts/{n}") for n in _below("entry/texts/", listed)}
         origin = str(root["origin"])
         if origin not in ORIGINS:
-            raise _damaged(self._path, f'its origin is "{origin}".')
+            raise damaged(self._path, f'its origin is "{origin}".')
         return Dataset(
             path=self._path,
             uuid=str(root["uuid"]),
@@ -179,11 +108,11 @@ class _Reading:
         text = self._text(MANIFEST)
         digest = hashlib.sha256(text.encode()).hexdigest()
         if digest != str(self._file[MANIFEST].attrs["sha256"]):
-            raise _damaged(self._path, f"/{MANIFEST} has changed since it was written.")
+            raise damaged(self._path, f"/{MANIFEST} has changed since it was written.")
         listed: dict[str, str] = json.loads(text)
         for name, expected in listed.items():
             if name != "/" and name not in self._file:
-                raise _damaged(self._path, f"/{name} is missing.")
+                raise damaged(self._path, f"/{name} is missing.")
             self._verify(name, expected)
         return listed
 
@@ -191,13 +120,13 @@ class _Reading:
         node = self._file[name]
         place = name if name == "/" else f"/{name}"
         if name.startswith(f"{SAMPLES}/") and node.shape != (self._rows,):
-            raise _damaged(self._path, f"{place} has the shape {node.shape}, not ({self._rows},).")
+            raise damaged(self._path, f"{place} has the shape {node.shape}, not ({self._rows},).")
         try:
             content = content_of(node)
         except BROKEN as error:
-            raise _damaged(self._path, f"{place} cannot be read: {_first_line(error)}.") from error
+            raise damaged(self._path, f"{place} cannot be read: {_first_line(error)}.") from error
         if digest_of(node, content) != expected:
-            raise _damaged(self._path, f"{place} has changed since it was written.")
+            raise damaged(self._path, f"{place} has changed since it was written.")
         if content is not None:
             self._contents[name] = content
 
@@ -218,7 +147,7 @@ class _Reading:
     def _text(self, name: str) -> str:
         node = self._file.get(name)
         if not isinstance(node, h5py.Dataset) or node.shape != ():
-            raise _damaged(self._path, f"/{name} is missing.")
+            raise damaged(self._path, f"/{name} is missing.")
         value = node[()]
         return value.decode("utf-8") if isinstance(value, bytes) else str(value)
 

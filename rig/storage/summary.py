@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,9 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import InputError
+from rig.storage.seal import BROKEN, SCHEMA, check_bytes
 
 _ROBOT = re.compile(r"^robot:\s*([A-Za-z0-9_.-]+)\s*(?:#.*)?$", re.MULTILINE)
 _DIRECTIONS = re.compile(r"^directions:\s*\{(.*)\}\s*(?:#.*)?$", re.MULTILINE)
+_TEXTS, _NUMBERS = ("schema", "uuid", "created", "title", "origin"), ("complete", "rows")
+_META = "entry/texts/meta"
 _NAME = re.compile(r"\s*([A-Za-z0-9_+-]+)\s*:\s*\[[^\]]*\]\s*(?:,|$)")
 
 
@@ -32,31 +36,70 @@ class Summary:
 
 def read_summary(path: Path) -> Summary:
     """Of an HDF5 file whose seal holds. InputError for anything that is no data set."""
-    import h5py
-
-    from rig.storage.hdf5 import SCHEMA
-    from rig.storage.hdf5read import BROKEN, check_bytes
-
     check_bytes(path)
     try:
-        with h5py.File(path, "r") as file:
-            root = file.attrs
-            if root.get("schema") != SCHEMA:
-                raise InputError(f"{path}: an HDF5 file of another program.")
-            robot, directions = _of_meta(file["entry/texts/meta"].asstr()[()], str(path))
-            return Summary(
-                uuid=str(root["uuid"]),
-                created=str(root["created"]),
-                title=str(root["title"]).removeprefix("EMULATED: "),
-                origin=str(root["origin"]),
-                complete=bool(root["complete"]),
-                rows=int(root["rows"]),
-                robot=robot,
-                directions=directions,
-            )
+        root, text = _root(path)
+        if root["schema"] != SCHEMA:
+            raise InputError(f"{path}: an HDF5 file of another program.")
+        robot, directions = _of_meta(text, str(path))
+        return Summary(
+            uuid=str(root["uuid"]),
+            created=str(root["created"]),
+            title=str(root["title"]).removeprefix("EMULATED: "),
+            origin=str(root["origin"]),
+            complete=bool(root["complete"]),
+            rows=int(root["rows"]),
+            robot=robot,
+            directions=directions,
+        )
     except BROKEN as error:
         first = str(error).split("\n", 1)[0] or type(error).__name__
         raise InputError(f"{path}: damaged: {first}.") from error
+
+
+def _root(path: Path) -> tuple[dict[str, Any], str]:
+    """Attributes of the root, `schema` None in a file of another program, and the text of META.
+
+    A file as this software writes it gives them in a third of the time that any other takes.
+    """
+    try:
+        return as_written(path)
+    except BROKEN:
+        return by_any_program(path)
+
+
+def as_written(path: Path) -> tuple[dict[str, Any], str]:
+    """By the library's plain calls, text of variable length and whole numbers; one of `BROKEN` for
+    anything else."""
+    import numpy as np
+    from h5py import h5a, h5d, h5f, h5s, string_dtype
+
+    text, number = np.empty((), string_dtype()), np.empty((), np.int64)
+    root: dict[str, Any] = {}
+    file = h5f.open(os.fsencode(path), h5f.ACC_RDONLY)
+    try:
+        for name in _TEXTS:
+            h5a.open(file, name.encode()).read(text)
+            root[name] = text[()].decode("utf-8")
+        for name in _NUMBERS:
+            h5a.open(file, name.encode()).read(number)
+            root[name] = int(number)
+        h5d.open(file, _META.encode()).read(h5s.ALL, h5s.ALL, text)
+        return root, text[()].decode("utf-8")
+    finally:
+        file.close()
+
+
+def by_any_program(path: Path) -> tuple[dict[str, Any], str]:
+    """Likewise, whatever types another program has stored them as again."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        if file.attrs.get("schema") != SCHEMA:
+            return {"schema": None}, ""
+        root = {name: file.attrs[name] for name in (*_TEXTS, *_NUMBERS)}
+        texts = {k: v.decode("utf-8") for k, v in root.items() if isinstance(v, bytes)}
+        return root | texts, file[_META].asstr()[()]
 
 
 def journal_summary(journal: Path) -> Summary:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.analyze import Analysis, Options, analyze, weighting
-from rig.analyze_text import number
+from rig.digits import number
 from rig.errors import InputError
 from rig.figures import curve, draw, pointwise
 from tests.unit.stiffness_tables import Table, run, table

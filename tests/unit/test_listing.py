@@ -20,8 +20,8 @@ from rig.dataset import write
 from rig.errors import InputError
 from rig.journal import journal_path
 from rig.listing import list_folder
-from rig.storage.hdf5read import seal_of
-from rig.storage.summary import _of_meta, read_summary
+from rig.storage.seal import seal_of
+from rig.storage.summary import _of_meta, as_written, by_any_program, read_summary
 from rig.tables import import_table
 from tests.unit.example_data import META_SPECIMEN, dataset, write_journal
 
@@ -209,6 +209,21 @@ def test_no_folder_and_a_file_for_one_are_refused(tmp_path: Path) -> None:
 )
 def test_robot_and_directions_of_any_way_to_write_them(text: str) -> None:
     assert _of_meta(text, "META") == ("none", ("x",))
+
+
+def test_what_another_program_stored_anew_is_read_as_well(folder: Path) -> None:
+    path = folder / "arm.h5"
+    before = read_summary(path)
+    assert as_written(path) == by_any_program(path)
+    assert seal_of(path)  # neither has touched the file
+    with h5py.File(path, "r+") as file:  # fixed lengths and small numbers, as other libraries do
+        for name in ("uuid", "title"):
+            text = str(file.attrs[name]).encode()
+            file.attrs.create(name, text, dtype=h5py.string_dtype("utf-8", len(text)))
+        file.attrs.create("rows", file.attrs["rows"], dtype="u2")
+    with pytest.raises(OSError, match="no appropriate function for conversion"):
+        as_written(path)
+    assert read_summary(path) == before
 
 
 def test_seal_is_none_where_the_end_is_not_whole(folder: Path) -> None:
