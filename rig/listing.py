@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +153,7 @@ def _entry(
         summary = Summary(**{**kept, "directions": tuple(kept["directions"])})
     else:
         summary = read_summary(path)
-        fresh[seal] = asdict(summary)
+        fresh[seal] = dict(vars(summary))
     return Entry(name, summary, found.get("stiffness"), found.get("verdict"), open=False)
 
 
@@ -187,7 +187,7 @@ def _analyzed(
 
 
 def _json(e: Entry) -> dict[str, Any]:
-    summary = asdict(e.summary)
+    summary = vars(e.summary)
     return {
         "file": e.file,
         **{k: summary[k] for k in ("uuid", "created", "title", "robot")},
