@@ -49,6 +49,11 @@ class Rig:
         """Whether the force was driven."""
         return self.trial.imposed == "force"
 
+    @property
+    def mean_slope(self) -> float:
+        """N/mm, of the whole test; 0 where a channel stands."""
+        return secant(self.force, self.displacement)
+
     def response(self, force: Array, displacement: Array) -> Array:
         """(n,) mm: what was not driven, a force over the simulated spring."""
         return displacement if self.by_force else force / self.stated.stiffness
@@ -56,6 +61,13 @@ class Rig:
     def simulated(self) -> Array:
         """(n,) mm: the response that the spring as stated gives."""
         return self.force / self.stated.stiffness if self.by_force else self.displacement
+
+
+def secant(force: Array, displacement: Array) -> float:
+    """N/mm: spread over spread; 0 where either stands (what rounding leaves does not count)."""
+    if not (np.ptp(force) > 0 and np.ptp(displacement) > 0):
+        return 0.0
+    return float(force.std() / displacement.std())
 
 
 def make_rig(form: Form, word: str, trial: Trial, random: Generator) -> Rig:
@@ -117,7 +129,7 @@ def _bent(
     elif way < 0.75:
         sd, k = random.uniform(0.3, 0.5), true * log_uniform(random, 0.5, 2.0)
     elif way < 0.87:
-        sd, k = random.uniform(0.1, 0.3), float(force.std() / max(moved.std(), 1e-300))
+        sd, k = random.uniform(0.1, 0.3), secant(force, moved)
         k = k if k > 0.05 * true else true
     else:
         sd = log_uniform(random, 0.1, 1.0)

@@ -32,8 +32,7 @@ def read(rig: Rig, noise_mm: float, random: Generator) -> Readings:
     turn = random.uniform(0.15, 1.4)
     here, there = np.cos(turn) * noise_mm, np.sin(turn) * noise_mm
     k = rig.stated.stiffness
-    lively = rig.force.std() > 0 and rig.displacement.std() > 0
-    slope = float(rig.force.std() / rig.displacement.std()) if lively else 0.0
+    slope = rig.mean_slope
     if rig.by_force:
         moved_sd, force_sd = here, there * slope
     else:
@@ -72,8 +71,7 @@ def noise_rms_mm(rig: Rig, readings: Readings) -> float:
     slope."""
     force = readings.force - rig.force
     moved = readings.displacement - rig.displacement
-    lively = rig.force.std() > 0 and rig.displacement.std() > 0
-    slope = float(rig.force.std() / rig.displacement.std()) if lively else 0.0
+    slope = rig.mean_slope
     if rig.by_force:
         error = moved - (force / slope if slope else 0.0)
     else:

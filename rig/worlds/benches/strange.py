@@ -112,7 +112,7 @@ def pinched_and_worn(random: Generator) -> Trial:
     room = random.uniform(0.2, 0.5) * most + 1e-9
     pinch = 1 - random.uniform(0.5, 0.9) * np.exp(-((path.value / room) ** 2)) * (most > 1.5)
     force = loop * pinch + 0.1 * path.value
-    return Trial(path.time, force, path.value, accept=_FRICTION | {"joint_backlash"})
+    return Trial(path.time, force, path.value, accept=_FRICTION)
 
 
 def _spring(random: Generator, least: int = 2) -> tuple[Array, Array]:
