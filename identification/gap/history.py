@@ -108,16 +108,20 @@ def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
     before[rest] = 0.0
     step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
     stands = settling_share(rows)
-    # z_i = keep_i z_{i-1} + gain_i: decay in a rest, a ramp to the new load, then standing there
+    # z_i = keep_i z_{i-1} + gain_i: decay in a rest, or the old load standing on; a ramp to the new
+    # load, then standing there
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
-    ramp = np.maximum(ease - stands, 0.0)[:, None] / times
+    pause = np.where(rest, 0.0, np.minimum(standing_on(rows), np.maximum(ease - stands, 0.0)))
+    paused = np.exp(-pause[:, None] / times)
+    ramp = np.maximum(ease - stands - pause, 0.0)[:, None] / times
     held = np.exp(-np.minimum(ease, stands)[:, None] / times)
     during = np.exp(-ramp)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(ramp > 0, -np.expm1(-ramp) / ramp, 1.0)
     ramped = load * (1 - share) + before * (share - during)  # of a ramp, z = 0 before it
-    keep = held * during * np.where(rest[:, None], np.exp(-step[:, None] / times), 1.0)
-    return _prefix(keep, held * ramped + load * (1 - held))
+    keep = held * during * np.where(rest[:, None], np.exp(-step[:, None] / times), paused)
+    stood = during * before * (1 - paused)
+    return _prefix(keep, held * (ramped + stood) + load * (1 - held))
 
 
 _REST_RAMP_S = 5.0  # the last of a rest: the screw comes to the load
@@ -148,14 +152,18 @@ def flowing_play(load: Array, radius: Array, times: Array, rows: Rows, fresh: Fl
     step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
     stands = np.minimum(settling_share(rows), ease)
+    pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
     part = (np.arange(_PARTS) + 0.5) / _PARTS
     for i, x in enumerate(load):
         if fresh[i]:
             state, before = np.zeros_like(state), 0.0
         elif rest[i]:  # minutes without load
             state, before = np.clip(state, -radius, radius), 0.0
-        if ease[i] > stands[i]:
-            share = -np.expm1(-(ease[i] - stands[i]) / _PARTS / times)
+        if pause[i] > 0:
+            beyond = np.clip(state, before - radius, before + radius) - state
+            state = state - beyond * np.expm1(-pause[i] / times)
+        if ease[i] > stands[i] + pause[i]:
+            share = -np.expm1(-(ease[i] - stands[i] - pause[i]) / _PARTS / times)
             for at in before + part * (x - before):
                 state = state + share * (np.clip(state, at - radius, at + radius) - state)
         beyond = np.clip(state, x - radius, x + radius) - state
@@ -175,6 +183,15 @@ def settling_share(rows: Rows) -> Array:
     return np.where(rows.hold_starts, half_sample(rows), 0.0)
 
 
+def standing_on(rows: Rows) -> Array:
+    """(n,) s: how long the old load still stood after the time of the row before, 0 within holds:
+    the time of a row is the middle of its samples, the load moves half a sample after the last."""
+    if rows.continuous:
+        return np.zeros(rows.n)
+    last = half_sample(rows) * np.concatenate([[0.0], rows.weight[:-1]])
+    return np.where(rows.hold_starts, last, 0.0)
+
+
 def half_sample(rows: Rows) -> float:
     """Half of the time between two samples of a hold, s."""
     step = np.diff(rows.time)
@@ -191,7 +208,8 @@ def delayed(values: Array, delay: float, rows: Rows) -> Array:
         t, v = rows.time[a:b], values[a:b]
         if not rows.continuous:
             new = rows.hold_starts[a:b]
-            t = np.concatenate([t, t[new] - half, t[:-1][new[1:]] + half])
+            last = half * rows.weight[a:b][:-1]
+            t = np.concatenate([t, t[new] - half, (t[:-1] + last)[new[1:]]])
             v = np.concatenate([v, v[new], v[:-1][new[1:]]])
             order = np.argsort(t, kind="stable")
             t, v = t[order], v[order]

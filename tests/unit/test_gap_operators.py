@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.gap.data import GapData, Instruments, Setup
-from identification.gap.history import bristles, delayed, play, retarded, worked_in
+from identification.gap.history import bristles, delayed, flowing_play, play, retarded, worked_in
 from identification.gap.rows import Rows, reduce_rows
 
 
@@ -83,7 +83,7 @@ def rows_of(data: GapData) -> Rows:
 
 
 def test_retardation_is_exact_under_a_held_load() -> None:
-    """One step in half a second, then a hold: z = 1 - exp(-t/T) up to the ramp's share."""
+    """A step half way between two samples, then a hold: z = 1 - exp(-t/T)."""
     n, T = 60, 10.0
     step = np.where(np.arange(n) < 1, 0, 1)
     force = np.where(step > 0, 1.0, 0.0)
@@ -91,10 +91,51 @@ def test_retardation_is_exact_under_a_held_load() -> None:
     rows = rows_of(data)
     z = retarded(rows.force[:, None], np.array([T]), rows, fresh(rows.n))[:, 0]
     t = rows.time - 0.5  # the load stands from there
-    ramp = 1 - T / 0.5 * (1 - np.exp(-0.5 / T))
-    expected = 1 - (1 - ramp) * np.exp(-(t - 0.0) / T)
     held = rows.time >= 1.0
-    assert z[held] == pytest.approx(expected[held], abs=1e-9)
+    assert z[held] == pytest.approx(1 - np.exp(-t[held] / T), abs=1e-9)
+
+
+def staircase() -> tuple[Rows, np.ndarray, np.ndarray]:
+    """Rows of holds of six samples, the last ones in one row; the clock and load that made them:
+    a ramp from half a second after the last sample to half a second before the next."""
+    start = 10.0 * np.arange(6)
+    time = (start[:, None] + np.arange(6.0)).ravel()
+    level = 10.0 * np.array([0, 1, 2, 3, 2, 1])
+    step = np.repeat(np.arange(6), 6)
+    data = bench_data(level[step], level[step] * 1e-5, step=step.astype(np.int64), time=time)
+    corner = np.sort(np.concatenate([start - 0.5, start + 5.5]))
+    grid = np.arange(0.0, 56.0, 1e-3)
+    return rows_of(data), grid, np.interp(grid, corner, np.repeat(level, 2))
+
+
+def test_retardation_follows_a_staircase_of_thinned_holds() -> None:
+    rows, grid, load = staircase()
+    z, state = np.zeros_like(grid), 0.0
+    for i in range(1, len(grid)):
+        state += (0.5 * (load[i] + load[i - 1]) - state) * -np.expm1(-1e-3 / 3.0)
+        z[i] = state
+    found = retarded(rows.force[:, None], np.array([3.0]), rows, fresh(rows.n))[:, 0]
+    alone = rows.weight == 1  # a row of several samples stands for their middle
+    assert found[alone] == pytest.approx(np.interp(rows.time, grid, z)[alone], abs=0.01)
+
+
+def test_slow_flow_follows_a_staircase_of_thinned_holds() -> None:
+    rows, grid, load = staircase()
+    y, state = np.zeros_like(grid), 0.0
+    for i in range(1, len(grid)):
+        beyond = np.clip(state, load[i] - 8.0, load[i] + 8.0) - state
+        state += beyond * -np.expm1(-1e-3 / 4.0)
+        y[i] = state
+    one = np.array([4.0])
+    found = flowing_play(rows.force, np.array([8.0]), one, rows, fresh(rows.n))[:, 0]
+    assert found == pytest.approx(np.interp(rows.time, grid, y), abs=0.15)  # ramps in four parts
+
+
+def test_a_delay_of_thinned_holds_is_that_of_the_load() -> None:
+    rows, grid, load = staircase()
+    found = delayed(rows.force, 1.8, rows)
+    alone = rows.weight == 1
+    assert found[alone] == pytest.approx(np.interp(rows.time - 1.8, grid, load)[alone], abs=1e-9)
 
 
 def test_delay_shows_the_step_before_and_nothing_later_in_the_hold() -> None:
