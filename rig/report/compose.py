@@ -12,9 +12,9 @@ from rig.report.pictures import Pictures
 from rig.report.results import Node
 
 
-def compose(gathered: Gathered, *, png: bool = False) -> Document:
-    """The whole report. png: figures also as PNG, for files."""
-    data, pictures = Node(gathered.to_json()), Pictures(png=png)
+def compose(gathered: Gathered, pictures: Pictures) -> Document:
+    """The whole report."""
+    data = Node(gathered.to_json())
     chapters: list[Section] = []
     if len(gathered.sessions) > 1:
         chapters.append(pair_sections.comparison(gathered, data, pictures))

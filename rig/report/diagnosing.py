@@ -1,5 +1,5 @@
-"""Diagnoses and their figures, beside the rest of the report: in processes of their own, because
-they take longer than everything else together."""
+"""Diagnoses beside the rest of the report: in processes of their own, because they take longer than
+everything else together. Loads nothing heavy here: they begin before anything else does."""
 
 from __future__ import annotations
 
@@ -8,18 +8,22 @@ import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rig.errors import InputError
 from rig.report.document import Figure
 
+if TYPE_CHECKING:
+    from rig.report.gap_pictures import GapView
+
 # Of one data set; a million samples take half a minute.
 DEADLINE_S = 900.0
+FIGURES = ("curve", "map", "withheld", "remainder")
 TURNED_OFF = "Left out, as asked for (--no-gap)."
 
 
@@ -41,17 +45,33 @@ class Job:
     png: bool
 
 
-def run(job: Job) -> Diagnosed:
-    """Diagnoses one data set and draws; a data set that can't be diagnosed says why."""
+@dataclass(frozen=True)
+class Found:
+    """As `Diagnosed`, with what its figures are drawn from instead of these."""
+
+    json: dict[str, Any] | None
+    view: GapView | None = None
+    reason: str = ""
+
+
+def run(job: Job) -> Found:
+    """Diagnoses one data set; a data set that can't be diagnosed says why."""
     from rig.dataset import load
     from rig.diagnose import diagnose
-    from rig.report.gap_pictures import gap_figures
+    from rig.report.gap_pictures import view_of
 
     try:
         diagnosis = diagnose(load(job.path))
     except InputError as error:
-        return Diagnosed(None, reason=without_name(str(error), job.path))
-    return Diagnosed(diagnosis.to_json(), tuple(gap_figures(diagnosis, job.stem, png=job.png)))
+        return Found(None, reason=without_name(str(error), job.path))
+    return Found(diagnosis.to_json(), view_of(diagnosis, job.stem, png=job.png))
+
+
+def draw(view: GapView, names: Sequence[str]) -> tuple[Figure, ...]:
+    """The figures of these names."""
+    from rig.report.gap_pictures import gap_figures
+
+    return tuple(gap_figures(view, names))
 
 
 def without_name(message: str, path: Path) -> str:
@@ -60,28 +80,56 @@ def without_name(message: str, path: Path) -> str:
     return text[:1].upper() + text[1:]
 
 
+class Crew:
+    """The processes that diagnose, and what they are at."""
+
+    def __init__(self, pool: ProcessPoolExecutor, jobs: Sequence[Job]) -> None:
+        self.pool = pool
+        self.begun = [pool.submit(run, job) for job in jobs]
+
+    @property
+    def idle(self) -> bool:
+        """Whether every diagnosis is done."""
+        return all(future.done() for future in self.begun)
+
+
 class Waiting:
     """A diagnosis on its way, or one that runs when it is asked for."""
 
-    def __init__(self, job: Job, future: Future[Diagnosed] | None) -> None:
-        """future None: run here."""
+    def __init__(self, job: Job, crew: Crew | None = None, number: int = 0) -> None:
+        """number: among the crew's jobs; crew None: run here."""
         self._job = job
-        self._future = future
+        self._crew = crew
+        self._number = number
 
     def result(self) -> Diagnosed:
-        """Waits for it, `DEADLINE_S` at most."""
-        if self._future is None:
+        """Waits for it, `DEADLINE_S` at most, and draws."""
+        found = self._found()
+        figures = () if found.view is None else self._drawn(found.view)
+        return Diagnosed(found.json, figures, found.reason)
+
+    def _found(self) -> Found:
+        if self._crew is None:
             return run(self._job)
         try:
-            return self._future.result(DEADLINE_S)
+            return self._crew.begun[self._number].result(DEADLINE_S)
         except TimeoutError:
-            return Diagnosed(
+            return Found(
                 None, reason=f"The diagnosis took longer than {DEADLINE_S:g} s and was given up."
             )
         except BrokenProcessPool:
-            return Diagnosed(
-                None, reason="The diagnosis was ended from outside, or ran out of memory."
-            )
+            return Found(None, reason="The diagnosis was ended from outside, or ran out of memory.")
+
+    def _drawn(self, view: GapView) -> tuple[Figure, ...]:
+        """Half of the figures here, the others in the process that has nothing to do any more."""
+        if self._crew is None or not self._crew.idle:
+            return draw(view, FIGURES)
+        here, there = FIGURES[:2], FIGURES[2:]
+        try:
+            others = self._crew.pool.submit(draw, view, there)
+            return (*draw(view, here), *others.result(DEADLINE_S))
+        except (TimeoutError, BrokenProcessPool):
+            return draw(view, FIGURES)
 
 
 def usable_cores() -> int:
@@ -98,7 +146,7 @@ def diagnosing(jobs: Sequence[Job], processes: int) -> Iterator[list[Waiting]]:
     What is still running when the block is left is ended.
     """
     if processes < 1 or not jobs:
-        yield [Waiting(job, None) for job in jobs]
+        yield [Waiting(job) for job in jobs]
         return
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(
@@ -106,8 +154,8 @@ def diagnosing(jobs: Sequence[Job], processes: int) -> Iterator[list[Waiting]]:
     )
     try:
         with _ctrl_c_ignored():  # which the children inherit, from their first moment on
-            begun = [Waiting(job, pool.submit(run, job)) for job in jobs]
-        yield begun
+            crew = Crew(pool, jobs)
+        yield [Waiting(job, crew, number) for number, job in enumerate(jobs)]
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         for child in set(multiprocessing.active_children()) - others:

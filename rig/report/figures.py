@@ -63,15 +63,18 @@ def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
     return watermark(figure, banners)
 
 
-def quality(dataset: Dataset, zeros: Sequence[RunZeros]) -> Figure | None:
-    """Over the session: lateness, zero of force and displacement, joint temperatures; None where
-    nothing of it was recorded."""
+def quality_recorded(dataset: Dataset, zeros: Sequence[RunZeros]) -> bool:
+    """Whether `quality` has anything to show."""
+    return bool(_panels(dataset, zeros))
+
+
+def quality(dataset: Dataset, zeros: Sequence[RunZeros]) -> Figure:
+    """Over the session: lateness, zero of force and displacement, joint temperatures, where
+    something of it was recorded."""
     from matplotlib.figure import Figure
 
     columns = dataset.columns
     panels = [panel for _, panel in _panels(dataset, zeros)]
-    if not panels:
-        return None
     figure = Figure(figsize=(7.5, 1.75 * len(panels) + 0.5), layout="constrained")
     rows = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
     for axes, panel in zip(rows, panels, strict=True):

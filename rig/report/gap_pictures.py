@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, cast
 
+from identification.gap.diagnose import GapResult
+from identification.gap.remainder import Remainder, remainder
 from rig.diagnose import Diagnosis
 from rig.gap_figures import curve, remaining, withheld
 from rig.gap_map import gap_map
-from rig.gap_points import held_table, point_table, points, remainder_table
+from rig.gap_points import Points, held_table, point_table, points, remainder_table
 from rig.report.document import Figure
 from rig.report.drawing import draw
 from rig.report.figures import watermark
@@ -21,27 +24,54 @@ if TYPE_CHECKING:
 Rows = tuple[tuple[object, ...], ...]
 
 
-def gap_figures(diagnosis: Diagnosis, stem: str, *, png: bool) -> Iterator[Figure]:
-    """Curve, map, withheld data, remainder; their names begin with `stem`."""
-    from identification.gap.remainder import remainder
+@dataclass(frozen=True, eq=False)
+class GapView:
+    """What the figures of a diagnosis are drawn from, small enough to be handed to another process.
 
-    r = diagnosis.result
-    p = points(r)
+    result: without engine, fit, candidates and pool, which no figure asks for any more. stem: what
+    the figures' names begin with.
+    """
+
+    result: GapResult
+    points: Points
+    rest: Remainder
+    banners: tuple[str, ...]
+    stem: str
+    png: bool
+
+
+def view_of(diagnosis: Diagnosis, stem: str, *, png: bool) -> GapView:
+    """Of a diagnosis."""
+    r, nothing = diagnosis.result, cast(Any, None)
+    light = replace(
+        r, engine=nothing, fit=nothing, found=nothing, bench=replace(r.bench, columns=[])
+    )
     rest = remainder(r.engine, r.fit)
+    return GapView(light, points(r), rest, diagnosis.banners, stem, png)
 
-    def one(name: str, caption: str, plot: Callable[[], Plot], table: Table) -> Figure:
-        marked = lambda: watermark(plot(), diagnosis.banners)  # noqa: E731
-        header, rows = _columns(table)
-        return draw(f"{stem}_{name}", caption, caption, marked, header=header, rows=rows, png=png)
 
-    yield one("gap_curve", "Measurement, and the simulation before and after the effects.",
-              lambda: curve(r, p), point_table(r, p))  # fmt: skip
-    yield one("gap_map", "Where the gap lies, before and after: over force and over time.",
-              lambda: gap_map(r, p), point_table(r, p))  # fmt: skip
-    yield one("gap_withheld", "How far the gap shrinks: fitted, and on data that were withheld.",
-              lambda: withheld(r), held_table(r))  # fmt: skip
-    yield one("gap_remainder", "What repeats and stays unexplained, with its uncertainty.",
-              lambda: remaining(r, p, rest), remainder_table(r, rest))  # fmt: skip
+def gap_figures(view: GapView, names: Sequence[str]) -> Iterator[Figure]:
+    """Curve, map, withheld data, remainder, as far as they are named."""
+    r, p, rest = view.result, view.points, view.rest
+    known: dict[str, tuple[str, Callable[[], Plot], Callable[[], Table]]] = {
+        "curve": ("Measurement, and the simulation before and after the effects.",
+                  lambda: curve(r, p), lambda: point_table(r, p)),
+        "map": ("Where the gap lies, before and after: over force and over time.",
+                lambda: gap_map(r, p), lambda: point_table(r, p)),
+        "withheld": ("How far the gap shrinks: fitted, and on data that were withheld.",
+                     lambda: withheld(r), lambda: held_table(r)),
+        "remainder": ("What repeats and stays unexplained, with its uncertainty.",
+                      lambda: remaining(r, p, rest), lambda: remainder_table(r, rest)),
+    }  # fmt: skip
+    for name in names:
+        caption, plot, table = known[name]
+        header, rows = _columns(table())
+        yield draw(f"{view.stem}_gap_{name}", caption, caption, _marked(plot, view.banners),
+                   header=header, rows=rows, png=view.png)  # fmt: skip
+
+
+def _marked(plot: Callable[[], Plot], banners: tuple[str, ...]) -> Callable[[], Plot]:
+    return lambda: watermark(plot(), banners)
 
 
 def _columns(table: Table) -> tuple[tuple[str, ...], Rows]:

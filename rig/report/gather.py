@@ -16,8 +16,9 @@ from rig.identify import IdentifyResult, identify
 from rig.journal import journal_path
 from rig.protocol import parse_protocol
 from rig.report.compare import Pair, compare, same_instruments
-from rig.report.diagnosing import TURNED_OFF, Diagnosed, Job, Waiting, diagnosing, without_name
+from rig.report.diagnosing import TURNED_OFF, Diagnosed, Waiting, without_name
 from rig.report.quality import Quality, assess
+from rig.report.wishes import Named, Wishes
 from rig.software import software_version
 from rig.terminal import Progress, silent
 
@@ -108,38 +109,15 @@ class Gathered:
         }
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """What else the report should hold. made: ISO 8601 time that it shows as its own; png: figures
-    as PNG too; processes: that diagnose beside the rest, 0 for none."""
-
-    couple: Path | None = None
-    gap: bool = True
-    made: str = ""
-    png: bool = False
-    processes: int = 0
-
-
-def gather(paths: Sequence[Path], wishes: Wishes, progress: Progress = silent) -> Gathered:
-    """Reads and computes everything. A part that the data do not allow is missing, with its reason;
-    InputError only for files that cannot be read, or no file at all."""
-    if not paths:
-        raise InputError("rig report: give at least one data set.")
-    names = list(zip(paths, _labels(paths), _stems(paths), strict=True))
-    loaded = [load(path) for path in paths]  # whatever is wrong with a file shows before long work
-    jobs = [Job(path, stem, wishes.png) for path, _, stem in names] if wishes.gap else []
-    with diagnosing(jobs, wishes.processes) as begun:
-        waiting = [*begun] if wishes.gap else [None] * len(names)
-        coupling = _coupling(wishes.couple)
-        drafts: list[Session] = []
-        for (path, label, stem), dataset in zip(names, loaded, strict=True):
-            progress(f"{label}: analyzing", 0.3 * len(drafts) / len(names))
-            drafts.append(_session(path, label, stem, dataset))
-        sessions: list[Session] = []
-        for draft, wait in zip(drafts, waiting, strict=True):
-            progress(f"{draft.label}: diagnosing", 0.3 + 0.6 * len(sessions) / len(names))
-            sessions.append(_with_gap(draft, wait))
-    progress("comparing", 0.9)
+def gather(names: Sequence[Named], wishes: Wishes, progress: Progress = silent) -> Gathered:
+    """Reads and computes everything but the gap. A part that the data do not allow is missing, with
+    its reason; InputError only for files that cannot be read."""
+    loaded = [load(name.path) for name in names]  # what is wrong with a file shows before long work
+    coupling = _coupling(wishes.couple)
+    sessions: list[Session] = []
+    for name, dataset in zip(names, loaded, strict=True):
+        progress(f"{name.label}: analyzing", 0.3 * len(sessions) / len(names))
+        sessions.append(_session(name, dataset))
     return Gathered(
         tuple(sessions),
         tuple(compare([(s.dataset, s.analysis) for s in sessions])),
@@ -150,39 +128,32 @@ def gather(paths: Sequence[Path], wishes: Wishes, progress: Progress = silent) -
     )
 
 
-def _labels(paths: Sequence[Path]) -> list[str]:
-    """File names; whole paths where two names are the same."""
-    names = [p.name for p in paths]
-    return [p.name if names.count(p.name) == 1 else str(p) for p in paths]
+def with_gaps(gathered: Gathered, begun: Sequence[Waiting], progress: Progress) -> Gathered:
+    """With the diagnosis of every session, or the reason why there is none; waits for them."""
+    sessions: list[Session] = []
+    for session, wait in zip(gathered.sessions, begun, strict=True):
+        progress(f"{session.label}: diagnosing", 0.3 + 0.6 * len(sessions) / len(begun))
+        found = wait.result()
+        missing = {k: why for k, why in session.missing.items() if k != "diagnose"}
+        if not found.json:
+            missing["diagnose"] = found.reason
+        sessions.append(replace(session, diagnosed=found, missing=missing))
+    return replace(gathered, sessions=tuple(sessions))
 
 
-def _stems(paths: Sequence[Path]) -> list[str]:
-    """File names for figures, all different."""
-    found: list[str] = []
-    for n, path in enumerate(paths, start=1):
-        stem = file_stem(path.stem)
-        lower = [s.lower() for s in found]
-        found.append(stem if stem.lower() not in lower else f"{stem}_{n}")
-    return found
-
-
-def file_stem(wanted: str) -> str:
-    """A name that every file system takes."""
-    return "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "_" for c in wanted)[:80]
-
-
-def _session(path: Path, label: str, stem: str, dataset: Dataset) -> Session:
+def _session(name: Named, dataset: Dataset) -> Session:
     """Everything but the gap."""
-    missing: dict[str, str] = {}
+    path, missing = name.path, dict[str, str]()
     joints = None
     try:
         joints = identify([path])
     except InputError as error:
         missing["identify"] = without_name(str(error), path)
+    missing["diagnose"] = TURNED_OFF
     return Session(
         path=path,
-        label=label,
-        stem=stem,
+        label=name.label,
+        stem=name.stem,
         dataset=dataset,
         analysis=analyze(dataset),
         joints=joints,
@@ -192,12 +163,6 @@ def _session(path: Path, label: str, stem: str, dataset: Dataset) -> Session:
         from_journal=journal_path(path).exists(),
         missing=missing,
     )
-
-
-def _with_gap(draft: Session, wait: Waiting | None) -> Session:
-    found = draft.diagnosed if wait is None else wait.result()
-    missing = draft.missing if found.json else draft.missing | {"diagnose": found.reason}
-    return replace(draft, diagnosed=found, missing=missing)
 
 
 def protocol_summary(dataset: Dataset) -> dict[str, Any] | None:

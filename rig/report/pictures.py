@@ -12,8 +12,9 @@ from rig.analyze import Analysis
 from rig.report import figures, setup_drawing
 from rig.report.document import Figure
 from rig.report.drawing import draw
-from rig.report.gather import Gathered, Session, file_stem
+from rig.report.gather import Gathered, Session
 from rig.report.setup_drawing import Load
+from rig.report.wishes import file_stem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Plot
@@ -28,6 +29,11 @@ class Pictures:
 
     png: bool = False
     _taken: set[str] = field(default_factory=set)
+    _drawn: dict[str, Figure] = field(default_factory=dict)
+
+    def again(self) -> Pictures:
+        """For the same document once more: what was drawn is not drawn again."""
+        return Pictures(self.png, _drawn=self._drawn)
 
     def setup(self, session: Session, pose: str, loads: Sequence[Load]) -> Figure:
         """The arm in one pose with its directions of load; a rig without an arm: its springs."""
@@ -106,8 +112,7 @@ class Pictures:
 
     def quality(self, session: Session) -> Figure | None:
         """Lateness, zeros and temperatures over the session; None if nothing was recorded."""
-        plot = figures.quality(session.dataset, session.quality.zeros)
-        if plot is None:
+        if not figures.quality_recorded(session.dataset, session.quality.zeros):
             return None
         header = ("pose", "direction", "repetition", "time_s", "force_N", "displacement_mm")
         rows = tuple(
@@ -116,8 +121,8 @@ class Pictures:
             for p in r.plateaus
         )
         caption = figures.quality_caption(session.dataset, session.quality.zeros)
-        again = lambda: figures.quality(session.dataset, session.quality.zeros) or plot  # noqa: E731
-        return self._draw("quality", session, caption, caption, again, header, rows)
+        plot = partial(figures.quality, session.dataset, session.quality.zeros)
+        return self._draw("quality", session, caption, caption, plot, header, rows)
 
     def coupling(self, gathered: Gathered) -> Figure:
         """Single and coupled stiffness, as the published Figure 9."""
@@ -167,9 +172,11 @@ class Pictures:
         *,
         mathematics: bool = False,
     ) -> Figure:
-        stem = name if session is None else f"{session.stem}_{name}"
-        return draw(self._free(stem), caption, alt, plot, header=header, rows=rows, png=self.png,
-                    mathematics=mathematics)  # fmt: skip
+        stem = self._free(name if session is None else f"{session.stem}_{name}")
+        if stem not in self._drawn:
+            self._drawn[stem] = draw(stem, caption, alt, plot, header=header, rows=rows,
+                                     png=self.png, mathematics=mathematics)  # fmt: skip
+        return self._drawn[stem]
 
     def _free(self, wanted: str) -> str:
         """A name that is not in use: `x/y` and `x_y` give the same one."""

@@ -8,17 +8,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rig.analyze_text import answer
 from rig.errors import InputError
-from rig.report.compose import compose
-from rig.report.diagnosing import usable_cores
+from rig.report.diagnosing import Job, diagnosing, usable_cores
 from rig.report.document import Document, Figure, figures
-from rig.report.gather import Gathered, Wishes, gather
-from rig.report.html import render
+from rig.report.wishes import Wishes, named
 from rig.storage.files import in_place_of
 from rig.terminal import Progress, silent
+
+if TYPE_CHECKING:
+    from rig.report.gather import Gathered
 
 __all__ = [
     "Report",
@@ -51,6 +51,8 @@ class Report:
 
     def to_html(self) -> str:
         """The page."""
+        from rig.report.html import render
+
         return render(self.document)
 
     def to_pdf(self) -> bytes:
@@ -65,16 +67,31 @@ def make(
 ) -> Report:
     """A report about data sets, the first of which the others are compared with.
 
-    InputError for files that cannot be read.
+    InputError for files that cannot be read, or no file at all.
     """
-    wishes = wishes or Wishes()
-    gathered = gather(paths, wishes, progress)
+    wishes, names = wishes or Wishes(), named(paths)
+    if not names:
+        raise InputError("rig report: give at least one data set.")
+    jobs = [Job(n.path, n.stem, wishes.png) for n in names] if wishes.gap else []
+    with diagnosing(jobs, wishes.processes) as begun:
+        # Only now: the diagnosis takes longest, and while it loads what it needs, so does the rest.
+        from rig.report.compose import compose
+        from rig.report.gather import gather, with_gaps
+        from rig.report.pictures import Pictures
+
+        gathered, pictures = gather(names, wishes, progress), Pictures(png=wishes.png)
+        if jobs:
+            if wishes.processes:
+                compose(gathered, pictures)  # a rehearsal, which draws all that needs no diagnosis
+            gathered = with_gaps(gathered, begun, progress)
     progress("drawing", 0.92)
-    return Report(gathered, compose(gathered, png=wishes.png))
+    return Report(gathered, compose(gathered, pictures.again()))
 
 
 def summary(gathered: Gathered) -> str:
     """One sentence a data set: banners, every k."""
+    from rig.analyze_text import answer
+
     lines = [*gathered.banners]
     lines += [f"{s.label}: {answer(s.analysis)}" for s in gathered.sessions]
     return "\n".join(lines)

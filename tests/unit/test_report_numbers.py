@@ -17,7 +17,7 @@ from rig.dataset import load
 from rig.diagnose import diagnose
 from rig.identify import identify
 from rig.report.document import Block, Section, Table, rich
-from rig.report.gather import Wishes
+from rig.report.wishes import Wishes
 from rig.report.report import Report, make
 from rig.report.results import Node, look_up
 from tests.recovery.emulated_sets import PAPER_C, REFERENCE_Q, measure, protocol

@@ -25,7 +25,7 @@ from rig.report.document import (
     Word,
     figures,
 )
-from rig.report.gather import Wishes
+from rig.report.wishes import Wishes
 from rig.report.html import escape, render
 from rig.report.report import Report, checked, make, write_figures, write_html
 from tests.unit.example_data import write_journal

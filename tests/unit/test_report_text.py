@@ -10,7 +10,7 @@ import pytest
 
 from rig import cli
 from rig.report.document import Block, Bullets, Cell, Facts, Paragraph, Section, Table, Word, rich
-from rig.report.gather import Wishes
+from rig.report.wishes import Wishes
 from rig.report.report import make
 from tests.unit.report_sets import bench, rewritten
 
