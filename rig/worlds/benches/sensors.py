@@ -14,7 +14,7 @@ from rig.worlds.benches.rig import Rig
 from rig.worlds.benches.trial import Array, log_uniform, whole
 
 _IDLE_SHARE = (1e-4, 1e-2)  # noise of a channel that shows nothing, of its largest value
-_MISJUDGED = (0.5, 2.0)  # what is stated of the noise over the noise
+_KNOWN, _MISJUDGED = 0.2, (0.5, 3.0)  # stated over true noise: within a fifth, or between these
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,10 @@ def read(rig: Rig, noise_mm: float, random: Generator) -> Readings:
     if rig.by_force:
         moved_sd, force_sd = here, there * slope
     else:
-        force_sd, moved_sd = here * k, there * k / slope if slope else 0.0
+        # Between the first slope and the mean one: who drives a specimen far beyond its first slope
+        # still wants to see that slope.
+        steep = np.sqrt(rig.stiffness * slope)
+        force_sd, moved_sd = here * k, there * k / steep if slope else 0.0
     idle = log_uniform(random, *_IDLE_SHARE)
     most_force, most_moved = (float(np.abs(x).max()) for x in (rig.force, rig.displacement))
     force_sd = force_sd or idle * (most_force or most_moved * k)
@@ -55,9 +58,18 @@ def _shown(true: Array, sd: float, random: Generator) -> tuple[Array, float]:
     noise = np.sqrt(1 - low**2) * random.standard_normal(len(true)) + low * wander
     digit = _nice(sd * log_uniform(random, 0.05, 3.0))
     shown = np.round((true + sd * noise) / digit) * digit
-    stated = np.hypot(sd, digit / np.sqrt(12)) * log_uniform(random, *_MISJUDGED)
+    stated = np.hypot(sd, digit / np.sqrt(12)) * _judged(random.random())
     decimals = max(0, int(np.ceil(-np.log10(digit))) + 1)
     return np.round(shown, decimals), float(f"{stated:.2g}")
+
+
+def _judged(x: float) -> float:
+    """Stated over true noise, of x uniform from 0 to 1: half the makers know it, the others round
+    up, or look at a quiet moment only."""
+    if x < 0.5:
+        return 1.0 + _KNOWN * (4 * x - 1)
+    low, high = _MISJUDGED
+    return float(low * (high / low) ** (2 * x - 1))
 
 
 def _nice(value: float) -> float:
