@@ -19,11 +19,12 @@ from rig.errors import InputError
 from rig.meta import Meta
 from rig.worlds.benches import channels, curves, loops, metals, strange, viscous
 from rig.worlds.benches.draw import EFFECTS, FORMS, WORDS, BenchCase, draw_case
+from rig.worlds.benches.imperfect import imperfect
 from rig.worlds.benches.label import WITHIN_SD, accepted, structural
 from rig.worlds.benches.memory import bouc_wen, chaboche, lowpass, maxwell, pursuit, stops
 from rig.worlds.benches.paths import through, to_and_fro
 from rig.worlds.benches.rig import Rig, Stated, make_rig
-from rig.worlds.benches.sensors import columns_of, noise_rms_mm, read
+from rig.worlds.benches.sensors import Readings, columns_of, noise_rms_mm, read
 from rig.worlds.benches.trial import Array, Trial, bent
 from rig.worlds.hidden.words import EFFECTS as OF_AN_ARM
 
@@ -93,6 +94,8 @@ def test_clocks_start_at_zero_and_never_go_back(cases: list[BenchCase]) -> None:
             assert clock[0] == 0
             assert (np.diff(clock)[inside] >= 0).all(), case.name
         if "session_s" in case.columns:
+            first = np.flatnonzero(np.diff(runs, prepend=0))
+            assert (case.columns["time_s"][first] == 0).all()
             assert (np.diff(case.columns["session_s"]) >= 0).all()
 
 
@@ -180,6 +183,7 @@ def test_of_scales_those_count_that_may_be_off_as_much() -> None:
 
 
 def test_a_scale_is_off_beyond_all_that_is_stated_and_a_clean_spring_is_not() -> None:
+    signs = set()
     for number in range(12):
         for word in ("force_scale", "displacement_scale", "joint_stiffness_error", "none"):
             case = draw_case(33, number, word=word)
@@ -191,6 +195,9 @@ def test_a_scale_is_off_beyond_all_that_is_stated_and_a_clean_spring_is_not() ->
             k = np.polyfit(case.columns["displacement_mm"], case.columns["force_N"], 1)[0]
             off = abs(np.log(k / spring["stiffness_N_per_mm"]["x"]))
             assert off > 2.2 * sd if word != "none" else off < 2.2 * sd + 0.01, (word, number)
+            if word != "none":
+                signs.add(case.label["parameters"][0]["factor"] > 1)
+    assert signs == {True, False}
 
 
 def test_noise_is_what_departs_from_the_response_without_it() -> None:
@@ -224,12 +231,41 @@ def test_a_late_displacement_is_a_dashpot_and_a_late_force_is_none() -> None:
         assert (done > 0) == lossy == ("joint_creep" in trial.accept)
 
 
-def test_samples_that_were_not_stored_leave_no_run_without_its_ends() -> None:
-    for k in range(30):
-        case = draw_case(34, k, word="contact_seating")
-        runs = case.columns["repetition"]
-        assert set(np.diff(runs)) <= {0, 1}
-        assert case.columns["time_s"][0] == 0 if "time_s" in case.columns else True
+def test_samples_that_were_not_stored_leave_every_run_its_ends() -> None:
+    path = through(to_and_fro(0.0, 1.0, 5), 1000)
+    number = np.arange(1000.0)
+    trial = Trial(path.time, path.value, path.value, repetition=path.repetition)
+    rig, lost = _rig(trial, Stated(1.0, 0.1, 0, 0)), 0
+    for k in range(20):
+        readings = Readings(number, path.value, 1.0, 1.0)
+        stored = columns_of(rig, readings, np.random.default_rng(k))["force_N"]
+        runs = [number[path.repetition == r] for r in range(1, 6)]
+        assert {float(x) for run in runs for x in run[[0, -1]]} <= set(stored.tolist())
+        lost += len(stored) < 1000
+    assert 0 < lost < 15
+
+
+def test_a_bench_adds_little_of_its_own_and_nothing_to_a_clean_trial() -> None:
+    clean = _line(1.0)
+    path = through(to_and_fro(-1.0, 1.0, 3), 600)
+    bent_one = Trial(path.time, path.value**3, path.value)
+    effect, added = bent(bent_one.displacement, bent_one.force), []
+    for k in range(20):
+        assert imperfect(clean, np.random.default_rng(k)) is clean
+        out = imperfect(bent_one, np.random.default_rng(k))
+        change = out.force[-600:] - bent_one.force  # what it may record before the start aside
+        added.append(float(change.std()) / effect)
+    assert 0.01 < np.median(added) < 0.1
+    assert max(added) < 0.25
+
+
+def test_a_crank_comes_to_rest_at_its_turning_points() -> None:
+    even, eased = (through([0, 1, -1], 3001, eased=e) for e in (False, True))
+    assert np.abs(np.diff(even.value)) == pytest.approx(1e-3)
+    turn = int(np.argmax(eased.value))
+    steps = np.abs(np.diff(eased.value))
+    assert max(steps[turn - 1], steps[turn]) < 0.01 * steps.max()
+    assert eased.value[[0, turn, -1]] == pytest.approx([0, 1, -1], abs=1e-6)
 
 
 # ---------------------------------------------------------------------------------------- laws
@@ -258,6 +294,9 @@ def test_a_maxwell_element_relaxes_by_its_time_whatever_the_sampling() -> None:
         strain = np.minimum(time / 1e-9, 1.0)
         left = maxwell(time, strain, tau, weight)
         assert left[2:] == pytest.approx(2.0 * np.exp(-time[2:] / 0.3), rel=1e-6)
+        ramp = np.linspace(0, 1, count)
+        pulled = maxwell(ramp, 3.0 * ramp, tau, weight)
+        assert pulled == pytest.approx(2.0 * 3.0 * 0.3 * (1 - np.exp(-ramp / 0.3)))
 
 
 def test_a_filter_and_a_presliding_near_their_goal_exponentially() -> None:
