@@ -204,7 +204,7 @@ def test_noise_is_what_departs_from_the_response_without_it() -> None:
     random = np.random.default_rng(4)
     trial = _line(5.0)
     for imposed in ("force", "displacement"):
-        rig = _rig(Trial(trial.time, trial.force, trial.displacement, imposed, 5.0),  # type: ignore[arg-type]
+        rig = _rig(Trial(trial.time, trial.force, trial.displacement, imposed, 5.0),
                    Stated(5.0, 0.1, 0, 0))  # fmt: skip
         readings = read(rig, 1e-3, random)
         assert 0.5e-3 < noise_rms_mm(rig, readings) < 2e-3
