@@ -10,6 +10,7 @@ from numpy.random import Generator
 
 from rig.worlds.arm import Array, place
 from rig.worlds.hidden.effect import Drawn, Form, Unsuited, draw_joint
+from rig.worlds.hidden.meaning import straight_factor
 from rig.worlds.hidden.scene import Change, Scene
 
 # drifts on the session clock
@@ -55,7 +56,8 @@ def drifting_force(law: str) -> Callable[[Scene, Generator], Drawn]:
             return Change(force=lambda force: force + added)
 
         def parameters(size: float) -> dict[str, Any]:
-            drift = size * channels if each else float(size * channels[0])
+            end = size * float(path[-1])  # a path that turns back ends elsewhere than at its most
+            drift = end * channels if each else end * float(channels[0])
             return {"drift_over_session_N": drift, "session_s": float(scene.history.time[-1]),
                     **extra}  # fmt: skip
 
@@ -141,7 +143,11 @@ def wrong_gain(channel: str, high: bool, bent: bool) -> Callable[[Scene, Generat
 
             return Change(laser=laser) if channel == "laser" else Change(force=force)
 
-        return Drawn(change, lambda size: {"factor": 1 + sign * size, "bend": bend}, (0.01, 0.25))
+        def parameters(size: float) -> dict[str, Any]:
+            factor = straight_factor(lambda x: x * (1 + sign * size * (1 + bend * x)))
+            return {"factor": factor, "bend": bend, "law_size": sign * size}
+
+        return Drawn(change, parameters, (0.01, 0.25))
 
     return draw
 

@@ -16,7 +16,8 @@ from numpy.random import Generator
 from rig.worlds.arm import Array
 from rig.worlds.hidden import memory
 from rig.worlds.hidden.effect import Drawn, Form, Unsuited, draw_joint, one_joint, share_of_joints
-from rig.worlds.hidden.scene import Change, Scene
+from rig.worlds.hidden.meaning import equal_work_threshold, run_seconds
+from rig.worlds.hidden.scene import Change, Index, Scene
 
 _STEEPEST = 12.0  # of a curve that may also take deflection away
 
@@ -63,7 +64,7 @@ def yields(law: str) -> Callable[[Scene, Generator], Drawn]:
         path, extra = knee_path(scene, scene.torque[:, joint], limit, law, random)
 
         def parameters(size: float) -> dict[str, Any]:
-            return {"threshold_Nm": limit, "hardening_ratio": 1.0 / (1.0 + size), **extra}
+            return {"hardening_ratio": 1.0 / (1.0 + size), **extra}
 
         return _in_joint(scene, joint, path, parameters, (0.02, 40.0), onset(scene, joint, limit))
 
@@ -73,28 +74,48 @@ def yields(law: str) -> Callable[[Scene, Generator], Drawn]:
 def knee_path(
     scene: Scene, load: Array, limit: float, law: str, random: Generator
 ) -> tuple[Array, dict[str, Any]]:
-    """(n) plastic path in units of the load, and the law's further parameters."""
+    """(n) plastic path in units of the load; the threshold as a sharp knee of equal work has it,
+    the limit as the law has it, and the law's further parameters."""
     fresh, time = scene.standing, scene.history.time
-    if law == "sharp":
-        return memory.play(load, limit, fresh), {}
+    if law == "perzyna":  # loaded slowly, it gives way at the limit, all at once
+        power, time_s = random.choice([1.0, 1.5, 2.0]), random.uniform(1.5, 15.0)
+        path = memory.flow(time, load, limit, time_s, power, fresh)
+        return path, {"threshold_Nm": limit, "flow_time_s": time_s, "power": power}
+    follow, extra = _knee_law(limit, law, random)
     if law == "taken_back":
-        return memory.play(load, limit, scene.history.run), {"returns": "between runs"}
+        fresh = scene.history.run
+    threshold = equal_work_threshold(
+        lambda x: follow(x, np.zeros(len(x), dtype=np.int64)), float(np.abs(load).max())
+    )
+    return follow(load, fresh), {"threshold_Nm": threshold, "law_limit_Nm": limit, **extra}
+
+
+def _knee_law(
+    limit: float, law: str, random: Generator
+) -> tuple[Callable[[Array, Index], Array], dict[str, Any]]:
+    """A law that knows no time: path (n) of a load (n) that starts anew with `fresh` (n)."""
+    if law == "sharp":
+        return lambda x, fresh: memory.play(x, limit, fresh), {}
+    if law == "taken_back":
+        return lambda x, fresh: memory.play(x, limit, fresh), {"returns": "between runs"}
     if law == "menegotto_pinto":
         sharp = random.uniform(3.0, 15.0)
         ratio = random.uniform(0.1, 0.6)
-        path = memory.rounded_knee(load, limit, ratio, sharp, fresh)
-        return path * ratio / (1.0 - ratio), {"Steel02_R0": sharp}
+        part = ratio / (1.0 - ratio)
+        return lambda x, fresh: part * memory.rounded_knee(x, limit, ratio, sharp, fresh), {
+            "Steel02_R0": sharp
+        }
     if law == "ramberg_osgood":
         power = random.uniform(4.0, 12.0)
-        path = memory.loops(load, lambda x: limit * (x / limit) ** power, fresh)
-        return path, {"power": power}
-    if law == "perzyna":
-        power, time_s = random.choice([1.0, 1.5, 2.0]), random.uniform(1.5, 15.0)
-        path = memory.flow(time, load, limit, time_s, power, fresh)
-        return path, {"flow_time_s": time_s, "power": power}
+        return lambda x, fresh: memory.loops(x, lambda s: limit * (s / limit) ** power, fresh), {
+            "power": power
+        }
     first, recall = random.uniform(0.2, 1.0), random.uniform(1.0, 6.0) / limit
-    path = memory.backstress(load, limit, first, recall, random.uniform(0.5, 1.5), fresh)
-    return path, {"backstress_ratio": first, "recall_per_Nm": recall}
+    second = random.uniform(0.5, 1.5)
+    return lambda x, fresh: memory.backstress(x, limit, first, recall, second, fresh), {
+        "backstress_ratio": first,
+        "recall_per_Nm": recall,
+    }
 
 
 # friction
@@ -182,11 +203,12 @@ def creep(law: str) -> Callable[[Scene, Generator], Drawn]:
         if law == "stress_dependent":  # grows faster than the load
             load = load * np.abs(load) / _top(scene, joint)
         path = memory.retarded(scene.history.time, load, times, weights)
+        seconds = run_seconds(scene)
+        after = float(weights @ -np.expm1(-seconds / times))  # of a load that stands so long
 
         def parameters(size: float) -> dict[str, Any]:
-            if not extra:
-                return {"creep_fraction": size, "times_s": times, "weights": weights}
-            return {"creep_fraction": size, **extra}
+            found = {"creep_fraction": size * after, "after_s": seconds, "law_size": size}
+            return found | (extra or {"times_s": times, "weights": weights})
 
         return _in_joint(scene, joint, path, parameters, (0.003, 0.8))
 
@@ -278,10 +300,13 @@ def lost_motion(law: str) -> Callable[[Scene, Generator], Drawn]:
         joint = int(random.choice(able))
         zone = float(top[joint] * np.exp(random.uniform(np.log(0.004), np.log(0.06))))
         x = net[:, joint]
-        rad = one_joint(joint, _taken_up(law, x, zone, scene, random))
+        place = _taken_up(law, x, zone, scene, random)
+        rad = one_joint(joint, place)
+        went = float(np.ptp(place[scene.history.sample]))  # pushed to one side only, it shows half
 
         def parameters(size: float) -> dict[str, Any]:
-            return {"width_rad": size, "zone_Nm": zone, "crossing_N": _crossing(scene, joint)}
+            return {"width_rad": size * went, "zone_Nm": zone, "law_size_rad": size,
+                    "crossing_N": _crossing(scene, joint)}  # fmt: skip
 
         return Drawn(
             lambda size: Change(joints=size * rad), parameters, (4e-6, 1.5e-3), (joint + 1,)

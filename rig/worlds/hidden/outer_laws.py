@@ -140,8 +140,8 @@ def slipping_base(axis: str, law: str) -> Callable[[Scene, Generator], Drawn]:
         }
 
         def parameters(size: float) -> dict[str, Any]:
-            return {"threshold_Nm": limit, "stiffness_after_Nm_per_rad": 1e6 / size,
-                    "axis": turn, "axis_depth_m": depth, **extra}  # fmt: skip
+            return {"stiffness_after_Nm_per_rad": 1e6 / size, "axis": turn, "axis_depth_m": depth,
+                    **extra}  # fmt: skip
 
         def change(size: float) -> Change:
             return Change(outside=size * moved)
@@ -172,9 +172,10 @@ def seating(law: str) -> Callable[[Scene, Generator], Drawn]:
         load = np.abs(scene.history.load)
         scale = float(load.max() * np.exp(random.uniform(np.log(0.03), np.log(0.2))))
         path = 1e-3 * _seated(law, load / scale, random)
+        seated = float(path.max()) * 1e3  # share of the depth that the largest load reaches
 
         def parameters(size: float) -> dict[str, Any]:
-            return {"depth_mm": size, "force_scale_N": scale}
+            return {"depth_mm": size * seated, "force_scale_N": scale, "law_size_mm": size}
 
         return Drawn(lambda size: Change(outside=size * path), parameters, (0.002, 0.15))
 
