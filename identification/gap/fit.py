@@ -6,13 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.gap.compare import moved_response
 from identification.gap.data import Array, Flags
-from identification.gap.evidence import HOLD_PART, ROW_PART, Engine
+from identification.gap.evidence import (
+    HOLD_PART,
+    ROW_PART,
+    RUN_PART,
+    Engine,
+    level_columns,
+    level_covariance,
+    run_columns,
+)
 from identification.gap.parts import Part, block
 from identification.gap.search import Explanation
 
 _LEVER_M = 0.3
 _WIDER = 3.0
+_LATER = 3  # rows of a hold from here on count as one
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +54,15 @@ class Fit:
         return np.asarray(engine.pool[:, columns] @ w)
 
 
-def fit(engine: Engine, explanation: Explanation, keep: Flags | None = None) -> Fit:
-    """Posterior mean under the explanation's imperfection. keep (size,): rows to fit on."""
+def fit(
+    engine: Engine, explanation: Explanation, keep: Flags | None = None, *, alike: bool = False
+) -> Fit:
+    """Posterior mean under the explanation's imperfection. keep (size,): rows to fit on.
+
+    alike: the covariance also counts that a law errs alike along a run and from run to run: the
+    same estimate `b = H^-1 X' V^-1 y`, under noise `V + C C'` instead of V, scatters by
+    `H^-1 X' V^-1 C C' V^-1 X H^-1` more.
+    """
     bench, n = engine.bench, engine.bench.rows.n
     keep = np.ones(bench.layout.size, dtype=bool) if keep is None else keep
     columns = [c for p in explanation.parts for c in p.variant.columns]
@@ -55,12 +72,18 @@ def fit(engine: Engine, explanation: Explanation, keep: Flags | None = None) -> 
     roots = [np.diag(engine.base.sd), *[_WIDER * p.root for p in explanation.parts]]
     X = np.column_stack([engine.base.columns, E])
     root = block(roots)
+    k = len(root)
     gram, moment = _normal(engine, X @ root, explanation.eta, keep)
-    precision = gram + np.eye(len(gram))
-    covariance = root @ np.linalg.solve(precision, root.T)
-    beta = root @ np.linalg.solve(precision, moment)
+    solved = np.linalg.solve(gram + np.eye(k), root.T)  # H^-1 root'
+    covariance = root @ solved
+    beta = solved.T @ moment
     kb = engine.base.columns.shape[1]
     w = beta[kb:]
+    if alike and explanation.eta > 0:
+        errs = _misled(engine, explanation.parts, w, explanation.eta)
+        gram, _ = _normal(engine, np.column_stack([X @ root, errs]), explanation.eta, keep)
+        moves = solved.T @ gram[:k, k:]
+        covariance = covariance + moves @ moves.T
     effect = (E @ w)[:n]
     return Fit(
         parts=explanation.parts,
@@ -71,6 +94,37 @@ def fit(engine: Engine, explanation: Explanation, keep: Flags | None = None) -> 
         response=(engine.base.columns @ beta[:kb])[:n] + effect,
         effect=effect,
     )
+
+
+def _misled(engine: Engine, parts: tuple[Part, ...], w: Array, eta: float) -> Array:
+    """(size, c) columns with independent unit coefficients: what an imperfection of eta m does that
+    repeats from run to run, that a run has to itself (`identification.gap.evidence`), and that all
+    holds have in common: in their first rows and in later ones, after rises and falls of the load,
+    the same everywhere and a share of what the law itself does there."""
+    if "imperfection" not in engine.cache:
+        levels = level_columns(engine.bench) @ np.linalg.cholesky(level_covariance(engine.bench))
+        runs = RUN_PART * run_columns(engine.bench)
+        begin = [engine.bench.stacked(m.astype(float)) for m in _phases(engine)]
+        engine.cache["imperfection"] = np.column_stack([levels, runs, *begin])
+    n, weight = engine.bench.rows.n, engine.bench.rows.weight
+    does = (engine.pool[:n, [c for p in parts for c in p.variant.columns]] @ w)[:, None]
+    moved = moved_response(engine, does)[:, 0]
+    size = float(np.sqrt(weight @ moved**2 / weight.sum()))
+    own = [engine.bench.stacked(moved * m / size) for m in _phases(engine) if size > 0]
+    return eta * np.column_stack([engine.cache["imperfection"], *own])
+
+
+def _phases(engine: Engine) -> list[Flags]:
+    """Rows (n,) by their place in the hold and by whether the load rose or fell before it."""
+    bench, rows = engine.bench, engine.bench.rows
+    if rows.continuous:
+        rises = np.gradient(np.abs(bench.load)) >= 0
+        return [rises, ~rises]
+    first = np.flatnonzero(rows.hold_starts)[np.cumsum(rows.hold_starts) - 1]
+    place = np.minimum(np.arange(rows.n) - first, _LATER)
+    rises = np.abs(bench.load[first]) >= np.abs(bench.load[np.maximum(first - 1, 0)])
+    masks = [(place == k) & (rises == up) for k in range(_LATER + 1) for up in (True, False)]
+    return [m for m in masks if m.any()]
 
 
 def _normal(engine: Engine, X: Array, eta: float, keep: Flags) -> tuple[Array, Array]:

@@ -1,16 +1,32 @@
-"""Parameters of an effect in words and units, from coefficients and their covariance."""
+"""Parameters of an effect in words and units, from coefficients and their covariance.
+
+What they mean, whatever shape was fitted, so that shapes can be compared and mixed:
+
+- threshold: of the sharp knee that, loaded once up to the largest load, comes out at the same
+  end with the same work (the bilinear curve of equal area, as with push-over curves in FEMA 356);
+- slope beyond, creep: against the elastic compliance as it was found, not as it was simulated;
+- creep_fraction: late share of the elastic deflection when a load has stood as long as a run lasts;
+- depth (of a seat): at the largest load;
+- lag: mean delay; factor: read over true along the straight line through zero.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.link_flexibility import STRAINS
+from identification.gap.effects.time_lag import late
+from identification.gap.history import half_sample
 from identification.gap.parts import Part
+
+_GRID_STEP = 0.03  # between finely spaced thresholds, as their share
+_TWO_SIDED = 1.959964  # standard deviations of a normal 95 % interval
 
 
 @dataclass(frozen=True)
@@ -23,40 +39,82 @@ class Parameter:
     unit: str
 
 
-def parameters(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    """Named parameters of one part; units are written out in the result."""
-    return _TABLE[part.word](bench, part, w, cov)
+@dataclass(frozen=True, eq=False)
+class Softer:
+    """Relative changes of the springs' compliance beside an effect, by joint: value, variance, and
+    covariance (k,) with the effect's coefficients. A joint without a spring of its own is absent.
+    """
+
+    value: dict[int, float]
+    variance: dict[int, float]
+    cross: dict[int, Array]
 
 
-def _linear(functional: Array, w: Array, cov: Array, unit: str, scale: float = 1.0) -> Parameter:
-    value = float(functional @ w) * scale
-    half = 1.96 * max(float(functional @ cov @ functional), 0.0) ** 0.5 * abs(scale)
+NOMINAL = Softer({}, {}, {})
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Coefficients (k,) of a part, their covariance (k, k), and the springs beside it."""
+
+    w: Array
+    cov: Array
+    softer: Softer
+
+    def linear(self, functional: Array, unit: str, scale: float = 1.0) -> Parameter:
+        """A linear function of the coefficients."""
+        square = max(float(functional @ self.cov @ functional), 0.0)
+        return _normal(float(functional @ self.w) * scale, square * scale**2, unit)
+
+    def one(self, index: int, unit: str, scale: float = 1.0) -> Parameter:
+        """A single coefficient."""
+        return self.linear(np.eye(len(self.w))[index], unit, scale)
+
+    def per_spring(self, functional: Array, joint: int | None, unit: str = "1") -> Parameter:
+        """A linear function of coefficients that are in units of a joint's simulated compliance,
+        over the compliance that was found: `f / (1 + s)`, by its derivatives."""
+        value = float(functional @ self.w)
+        square = float(functional @ self.cov @ functional)
+        if joint is None or joint not in self.softer.value:
+            return _normal(value, max(square, 0.0), unit)
+        softer = max(1 + self.softer.value[joint], _LEAST_COMPLIANCE)
+        ratio = value / softer
+        square += ratio**2 * self.softer.variance[joint]
+        square -= 2 * ratio * float(functional @ self.softer.cross[joint])
+        return _normal(ratio, max(square, 0.0) / softer**2, unit)
+
+
+_LEAST_COMPLIANCE = 0.1  # of the simulated one
+
+
+def parameters(
+    bench: Bench, part: Part, w: Array, cov: Array, softer: Softer = NOMINAL
+) -> dict[str, Parameter]:
+    """Named parameters of one part; units are written out in the result. w (k,), cov (k, k): its
+    coefficients and their covariance; softer: what the springs turned out to be."""
+    return _TABLE[part.word](bench, part, _Found(w, cov, softer))
+
+
+def _normal(value: float, variance: float, unit: str) -> Parameter:
+    half = _TWO_SIDED * variance**0.5
     return Parameter(value, value - half, value + half, unit)
-
-
-def _one(w: Array, cov: Array, index: int, unit: str, scale: float = 1.0) -> Parameter:
-    return _linear(np.eye(len(w))[index], w, cov, unit, scale)
 
 
 def _torque_unit(bench: Bench) -> str:
     return "Nm" if bench.data.arm else "N"
 
 
-def _knee(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _knee(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     info = part.variant.info
-    radius = np.asarray(info["radius"])
-    w, cov = w[: len(radius)], cov[: len(radius), : len(radius)]  # the rest flows back
-    power = np.maximum(w, 0.0)
-    total = float(power.sum())
-    centre = float(power @ radius / total) if total > 0 else float(info["centre"])
-    near = np.sort(np.abs(radius - centre))
-    # the grid's neighbours bound it; of the fine grid, one step
-    half = float(near[1]) if len(near) > 1 else 0.017 * centre
-    slope = _linear(np.ones(len(w)), w, cov, "1")
+    k = len(info["radius"])  # the rest flows back
+    cross = {j: c[:k] for j, c in found.softer.cross.items()}
+    softer = Softer(found.softer.value, found.softer.variance, cross)
+    knee = _Found(found.w[:k], found.cov[:k, :k], softer)
+    slope = knee.per_spring(np.ones(k), info.get("joint"))
     least = part.variant.least  # what bends less does not give way
     value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
     out = {
-        "threshold": Parameter(centre, centre - half, centre + half, _torque_unit(bench)),
+        "threshold": _threshold(bench, part, knee),
         "slope_beyond_over_elastic": Parameter(value, low, high, "1"),
     }
     if info["flow_s"]:
@@ -65,49 +123,84 @@ def _knee(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter
     return out
 
 
-def _hysteresis(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _threshold(bench: Bench, part: Part, knee: _Found) -> Parameter:
+    """`top - sum w (top - r)^2 / sum w (top - r)` of plays of radii r, by its derivatives; one
+    alone is known to the step of its grid. The gain of the force acts on every threshold."""
+    info = part.variant.info
+    radius = np.asarray(info["radius"])
+    beyond = np.maximum(float(np.abs(info["load"]).max()) - radius, 0.0)
+    path, work = float(knee.w @ beyond), float(knee.w @ beyond**2)
+    value, variance = float(info["centre"]), (_GRID_STEP * float(info["centre"])) ** 2 / 12
+    if len(radius) > 1 and path > 0:
+        mean = work / path
+        slope = (mean - beyond) * beyond / path
+        value = float(np.clip(np.max(beyond + radius) - mean, radius.min(), radius.max()))
+        variance = float(slope @ knee.cov @ slope)
+    gain = bench.data.instruments.force_gain if not bench.imposed else 0.0
+    return _normal(value, max(variance, 0.0) + (gain * value) ** 2, _torque_unit(bench))
+
+
+def _hysteresis(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     """Of the strengths that slip within the range."""
-    radius = np.asarray(part.variant.info["radius"])
-    load = bench.torque[:, int(part.variant.info["joint"])]
-    slips = (radius < float(np.ptp(np.append(load, 0.0)))).astype(float)
+    radius, joint = np.asarray(part.variant.info["radius"]), int(part.variant.info["joint"])
+    slips = (radius < float(np.ptp(np.append(bench.torque[:, joint], 0.0)))).astype(float)
     return {
-        "friction": _linear(slips * radius, w, cov, _torque_unit(bench)),
-        "share_through_friction": _linear(slips, w, cov, "1"),
+        "friction": found.linear(slips * radius, _torque_unit(bench)),
+        "share_through_friction": found.per_spring(slips, joint),
     }
 
 
-def _backlash(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    return {
-        "width": _one(w, cov, 0, "rad" if bench.data.arm else "mm", 1.0 if bench.data.arm else 1e3)
-    }
+def _backlash(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+    """Of the play, what the loads went through: a joint that is pushed to one side only shows
+    half of it, and what lies beyond is a matter of the law."""
+    arm, joint = bench.data.arm, int(part.variant.info["joint"])
+    lever, moved = bench.lever[:, joint], bench.columns[part.variant.columns[0]][: bench.rows.n]
+    seen = np.abs(lever) > _LEAST_LEVER * np.abs(lever).max()
+    went = min(float(np.ptp(moved[seen] / lever[seen])), 1.0)
+    return {"width": found.one(0, "rad" if arm else "mm", went * (1.0 if arm else 1e3))}
 
 
-def _curve(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+_LEAST_LEVER = 0.1  # of the largest: a joint hardly moves what has less
+
+
+def _curve(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     """What the compliance at the largest torque has more than at none: a hinge adds itself, a
     power its exponent, a line nothing."""
     grows = {"line": 0.0, "quadratic": 2.0, "even": 2.0, "cubic": 3.0}
     change = np.array([grows.get(kind, 1.0) for kind in part.variant.info["kinds"]])
-    out = _linear(change, w, cov, "1", bench.sense)
-    return {"change_of_compliance_over_range": out}
+    return {"change_of_compliance_over_range": found.linear(change, "1", bench.sense)}
 
 
-def _creep(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    times = np.asarray(part.variant.info["times_s"])
-    power = np.maximum(w, 0.0)
+def _creep(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+    times, seconds = np.asarray(part.variant.info["times_s"]), run_seconds(bench)
+    power = np.maximum(found.w, 0.0)
     mean = (
         float(np.exp(power @ np.log(times) / power.sum())) if power.sum() > 0 else float(times[0])
     )
+    after = found.per_spring(-np.expm1(-seconds / times), part.variant.info.get("joint"))
     return {
-        "creep_fraction": _linear(np.ones(len(w)), w, cov, "1"),
+        "creep_fraction": after,
+        "creep_fraction_after": Parameter(seconds, seconds, seconds, "s"),
         "retardation_time": Parameter(mean, mean / 3, mean * 3, "s"),
     }
 
 
-def _stiffness(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def run_seconds(bench: Bench) -> float:
+    """s from the first sample of a run to its last, mean over runs."""
+    data = bench.data
+    number = np.unique(data.run, return_inverse=True)[1]
+    first = np.full(number.max() + 1, np.inf)
+    last = np.full(number.max() + 1, -np.inf)
+    np.minimum.at(first, number, data.time)
+    np.maximum.at(last, number, data.time)
+    return float(np.mean(last - first))
+
+
+def _stiffness(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     """Factor on the simulated stiffness: of compliance where force is imposed, else of force."""
     out = {}
     for i, j in enumerate(part.variant.info["joints"]):
-        c = _one(w, cov, i, "1")
+        c = found.one(i, "1")
         ends = [1 / max(1 + v, 0.02) for v in (c.value, c.high, c.low)]
         if bench.imposed:
             ends = [max(1 + v, 0.0) for v in (c.value, c.low, c.high)]
@@ -115,94 +208,164 @@ def _stiffness(bench: Bench, part: Part, w: Array, cov: Array) -> dict[str, Para
     return out
 
 
-def _gain(bench: Bench, _: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _gain(bench: Bench, _: Part, found: _Found) -> dict[str, Parameter]:
     """Read over true. The columns are shares of what was read, but for an imposed displacement."""
-    g = _one(w, cov, 0, "1")
+    g = found.one(0, "1")
     ends = [1 + v if bench.imposed else 1 / max(1 - v, 0.02) for v in (g.value, g.low, g.high)]
     return {"factor": Parameter(ends[0], ends[1], ends[2], "1")}
 
 
-def _links(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _links(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     return {
-        f"{strain}_compliance_over_nominal_segment{k + 1}": _one(w, cov, 2 * i + s, "1")
+        f"{strain}_compliance_over_nominal_segment{k + 1}": found.one(2 * i + s, "1")
         for i, k in enumerate(part.variant.info["segments"])
         for s, strain in enumerate(STRAINS)
     }
 
 
-def _base(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _base(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     return {
-        f"compliance_about_{'xyz'[a]}": _one(w, cov, i, "rad/Nm")
+        f"compliance_about_{'xyz'[a]}": found.one(i, "rad/Nm")
         for i, a in enumerate(part.variant.info["axes"])
     }
 
 
-def _seating(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    f0 = float(part.variant.info["force_N"])
+def _seating(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+    f0, top = float(part.variant.info["force_N"]), float(np.abs(bench.load).max())
+    seated = {
+        "exponential": lambda scale: -np.expm1(-top / scale),
+        "hyperbolic": lambda scale: top / (top + scale),
+    }
+    at_top = np.array([seated[law](scale) for law, scale in part.variant.info["laws"]])
     return {
-        "depth": _linear(np.ones(len(w)), w, cov, "mm", 1e3),
+        "depth": found.linear(at_top, "mm", 1e3),
         "force_scale": Parameter(f0, f0 / 2, f0 * 2, "N"),
     }
 
 
-def _misalignment(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _misalignment(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     """Tangents at the largest load."""
     names, turns = part.variant.info["directions"], part.variant.info["at_N"] is not None
     per = 4 if turns else 2
-    rows = np.eye(len(w))
+    rows = np.eye(len(found.w))
     return {
-        f"tangent_{name}_{k + 1}": _linear(
-            rows[per * i + k] + (rows[per * i + k + 2] if turns else 0.0), w, cov, "1"
+        f"tangent_{name}_{k + 1}": found.linear(
+            rows[per * i + k] + (rows[per * i + k + 2] if turns else 0.0), "1"
         )
         for i, name in enumerate(names)
         for k in range(2)
     }
 
 
-def _drift(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _drift(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     """Change from start to end of the session, per direction where it has its own."""
     unit, scale = ("N", 1.0) if part.word == "force_drift" else ("mm", 1e3)
     names, path = part.variant.info["names"], part.variant.info["path"]
-    per = len(w) // len(names)
+    per = len(found.w) // len(names)
     out = {}
     for i, name in enumerate(names):
-        f = np.zeros(len(w))
+        f = np.zeros(len(found.w))
         mine = slice(i * per, (i + 1) * per)
         if path == "free":
             f[mine.start], f[mine.stop - 1] = -1.0, 1.0
         else:
-            f[mine] = 1.0
+            f[mine] = _end(bench, str(path))
         over = "drift" if path == "each run" else "drift_over_session"
         key = over + (f"_{name}" if name else "")
-        out[key] = _linear(f, w, cov, unit, scale)
+        out[key] = found.linear(f, unit, scale)
     return out
 
 
-def _shift(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    if len(w) == 1:
+def _end(bench: Bench, path: str) -> float:
+    """Where a path is at the end of the session: 1, but temperatures may have come back."""
+    temperature = bench.rows.temperature
+    if temperature is None or "temperature" not in path:
+        return 1.0
+    number = path.removeprefix("temperature ")
+    v = temperature[:, int(number) - 1] if number.isdigit() else temperature.mean(axis=1)
+    return float((v[-1] - v[0]) / np.ptp(v))
+
+
+def _shift(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+    if len(found.w) == 1:
         run = part.variant.info["runs"][0] + 1
-        return {f"shift_before_run{run}": _one(w, cov, 0, "mm", 1e3)}
-    return {f"shift{i + 1}": _one(w, cov, i, "mm", 1e3) for i in range(len(w))}
+        return {f"shift_before_run{run}": found.one(0, "mm", 1e3)}
+    return {f"shift{i + 1}": found.one(i, "mm", 1e3) for i in range(len(found.w))}
 
 
-def _lag(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
-    lag = float(part.variant.info["lag_s"])
-    return {"lag": _one(w, cov, 0, "s", lag)}
+_LAGS = np.geomspace(0.2, 16.0, 40)  # of the time between two samples: lags that are compared
 
 
-def _pose(_: Bench, part: Part, w: Array, cov: Array) -> dict[str, Parameter]:
+def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+    """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
+    a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
+    is read as the delay and as the filter that do the same, each the more the closer it comes."""
+    n, info = bench.rows.n, part.variant.info
+    w = found.w
+    does = sum((v * bench.columns[c][:n] for v, c in zip(w, part.variant.columns, strict=True)),
+               np.zeros(n))  # fmt: skip
+    total = found.linear(np.ones(len(w)), "1")
+    relative = (total.high - total.low) / (2 * _TWO_SIDED) / max(abs(total.value), 1e-6)
+    lags, misses, spread = np.zeros(2), np.zeros(2), np.zeros(2)
+    for k, kind in enumerate(("delay", "filter")):
+        lags[k], misses[k] = _closest(bench, info["channel"], kind, does)
+        more, _ = _closest(bench, info["channel"], kind, does * (1 + min(relative, 0.5)))
+        spread[k] = more - lags[k]
+    share = 1 / np.maximum(misses, _LEAST_MISS) ** 2
+    share /= share.sum()
+    value = float(share @ lags)
+    variance = float(share @ (spread**2 + (lags - value) ** 2))
+    return {"lag": _normal(value, variance, "s")}
+
+
+_LEAST_MISS = 0.002  # of the effect: no closer is told apart
+
+
+def _closest(bench: Bench, channel: str, kind: str, does: Array) -> tuple[float, float]:
+    """Lag s of that kind that does most nearly the same (n,), and what it misses, as a share."""
+    lags, columns = _lagging(bench, channel, kind)
+    scale = 1 / bench.noise.response
+    y, does_each = does * scale, columns * scale
+    left = np.sum((does_each - y) ** 2, axis=1)
+    i = int(np.clip(left.argmin(), 1, len(lags) - 2))
+    # between three lags what a lag does is straight, and what is left a parabola
+    a, b, c = left[i - 1 : i + 2]
+    bend = a - 2 * b + c
+    shift = float(np.clip(0.5 * (a - c) / bend, -1, 1)) if bend > 0 else 0.0
+    least = max(b - 0.25 * (a - c) * shift, 0.0)
+    step = float(np.log(lags[1] / lags[0]))
+    return float(lags[i] * np.exp(shift * step)), float(np.sqrt(least / max(y @ y, 1e-300)))
+
+
+def _sampling_time(bench: Bench) -> float:
+    if not bench.rows.continuous:
+        return 2 * half_sample(bench.rows)
+    step: Array = np.diff(bench.rows.time)
+    return float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
+
+
+@lru_cache(maxsize=4)
+def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
+    """Lags (k,) s and what each does to the responses (k, n)."""
+    lags = _LAGS * _sampling_time(bench)
+    return lags, np.array([late(bench, channel, kind, float(t))[: bench.rows.n] for t in lags])
+
+
+def _pose(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     """Tool offset and angles of the joints."""
     kind = part.variant.info["kind"]
     out: dict[str, Parameter] = {}
     if kind in ("tool", "both"):
-        out |= {f"offset_{a}": _one(w, cov, i, "mm", 1e3) for i, a in enumerate("xyz")}
+        out |= {f"offset_{a}": found.one(i, "mm", 1e3) for i, a in enumerate("xyz")}
     if kind in ("joints", "both"):
         first = 3 if kind == "both" else 0
-        out |= {f"angle_joint{i - first + 1}": _one(w, cov, i, "rad") for i in range(first, len(w))}
+        out |= {
+            f"angle_joint{i - first + 1}": found.one(i, "rad") for i in range(first, len(found.w))
+        }
     return out
 
 
-_TABLE: dict[str, Callable[[Bench, Part, Array, Array], dict[str, Parameter]]] = {
+_TABLE: dict[str, Callable[[Bench, Part, _Found], dict[str, Parameter]]] = {
     "joint_yield": _knee,
     "base_slip": _knee,
     "joint_hysteresis": _hysteresis,

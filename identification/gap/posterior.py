@@ -6,67 +6,121 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.compare import Scored, score
+from identification.gap.compare import IMPERFECTION, level_prior, score
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
-from identification.gap.fit import fit
-from identification.gap.parameters import Parameter, parameters
-from identification.gap.parts import Part
-from identification.gap.search import Explanation, conditioned
+from identification.gap.fit import Fit, fit
+from identification.gap.parameters import Parameter, Softer, parameters
+from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
+from identification.gap.search import SAME_JOINT, Explanation, conditioned
 from identification.gap.variants import Variant
 
-_MOST, _LEAST_SHARE = 6, 0.02  # shapes that count, and their least share of the posterior
+_MOST, _LEAST_SHARE = 10, 0.01  # shapes that count, and their least share of the posterior
 _TWO_SIDED = 1.959964  # standard deviations of a normal 95 % interval
 
 
 def parameters_of(
     engine: Engine, variants: list[Variant], chosen: Explanation, index: int
 ) -> dict[str, Parameter]:
-    """Parameters of effect `index` of the explanation: value and 95 % interval of the mixture of
-    its likeliest shapes, the other effects as they are."""
+    """Parameters of effect `index` of the explanation: 95 % interval of the mixture of its
+    likeliest shapes, wherever they sit, under every size of imperfection, the other effects as they
+    are; value: of those that sit where the explanation says. What names its joint or axis is mixed
+    over the shapes that have it."""
+    found, weights, here = [], [], []
+    place = _place(chosen.parts[index].variant)
+    for explanation, weight in _open(engine, variants, chosen, index):
+        part = explanation.parts[index]
+        fitted = fit(engine, explanation, alike=True)
+        softer = _softer(engine, fitted, index)
+        found.append(parameters(engine.bench, part, *fitted.of(index), softer))
+        weights.append(weight)
+        here.append(_place(part.variant) == place)
+    share = np.exp(np.array(weights) - max(weights))
+    out = {}
+    for name in found[0]:
+        has = np.array([name in f for f in found])
+        mine = has & np.array(here)
+        every = _mixture([f[name] for f in found if name in f], share[has])
+        value = _mixture(
+            [f[name] for f, m in zip(found, mine, strict=True) if m], share[mine]
+        ).value
+        out[name] = replace(every, value=value, low=min(every.low, value),
+                            high=max(every.high, value))  # fmt: skip
+    return out
+
+
+def _open(
+    engine: Engine, variants: list[Variant], chosen: Explanation, index: int
+) -> list[tuple[Explanation, float]]:
+    """What the data leave open, the chosen shape first: explanations with other shapes of the
+    effect and other sizes of imperfection, with their log weights."""
     part = chosen.parts[index]
     rest = tuple(p for i, p in enumerate(chosen.parts) if i != index)
     levels, energy = conditioned(engine, rest)
     family = [v for v in variants if v.word == part.word]
-    likely, share = _likeliest(score(engine, levels, family, energy), part)
-    found = []
-    for scored in likely:
-        parts = list(chosen.parts)
-        parts[index] = Part(scored.variant, scored.scale)
-        fitted = fit(engine, replace(chosen, parts=tuple(parts)))
-        found.append(parameters(engine.bench, parts[index], *fitted.of(index)))
-    return {
-        name: _mixture([f[name] for f in found if name in f],
-                       share[[name in f for f in found]])
-        for name in found[0]
-    }  # fmt: skip
+    ranked = sorted(score(engine, levels, family, energy), key=lambda s: -s.log_evidence)
+    shapes = [part, *(Part(s.variant, s.scale) for s in ranked[:_MOST])]
+    out = []
+    for shape in [shapes[0], *(s for s in shapes[1:] if s.variant is not part.variant)]:
+        parts = (*chosen.parts[:index], shape, *chosen.parts[index + 1 :])
+        prior = np.log(shape.variant.prior) - SAME_JOINT * _crowds(shape, rest)
+        each = _levels(engine, replace(chosen, parts=parts), prior)
+        out += sorted(each, key=lambda e: -e[1])
+    least = max(weight for _, weight in out) + np.log(_LEAST_SHARE)
+    return [(e, w) for i, (e, w) in enumerate(out) if w > least or i == 0]
 
 
-def _likeliest(scored: list[Scored], part: Part) -> tuple[list[Scored], Array]:
-    """The chosen shape first, then others of its element that meet the data as closely, with their
-    shares of the posterior."""
-    mine = next(s for s in scored if s.variant is part.variant)
-    place = _place(part.variant)
-    near = [s for s in scored if s is not mine and s.level <= mine.level]
-    others = [s for s in near if _place(s.variant) == place]
-    ranked = [mine, *sorted(others, key=lambda s: -s.log_evidence)[: _MOST - 1]]
-    weight = np.array([s.log_evidence for s in ranked])
-    share = np.exp(weight - weight.max())
-    share /= share.sum()
-    if share[0] < _LEAST_SHARE:  # chosen for its place beside the other effects
-        return [mine], np.ones(1)
-    kept = np.flatnonzero((share >= _LEAST_SHARE) | (np.arange(len(ranked)) == 0))
-    return [ranked[i] for i in kept], share[kept] / share[kept].sum()
+def _crowds(shape: Part, rest: tuple[Part, ...]) -> bool:
+    """Whether it sits in the joint of another effect."""
+    joint = shape.variant.info.get("joint")
+    return joint is not None and any(p.variant.info.get("joint") == joint for p in rest)
 
 
-def _place(variant: Variant) -> tuple[object, ...]:
-    """Where a variant acts: parameters of other joints or axes are other parameters."""
+def _levels(
+    engine: Engine, explanation: Explanation, prior: float
+) -> list[tuple[Explanation, float]]:
+    """The explanation at every size of imperfection, with its log weight."""
+    out = []
+    for i, level in enumerate(engine.levels):
+        energy = part_sizes(engine, explanation.parts, i)[1]
+        weight = prior + log_joint(level, explanation.parts) + level_prior(engine, i, energy)
+        weight += signs_kept(level, explanation.parts)
+        out.append((replace(explanation, eta=_size(engine, i, energy)), float(weight)))
+    return out
+
+
+def _size(engine: Engine, i: int, energy: float) -> float:
+    """Size of imperfection, m, that a level stands for; energy: mean square (m^2) of the effects.
+    The lowest takes in all that the noise hides: no law is met exactly."""
+    etas = engine.etas
+    if i > 0:
+        return float(etas[i])
+    return float(min(IMPERFECTION * energy**0.5, etas[1] / 2.5**0.5))
+
+
+def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:
+    """The springs beside an effect, with what their uncertainty has in common with it."""
+    base, before = len(fitted.base), sum(len(p.variant.columns) for p in fitted.parts[:index])
+    start = base + before
+    mine = slice(start, start + len(fitted.parts[index].variant.columns))
+    covariance = fitted.joint_covariance
+    at = {int(engine.base.names[i].removeprefix("spring")) - 1: i
+          for i in engine.base.index("spring")}  # fmt: skip
+    return Softer(
+        {j: float(fitted.base[i]) for j, i in at.items()},
+        {j: float(covariance[i, i]) for j, i in at.items()},
+        {j: covariance[i, mine] for j, i in at.items()},
+    )
+
+
+def _place(variant: Variant) -> tuple[str, ...]:
+    """Where a variant acts."""
     info = variant.info
     return tuple(str(info.get(key)) for key in ("joint", "joints", "axis", "axes", "depth_m"))
 
 
 def _mixture(each: list[Parameter], share: Array) -> Parameter:
-    """Value and interval of a mixture of normals; one alone keeps its own, skewed as it may be."""
+    """Median and interval of a mixture of normals; one alone keeps its own, skewed as it may be."""
     if len(each) == 1:
         return each[0]
     share = share / share.sum()
@@ -78,7 +132,7 @@ def _mixture(each: list[Parameter], share: Array) -> Parameter:
     )
     mean, low, high = (np.log(ends) if skewed else ends).T
     sd = np.maximum(high - low, 0.0) / (2 * _TWO_SIDED) + 1e-300
-    out = [float(share @ mean), *(_quantile(mean, sd, share, q) for q in (0.025, 0.975))]
+    out = [_quantile(mean, sd, share, q) for q in (0.5, 0.025, 0.975)]
     value, least, most = (float(np.exp(v)) for v in out) if skewed else out
     return Parameter(value, least, most, each[0].unit)
 
