@@ -31,7 +31,10 @@ from rig.report.document import (
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; form-action 'none'"
 # Characters that XML and HTML do not know, and lone halves of surrogate pairs (file names).
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-_LONG = 14  # rows beyond which a table may be split between pages
+_LONG = 8  # rows beyond which a table may be split between pages
+# Wider or higher than that, in points, figures have panels that nobody could read in small print.
+_LARGE = (700.0, 450.0)
+_VIEW = re.compile(r'viewBox="\S+ \S+ ([\d.]+) ([\d.]+)"')
 _MARKS = {"good": "✓ ", "bad": "✗ ", "open": "○ "}
 
 
@@ -115,9 +118,12 @@ def _block(block: Block, level: int) -> str:
 
 
 def _figure(figure: Figure) -> str:
+    view = _VIEW.search(figure.svg)
+    large = view is not None and any(float(view[i]) > most for i, most in enumerate(_LARGE, 1))
+    drawing = f'<div role="img" aria-label="{escape(figure.alt)}">{figure.svg}</div>'
     return (
-        f'<figure id="{escape(figure.name)}"><div role="img" aria-label="{escape(figure.alt)}">'
-        f"{figure.svg}</div><figcaption>{escape(figure.caption)}</figcaption></figure>"
+        f'<figure id="{escape(figure.name)}" class="{"large" if large else "small"}">'
+        f"{drawing}<figcaption>{escape(figure.caption)}</figcaption></figure>"
     )
 
 

@@ -16,8 +16,8 @@ from identification.stiffness import Stiffness
 from identification.uncertainty import Contribution, Quantity, combined
 from rig.dataset import Dataset, load
 from rig.report.compare import Pair, adjusted, paired, probability, same_instruments
-from rig.report.wishes import Wishes
 from rig.report.report import make
+from rig.report.wishes import Wishes
 from tests.unit.report_sets import Page, bench, linear, rewritten
 
 CHOICE = Choice("proportional", intercept=False)

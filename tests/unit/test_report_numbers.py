@@ -17,9 +17,9 @@ from rig.dataset import load
 from rig.diagnose import diagnose
 from rig.identify import identify
 from rig.report.document import Block, Section, Table, rich
-from rig.report.wishes import Wishes
 from rig.report.report import Report, make
 from rig.report.results import Node, look_up
+from rig.report.wishes import Wishes
 from tests.recovery.emulated_sets import PAPER_C, REFERENCE_Q, measure, protocol
 from tests.unit.report_sets import Page, bench
 

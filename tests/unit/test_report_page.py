@@ -25,9 +25,9 @@ from rig.report.document import (
     Word,
     figures,
 )
-from rig.report.wishes import Wishes
 from rig.report.html import escape, render
 from rig.report.report import Report, checked, make, write_figures, write_html
+from rig.report.wishes import Wishes
 from tests.unit.example_data import write_journal
 from tests.unit.report_sets import META, SIMULATION, Page, bench, rewritten
 
@@ -235,6 +235,26 @@ def test_one_process_beside_gives_the_same_page(tmp_path: Path) -> None:
     drawn = {f.name: f.svg for f in figures(alone.document.sections)}
     assert {"a_gap_curve", "a_gap_map", "a_gap_withheld", "a_gap_remainder"} <= drawn.keys()
     assert not [name for name, svg in drawn.items() if "<!-- EMULATED -->" not in svg]
+
+
+def test_figures_with_many_panels_stay_legible_on_paper() -> None:
+    sizes = {
+        "0 0 540 360": "small",
+        "0 0 864.5 400": "large",
+        "0 0 540 734.4": "large",
+        "": "small",
+    }
+    for view, kind in sizes.items():
+        figure = Figure("f", "", "", f'<svg viewBox="{view}"></svg>' if view else "<svg></svg>")
+        page = Page(render(Document("", "", (), (Section("s", "", (figure,)),), "")))
+        assert [e.attributes["class"] for e in page.all("figure")] == [kind], view
+
+
+def test_tables_that_fill_a_page_may_be_split() -> None:
+    for rows, kind in ((8, "short"), (9, "long")):
+        table = Table("t", ("a",), (("1",),) * rows)
+        page = Page(render(Document("", "", (), (Section("s", "", (table,)),), "")))
+        assert [e.attributes["class"] for e in page.all("table")] == [kind]
 
 
 def test_pdf_takes_dangerous_words_as_words(evil: Report) -> None:

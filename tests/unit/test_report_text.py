@@ -10,8 +10,8 @@ import pytest
 
 from rig import cli
 from rig.report.document import Block, Bullets, Cell, Facts, Paragraph, Section, Table, Word, rich
-from rig.report.wishes import Wishes
 from rig.report.report import make
+from rig.report.wishes import Wishes
 from tests.unit.report_sets import bench, rewritten
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "report_text.txt"
