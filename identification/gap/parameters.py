@@ -293,7 +293,7 @@ def _shift(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     return {f"shift{i + 1}": found.one(i, "mm", 1e3) for i in range(len(found.w))}
 
 
-_LAGS = np.geomspace(0.2, 16.0, 40)  # of the time between two samples: lags that are compared
+_LAGS = np.geomspace(0.2, 16.0, 32)  # of the time between two samples: lags that are compared
 
 
 def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
@@ -326,15 +326,15 @@ def _closest(bench: Bench, channel: str, kind: str, does: Array) -> tuple[float,
     lags, columns = _lagging(bench, channel, kind)
     scale = 1 / bench.noise.response
     y, does_each = does * scale, columns * scale
-    left = np.sum((does_each - y) ** 2, axis=1)
-    i = int(np.clip(left.argmin(), 1, len(lags) - 2))
-    # between three lags what a lag does is straight, and what is left a parabola
-    a, b, c = left[i - 1 : i + 2]
-    bend = a - 2 * b + c
-    shift = float(np.clip(0.5 * (a - c) / bend, -1, 1)) if bend > 0 else 0.0
-    least = max(b - 0.25 * (a - c) * shift, 0.0)
-    step = float(np.log(lags[1] / lags[0]))
-    return float(lags[i] * np.exp(shift * step)), float(np.sqrt(least / max(y @ y, 1e-300)))
+    i = int(np.sum((does_each - y) ** 2, axis=1).argmin())
+    best = (np.inf, float(lags[i]))
+    for k in (i - 1, i):  # between two lags, what a lag does is straight
+        if 0 <= k < len(lags) - 1:
+            way, ahead = does_each[k + 1] - does_each[k], y - does_each[k]
+            at = float(np.clip(way @ ahead / max(float(way @ way), 1e-300), 0.0, 1.0))
+            left = float(np.sum((ahead - at * way) ** 2))
+            best = min(best, (left, float(lags[k] + at * (lags[k + 1] - lags[k]))))
+    return best[1], float(np.sqrt(best[0] / max(float(y @ y), 1e-300)))
 
 
 def _sampling_time(bench: Bench) -> float:

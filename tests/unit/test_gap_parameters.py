@@ -1,0 +1,249 @@
+"""What parameters mean, whatever shape was fitted, and how their intervals come about."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import Bench, make_bench
+from identification.gap.effects import library
+from identification.gap.effects.time_lag import late
+from identification.gap.evidence import (
+    HOLD_PART,
+    ROW_PART,
+    Engine,
+    level_covariance,
+    row_noise,
+)
+from identification.gap.fit import fit
+from identification.gap.parameters import Parameter, Softer, parameters, run_seconds
+from identification.gap.parts import Part
+from identification.gap.posterior import _mixture, parameters_of
+from identification.gap.search import Explanation
+from identification.gap.variants import Variant
+from tests.unit.test_gap_evidence import small_bench, small_engine
+from tests.unit.test_gap_operators import bench_data
+
+Array = np.ndarray
+
+
+def up_and_down() -> Bench:
+    """Two runs of four steps up and three down, four samples each, 3 s to turn the screw."""
+    level = np.array([0, 20, 40, 60, 80, 60, 40, 20.0])
+    step = np.repeat(np.arange(8), 4)
+    time = (7.0 * np.arange(8)[:, None] + np.arange(4.0)).ravel()
+    force = np.tile(level[step], 2)
+    return make_bench(
+        bench_data(
+            force, force * 1e-5, time=np.tile(time, 2), step=np.tile(step, 2).astype(np.int64),
+            run=np.repeat([0, 1], 32), repetition=np.repeat([1, 2], 32),
+            branch=np.tile(np.where(step == 0, 0, np.where(step > 4, 2, 1)), 2),
+        )
+    )  # fmt: skip
+
+
+def of(bench: Bench, word: str, wanted: str) -> Variant:
+    return next(v for v in library(bench, [word]) if wanted in v.label)
+
+
+def sd(p: Parameter) -> float:
+    return (p.high - p.low) / (2 * 1.959964)
+
+
+def no_spread(w: Array) -> Array:
+    return np.zeros((len(w), len(w)))
+
+
+def test_a_round_knee_has_the_threshold_of_the_sharp_one_with_equal_work() -> None:
+    bench = up_and_down()
+    knee = of(bench, "joint_yield", "round")
+    radius = np.asarray(knee.info["radius"])
+    w = np.zeros(len(knee.columns))
+    w[: len(radius)] = np.linspace(0.2, 0.8, len(radius))
+    found = parameters(bench, Part(knee, 1.0), w, no_spread(w))["threshold"]
+    x = np.linspace(0, 80, 20001)
+    path = np.maximum(x[:, None] - radius, 0.0) @ w[: len(radius)]
+    sharp = path[-1] / (80 - found.value) * np.maximum(x - found.value, 0.0)
+    assert sharp[-1] == pytest.approx(path[-1])
+    assert np.trapezoid(sharp, x) == pytest.approx(np.trapezoid(path, x), rel=1e-4)
+
+
+def test_spread_of_a_threshold_is_that_of_its_draws_and_of_the_gain() -> None:
+    bench = up_and_down()
+    knee = of(bench, "joint_yield", "round")
+    k, own = len(knee.columns), len(knee.info["radius"])
+    rng = np.random.default_rng(0)
+    w = np.where(np.arange(k) < own, 0.5, 0.0)
+    root = 0.01 * rng.normal(size=(k, k))
+    found = parameters(bench, Part(knee, 1.0), w, root @ root.T)["threshold"]
+    top = 80 - np.asarray(knee.info["radius"])
+    drawn = (w + rng.normal(size=(20000, k)) @ root.T)[:, :own]
+    values = 80 - drawn @ top**2 / (drawn @ top)
+    gain = bench.data.instruments.force_gain * found.value
+    assert sd(found) == pytest.approx(np.hypot(values.std(), gain), rel=0.03)
+
+
+def test_creep_is_what_came_late_when_a_load_stood_as_long_as_a_run() -> None:
+    bench = up_and_down()
+    assert run_seconds(bench) == 52.0
+    spectrum = of(bench, "joint_creep", "spectrum")
+    times = np.asarray(spectrum.info["times_s"])
+    w = np.linspace(0.02, 0.05, len(times))
+    found = parameters(bench, Part(spectrum, 1.0), w, no_spread(w))
+    assert found["creep_fraction"].value == pytest.approx(w @ (1 - np.exp(-52.0 / times)))
+    assert found["creep_fraction_after"].value == 52.0
+
+
+def test_creep_is_counted_against_the_spring_as_it_is() -> None:
+    """A spring 25 % softer than simulated, known to 10 %: against draws."""
+    bench = up_and_down()
+    single = of(bench, "joint_creep", "T ")
+    rng = np.random.default_rng(1)
+    full = np.array([[4e-4, 1e-4, 5e-4], [1e-4, 3e-4, -2e-4], [5e-4, -2e-4, 1e-2]])
+    w, joint = np.array([0.15, 0.1]), int(single.info["joint"])
+    softer = Softer({joint: 0.25}, {joint: full[2, 2]}, {joint: full[2, :2]})
+    found = parameters(bench, Part(single, 1.0), w, full[:2, :2], softer)["creep_fraction"]
+    after = 1 - np.exp(-52.0 / np.asarray(single.info["times_s"]))
+    drawn = np.array([*w, 0.25]) + rng.normal(size=(40000, 3)) @ np.linalg.cholesky(full).T
+    values = drawn[:, :2] @ after / (1 + drawn[:, 2])
+    assert found.value == pytest.approx(w @ after / 1.25)
+    assert sd(found) == pytest.approx(values.std(), rel=0.05)
+
+
+@pytest.mark.parametrize("true", [0.9, 1.3, 2.2])
+def test_a_lag_is_read_by_what_it_does(true: float) -> None:
+    bench = up_and_down()
+    column = of(bench, "time_lag", "displacement delay 1.6 s")
+    bench.columns[column.columns[0]] = late(bench, "displacement", "delay", true)
+    found = parameters(bench, Part(column, 1.0), np.ones(1), np.zeros((1, 1)))["lag"]
+    assert found.value == pytest.approx(true, rel=0.02)
+    assert found.low < true < found.high
+
+
+def test_a_lag_is_not_in_proportion_to_what_it_does() -> None:
+    """The first sample comes half a second after the load: a delay of 0.9 s does little more than a
+    third of what one of 1.6 s does."""
+    bench = up_and_down()
+    column = of(bench, "time_lag", "displacement delay 1.6 s")
+    other, own = (late(bench, "displacement", "delay", t)[: bench.rows.n] for t in (0.9, 1.6))
+    w = np.array([float(other @ own / (own @ own))])
+    assert w[0] * 1.6 < 0.6
+    found = parameters(bench, Part(column, 1.0), w, np.zeros((1, 1)))["lag"]
+    assert found.value == pytest.approx(0.9, rel=0.1)
+
+
+def test_what_neither_a_delay_nor_a_filter_does_is_known_less_well() -> None:
+    bench = up_and_down()
+    both = of(bench, "time_lag", "displacement window 2 s")
+    delay, filtered = (
+        parameters(bench, Part(both, 1.0), np.array(w), np.zeros((2, 2)))["lag"]
+        for w in ([1.0, 0.0], [0.0, 1.0])
+    )
+    mixed = parameters(bench, Part(both, 1.0), np.array([0.5, 0.5]), np.zeros((2, 2)))["lag"]
+    assert delay.value == pytest.approx(2.0, rel=0.02)
+    assert filtered.value == pytest.approx(2.0, rel=0.02)
+    assert sd(mixed) > 2 * max(sd(delay), sd(filtered))
+
+
+def test_depth_of_a_seat_is_that_at_the_largest_load() -> None:
+    bench = up_and_down()
+    seat = of(bench, "contact_seating", "hyperbolic 0.4")
+    found = parameters(bench, Part(seat, 1.0), np.array([1e-5]), np.zeros((1, 1)))["depth"]
+    assert found.value == pytest.approx(1e-2 / 1.4)
+
+
+# --- covariance that knows the mistakes of a law ---
+
+
+def explained(engine: Engine, eta: float) -> Explanation:
+    v = Variant("joint_nonlinear_stiffness", "", (0,), (1.0,), np.eye(1))
+    return Explanation((Part(v, 1.0),), 0.0, eta, (0.0,), 0.0)
+
+
+def test_covariance_under_alike_mistakes_is_the_scatter_of_the_estimate() -> None:
+    """Against draws: noise as the fit takes it, and mistakes that repeat; the estimate scatters
+    about the truth as the covariance says, which the plain one falls short of."""
+    bench = small_bench()
+    engine, eta = small_engine(bench, (0.0, 6e-6)), 6e-6
+    plain = fit(engine, explained(engine, eta))
+    alike = fit(engine, explained(engine, eta), alike=True)
+    n, rng = bench.rows.n, np.random.default_rng(2)
+    V = np.diag(row_noise(bench) ** 2 + (ROW_PART * eta) ** 2 / bench.rows.weight)
+    same = np.equal.outer(bench.rows.hold, bench.rows.hold)
+    V += same * (np.outer(bench.noise.hold, bench.noise.hold) + (HOLD_PART * eta) ** 2)
+    levels = level_covariance(bench)[np.ix_(bench.rows.level, bench.rows.level)]
+    runs = 0.6**2 * np.equal.outer(bench.rows.run, bench.rows.run) * _hats(bench)
+    phases = _alike(bench, engine, plain.coefficients)
+    K = np.linalg.cholesky(V + eta**2 * (levels + runs + phases))
+    priors = np.append(engine.base.sd, 3.0)
+    columns = np.column_stack([engine.base.columns, engine.pool[:, 0]])
+    missed = []
+    for _ in range(400):
+        truth = priors * rng.normal(size=len(priors))
+        engine.target = columns @ truth
+        engine.target[:n] += K @ rng.normal(size=n)
+        missed.append(fit(engine, explained(engine, eta)).coefficients[0] - truth[-1])
+    scatter = float(np.std(missed))
+    assert np.sqrt(alike.covariance[0, 0]) == pytest.approx(scatter, rel=0.12)
+    assert np.sqrt(plain.covariance[0, 0]) < 0.8 * scatter
+
+
+def _hats(bench: Bench) -> Array:
+    """Covariance of four hat functions of the load with independent unit heights."""
+    x = bench.load
+    hats = []
+    for run in np.unique(bench.rows.run):
+        mine = bench.rows.run == run
+        at = (x - x[mine].min()) / np.ptp(x[mine]) * 3
+        hats.append(np.where(mine[:, None], np.maximum(0, 1 - np.abs(at[:, None] - range(4))), 0))
+    all_hats = np.column_stack(hats)
+    return np.asarray(all_hats @ all_hats.T)
+
+
+def _alike(bench: Bench, engine: Engine, w: Array) -> Array:
+    """Covariance of mistakes by place in the hold: an even one, and a share of the law's own."""
+    rows, n = bench.rows, bench.rows.n
+    first = np.array([np.flatnonzero(rows.hold == h)[0] for h in rows.hold])
+    place = np.minimum(np.arange(n) - first, 3)
+    before = np.maximum(first - 1, 0)
+    rises = np.abs(bench.load[first]) >= np.abs(bench.load[before])
+    does = engine.pool[:n, 0] * w[0]
+    does = does - np.average(does, weights=rows.weight)
+    does /= np.sqrt(np.average(does**2, weights=rows.weight))
+    key = place * 2 + rises
+    return np.asarray(np.equal.outer(key, key) * (1 + np.outer(does, does)))
+
+
+def test_without_imperfection_nothing_is_added() -> None:
+    engine = small_engine(small_bench())
+    one, other = (fit(engine, explained(engine, 0.0), alike=a) for a in (False, True))
+    np.testing.assert_array_equal(one.covariance, other.covariance)
+
+
+# --- mixtures ---
+
+
+def test_a_mixture_spans_what_its_parts_span() -> None:
+    each = [Parameter(10.0, 8.04, 11.96, "Nm"), Parameter(20.0, 18.04, 21.96, "Nm")]
+    both = _mixture(each, np.array([0.5, 0.5]))
+    assert both.low == pytest.approx(8.36, abs=0.05)  # 5 % of the lower one lie below
+    assert both.high == pytest.approx(21.64, abs=0.05)
+    almost = _mixture(each, np.array([0.999, 0.001]))
+    assert (almost.value, almost.high) == pytest.approx((10.0, 11.96), abs=0.02)
+
+
+def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
+    """The same column under two names of thresholds: neither the data nor the prior decide."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    common = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0}
+    low, high = (
+        Variant("joint_yield", f"at {c}", (0,), (1.0,), np.eye(1),
+                info={**common, "centre": c, "joint": j}, prior=0.5)
+        for c, j in ((30.0, 0), (60.0, 1))
+    )  # fmt: skip
+    chosen = Explanation((Part(low, 1.0),), 0.0, 0.0, (0.0,), 0.0)
+    found = parameters_of(engine, [low, high], chosen, 0)["threshold"]
+    assert found.value == pytest.approx(30.0, rel=0.01)  # where the explanation says
+    assert found.low < 30.0
+    assert found.high > 60.0
