@@ -12,6 +12,8 @@ import pytest
 from rig.dataset import load
 from rig.errors import InputError
 from rig.journal import journal_path
+from rig.report import pictures
+from rig.report.compose import compose
 from rig.report.document import (
     Bullets,
     Document,
@@ -25,9 +27,10 @@ from rig.report.document import (
     Word,
     figures,
 )
+from rig.report.gather import gather
 from rig.report.html import escape, render
 from rig.report.report import Report, checked, make, write_figures, write_html
-from rig.report.wishes import Wishes
+from rig.report.wishes import Wishes, named
 from tests.unit.example_data import write_journal
 from tests.unit.report_sets import META, SIMULATION, Page, bench, rewritten
 
@@ -235,6 +238,22 @@ def test_one_process_beside_gives_the_same_page(tmp_path: Path) -> None:
     drawn = {f.name: f.svg for f in figures(alone.document.sections)}
     assert {"a_gap_curve", "a_gap_map", "a_gap_withheld", "a_gap_remainder"} <= drawn.keys()
     assert not [name for name, svg in drawn.items() if "<!-- EMULATED -->" not in svg]
+
+
+def test_a_rehearsed_figure_is_not_drawn_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = [n.stem for n in named([bench(tmp_path / "a.h5")])]
+    drawn: list[str] = []
+    monkeypatch.setattr(
+        pictures, "draw", lambda name, *_, **__: drawn.append(name) or Figure(name, "", "", "")
+    )
+    gathered, first = gather(named([tmp_path / "a.h5"]), QUIET), pictures.Pictures()
+    once = compose(gathered, first)
+    assert compose(gathered, first.again()) == once
+    assert drawn == [f.name for f in figures(once.sections)]
+    assert len(drawn) == len(set(drawn)) > 2
+    assert all(name.startswith(names[0]) for name in drawn)
 
 
 def test_figures_with_many_panels_stay_legible_on_paper() -> None:
