@@ -16,7 +16,7 @@ import numpy as np
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
 from identification.gap.noise import Noise, estimate_noise
-from identification.gap.rows import Rows, reduce_rows
+from identification.gap.rows import Rows, passes, reduce_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +31,7 @@ class Layout:
     size: int
 
 
+_MANY = 1000
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
 
 
@@ -91,6 +92,15 @@ class Bench:
     def once(self) -> bool:
         """Every setup was loaded once, and never unloaded: all memory is hidden."""
         return not self.unloads and len(np.unique(self.rows.run)) <= len(self.data.setups)
+
+    @property
+    def passes(self) -> int:
+        """How often the load comes from zero or goes back there: one for a single pull, two for a
+        cycle; runs that start anew count at least one each; many where it only trembles."""
+        if not np.ptp(self.load) > 0:
+            return _MANY
+        runs = np.unique(self.rows.run)
+        return sum(passes(self.load[self.rows.run == r]) for r in runs)
 
     @property
     def line(self) -> Array:

@@ -9,8 +9,9 @@ import numpy as np
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
-from identification.gap.data import Array, GapData, Ints
+from identification.gap.data import GapData, Ints
 from identification.gap.discriminate import NextMeasurement, Others, next_measurement
+from identification.gap.earned import earned, noise_of, sample_rms
 from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.fit import Fit, fit
@@ -95,9 +96,8 @@ def diagnose_gap(
         engine.extend()
     found = search(engine, variants)
     tell("withheld data", 0.7)
+    found = earned(found)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
-    if not forced:
-        found, verdict = _earned(found, verdict)
     if forced:
         chosen = force(engine, variants, found.explanations, forced)
     else:
@@ -120,38 +120,13 @@ def check_words(words: set[str] | frozenset[str]) -> None:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
 
 
-DEEP = 3  # effects of an explanation from which on withheld data must confirm it
-_CLOSED = 0.1  # of the gap: if no more is left of it, it was explained all the same
-_FAILS = 2.5  # times what is fitted, or the noise: then a repetition was not foreseen
-
-
-def _earned(found: Found, verdict: str) -> tuple[Found, str]:
-    """A third effect must earn its place on withheld repetitions: where they are missed by far,
-    the explanation is a fit of this session, and most of its probability goes to `unknown`."""
-    chosen = _chosen(found, verdict)
-    fold = folds(found.engine).get("repetition")
-    if len(chosen.parts) < DEEP or fold is None:
-        return found, verdict
-    bench = found.engine.bench
-    left = found.engine.target[: bench.rows.n] - fit(found.engine, chosen).response
-    fitted = max(_sample_rms(bench, left), _noise(bench))
-    held = held_out(found.engine, chosen, "repetition", fold)
-    if held.after < _FAILS * fitted or held.after < _CLOSED * held.before:
-        return found, verdict
-    probabilities = dict(found.probabilities)
-    moved = 2 / 3 * probabilities[verdict]
-    probabilities[verdict] -= moved
-    probabilities["unknown"] += moved
-    verdict = max(probabilities, key=lambda w: probabilities[w])
-    return replace(found, probabilities=probabilities), verdict
-
-
 def _chosen(found: Found, verdict: str) -> Explanation:
     """The best explanation with the verdict as its main cause."""
     if verdict in ("none", "unknown"):
         return next(e for e in found.explanations if not e.parts)
     mine = [e for e in found.explanations if e.parts and e.parts[0].word == verdict]
-    return next((e for e in mine if e.good), mine[0])
+    held = [e for e in mine if found.kept.get(e.words, 1.0) > 0.5]
+    return next((e for e in [*held, *mine] if e.good), mine[0])
 
 
 def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explanation) -> GapResult:
@@ -169,9 +144,9 @@ def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explana
         probabilities=found.probabilities,
         effects=_effects(found, variants, chosen),
         where=locate(engine, fitted, structural),
-        noise=_noise(bench),
-        before=_sample_rms(bench, gap),
-        after=_sample_rms(bench, left),
+        noise=noise_of(bench),
+        before=sample_rms(bench, gap),
+        after=sample_rms(bench, left),
         held_out=held,
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,
@@ -267,20 +242,6 @@ def _next(
     if verdict in WORDS and len(words) == 2:
         return next_measurement(found, variants, chosen, (words[0], words[1]), others)
     return None
-
-
-def _noise(bench: Bench) -> float:
-    """rms that the instruments alone would leave in single samples, m."""
-    noise, weight = bench.noise, bench.rows.weight
-    count = np.ones(bench.rows.n) if bench.rows.continuous else weight
-    square = noise.response**2 * count + noise.hold**2 + noise.run**2
-    return float(np.sqrt(weight @ square / weight.sum()))
-
-
-def _sample_rms(bench: Bench, values: Array) -> float:
-    """rms over samples: that of the rows, and the scatter of the samples within rows."""
-    weight = bench.rows.weight
-    return float(np.sqrt(weight @ (values**2 + bench.scatter) / weight.sum()))
 
 
 def _notes(bench: Bench) -> tuple[str, ...]:

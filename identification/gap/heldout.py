@@ -1,8 +1,10 @@
 """Withheld data: parameters fitted without a fold, judged on the fold.
 
-Folds are whole repetitions, directions or poses; of a single run, blocks of time. The zero-load
-rows of a withheld run stay in: they carry its datum (of the laser, and of a drift), which no model
-can know. A withheld direction's datum is taken from its own mean.
+Folds are whole repetitions, directions or poses; of a single run, blocks of time. The first
+repetition of a setup is never withheld: where something slipped or yielded in it for good, the
+later ones do not show what happened, and the datum is set in it. The zero-load rows of a withheld
+run stay in: they carry its datum (of the laser, and of a drift), which no model can know. The datum
+of a withheld direction, or of a laser that is zeroed before each run, is taken from its own mean.
 """
 
 from __future__ import annotations
@@ -41,7 +43,7 @@ def folds(engine: Engine) -> dict[str, Ints]:
     poses = list(dict.fromkeys(s.pose for s in data.setups))
     out = {}
     if len(np.unique(rows.repetition)) > 1:
-        out["repetition"] = np.unique(rows.repetition, return_inverse=True)[1].astype(np.int64)
+        out["repetition"] = _later(rows.setup, rows.repetition)
     if len(directions) > 1:
         of = np.array([directions.index(s.direction) for s in data.setups])
         out["direction"] = of[rows.setup]
@@ -53,11 +55,21 @@ def folds(engine: Engine) -> dict[str, Ints]:
     return out
 
 
+ALWAYS_IN = -1  # number of the fold of rows that are never withheld
+
+
+def _later(setup: Ints, repetition: Ints) -> Ints:
+    """Number of the repetition of every row, ALWAYS_IN for the first of its setup."""
+    first = np.array([repetition[setup == s].min() for s in range(int(setup.max()) + 1)])
+    number = np.unique(repetition, return_inverse=True)[1].astype(np.int64)
+    return np.where(repetition == first[setup], ALWAYS_IN, number)
+
+
 def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) -> HeldOut:
     """Judges an explanation on every fold in turn."""
     bench, n = engine.bench, engine.bench.rows.n
     before, after = np.zeros(n), np.zeros(n)
-    for f in np.unique(fold):
+    for f in np.unique(fold[fold != ALWAYS_IN]):
         test = (fold == f) & ~bench.rows.zero
         if not test.any():
             continue
@@ -65,10 +77,11 @@ def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) ->
         fitted = fit(engine, explanation, _stacked_keep(engine, out))
         left = engine.target[:n] - fitted.response
         gap = bench.response - stated_prediction(engine)
-        whole = np.array([bool(np.all(out[bench.rows.setup == s])) for s in bench.rows.setup])
-        after[test] = _less_datum(bench.rows.setup, left, whole & test)[test]
-        before[test] = _less_datum(bench.rows.setup, gap, whole & test)[test]
-    judged = ~bench.rows.zero
+        group = bench.rows.run if bench.data.datum == "repetition" else bench.rows.setup
+        whole = _whole(group, out)
+        after[test] = _less_datum(group, left, whole & test)[test]
+        before[test] = _less_datum(group, gap, whole & test)[test]
+    judged = ~bench.rows.zero & (fold != ALWAYS_IN)
     scatter = bench.scatter
     before, after = np.sqrt(before**2 + scatter), np.sqrt(after**2 + scatter)
     blocks = bench.rows.run if len(np.unique(bench.rows.run)) > 2 else fold
@@ -107,11 +120,17 @@ def _stacked_keep(engine: Engine, out: Flags) -> Flags:
     return keep
 
 
-def _less_datum(setup: Ints, values: Array, rows: Flags) -> Array:
-    """Values less their mean per setup over `rows`, where a setup was withheld as a whole."""
+def _whole(group: Ints, out: Flags) -> Flags:
+    """(n,) rows of groups that are withheld as a whole."""
+    inside = np.bincount(group, weights=~out)
+    return np.asarray(inside[group] == 0)
+
+
+def _less_datum(group: Ints, values: Array, rows: Flags) -> Array:
+    """Values less their mean per group over `rows`, where a group was withheld as a whole."""
     out = values.copy()
-    for s in np.unique(setup[rows]) if rows.any() else []:
-        mine = rows & (setup == s)
+    for g in np.unique(group[rows]):
+        mine = rows & (group == g)
         out[mine] -= values[mine].mean()
     return out
 

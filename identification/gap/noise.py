@@ -40,7 +40,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
     common = np.where(rows.steady, steep * meter.force / np.sqrt(rows.hold_weight), 0.0)
     if rows.continuous:
-        per_sample, common = fallback, np.zeros(rows.n)
+        per_sample, common = _running(data, rows, slope, imposed), np.zeros(rows.n)
     else:
         alone = np.where(rows.steady, meter.displacement, fallback)
         per_sample = _white(data, rows, alone, slope, hold)
@@ -50,11 +50,57 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         for j in range(data.joints):
             found = _scatter(data.q[:, j], hold)
             q[j] = max(found or ENCODER_RAD, 1e-7)
-    stated = float(np.median(fallback)) if imposed else meter.displacement
+    stated = float(np.median(per_sample)) if rows.continuous else meter.displacement
     return Noise(
         response=per_sample / np.sqrt(weight), q=q, force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
     )  # fmt: skip
+
+
+def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:
+    """Noise of one sample's response (n,) in a running recording, m: that of what answers, and
+    that of what is driven times how steeply the answer follows it there. On a plateau of friction,
+    or of a metal that flows, a displacement that is driven adds nothing."""
+    meter = data.instruments
+    force = max(meter.force, white_noise(data.force))
+    displacement = max(meter.displacement, white_noise(data.displacement))
+    if imposed:
+        stiff = _steepness(rows, rows.displacement, rows.measured_force, displacement)
+        return np.asarray(slope * np.hypot(force, stiff * displacement))
+    soft = _steepness(rows, rows.measured_force, rows.displacement, force)
+    return np.hypot(displacement, soft * force)
+
+
+_REACH = 3  # rows to either side, over which a local slope is taken
+
+
+def _steepness(rows: Rows, driven: Array, answer: Array, sd: float) -> Array:
+    """(n,) how much the answer changes per unit of what is driven, about a row within its run;
+    changes of what is driven below three standard deviations count as that much."""
+    number = np.arange(rows.n)
+    first = np.flatnonzero(rows.starts)[np.cumsum(rows.starts) - 1]
+    last = np.append(np.flatnonzero(rows.starts)[1:], rows.n)[np.cumsum(rows.starts) - 1] - 1
+    a, b = np.maximum(number - _REACH, first), np.minimum(number + _REACH, last)
+    way = np.maximum(np.abs(driven[b] - driven[a]), max(3 * sd, 1e-300))
+    return np.asarray(np.abs(answer[b] - answer[a]) / way)
+
+
+_WHITE = 1.5  # ratio of second differences' variances over two samples and over one: noise has 1
+_LEAST_SAMPLES = 300
+
+
+def white_noise(values: Array) -> float:
+    """Standard deviation of the white part of a signal that is sampled densely; 0 where second
+    differences show how it moves rather than its noise."""
+    if len(values) < _LEAST_SAMPLES:
+        return 0.0
+
+    def middle(step: int) -> float:
+        second = values[2 * step :] - 2 * values[step:-step] + values[: -2 * step]
+        return float(np.median(np.abs(second))) / 0.6745 / 6**0.5
+
+    one, two = middle(1), middle(2)
+    return one if 0 < two < _WHITE**0.5 * one else 0.0
 
 
 def tangent(rows: Rows, force_sd: float) -> Array:

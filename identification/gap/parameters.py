@@ -299,15 +299,16 @@ _LAGS = np.geomspace(0.2, 16.0, 32)  # of the time between two samples: lags tha
 def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
     a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
-    is read as the delay and as the filter that do the same, each the more the closer it comes."""
+    is read as the delay, the filter and the moving average that do the same, each the more the
+    closer it comes."""
     n, info = bench.rows.n, part.variant.info
     w = found.w
     does = sum((v * bench.columns[c][:n] for v, c in zip(w, part.variant.columns, strict=True)),
                np.zeros(n))  # fmt: skip
     total = found.linear(np.ones(len(w)), "1")
     relative = (total.high - total.low) / (2 * _TWO_SIDED) / max(abs(total.value), 1e-6)
-    lags, misses, spread = np.zeros(2), np.zeros(2), np.zeros(2)
-    for k, kind in enumerate(("delay", "filter")):
+    lags, misses, spread = np.zeros(3), np.zeros(3), np.zeros(3)
+    for k, kind in enumerate(("delay", "filter", "average")):
         lags[k], misses[k] = _closest(bench, info["channel"], kind, does)
         more, _ = _closest(bench, info["channel"], kind, does * (1 + min(relative, 0.5)))
         spread[k] = more - lags[k]
@@ -337,6 +338,20 @@ def _closest(bench: Bench, channel: str, kind: str, does: Array) -> tuple[float,
     return best[1], float(np.sqrt(best[0] / max(float(y @ y), 1e-300)))
 
 
+def _mean_up_to(longest: float, delays: Array, does: Array) -> Array:
+    """(n,) mean of what delays from 0 to `longest` s do, of delays (k,) that do (k, n)."""
+    at = (np.arange(_WINDOW) + 0.5) / _WINDOW * longest
+    place = np.searchsorted(delays, at)
+    out = np.zeros(does.shape[1])
+    for t, k in zip(at, place, strict=True):
+        low, before = (float(delays[k - 1]), does[k - 1]) if k else (0.0, 0.0 * does[0])
+        out += before + (does[k] - before) * (t - low) / (float(delays[k]) - low)
+    return out / _WINDOW
+
+
+_WINDOW = 24  # parts of a moving average
+
+
 def _sampling_time(bench: Bench) -> float:
     if not bench.rows.continuous:
         return 2 * half_sample(bench.rows)
@@ -344,10 +359,14 @@ def _sampling_time(bench: Bench) -> float:
     return float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=6)
 def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
     """Lags (k,) s and what each does to the responses (k, n)."""
     lags = _LAGS * _sampling_time(bench)
+    if kind == "average":  # over twice the lag: the mean of what all delays up to that do
+        delays, does = _lagging(bench, channel, "delay")
+        lags = lags[: np.searchsorted(lags, lags[-1] / 2)]
+        return lags, np.array([_mean_up_to(2 * t, delays, does) for t in lags])
     return lags, np.array([late(bench, channel, kind, float(t))[: bench.rows.n] for t in lags])
 
 

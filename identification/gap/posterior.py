@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -28,31 +29,69 @@ def parameters_of(
     over the shapes that have it."""
     found, weights, here = [], [], []
     place = _place(chosen.parts[index].variant)
-    for explanation, weight in _open(engine, variants, chosen, index):
-        part = explanation.parts[index]
-        fitted = fit(engine, explanation, alike=True)
-        softer = _softer(engine, fitted, index)
-        found.append(parameters(engine.bench, part, *fitted.of(index), softer))
+    every = _open(engine, variants, chosen, index)
+    least = max(weight for _, weight in every) + np.log(_LEAST_SHARE)
+    open_ = [e for i, e in enumerate(every) if e[1] > least or i == 0]
+    for explanation, weight in open_:
+        found.append(_read(engine, explanation, index))
         weights.append(weight)
-        here.append(_place(part.variant) == place)
+        here.append(_place(explanation.parts[index].variant) == place)
+    beside = _beside(every, open_, index)
+    step = _read(engine, beside, index) if beside is not None else {}
     share = np.exp(np.array(weights) - max(weights))
     out = {}
     for name in found[0]:
         has = np.array([name in f for f in found])
         mine = has & np.array(here)
-        every = _mixture([f[name] for f in found if name in f], share[has])
+        mixed = _mixture([f[name] for f in found if name in f], share[has])
         value = _mixture(
             [f[name] for f, m in zip(found, mine, strict=True) if m], share[mine]
         ).value
-        out[name] = replace(every, value=value, low=min(every.low, value),
-                            high=max(every.high, value))  # fmt: skip
+        grid = _TWO_SIDED * abs(step[name].value - value) / 12**0.5 if name in step else 0.0
+        low, high = min(mixed.low - value, 0.0), max(mixed.high - value, 0.0)
+        out[name] = replace(
+            mixed,
+            value=value,
+            low=value - float(np.hypot(low, grid)),
+            high=value + float(np.hypot(high, grid)),
+        )
     return out
 
 
-def _open(
-    engine: Engine, variants: list[Variant], chosen: Explanation, index: int
-) -> list[tuple[Explanation, float]]:
-    """What the data leave open, the chosen shape first: explanations with other shapes of the
+def _read(engine: Engine, explanation: Explanation, index: int) -> dict[str, Parameter]:
+    """Parameters of one effect of an explanation as it is."""
+    fitted = fit(engine, explanation, alike=True)
+    softer = _softer(engine, fitted, index)
+    return parameters(engine.bench, explanation.parts[index], *fitted.of(index), softer)
+
+
+_Weighed = list[tuple[Explanation, float]]
+
+
+def _beside(every: _Weighed, open_: _Weighed, index: int) -> Explanation | None:
+    """The next shape on the grid (of times, zones, thresholds) that the likeliest one stands on,
+    where the data left none of them but that one: what is true lies between such shapes, and a
+    shape stands for half the way to the next."""
+    top = max(open_, key=lambda e: e[1])[0].parts[index].variant
+    kind, place = _NUMBER.sub("#", top.label), _place(top)
+    others = [
+        (e, w)
+        for e, w in every
+        if (v := e.parts[index].variant) is not top
+        and _NUMBER.sub("#", v.label) == kind
+        and _place(v) == place
+    ]
+    left = {id(e.parts[index].variant) for e, _ in open_}
+    if not others or any(id(e.parts[index].variant) in left for e, _ in others):
+        return None
+    return max(others, key=lambda e: e[1])[0]
+
+
+_NUMBER = re.compile(r"\d[\d.e+-]*")
+
+
+def _open(engine: Engine, variants: list[Variant], chosen: Explanation, index: int) -> _Weighed:
+    """What the data may leave open, the chosen shape first: explanations with other shapes of the
     effect and other sizes of imperfection, with their log weights."""
     part = chosen.parts[index]
     rest = tuple(p for i, p in enumerate(chosen.parts) if i != index)
@@ -66,8 +105,7 @@ def _open(
         prior = np.log(shape.variant.prior) - SAME_JOINT * _crowds(shape, rest)
         each = _levels(engine, replace(chosen, parts=parts), prior)
         out += sorted(each, key=lambda e: -e[1])
-    least = max(weight for _, weight in out) + np.log(_LEAST_SHARE)
-    return [(e, w) for i, (e, w) in enumerate(out) if w > least or i == 0]
+    return out
 
 
 def _crowds(shape: Part, rest: tuple[Part, ...]) -> bool:
@@ -76,9 +114,7 @@ def _crowds(shape: Part, rest: tuple[Part, ...]) -> bool:
     return joint is not None and any(p.variant.info.get("joint") == joint for p in rest)
 
 
-def _levels(
-    engine: Engine, explanation: Explanation, prior: float
-) -> list[tuple[Explanation, float]]:
+def _levels(engine: Engine, explanation: Explanation, prior: float) -> _Weighed:
     """The explanation at every size of imperfection, with its log weight."""
     out = []
     for i, level in enumerate(engine.levels):

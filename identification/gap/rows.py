@@ -163,7 +163,7 @@ def _continuous_edges(data: GapData) -> Ints:
     """Bins of equal path of force and displacement together, so that fast and slow parts count
     alike and no bin straddles much of either; every run starts a bin."""
     n = len(data.force)
-    wanted = int(np.clip(_ROWS_PER_PASS * _passes(data.force), CONTINUOUS_ROWS, _MOST_ROWS))
+    wanted = int(np.clip(_ROWS_PER_PASS * passes(data.force), CONTINUOUS_ROWS, _MOST_ROWS))
     if n <= wanted:
         return np.arange(n, dtype=np.int64)
     path = np.arange(n) / n
@@ -178,7 +178,7 @@ def _continuous_edges(data: GapData) -> Ints:
     return np.flatnonzero(new).astype(np.int64)
 
 
-def _passes(force: Array) -> int:
+def passes(force: Array) -> int:
     """How often the force goes up or down by a quarter of its range: passes of the cycles."""
     coarse = force[:: max(1, len(force) // 20_000)].tolist()
     back = 0.25 * float(np.ptp(force))

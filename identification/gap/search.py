@@ -6,7 +6,8 @@ odds 1:20, a third again 1:20. Within a count all words (or sets of words) are e
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import comb, log
 
@@ -32,12 +33,14 @@ LOG_MORE = log(0.05)
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
 REMAINDER = 0.25
+SOFT = 4.0  # how fast, per factor e beyond that, it loses what it explains to `unknown`
 # Nor can a law be met better than to a few percent of what it does.
 LAW_REMAINDER = 0.03
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
 # Mechanisms of the same kind mimic parts of each other: rate-dependent flow looks like creep.
 LEAST_SHARE_AKIN = 0.3
+CANCELLING = 1.8  # times the gap: larger effects of one explanation cancel each other
 MECHANISMS = frozenset(
     [
         "joint_yield",
@@ -85,14 +88,17 @@ class Explanation:
 @dataclass(frozen=True, eq=False)
 class Found:
     """What the search found: explanations (best first), evidence of the words alone (nats, against
-    none), probabilities of all words, and the engine it ran on."""
+    none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
+    gap that no law explains, and what share of its weight withheld data leave an explanation."""
 
     engine: Engine
     explanations: tuple[Explanation, ...]
     alone: dict[str, float]
     probabilities: dict[str, float]
     best: Explanation
+    unknown: float
     unknown_eta: float
+    kept: Mapping[frozenset[str], float] = field(default_factory=dict)
 
 
 # A bolted stand slips less often than a joint or its controller gives way.
@@ -126,7 +132,18 @@ def search(engine: Engine, variants: list[Variant], deepest: int = 3) -> Found:
         front = _deepen(engine, variants, pool, front, depth)
         if not front:
             break
-    return _conclude(engine, pool, alone, none)
+    ranked = sorted(pool.values(), key=lambda e: -e.log_weight)
+    strange = [lv for lv in engine.levels if lv.eta > 0.6 * engine.bench.noise.stated]
+    found = Found(
+        engine=engine,
+        explanations=tuple(ranked),
+        alone={w: v - none for w, v in alone.items()},
+        probabilities={},
+        best=ranked[0],
+        unknown=log_mean([lv.log_base for lv in strange]) + LOG_UNKNOWN,
+        unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
+    )
+    return weighed(found, {})
 
 
 def refine(engine: Engine, variants: list[Variant]) -> list[Variant]:
@@ -329,13 +346,13 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
         REMAINDER * engine.structural / max(len(parts), 1),
         LAW_REMAINDER * float(each.max(initial=0.0)),
     )
-    good = np.array([lv.eta <= least for lv in levels])
+    good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
     share = np.exp(logs - logs.max())
-    fraction = float(share[good].sum() / share.sum())
+    fraction = float(share @ good / share.sum())
     order = np.argsort(-each, kind="stable")
     weight = log_evidence + prior_of(frozenset(p.word for p in parts))
     if len(parts) > 1:
-        weight -= _pettiness(engine, parts, each)
+        weight -= _pettiness(engine, parts, each) + _cancelling(engine, each)
         weight += signs_kept(levels[best], parts)
     return Explanation(
         tuple(parts[i] for i in order),
@@ -363,6 +380,12 @@ def _pettiness(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
             least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
             penalty += 60.0 * max(0.0, float(np.log(least / share)))
     return penalty
+
+
+def _cancelling(engine: Engine, sizes: Array) -> float:
+    """Penalty in nats for effects that are larger than the gap and take each other back."""
+    share = max(float(sizes.max()) / max(engine.structural, 1e-300), 1e-6)
+    return 20.0 * max(0.0, float(np.log(share / CANCELLING)))
 
 
 def _same_element(engine: Engine, one: Part, other: Part) -> bool:
@@ -402,48 +425,39 @@ def trusted(probabilities: dict[str, float], library: set[str]) -> dict[str, flo
     return out
 
 
-def _heir(explanation: Explanation, ranked: list[Explanation]) -> str:
-    """Who gets the weight of an explanation that leaves too much for its number of effects: the
-    best one with fewer of the same effects that explains enough for itself, else unknown."""
-    for e in ranked:
-        if e.parts and e.words < explanation.words and e.good:
-            return e.parts[0].word
-    return "unknown"
-
-
 def _joints(part: Part) -> set[int]:
     """Joints that the part sits in."""
     info = part.variant.info
     return set(info["joints"]) if "joints" in info else {info.get("joint", -1)}
 
 
-def _conclude(
-    engine: Engine,
-    pool: dict[frozenset[str], Explanation],
-    alone: dict[str, float],
-    none: float,
-) -> Found:
-    """Posterior over words as main cause; what leaves a large remainder counts as unknown."""
-    strange = [lv for lv in engine.levels if lv.eta > 0.6 * engine.bench.noise.stated]
-    unknown = log_mean([lv.log_base for lv in strange]) + LOG_UNKNOWN
-    eta = max(strange, key=lambda lv: lv.log_base).eta
-    ranked = sorted(pool.values(), key=lambda e: -e.log_weight)
-    top = max(ranked[0].log_weight, unknown)
+def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
+    """With the posterior over words as main cause. kept: words of an explanation -> share of its
+    weight that it keeps, where withheld data were looked at. What it loses, and what leaves a large
+    remainder, goes to its heir."""
+    ranked = found.explanations
+    top = max(ranked[0].log_weight, found.unknown)
     mass = dict.fromkeys([*WORDS, "none", "unknown"], 0.0)
-    mass["unknown"] = float(np.exp(unknown - top))
+    mass["unknown"] = float(np.exp(found.unknown - top))
     for e in ranked:
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
+        good *= kept.get(e.words, 1.0)
         mass[e.parts[0].word if e.parts else "none"] += good
-        mass[_heir(e, ranked)] += whole - good
-    if engine.bench.rows.continuous and ranked[0].eta > 0:
+        mass[_heir(e, ranked, kept)] += whole - good
+    if found.engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
     total = sum(mass.values())
-    probabilities = trusted({w: m / total for w, m in mass.items()}, set(alone))
-    return Found(
-        engine=engine,
-        explanations=tuple(ranked),
-        alone={w: v - none for w, v in alone.items()},
-        probabilities=probabilities,
-        best=ranked[0],
-        unknown_eta=eta,
-    )
+    probabilities = trusted({w: m / total for w, m in mass.items()}, set(found.alone))
+    return replace(found, probabilities=probabilities, kept=kept)
+
+
+def _heir(
+    explanation: Explanation, ranked: Sequence[Explanation], kept: Mapping[frozenset[str], float]
+) -> str:
+    """Who gets the weight of an explanation that leaves too much for its number of effects: the
+    best one with fewer of the same effects that explains enough for itself, else unknown."""
+    for e in ranked:
+        fewer = e.parts and e.words < explanation.words
+        if fewer and e.good and kept.get(e.words, 1.0) > 0.5:
+            return e.parts[0].word
+    return "unknown"

@@ -20,9 +20,21 @@ def warm_ups(bench: Bench) -> dict[str, Array]:
     return out
 
 
-def has_runs(bench: Bench) -> bool:
-    """At least three runs: within one, a free path in time is a free curve of the load."""
-    return len(np.unique(bench.rows.run)) >= 3
+def own_clock(bench: Bench) -> bool:
+    """Whether time and load part company: the load comes and goes at least three times, in runs or
+    in cycles of one, or does not change at all. Else a path in time is a curve of the load."""
+    return bench.passes >= 3
+
+
+def paths(bench: Bench) -> dict[str, Array]:
+    """Named paths that a drift may take here: where it can't be told from a curve of the load,
+    only the straight line, and seldom (SMALL)."""
+    every = warm_ups(bench)
+    return every if own_clock(bench) else {"linear": every["linear"]}
+
+
+# Of the deflection, or the largest force: what amplifiers and warming arms drift in minutes.
+SMALL = 2
 
 
 def free_path(bench: Bench) -> Array:

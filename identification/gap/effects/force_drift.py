@@ -14,7 +14,14 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.drift import PIECES, free_path, has_runs, path_root, warm_ups
+from identification.gap.effects.drift import (
+    PIECES,
+    SMALL,
+    free_path,
+    own_clock,
+    path_root,
+    paths,
+)
 from identification.gap.variants import Variant, variant
 
 WORD = "force_drift"
@@ -25,7 +32,8 @@ def variants(bench: Bench) -> list[Variant]:
     """Warm-up paths, alike in all directions or per component, several
     rates at once, and a free smooth path."""
     top = float(np.abs(bench.rows.measured_force).max())
-    scales = tuple(s * top for s in SHARES)
+    free = own_clock(bench)
+    scales = tuple(s * top for s in (SHARES if free else SHARES[:SMALL]))
     if not top > 0:
         return []
 
@@ -35,7 +43,7 @@ def variants(bench: Bench) -> list[Variant]:
         return bench.add(drifting(bench, _tared(bench, path)))
 
     out, common = [], {}
-    for label, path in warm_ups(bench).items():
+    for label, path in paths(bench).items():
         common[label] = column(path)
         out.append(variant(WORD, label, [common[label]], scales, positive=False, path=label,
                            names=("",)))  # fmt: skip
@@ -44,11 +52,11 @@ def variants(bench: Bench) -> list[Variant]:
             out.append(variant(WORD, f"{label}, each component", each, scales, positive=False,
                                path=label, names=tuple(axes)))  # fmt: skip
     out += _each_run(bench, scales)
+    if not free:
+        return out
     rates = [c for label, c in common.items() if label != "root"]
     out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
-    if not has_runs(bench):
-        return out
     hats = free_path(bench)
     columns = [column(hats[:, k]) for k in range(PIECES)]
     out.append(variant(WORD, "free path", columns, scales, path_root(), positive=False, prior=2.0,

@@ -14,7 +14,14 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.drift import PIECES, free_path, has_runs, path_root, warm_ups
+from identification.gap.effects.drift import (
+    PIECES,
+    SMALL,
+    free_path,
+    own_clock,
+    path_root,
+    paths,
+)
 from identification.gap.variants import Variant, variant
 
 WORD = "thermal_drift"
@@ -23,7 +30,8 @@ SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the deflection
 
 def variants(bench: Bench) -> list[Variant]:
     """Paths times directions."""
-    scales = tuple(s * bench.reach for s in SHARES)
+    free = own_clock(bench)
+    scales = tuple(s * bench.reach for s in (SHARES if free else SHARES[:SMALL]))
     names = [s.direction for s in bench.data.setups]
     masks = [
         np.array([n == name for n in names])[bench.rows.setup].astype(float)
@@ -31,16 +39,16 @@ def variants(bench: Bench) -> list[Variant]:
     ]
     named = tuple(dict.fromkeys(names))
     out, rates = [], []
-    for label, path in {**warm_ups(bench), **_temperatures(bench)}.items():
+    for label, path in {**paths(bench), **_temperatures(bench)}.items():
         columns = [bench.add(bench.outside_column(m * path)) for m in masks]
         out.append(variant(WORD, label, columns, scales, positive=False, path=label, names=named))
         if label.startswith("T ") or label == "linear":
             rates.append(columns)
+    if not free:
+        return out
     every = [c for columns in zip(*rates, strict=True) for c in columns]
     out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
                        names=named))  # fmt: skip
-    if not has_runs(bench):
-        return out
     hats = free_path(bench)
     columns = [
         bench.add(bench.outside_column(m * hats[:, k])) for m in masks for k in range(PIECES)

@@ -10,6 +10,7 @@ Source: averaging and filter settings of amplifiers and laser sensors.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -50,14 +51,35 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
     """(size,) what a lag of a channel does: the laser shows the response of earlier loads; a force
     that lags was in truth ahead of what was read."""
     if channel == "displacement":
-        return bench.stacked(bench.sense * (_behind(bench, bench.line[:, None], kind, lag)[:, 0]
-                                            - bench.line))  # fmt: skip
+        line = _smooth(bench, bench.line)
+        return bench.stacked(bench.sense * (_behind(bench, line[:, None], kind, lag)[:, 0]
+                                            - line))  # fmt: skip
     if bench.rows.continuous:
-        ahead = bench.load - _behind(bench, bench.load[:, None], kind, lag)[:, 0]
+        load = _smooth(bench, bench.load)
+        ahead = load - _behind(bench, load[:, None], kind, lag)[:, 0]
     else:
         ahead = _true_force(bench, kind, lag) - bench.load
     # unloaded, a force that lags still shows what is over
     return bench.force_column(bench.sense * ahead) + bench.stacked(zero_force=-ahead)
+
+
+_SIDE = 4  # rows to either side
+
+
+def _smooth(bench: Bench, values: Array) -> Array:
+    """Values (n,) of a running recording from the rows about them, by a straight line through the
+    neighbours alone: noise of what is driven is in the response as well, and must not stand in the
+    column that is to explain it."""
+    if not bench.rows.continuous:
+        return values
+    out, edges = values.copy(), np.append(np.flatnonzero(bench.rows.starts), bench.rows.n)
+    kernel = np.ones(2 * _SIDE + 1)
+    kernel[_SIDE] = 0.0
+    for a, b in pairwise(edges):
+        if b - a > 4 * _SIDE:
+            inner = np.convolve(values[a:b], kernel / kernel.sum(), mode="valid")
+            out[a + _SIDE : b - _SIDE] = inner
+    return out
 
 
 def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
