@@ -80,12 +80,12 @@ def as_written(path: Path) -> tuple[dict[str, Any], str]:
     try:
         for name in _TEXTS:
             h5a.open(file, name.encode()).read(text)
-            root[name] = text[()].decode("utf-8")
+            root[name] = text.item().decode("utf-8")
         for name in _NUMBERS:
             h5a.open(file, name.encode()).read(number)
             root[name] = int(number)
         h5d.open(file, _META.encode()).read(h5s.ALL, h5s.ALL, text)
-        return root, text[()].decode("utf-8")
+        return root, text.item().decode("utf-8")
     finally:
         file.close()
 
