@@ -161,31 +161,25 @@ def explained(engine: Engine, eta: float) -> Explanation:
 
 
 def test_covariance_under_alike_mistakes_is_the_scatter_of_the_estimate() -> None:
-    """Against draws: noise as the fit takes it, and mistakes that repeat; the estimate scatters
-    about the truth as the covariance says, which the plain one falls short of."""
+    """`b = H^-1 X' V^-1 y` under noise V and mistakes K that repeat, in full matrices; V as the fit
+    takes it. The plain covariance falls short of it."""
     bench = small_bench()
     engine, eta = small_engine(bench, (0.0, 6e-6)), 6e-6
     plain = fit(engine, explained(engine, eta))
     alike = fit(engine, explained(engine, eta), alike=True)
-    n, rng = bench.rows.n, np.random.default_rng(2)
     V = np.diag(row_noise(bench) ** 2 + (ROW_PART * eta) ** 2 / bench.rows.weight)
     same = np.equal.outer(bench.rows.hold, bench.rows.hold)
     V += same * (np.outer(bench.noise.hold, bench.noise.hold) + (HOLD_PART * eta) ** 2)
     levels = level_covariance(bench)[np.ix_(bench.rows.level, bench.rows.level)]
-    runs = 0.6**2 * np.equal.outer(bench.rows.run, bench.rows.run) * _hats(bench)
-    phases = _alike(bench, engine, plain.coefficients)
-    K = np.linalg.cholesky(V + eta**2 * (levels + runs + phases))
-    priors = np.append(engine.base.sd, 3.0)
-    columns = np.column_stack([engine.base.columns, engine.pool[:, 0]])
-    missed = []
-    for _ in range(400):
-        truth = priors * rng.normal(size=len(priors))
-        engine.target = columns @ truth
-        engine.target[:n] += K @ rng.normal(size=n)
-        missed.append(fit(engine, explained(engine, eta)).coefficients[0] - truth[-1])
-    scatter = float(np.std(missed))
-    assert np.sqrt(alike.covariance[0, 0]) == pytest.approx(scatter, rel=0.12)
-    assert np.sqrt(plain.covariance[0, 0]) < 0.8 * scatter
+    K = eta**2 * (levels + 0.6**2 * _hats(bench) + _alike(bench, engine, plain.coefficients))
+    X = np.column_stack([engine.base.columns, engine.pool[:, 0]])
+    prior = np.diag(1 / np.append(engine.base.sd, 3.0) ** 2)
+    weighed = np.linalg.solve(V, X)
+    H = np.linalg.inv(X.T @ weighed + prior)
+    scatter = H @ (weighed.T @ (V + K) @ weighed + prior) @ H
+    np.testing.assert_allclose(plain.covariance[0, 0], H[-1, -1], rtol=1e-4)
+    np.testing.assert_allclose(alike.covariance[0, 0], scatter[-1, -1], rtol=1e-4)
+    assert np.sqrt(plain.covariance[0, 0]) < 0.8 * np.sqrt(scatter[-1, -1])
 
 
 def _hats(bench: Bench) -> Array:
@@ -247,3 +241,21 @@ def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
     assert found.value == pytest.approx(30.0, rel=0.01)  # where the explanation says
     assert found.low < 30.0
     assert found.high > 60.0
+
+
+def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> None:
+    """Data that exclude all thresholds of a grid but one say no more than where it stands on it."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    engine.target = engine.target + 40.0 * engine.pool[:, 0]
+    family = [
+        Variant("joint_yield", f"at {c}", (k,), (50.0,), np.eye(1), prior=0.5, info={
+            "radius": np.array([c]), "load": bench.load, "flow_s": 0.0, "centre": c, "joint": 0,
+        })
+        for k, c in ((0, 30.0), (1, 36.0))
+    ]  # fmt: skip
+    chosen = Explanation((Part(family[0], 50.0),), 0.0, 0.0, (0.0,), 0.0)
+    alone = parameters_of(engine, family[:1], chosen, 0)["threshold"]
+    found = parameters_of(engine, family, chosen, 0)["threshold"]
+    assert found.value == pytest.approx(30.0, rel=0.01)
+    assert sd(found) == pytest.approx(np.hypot(sd(alone), 6.0 / 12**0.5), rel=0.05)

@@ -16,7 +16,7 @@ from numpy.random import Generator
 from rig.worlds.arm import Array
 from rig.worlds.hidden import memory
 from rig.worlds.hidden.effect import Drawn, Form, Unsuited, draw_joint, one_joint, share_of_joints
-from rig.worlds.hidden.meaning import equal_work_threshold, run_seconds
+from rig.worlds.hidden.meaning import equal_work_threshold, run_seconds, straight_factor
 from rig.worlds.hidden.scene import Change, Index, Scene
 
 _STEEPEST = 12.0  # of a curve that may also take deflection away
@@ -199,12 +199,13 @@ def creep(law: str) -> Callable[[Scene, Generator], Drawn]:
     def draw(scene: Scene, random: Generator) -> Drawn:
         joint = draw_joint(scene, random)
         times, weights, extra = _spectrum(law, random)
-        load = scene.torque[:, joint]
+        load, part = scene.torque[:, joint], 1.0
         if law == "stress_dependent":  # grows faster than the load
             load = load * np.abs(load) / _top(scene, joint)
+            part = straight_factor(lambda x: x**2)
         path = memory.retarded(scene.history.time, load, times, weights)
         seconds = run_seconds(scene)
-        after = float(weights @ -np.expm1(-seconds / times))  # of a load that stands so long
+        after = part * float(weights @ -np.expm1(-seconds / times))  # of a load that stands so long
 
         def parameters(size: float) -> dict[str, Any]:
             found = {"creep_fraction": size * after, "after_s": seconds, "law_size": size}

@@ -1,0 +1,108 @@
+"""Answers give what the true curve shows, not constants that only its own formula knows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rig.worlds.hidden import memory
+from rig.worlds.hidden.effect import draw_joint
+from rig.worlds.hidden.joint_laws import _knee_law
+from rig.worlds.hidden.meaning import equal_work_threshold, run_seconds, straight_factor
+from rig.worlds.hidden.scene import Scene, observe
+from tests.unit.hidden_scenes import contribution, effect_of, middle, scene_of
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return scene_of("medium")
+
+
+def test_a_sharp_knee_gives_its_own_threshold(scene: Scene) -> None:
+    drawn = effect_of(scene, "joint_yield", "sharp")
+    answers = drawn.parameters(1.0)
+    assert answers["threshold_Nm"] == pytest.approx(answers["law_limit_Nm"], rel=1e-6)
+
+
+@pytest.mark.parametrize("limit", [30.0, 50.0])
+def test_a_power_law_has_one_threshold_whatever_its_reference(limit: float) -> None:
+    """`limit (x / limit)^5` is one law for all limits, with another size: top (1 - 2/6)."""
+    found = equal_work_threshold(lambda x: limit * (x / limit) ** 5, 60.0)
+    assert found == pytest.approx(40.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("form", "law"),
+    [
+        ("rounded", "menegotto_pinto"),
+        ("ramberg_osgood", "ramberg_osgood"),
+        ("two_backstresses", "chaboche"),
+    ],
+)
+def test_the_sharp_knee_of_a_round_one_ends_where_it_ends_with_equal_work(
+    scene: Scene, form: str, law: str
+) -> None:
+    answers = effect_of(scene, "joint_yield", form, 5).parameters(1.0)
+    drawn = effect_of(scene, "joint_yield", form, 5)
+    top = float(np.abs(scene.torque[:, drawn.joints[0] - 1]).max())
+    random = np.random.default_rng(5)
+    draw_joint(scene, random)
+    limit = top * random.uniform(0.4, 0.88)
+    follow, _ = _knee_law(limit, law, random)
+    x = np.linspace(0.0, top, 4001)
+    y = follow(x, np.zeros(len(x), dtype=np.int64))
+    knee = answers["threshold_Nm"]
+    sharp = y[-1] / (top - knee) * np.maximum(x - knee, 0.0)
+    assert answers["law_limit_Nm"] == pytest.approx(limit)
+    assert np.trapezoid(y, x) == pytest.approx(np.trapezoid(sharp, x), rel=2e-3)
+
+
+def test_creep_is_that_of_a_load_that_stood_as_long_as_a_run(scene: Scene) -> None:
+    for form in ("standard_solid", "power_law", "logarithmic"):
+        drawn = effect_of(scene, "joint_creep", form)
+        answers = drawn.parameters(0.2)
+        assert answers["after_s"] == run_seconds(scene)
+    drawn = effect_of(scene, "joint_creep", "standard_solid")
+    answers = drawn.parameters(0.2)
+    time = np.array([0.0, 1e-9, run_seconds(scene)])
+    late = memory.retarded(time, np.array([0.0, 1.0, 1.0]), answers["times_s"], answers["weights"])
+    assert answers["creep_fraction"] == pytest.approx(0.2 * late[-1], rel=1e-6)
+
+
+def test_a_run_lasts_from_its_first_sample_to_its_last(scene: Scene) -> None:
+    history = scene.history
+    run = history.run[history.sample]
+    spans = [np.ptp(history.run_time[run == r]) for r in np.unique(run)]
+    assert run_seconds(scene) == pytest.approx(np.mean(spans), abs=0.1)
+
+
+@pytest.mark.parametrize("form", ["two_rates", "wander", "linear"])
+def test_drift_over_the_session_is_what_the_force_shows_at_its_end(form: str) -> None:
+    scene = scene_of("medium")
+    for seed in range(4):
+        drawn = effect_of(scene, "force_drift", form, seed)
+        added = observe(scene, [drawn.change(2.0)]).force_N - observe(scene).force_N
+        along = np.sum(added * scene.unit[scene.history.setup[scene.history.sample]], axis=1)
+        assert drawn.parameters(2.0)["drift_over_session_N"] == pytest.approx(along[-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("form", ["smooth", "soft_flanks", "slow_approach"])
+def test_width_of_a_play_is_what_the_loads_went_through(scene: Scene, form: str) -> None:
+    drawn = effect_of(scene, "joint_backlash", form)
+    size = middle(drawn)
+    _, _, q = contribution(scene, drawn, size)
+    width = drawn.parameters(size)["width_rad"]
+    assert width == pytest.approx(np.ptp(q[:, drawn.joints[0] - 1]), rel=1e-6)
+    assert width <= size
+
+
+def test_depth_of_a_seat_is_reached_by_the_largest_load(scene: Scene) -> None:
+    for form in ("exponential", "hyperbolic", "arctan", "power"):
+        drawn = effect_of(scene, "contact_seating", form)
+        moved, _, _ = contribution(scene, drawn, 0.05)
+        assert drawn.parameters(0.05)["depth_mm"] == pytest.approx(np.ptp(moved), rel=1e-6)
+
+
+def test_a_bent_gain_is_the_best_straight_one() -> None:
+    assert straight_factor(lambda x: 1.1 * x) == pytest.approx(1.1)
+    assert straight_factor(lambda x: x**2) == pytest.approx(0.75, rel=1e-3)
