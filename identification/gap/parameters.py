@@ -20,6 +20,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effects.base_slip import DEPTHS_M
 from identification.gap.effects.link_flexibility import STRAINS
 from identification.gap.effects.time_lag import late
 from identification.gap.history import half_sample
@@ -136,8 +137,19 @@ def _threshold(bench: Bench, part: Part, knee: _Found) -> Parameter:
         slope = (mean - beyond) * beyond / path
         value = float(np.clip(np.max(beyond + radius) - mean, radius.min(), radius.max()))
         variance = float(slope @ knee.cov @ slope)
-    gain = bench.data.instruments.force_gain if not bench.imposed else 0.0
-    return _normal(value, max(variance, 0.0) + (gain * value) ** 2, _torque_unit(bench))
+    shared = bench.data.instruments.force_gain if not bench.imposed else 0.0
+    if part.word == "base_slip" and info["axis"] < 2:
+        shared = float(np.hypot(shared, _depth_sd(bench, np.asarray(info["load"]))))
+    return _normal(value, max(variance, 0.0) + (shared * value) ** 2, _torque_unit(bench))
+
+
+def _depth_sd(bench: Bench, moment: Array) -> float:
+    """Relative sd of a moment (n,) about a lying axis whose depth is known to a step of its grid:
+    the moment is the force times height over the axis."""
+    loaded = np.abs(bench.load) > 0.5 * np.abs(bench.load).max()
+    lever = float(np.median(np.abs(moment[loaded] / bench.load[loaded])))
+    step = DEPTHS_M[1] - DEPTHS_M[0]
+    return step / 12**0.5 / max(lever, step)
 
 
 def _hysteresis(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:

@@ -152,7 +152,7 @@ def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:
 def _place(variant: Variant) -> tuple[str, ...]:
     """Where a variant acts."""
     info = variant.info
-    return tuple(str(info.get(key)) for key in ("joint", "joints", "axis", "axes", "depth_m"))
+    return tuple(str(info.get(key)) for key in ("joint", "joints", "axis", "axes"))
 
 
 def _mixture(each: list[Parameter], share: Array) -> Parameter:

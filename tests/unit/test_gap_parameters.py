@@ -247,15 +247,16 @@ def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> Non
     """Data that exclude all thresholds of a grid but one say no more than where it stands on it."""
     bench = small_bench()
     engine = small_engine(bench)
-    engine.target = engine.target + 40.0 * engine.pool[:, 0]
+    engine.target = engine.target + 4.0 * engine.pool[:, 0]
     family = [
-        Variant("joint_yield", f"at {c}", (k,), (50.0,), np.eye(1), prior=0.5, info={
+        Variant("joint_yield", f"at {c}", (k,), (1.0,), np.eye(1), prior=prior, info={
             "radius": np.array([c]), "load": bench.load, "flow_s": 0.0, "centre": c, "joint": 0,
         })
-        for k, c in ((0, 30.0), (1, 36.0))
+        for k, c, prior in ((0, 30.0, 1.0), (1, 36.0, 1e-12))
     ]  # fmt: skip
-    chosen = Explanation((Part(family[0], 50.0),), 0.0, 0.0, (0.0,), 0.0)
+    chosen = Explanation((Part(family[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
     alone = parameters_of(engine, family[:1], chosen, 0)["threshold"]
     found = parameters_of(engine, family, chosen, 0)["threshold"]
     assert found.value == pytest.approx(30.0, rel=0.01)
-    assert sd(found) == pytest.approx(np.hypot(sd(alone), 6.0 / 12**0.5), rel=0.05)
+    assert sd(found) == pytest.approx(np.hypot(sd(alone), 6.0 / 12**0.5), rel=0.01)
+    assert found.high - 30.0 == pytest.approx(30.0 - found.low)
