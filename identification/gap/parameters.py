@@ -324,14 +324,13 @@ def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
         lags[k], misses[k] = _closest(bench, info["channel"], kind, does)
         more, _ = _closest(bench, info["channel"], kind, does * (1 + min(relative, 0.5)))
         spread[k] = more - lags[k]
-    share = 1 / np.maximum(misses, _LEAST_MISS) ** 2
+    # what the noise hides of a miss tells no kind from another
+    hidden = 1 / max(float(np.linalg.norm(does / bench.noise.response)), 1.0)
+    share = 1 / (misses**2 + hidden**2)
     share /= share.sum()
     value = float(share @ lags)
     variance = float(share @ (spread**2 + (lags - value) ** 2))
     return {"lag": _normal(value, variance, "s")}
-
-
-_LEAST_MISS = 0.002  # of the effect: no closer is told apart
 
 
 def _closest(bench: Bench, channel: str, kind: str, does: Array) -> tuple[float, float]:

@@ -147,9 +147,9 @@ def test_what_neither_a_delay_nor_a_filter_does_is_known_less_well() -> None:
 
 def test_depth_of_a_seat_is_that_at_the_largest_load() -> None:
     bench = up_and_down()
-    seat = of(bench, "contact_seating", "hyperbolic 0.4")
+    seat = of(bench, "contact_seating", "hyperbolic")
     found = parameters(bench, Part(seat, 1.0), np.array([1e-5]), np.zeros((1, 1)))["depth"]
-    assert found.value == pytest.approx(1e-2 / 1.4)
+    assert found.value == pytest.approx(1e-2 * 80 / (80 + seat.info["force_N"]))
 
 
 # --- covariance that knows the mistakes of a law ---
