@@ -15,8 +15,9 @@ import numpy as np
 
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
+from identification.gap.imposed import displacement_simpler
 from identification.gap.noise import Noise, estimate_noise
-from identification.gap.rows import Rows, passes, reduce_rows
+from identification.gap.rows import Rows, hold_ids, is_continuous, passes, reduce_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +272,7 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         load, response = rows.force, rows.displacement
         scatter = rows.displacement_scatter
     torque = lever * load[:, None]
-    layout = _layout(data, rows)
+    layout = _layout(data, rows, imposed)
     observed = np.zeros(layout.size)
     observed[: rows.n] = response
     if layout.q.stop > layout.q.start and rows.q is not None:
@@ -298,39 +299,20 @@ def hold_means(rows: Rows, values: Array) -> Array:
     return np.asarray(sums / total[:, None])
 
 
-def _layout(data: GapData, rows: Rows) -> Layout:
+def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:
     n, m, h = rows.n, data.joints, int(rows.hold_starts.sum())
     q = h * m if data.q is not None and data.output_encoder else 0
     t = 0 if rows.tangential is None else 2 * h
-    z = 0 if displacement_imposed(data) else int(rows.zero.sum())
+    z = 0 if imposed else int(rows.zero.sum())
     return Layout(n, m, slice(n, n + q), slice(n + q, n + q + t),
                   slice(n + q + t, n + q + t + z), n + q + t + z)  # fmt: skip
 
 
 def displacement_imposed(data: GapData) -> bool:
-    """Whether the rig drove the displacement: as stated, else as the data show.
-
-    What is driven moves evenly; what answers does not. On a friction plateau the force stands while
-    the displacement runs: then the share of the path of displacement that happens while the force
-    moves by less than its noise is large, and the force can't have driven it. A rig that rests at
-    levels, or an arm, is loaded through its screw and read at rest: force.
-    """
+    """Whether the rig drove the displacement: as stated, else as the data show (imposed.py). A rig
+    that rests at levels, or an arm, is loaded through its screw and read at rest: force."""
     if data.imposed is not None:
         return data.imposed == "displacement"
-    still = not (np.ptp(data.displacement) > 0 and np.ptp(data.force) > 0)
-    if data.arm or len(data.force) < 20 or still:
+    if data.arm or not is_continuous(data, hold_ids(data)):
         return False
-    from identification.gap.rows import hold_ids, is_continuous
-
-    if not is_continuous(data, hold_ids(data)):
-        return False
-    return _unevenness(data.force) > 1.5 * _unevenness(data.displacement)
-
-
-def _unevenness(values: Array) -> float:
-    """Spread of the speed of a signal over its moving parts: 0 for a triangle, large for steps."""
-    width = max(1, len(values) // 400)
-    smooth = np.add.reduceat(values, np.arange(0, len(values), width))[:-1] / width
-    speed = np.abs(np.diff(smooth))
-    mean = speed.mean() if speed.size else 0.0
-    return float(speed.std() / mean) if mean > 0 else np.inf
+    return displacement_simpler(data)

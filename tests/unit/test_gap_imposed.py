@@ -1,0 +1,174 @@
+"""Which channel was driven, from the data alone: signatures of hand-made rigs, both ways round."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import displacement_imposed
+from identification.gap.data import Array, GapData
+from identification.gap.imposed import displacement_simpler
+from tests.unit.test_gap_operators import bench_data
+
+NOISE = 3e-4  # of the range
+N = 1500
+
+
+def triangle(t: Array, cycles: float) -> Array:
+    return np.asarray(2 * np.abs(2 * ((cycles * t + 0.25) % 1) - 1) - 1)
+
+
+def crank(t: Array, cycles: float) -> Array:
+    return np.asarray(np.sin(2 * np.pi * cycles * t))
+
+
+def slider(u: Array, limit: float) -> Array:
+    """Spring of 1 up to a limit of friction."""
+    out, state = np.empty_like(u), 0.0
+    for i, step in enumerate(np.diff(u, prepend=u[0])):
+        state = float(np.clip(state + step, -limit, limit))
+        out[i] = state
+    return out
+
+
+def relaxing(t: Array, u: Array) -> Array:
+    """Standard solid: half of it fades within a twentieth of the test."""
+    slow, dt = np.zeros_like(u), t[1] - t[0]
+    for i in range(1, len(u)):
+        slow[i] = slow[i - 1] + dt / 0.05 * (u[i - 1] - slow[i - 1])
+    return u - 0.5 * slow
+
+
+def stairs(t: Array, steps: int) -> Array:
+    return np.asarray(np.clip((t * steps) % 1 / 0.05, 0, 1) + np.floor(t * steps)) / steps
+
+
+def rates(t: Array) -> Array:
+    """Two cycles each in a twentieth, a fifth and the rest of the test."""
+    return triangle(np.interp(t, [0, 0.05, 0.25, 1], [0, 2, 4, 6]), 1)
+
+
+def play(u: Array) -> Array:
+    return u - np.clip(u, -0.3, 0.3)
+
+
+# name -> (path, answer): what answers follows from what is driven
+RIGS: dict[str, Callable[[Array], tuple[Array, Array]]] = {
+    "friction, triangles": lambda t: (triangle(t, 6), slider(triangle(t, 6), 0.2)),
+    "friction, crank": lambda t: (crank(t, 6), slider(crank(t, 6), 0.2)),
+    "growing cycles": lambda t: ((1 + t) * crank(t, 8), slider((1 + t) * crank(t, 8), 0.4)),
+    "yield in one pull": lambda t: (t, np.minimum(t, 0.3 + 0.1 * t)),
+    "cubic, crank": lambda t: (crank(t, 3), crank(t, 3) ** 3),
+    "nearly straight, crank": lambda t: (crank(t, 3), crank(t, 3) + 0.03 * crank(t, 3) ** 3),
+    "play, triangles": lambda t: (triangle(t, 5), play(triangle(t, 5))),
+    "ramps and holds": lambda t: (stairs(t, 3), relaxing(t, stairs(t, 3))),
+    "held from the start": lambda t: (np.ones_like(t), 0.5 + 0.5 * np.exp(-t / 0.1)),
+    "rates far apart": lambda t: (rates(t), relaxing(t, rates(t))),
+}
+
+
+def measured(name: str, by_force: bool, n: int = N, seed: int = 1, unit: float = 1.0) -> GapData:
+    t = np.arange(n) / n
+    driven, answer = RIGS[name](t)
+    rng = np.random.default_rng(seed)
+    driven = driven + NOISE * rng.standard_normal(n)
+    answer = answer + NOISE * rng.standard_normal(n)
+    force, moved = (driven, answer) if by_force else (answer, driven)
+    data = bench_data(unit * 8.0 * force, 2**-10 * moved, time=t, session=t,
+                      step=np.full(n, -1), branch=np.full(n, 3), run=np.zeros(n, dtype=np.int64),
+                      repetition=np.ones(n, dtype=np.int64))  # fmt: skip
+    known = replace(data.instruments, force=unit * 8.0 * NOISE, displacement=2**-10 * NOISE)
+    return replace(data, instruments=known)
+
+
+@pytest.mark.parametrize("by_force", [False, True], ids=["displacement", "force"])
+@pytest.mark.parametrize("name", RIGS)
+def test_what_follows_lines_and_cosines_is_driven(name: str, by_force: bool) -> None:
+    assert displacement_imposed(measured(name, by_force)) is not by_force
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_neither_units_nor_sizes_nor_misjudged_noise_decide(name: str) -> None:
+    for unit in (2.0**-30, 2.0**20):
+        assert displacement_simpler(measured(name, False, unit=unit))
+    data = measured(name, False)
+    for factor in (0.5, 2.0):
+        judged = replace(data.instruments, force=data.instruments.force * factor)
+        assert displacement_simpler(replace(data, instruments=judged))
+
+
+def test_noise_of_the_driven_channel_is_no_answer() -> None:
+    """A weak curve over a crank that is read thirty times worse than the force."""
+    data = measured("nearly straight, crank", by_force=False)
+    rough = data.displacement + 2**-10 * 30 * NOISE * np.random.default_rng(2).standard_normal(N)
+    known = replace(data.instruments, displacement=2**-10 * 30 * NOISE)
+    assert displacement_simpler(replace(data, displacement=rough, instruments=known))
+
+
+def test_a_reading_that_wanders_within_its_noise_stands_still() -> None:
+    data = measured("held from the start", by_force=False)
+    wander = np.cumsum(np.random.default_rng(5).standard_normal(N))
+    held = 1 + NOISE * (wander - wander.mean()) / wander.std()
+    assert displacement_simpler(replace(data, displacement=2**-10 * held))
+
+
+def test_the_clock_may_be_missing_or_start_anew_with_every_run() -> None:
+    data = measured("friction, crank", by_force=False)
+    number = np.arange(N, dtype=float)
+    assert displacement_simpler(replace(data, time=number, session=None))
+    assert displacement_simpler(replace(data, time=-number, session=-number))  # no clock at all
+
+
+def test_samples_that_were_not_kept_leave_gaps_on_the_clock_of_every_run() -> None:
+    data = measured("cubic, crank", by_force=False)
+    run = np.minimum(np.arange(N) * 3 // N, 2).astype(np.int64)
+    kept = np.random.default_rng(6).random(N) < 0.15
+    kept[np.searchsorted(run, [0, 1, 2])] = True
+    anew = np.arange(N) - np.searchsorted(run, run)
+    few = {k: v[kept] for k, v in {"step": data.step, "branch": data.branch, "run": run,
+                                   "repetition": run + 1, "time": 1.0 * anew}.items()}  # fmt: skip
+    data = replace(bench_data(data.force[kept], data.displacement[kept], **few),
+                   instruments=data.instruments)  # fmt: skip
+    assert displacement_simpler(data)
+
+
+def test_a_long_recording_with_short_ramps_shows_them() -> None:
+    """Ramps of one thousandth: bins of equal time would lose them."""
+    t = np.arange(60_000) / 60_000
+    u = np.clip((t - 0.1) / 1e-3, 0, 1) + np.clip((t - 0.5) / 1e-3, 0, 1)
+    data = measured("cubic, crank", by_force=False, n=len(t))
+    noise = 3e-4 * np.random.default_rng(3).standard_normal((2, len(t)))
+    force, moved = 8.0 * (relaxing(t, u) + noise[0]), 2**-10 * (u + noise[1])
+    assert displacement_simpler(replace(data, force=force, displacement=moved))
+
+
+def test_outliers_of_a_reading_are_its_own() -> None:
+    """A spring whose force is read in bursts: the noise of a loose plug follows no driven path."""
+    data = measured("cubic, crank", by_force=False)
+    plain = data.displacement / 2**-10
+    bursts = np.where(np.arange(N) % 200 < 20, np.random.default_rng(4).standard_normal(N), 0.0)
+    assert displacement_simpler(replace(data, force=8.0 * (plain + 0.4 * bursts)))
+    turned = replace(data, displacement=2**-10 * (plain + 0.4 * bursts), force=8.0 * plain)
+    assert not displacement_simpler(turned)
+
+
+def test_what_does_not_tell_is_force() -> None:
+    """A straight spring; nothing that moves at all; a standing force under a target that drifts."""
+    data = measured("cubic, crank", by_force=False)
+    line = triangle(np.arange(N) / N, 4)
+    assert not displacement_simpler(replace(data, force=line, displacement=1e-3 * line))
+    still = np.zeros(N)
+    assert not displacement_simpler(replace(data, force=still, displacement=still))
+    assert not displacement_simpler(replace(data, force=still, displacement=1e-3 * line**2))
+    few = bench_data(line[:10], np.abs(line[:10]), step=np.full(10, -1))
+    assert not displacement_simpler(few)
+
+
+def test_what_is_stated_counts() -> None:
+    data = measured("friction, crank", by_force=False)
+    assert not displacement_imposed(replace(data, imposed="force"))
+    turned = measured("friction, crank", by_force=True)
+    assert displacement_imposed(replace(turned, imposed="displacement"))
