@@ -10,13 +10,16 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array
+from identification.gap.compare import LINEAR, moved_response
+from identification.gap.data import Array, Ints
+from identification.gap.evidence import Engine
+from identification.gap.fit import fit
 from identification.gap.heldout import folds, held_out
 from identification.gap.search import Explanation, Found, weighed
 
-FAILS = 2.5  # times the noise: then a repetition was not foreseen
-CLOSED = 0.1  # of the structure: if no more is left of it, it was foreseen all the same
-SHARP = 4.0  # how fast weight is lost about the limit, per factor e
+FAILS = 1.9  # times the noise: then a repetition was not foreseen
+CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
+SHARP = 8.0  # how fast weight is lost about the limit, per factor e
 _LOOKED_AT, _WITHIN = 6, 9.0  # explanations, and nats below the best, that are looked at
 
 
@@ -30,9 +33,7 @@ def earned(found: Found) -> Found:
         todo = [e for e in _weighty(found, kept) if e.words not in kept]
         if not todo:
             break
-        kept[todo[0].words] = _kept(
-            found, held_out(found.engine, todo[0], "repetition", fold).after
-        )
+        kept[todo[0].words] = _kept(found, todo[0], fold)
     return weighed(found, kept)
 
 
@@ -56,11 +57,22 @@ def _weighty(found: Found, kept: dict[frozenset[str], float]) -> list[Explanatio
     return [*matter, *[e for e in fewer if e not in matter]]
 
 
-def _kept(found: Found, after: float) -> float:
-    """Share of the weight that is kept after leaving `after` (rms m) on withheld repetitions."""
+def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
+    """Share of the weight that is kept after a look at withheld repetitions."""
     engine = found.engine
-    limit = max(FAILS * noise_of(engine.bench), CLOSED * engine.structural)
+    after = held_out(engine, explanation, "repetition", fold).after
+    limit = max(FAILS * noise_of(engine.bench), CLOSED * _moved(engine, explanation))
     return float(1 / (1 + (after / limit) ** SHARP))
+
+
+def _moved(engine: Engine, explanation: Explanation) -> float:
+    """rms (m) of what the effects that are no linear laws move, at least the gap's structure."""
+    fitted, n = fit(engine, explanation), engine.bench.rows.n
+    bent = [i for i, p in enumerate(explanation.parts) if p.word not in LINEAR]
+    moved = sum((fitted.contribution(engine, i)[:n] for i in bent), np.zeros(n))
+    square = moved_response(engine, moved[:, None])[:, 0] ** 2
+    weight = engine.bench.rows.weight
+    return max(engine.structural, float(np.sqrt(weight @ square / weight.sum())))
 
 
 def noise_of(bench: Bench) -> float:

@@ -21,7 +21,6 @@ from identification.gap.parts import Part, block
 from identification.gap.search import Explanation
 
 _LEVER_M = 0.3
-_WIDER = 3.0
 _LATER = 3  # rows of a hold from here on count as one
 
 
@@ -67,9 +66,8 @@ def fit(
     keep = np.ones(bench.layout.size, dtype=bool) if keep is None else keep
     columns = [c for p in explanation.parts for c in p.variant.columns]
     E = engine.pool[:, columns]
-    # The imperfection counts as noise here and may not take over what the effects can give;
-    # priors are widened, since this is a fit and no comparison any more.
-    roots = [np.diag(engine.base.sd), *[_WIDER * p.root for p in explanation.parts]]
+    # The imperfection counts as noise here and may not take over what the effects can give.
+    roots = [np.diag(engine.base.sd), *[p.root for p in explanation.parts]]
     X = np.column_stack([engine.base.columns, E])
     root = block(roots)
     k = len(root)

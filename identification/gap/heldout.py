@@ -4,7 +4,8 @@ Folds are whole repetitions, directions or poses; of a single run, blocks of tim
 repetition of a setup is never withheld: where something slipped or yielded in it for good, the
 later ones do not show what happened, and the datum is set in it. The zero-load rows of a withheld
 run stay in: they carry its datum (of the laser, and of a drift), which no model can know. The datum
-of a withheld direction, or of a laser that is zeroed before each run, is taken from its own mean.
+of a withheld direction, of a laser that is zeroed before each run, or of a run that was never read
+without load is taken from its own mean.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.evidence import Engine
 from identification.gap.fit import fit
@@ -77,7 +79,7 @@ def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) ->
         fitted = fit(engine, explanation, _stacked_keep(engine, out))
         left = engine.target[:n] - fitted.response
         gap = bench.response - stated_prediction(engine)
-        group = bench.rows.run if bench.data.datum == "repetition" else bench.rows.setup
+        group = _own_datum(bench)
         whole = _whole(group, out)
         after[test] = _less_datum(group, left, whole & test)[test]
         before[test] = _less_datum(group, gap, whole & test)[test]
@@ -118,6 +120,15 @@ def _stacked_keep(engine: Engine, out: Flags) -> Flags:
     copies = (bench.layout.tangential.stop - n) // max(len(held), 1)
     keep[n : bench.layout.tangential.stop] = np.tile(held, copies)
     return keep
+
+
+def _own_datum(bench: Bench) -> Ints:
+    """(n,) groups of rows that, withheld as a whole, take their datum with them: setups, or runs
+    where each has a datum of its own or was never read without load."""
+    rows = bench.rows
+    zeros = np.bincount(rows.run, weights=rows.zero)
+    alone = (zeros[rows.run] == 0) | (bench.data.datum == "repetition")
+    return np.where(alone, rows.run + int(rows.setup.max()) + 1, rows.setup)
 
 
 def _whole(group: Ints, out: Flags) -> Flags:

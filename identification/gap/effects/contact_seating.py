@@ -13,10 +13,15 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.data import Array
 from identification.gap.variants import Variant, variant
 
 WORD = "contact_seating"
 FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
+# A bench has no second direction that would tell a seat from a curved spring: only low forces.
+BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1, 0.2)
+BENCH_SHARES = (0.01, 0.03, 0.1, 0.3)
+SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)  # of an imposed stroke
 SHARES = (0.003, 0.01, 0.03, 0.1)  # of the deflection
 
 
@@ -25,10 +30,11 @@ def variants(bench: Bench) -> list[Variant]:
     top = float(np.abs(bench.load).max())
     if not top > 0:
         return []
-    scales = tuple(s * bench.reach for s in SHARES)
-    size, sign = np.abs(bench.load), np.sign(bench.load)
+    scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else BENCH_SHARES))
+    size, sign = _pressed(bench)
     out, columns = [], []
-    for share in FORCES:
+    forces = FORCES if bench.data.arm else BENCH_FORCES
+    for share in forces:
         f0 = share * top
         for law, shape in (
             ("exponential", 1 - np.exp(-size / f0)),
@@ -48,7 +54,35 @@ def variants(bench: Bench) -> list[Variant]:
             scales,
             prior=2.0,
             force_N=0.1 * top,
-            laws=tuple(("exponential", s * top) for s in FORCES),
+            laws=tuple(("exponential", s * top) for s in forces),
         )
     )
+    return [*out, *_slacks(bench, top)]
+
+
+def _pressed(bench: Bench) -> tuple[Array, Array]:
+    """Force (n,) N on the seat and its sense. A bench that is loaded from one side presses on it
+    from where its load begins, wherever the zero of its force is."""
+    low, high = np.quantile(bench.load, [0.005, 0.995])
+    if bench.data.arm or low < -_ONE_SIDED * high:
+        return np.abs(bench.load), np.sign(bench.load)
+    return np.maximum(bench.load - low, 0.0), np.ones(bench.rows.n)
+
+
+def _slacks(bench: Bench, top: float) -> list[Variant]:
+    """Where the stroke is imposed, from one side: slack that is taken up before force rises, `d`
+    at the least force. The simulated load knows nothing of it, so it is told by the stroke."""
+    stroke = np.asarray(bench.slope * bench.load)
+    if bench.data.arm or not bench.imposed or stroke.min() < -_ONE_SIDED * stroke.max():
+        return []
+    out, f0 = [], BENCH_FORCES[0] * top
+    for share in SLACKS:
+        d = share * float(stroke.max())
+        shape = np.clip(stroke / d, 0.0, 1.0)
+        column = bench.add(bench.outside_column(shape))
+        out.append(variant(WORD, f"slack {share:g}", [column], (0.5 * d, d), force_N=f0,
+                           laws=(("exponential", f0),)))  # fmt: skip
     return out
+
+
+_ONE_SIDED = 0.1

@@ -9,6 +9,7 @@ from identification.gap.data import Array
 
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
 PIECES = 10  # of a free smooth path: slower than a run, faster than the session
+LONG_PIECES = 24  # of a recording that runs on and on
 
 
 def warm_ups(bench: Bench) -> dict[str, Array]:
@@ -37,15 +38,21 @@ def paths(bench: Bench) -> dict[str, Array]:
 SMALL = 2
 
 
+def pieces(bench: Bench) -> int:
+    """Of a free smooth path."""
+    return LONG_PIECES if bench.rows.continuous else PIECES
+
+
 def free_path(bench: Bench) -> Array:
-    """Hat functions (n, PIECES) over the session; with correlated coefficients a smooth path."""
+    """Hat functions (n, pieces) over the session; with correlated coefficients a smooth path."""
     t = (bench.rows.session - bench.rows.session.min()) / bench.session_span
-    at = np.linspace(0, 1, PIECES)
-    return np.asarray(np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (PIECES - 1)))
+    count = pieces(bench)
+    at = np.linspace(0, 1, count)
+    return np.asarray(np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (count - 1)))
 
 
-def path_root() -> Array:
+def path_root(bench: Bench) -> Array:
     """Root of a random walk's covariance over the pieces, free where it starts."""
-    at = np.linspace(0.15, 1, PIECES)
-    covariance = np.minimum(at[:, None], at) + 1e-9 * np.eye(PIECES)
+    at = np.linspace(0.15, 1, pieces(bench))
+    covariance = np.minimum(at[:, None], at) + 1e-9 * np.eye(len(at))
     return np.asarray(np.linalg.cholesky(covariance), dtype=float)

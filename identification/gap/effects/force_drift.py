@@ -15,7 +15,6 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
-    PIECES,
     SMALL,
     free_path,
     own_clock,
@@ -58,13 +57,14 @@ def variants(bench: Bench) -> list[Variant]:
     out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
     hats = free_path(bench)
-    columns = [column(hats[:, k]) for k in range(PIECES)]
-    out.append(variant(WORD, "free path", columns, scales, path_root(), positive=False, prior=2.0,
+    columns = [column(hats[:, k]) for k in range(hats.shape[1])]
+    root = path_root(bench)
+    out.append(variant(WORD, "free path", columns, scales, root, positive=False, prior=2.0,
                        path="free", names=("",)))  # fmt: skip
     if len(axes) > 1:
         each = [bench.add(component(bench, axis, hats[:, k]))
-                for axis in axes.values() for k in range(PIECES)]  # fmt: skip
-        root = np.kron(np.eye(len(axes)), path_root()).astype(float)
+                for axis in axes.values() for k in range(hats.shape[1])]  # fmt: skip
+        root = np.kron(np.eye(len(axes)), path_root(bench)).astype(float)
         out.append(variant(WORD, "free path, each component", each, scales, root, positive=False,
                            path="free", names=tuple(axes)))  # fmt: skip
     return out

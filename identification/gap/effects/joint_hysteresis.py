@@ -47,7 +47,9 @@ SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 def variants(bench: Bench) -> list[Variant]:
     """Per joint and memory: kept while the arm stands; lost in the rest between runs; there from
     the beginning, of loads like those measured (rigs are cycled before they are measured)."""
-    memories = {"": (bench.moved, False), " worked in": (bench.moved, True)}
+    memories = {"": (bench.moved, False)}
+    if not bench.once:
+        memories[" worked in"] = (bench.moved, True)
     if np.sum(bench.rest) > np.sum(bench.moved):
         memories[" rested"] = (bench.moved | bench.rest, False)
     out = []

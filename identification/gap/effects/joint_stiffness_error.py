@@ -17,6 +17,7 @@ from identification.gap.variants import Variant, variant
 WORD = "joint_stiffness_error"
 SCALES = (1.0, 3.0)
 BENCH_SCALES = (3.0, 9.0)
+STIFFEST = -0.9  # relative change of what the spring gives (compliance; force, if that answers)
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -28,9 +29,12 @@ def variants(bench: Bench) -> list[Variant]:
         columns.append(column)
         beyond = max(2 * float(relative[j]), 0.2)
         scales = tuple(beyond * f for f in SCALES) + (() if bench.data.arm else BENCH_SCALES)
+        # a spring's compliance stays positive: a tenth of what is simulated at least
+        least, sign = (0.0, False) if bench.data.arm else (STIFFEST, True)
         out.append(
-            variant(WORD, f"joint {j + 1}", [column], scales, positive=False, joint=j, joints=[j])
-        )
+            variant(WORD, f"joint {j + 1}", [column], scales, positive=sign, least=least, joint=j,
+                    joints=[j])
+        )  # fmt: skip
     if len(columns) > 1:
         scales = (max(2 * float(relative.max()), 0.2),)
         out.append(

@@ -15,7 +15,6 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
-    PIECES,
     SMALL,
     free_path,
     own_clock,
@@ -51,9 +50,9 @@ def variants(bench: Bench) -> list[Variant]:
                        names=named))  # fmt: skip
     hats = free_path(bench)
     columns = [
-        bench.add(bench.outside_column(m * hats[:, k])) for m in masks for k in range(PIECES)
+        bench.add(bench.outside_column(m * hats[:, k])) for m in masks for k in range(hats.shape[1])
     ]
-    root: Array = np.kron(np.eye(len(masks)), path_root()).astype(float)
+    root: Array = np.kron(np.eye(len(masks)), path_root(bench)).astype(float)
     out.append(variant(WORD, "free path", columns, scales, root, positive=False, prior=2.0,
                        path="free", names=named))  # fmt: skip
     return out

@@ -7,7 +7,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects import force_drift, time_lag
-from identification.gap.effects.drift import PIECES, RATES
+from identification.gap.effects.drift import RATES, pieces
 from identification.gap.forms.law import Law, Term, along
 from identification.gap.variants import Variant
 
@@ -118,9 +118,9 @@ def _path(bench: Bench, label: str) -> tuple[dict[str, object], tuple[Term, ...]
         terms = (Term("drift_rate"), *(Term("drift", {"time_constant": r * span}) for r in RATES))
         return {"path": "rates"}, terms, np.array([1 / span, *rises])
     if label == "free":
-        places = np.linspace(0, span, PIECES)
+        places = np.linspace(0, span, pieces(bench))
         terms = tuple(Term("drift_knot", {"at": float(t)}) for t in places)
-        return {"path": "free"}, terms, np.ones(PIECES)
+        return {"path": "free"}, terms, np.ones(len(terms))
     values = bench.rows.temperature
     assert values is not None
     sensor = "mean" if label.startswith("mean") else label.rsplit(maxsplit=1)[-1]
