@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -22,8 +21,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.base_slip import DEPTHS_M
 from identification.gap.effects.link_flexibility import STRAINS
-from identification.gap.effects.time_lag import late
-from identification.gap.history import half_sample
+from identification.gap.lags import closest_lag
 from identification.gap.parts import Part
 
 _GRID_STEP = 0.03  # between finely spaced thresholds, as their share
@@ -305,9 +303,6 @@ def _shift(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     return {f"shift{i + 1}": found.one(i, "mm", 1e3) for i in range(len(found.w))}
 
 
-_LAGS = np.geomspace(0.2, 16.0, 32)  # of the time between two samples: lags that are compared
-
-
 def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
     a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
@@ -321,8 +316,8 @@ def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     relative = (total.high - total.low) / (2 * _TWO_SIDED) / max(abs(total.value), 1e-6)
     lags, misses, spread = np.zeros(3), np.zeros(3), np.zeros(3)
     for k, kind in enumerate(("delay", "filter", "average")):
-        lags[k], misses[k] = _closest(bench, info["channel"], kind, does)
-        more, _ = _closest(bench, info["channel"], kind, does * (1 + min(relative, 0.5)))
+        lags[k], misses[k] = closest_lag(bench, info["channel"], kind, does)
+        more, _ = closest_lag(bench, info["channel"], kind, does * (1 + min(relative, 0.5)))
         spread[k] = more - lags[k]
     # what the noise hides of a miss tells no kind from another
     hidden = 1 / max(float(np.linalg.norm(does / bench.noise.response)), 1.0)
@@ -331,54 +326,6 @@ def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     value = float(share @ lags)
     variance = float(share @ (spread**2 + (lags - value) ** 2))
     return {"lag": _normal(value, variance, "s")}
-
-
-def _closest(bench: Bench, channel: str, kind: str, does: Array) -> tuple[float, float]:
-    """Lag s of that kind that does most nearly the same (n,), and what it misses, as a share."""
-    lags, columns = _lagging(bench, channel, kind)
-    scale = 1 / bench.noise.response
-    y, does_each = does * scale, columns * scale
-    i = int(np.sum((does_each - y) ** 2, axis=1).argmin())
-    best = (np.inf, float(lags[i]))
-    for k in (i - 1, i):  # between two lags, what a lag does is straight
-        if 0 <= k < len(lags) - 1:
-            way, ahead = does_each[k + 1] - does_each[k], y - does_each[k]
-            at = float(np.clip(way @ ahead / max(float(way @ way), 1e-300), 0.0, 1.0))
-            left = float(np.sum((ahead - at * way) ** 2))
-            best = min(best, (left, float(lags[k] + at * (lags[k + 1] - lags[k]))))
-    return best[1], float(np.sqrt(best[0] / max(float(y @ y), 1e-300)))
-
-
-def _mean_up_to(longest: float, delays: Array, does: Array) -> Array:
-    """(n,) mean of what delays from 0 to `longest` s do, of delays (k,) that do (k, n)."""
-    at = (np.arange(_WINDOW) + 0.5) / _WINDOW * longest
-    place = np.searchsorted(delays, at)
-    out = np.zeros(does.shape[1])
-    for t, k in zip(at, place, strict=True):
-        low, before = (float(delays[k - 1]), does[k - 1]) if k else (0.0, 0.0 * does[0])
-        out += before + (does[k] - before) * (t - low) / (float(delays[k]) - low)
-    return out / _WINDOW
-
-
-_WINDOW = 24  # parts of a moving average
-
-
-def _sampling_time(bench: Bench) -> float:
-    if not bench.rows.continuous:
-        return 2 * half_sample(bench.rows)
-    step: Array = np.diff(bench.rows.time)
-    return float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
-
-
-@lru_cache(maxsize=6)
-def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
-    """Lags (k,) s and what each does to the responses (k, n)."""
-    lags = _LAGS * _sampling_time(bench)
-    if kind == "average":  # over twice the lag: the mean of what all delays up to that do
-        delays, does = _lagging(bench, channel, "delay")
-        lags = lags[: np.searchsorted(lags, lags[-1] / 2)]
-        return lags, np.array([_mean_up_to(2 * t, delays, does) for t in lags])
-    return lags, np.array([late(bench, channel, kind, float(t))[: bench.rows.n] for t in lags])
 
 
 def _pose(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:

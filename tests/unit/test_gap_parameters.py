@@ -173,7 +173,7 @@ def test_covariance_under_alike_mistakes_is_the_scatter_of_the_estimate() -> Non
     levels = level_covariance(bench)[np.ix_(bench.rows.level, bench.rows.level)]
     K = eta**2 * (levels + 0.6**2 * _hats(bench) + _alike(bench, engine, plain.coefficients))
     X = np.column_stack([engine.base.columns, engine.pool[:, 0]])
-    prior = np.diag(1 / np.append(engine.base.sd, 3.0) ** 2)
+    prior = np.diag(1 / np.append(engine.base.sd, 1.0) ** 2)
     weighed = np.linalg.solve(V, X)
     H = np.linalg.inv(X.T @ weighed + prior)
     scatter = H @ (weighed.T @ (V + K) @ weighed + prior) @ H
