@@ -46,7 +46,10 @@ CONSTANTS: dict[str, Key] = {
     "law": Key("law", "text", options=("Iwan", "Dahl", "Bouc-Wen")),
     "zone": Key("zone_Nm", "positive"),
     "crossing": Key("crossing", "text", options=("weight", "load")),
-    "kind": Key("kind", "text", options=("free", "friction", "friction 3", "soft")),
+    "kind": Key("kind", "text", options=("free", "friction", "friction 3", "soft", "gap", "held")),
+    "centre": Key("centre_Nm"),
+    "corner": Key("corner_Nm", "positive"),
+    "friction": Key("friction_Nm", "positive"),
     "weight_factor": Key("weight_over_stated", "positive"),
     "way": Key("kind", "text", options=("delay", "filter", "window")),
     "measured_to": Key("measured_to_Nm", "positive"),
@@ -114,7 +117,7 @@ for _name, _unit in _DRIFTS.items():
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
 
 
-MAY_BE_MISSING = ("measured_to", "about")
+MAY_BE_MISSING = ("measured_to", "about", "centre", "corner", "friction")
 
 
 @dataclass(frozen=True)
@@ -145,8 +148,13 @@ GRAMMAR: dict[str, Grammar] = {
         ("joint", "law", "memory"), (("compliance", ("strength",)), ("compliance", ("reach",)))
     ),
     "joint_backlash": Grammar(
-        ("joint", "zone", "crossing", "kind", "weight_factor"),
-        (("width", ()), ("rub", ()), ("place", ("pose", "direction", "first"))),
+        ("joint", "zone", "crossing", "kind", "weight_factor", "centre", "corner", "friction"),
+        (
+            ("width", ()),
+            ("rub", ()),
+            ("compliance", ()),
+            ("place", ("pose", "direction", "first")),
+        ),
     ),
     "joint_nonlinear_stiffness": Grammar(
         ("joint", "measured_to"),

@@ -5,6 +5,8 @@ or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where 
 the torque has turned: a play of radius `zone` on the torque, cut at the ends of the play. Gears
 with play rub too: a stop operator of the zone's strength rides along. Without torque the joint
 lies anywhere in its play: a free place per setup at its first zero load, and at later ones.
+Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
+force: such plays are placed by the data (flanks.py), with the springs that they bring.
 
 Size: about 1 arcmin (3e-4 rad) with gears of ratio >= 80, ten times less and more allowed.
 Prior: width positive, sd out of SCALES, equally likely; zones and crossings equally likely.
@@ -19,14 +21,17 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
+from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
 KINDS = ("free", "friction", "friction 3", "soft")
+PLACED = ("gap", "held")
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
 _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an arm
+_PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -48,6 +53,9 @@ def variants(bench: Bench) -> list[Variant]:
                                         "weight_factor": 1.0}  # fmt: skip
                 label = f"joint {j + 1} {name}"
                 out += _zone(bench, x, KINDS, label, f"{zone:g}", 1.0, info, places)
+        if not bench.data.arm and bench.rows.continuous:
+            flanks = placed(bench, torque)
+            out += [] if flanks is None else _placed(bench, j, flanks)
     return out
 
 
@@ -55,6 +63,8 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
     """Zones about one that was found; where the weight decides about the crossing, at weights that
     are a few percent off: they are known no better, and the zone is small beside them."""
     info, j = dict(found.info), int(found.info["joint"])
+    if info["kind"] in PLACED:
+        return []
     torque, g = bench.torque[:, j], _weight(bench, j)
     weighty = info["crossing"] == "weight" and np.any(g)
     factors = np.linspace(0.92, 1.08, 9) if weighty else np.ones(1)
@@ -69,6 +79,24 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
             label = f"joint {j + 1} {info['crossing']} x {factor:.2f}"
             out += _zone(bench, x, kinds, label, f"{zone:.3g} Nm fine", share, exact, places)
     return out
+
+
+def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
+    """With the springs as they are, and with others beside the play."""
+    torque = bench.torque[:, j]
+    parts = [bench.sense * part for part in shapes(bench, torque, flanks)]
+    columns = [bench.add_joint(j, part) for part in (*parts, torque / float(np.ptp(torque)))]
+    scales = tuple(s * bench.reach for s in _SHARES)
+    info: dict[str, Any] = {
+        "joint": j, "zone_Nm": flanks.zone, "crossing": "load", "weight_factor": 1.0,
+        "kind": flanks.kind, "flanks": flanks, "span": float(np.ptp(torque)),
+    }  # fmt: skip
+    root = np.diag([1.0, FRICTION, 1.0])
+    return [
+        variant(WORD, f"joint {j + 1} {flanks.kind}{name}", columns[:k], scales, root[:k, :k],
+                np.eye(k)[0], _PLACED_PRIOR, **info)
+        for k, name in ((2, ""), (3, ", other springs"))
+    ]  # fmt: skip
 
 
 def _weight(bench: Bench, joint: int) -> Array:

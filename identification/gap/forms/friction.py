@@ -7,6 +7,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effects import joint_backlash
+from identification.gap.flanks import Flanks, shapes
 from identification.gap.forms.law import KEPT, LOST, WORKED, Law, Term, fresh_after
 from identification.gap.history import bristles, play, worked_in
 from identification.gap.variants import Variant
@@ -52,6 +53,12 @@ def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
         "kind": str(info["kind"]),
         "weight_factor": float(info["weight_factor"]),
     }
+    if info["kind"] in joint_backlash.PLACED:
+        flanks = info["flanks"]
+        constants |= {"centre": flanks.centre, "corner": flanks.corner, "friction": flanks.friction}
+        terms, unit = [Term("width"), Term("rub"), Term("compliance")], 1 / float(info["span"])
+        count = len(v.columns)
+        return Law(constants, tuple(terms[:count])), np.array([1.0, 1.0, unit])[:count]
     terms = [Term("width"), Term("rub")]
     law = Law(constants, ())
     for s, first in _places(bench, law):
@@ -66,8 +73,12 @@ def backlash(bench: Bench, law: Law) -> list[Array]:
     """Deflections of the library's shapes, in rad per unit."""
     c = law.constants
     joint, x = c["joint"], _net(bench, law)
-    shape = joint_backlash._shapes(bench, x, c["zone"])[c["kind"]]
-    parts = {"width": bench.sense * shape[0], "rub": bench.sense * shape[1]}
+    if c["kind"] in joint_backlash.PLACED:
+        places = Flanks(c["kind"], c["centre"], c["zone"], c["corner"], c["friction"])
+        shape = list(shapes(bench, x, places))
+    else:
+        shape = joint_backlash._shapes(bench, x, c["zone"])[c["kind"]]
+    parts = {"width": bench.sense * shape[0], "rub": bench.sense * shape[1], "compliance": x}
     names = [(s.pose, s.direction) for s in bench.data.setups]
     loose = np.abs(x) < c["zone"]
     out = []

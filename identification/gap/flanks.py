@@ -1,0 +1,155 @@
+"""Where a joint changes flanks: centre, width and corners of its play, placed by the data.
+
+A rig without an arm has no weight that says where a joint's torque passes zero, and neither channel
+need be zeroed: the crossing lies anywhere. Two laws, by what is driven:
+
+- displacement: no force inside the play, then springs, `dead_zone(u - centre)`;
+- force: friction `r` holds the flank until the load has turned, then it changes within a zone `e`
+  of no more than the friction, `tanh(play_r(F - centre) / e)`.
+
+Both are met to a few percent or not at all: corners are sharp, and a grid of places would miss
+them. So the places are found by least squares, before the evidence is asked. Play: Krasnosel'skii,
+Pokrovskii 1989. Where no play passes through the load's range none is placed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+
+ENOUGH = 0.3  # rms that may be left of what a straight line leaves
+_BEYOND = 0.03  # of the load's range: so far it has to go past either corner
+_CENTRES = np.linspace(-0.25, 0.25, 9)  # starts, of the range
+_HALVES = (0.03, 0.07, 0.13, 0.2)
+_CORNERS = (0.02, 0.2)  # of the half width
+_FRICTIONS = (0.002, 0.005, 0.01, 0.02)  # radius inside the play, of the range
+_HELD = (0.003, 0.01, 0.03)  # radius that holds a flank, of the range
+_ZONES = (0.2, 0.8)  # of that radius
+_HALVINGS, _ROUNDS = 6, 4  # of the steps of the search; rounds with each
+
+
+@dataclass(frozen=True)
+class Flanks:
+    """All in units of the load (Nm; N without an arm). kind: "gap" or "held". zone: half width of
+    a gap, or within what load a held joint changes flanks; corner: over which the gap's corners are
+    round; friction: radius of the play operator beside it."""
+
+    kind: str
+    centre: float
+    zone: float
+    corner: float
+    friction: float
+
+
+def shapes(bench: Bench, load: Array, flanks: Flanks) -> tuple[Array, Array]:
+    """Of a load (n,): place within the play (-1/2 .. 1/2), and the friction beside it."""
+    state = bench.plays(load - flanks.centre, np.array([flanks.friction]))[:, 0]
+    return _place(load, state, flanks), -(load - flanks.centre - state) / (2 * flanks.friction)
+
+
+def placed(bench: Bench, load: Array) -> Flanks | None:
+    """Flanks for the load (n,) of a bench by least squares on its response; None where the play
+    leaves more than ENOUGH of what a straight line does, or no more than that was noise."""
+    weight, span = bench.rows.weight, float(np.ptp(load))
+    if not span > 0 or bench.rows.n < 20:
+        return None
+    plain = _left([load], bench.response, weight)
+    if not plain > bench.noise.stated:
+        return None
+    find = _gap if bench.imposed else _held
+    found, left = find(bench, load, span)
+    inside = found.zone if found.kind == "gap" else found.friction
+    ends = load.min() + _BEYOND * span, load.max() - _BEYOND * span
+    crossed = ends[0] < found.centre - inside and found.centre + inside < ends[1]
+    return found if crossed and left < ENOUGH * plain else None
+
+
+def _place(load: Array, state: Array, flanks: Flanks) -> Array:
+    if flanks.kind == "held":
+        return np.asarray(np.tanh(state / flanks.zone) / 2)
+    x = load - flanks.centre
+    return np.asarray((x - _dead_zone(x, flanks.zone, flanks.corner)) / (2 * flanks.zone))
+
+
+def _dead_zone(x: Array, half: float, corner: float) -> Array:
+    """`x` less what lies within +-half, corners rounded over `corner` (softplus)."""
+    ends = [np.logaddexp(0.0, (side - half) / corner) for side in (x, -x)]
+    return np.asarray(corner * (ends[0] - ends[1]))
+
+
+def _gap(bench: Bench, load: Array, span: float) -> tuple[Flanks, float]:
+    y, weight = bench.response, bench.rows.weight
+    rubs = load[:, None] - bench.plays(load, span * np.array(_FRICTIONS))
+
+    def flanks(p: Array, k: int = 2) -> Flanks:
+        half = span * float(np.exp(p[1]))
+        return Flanks("gap", span * float(p[0]), half, half * float(np.exp(min(p[2], 0.0))),
+                      span * _FRICTIONS[k])  # fmt: skip
+
+    def left(p: Array, k: int = 2) -> float:
+        f = flanks(p)
+        return _left([_dead_zone(load - f.centre, f.zone, f.corner), rubs[:, k]], y, weight)
+
+    middle = float(load.min() + load.max()) / (2 * span)
+    starts = [np.array([middle + c, np.log(h), np.log(r)])
+              for c in _CENTRES for h in _HALVES for r in _CORNERS]  # fmt: skip
+    best, _ = _descend(left, starts, np.array([0.03, 0.3, 0.7]))
+    each = [left(best, k) for k in range(len(_FRICTIONS))]
+    k = int(np.argmin(each))
+    return flanks(best, k), each[k]
+
+
+def _held(bench: Bench, load: Array, span: float) -> tuple[Flanks, float]:
+    y, weight = bench.response, bench.rows.weight
+
+    def flanks(p: Array) -> Flanks:
+        radius = span * float(np.exp(p[1]))
+        zone = radius * float(np.exp(min(p[2], 0.0)))
+        return Flanks("held", span * float(p[0]), zone, zone, radius)
+
+    def left(p: Array) -> float:
+        f = flanks(p)
+        return _left([load, shapes(bench, load, f)[0]], y, weight)
+
+    middle = float(load.min() + load.max()) / (2 * span)
+    starts = [np.array([middle + c, np.log(r), np.log(z)])
+              for c in _CENTRES for r in _HELD for z in _ZONES]  # fmt: skip
+    best, rest = _descend(left, starts, np.array([0.03, 0.5, 0.5]))
+    return flanks(best), rest
+
+
+def _left(shapes: list[Array], y: Array, weight: Array) -> float:
+    """Weighted rms that shapes (n,) and a constant leave of y (n,)."""
+    a = np.column_stack([*shapes, y])
+    a = a - weight @ a / weight.sum()
+    gram = a.T @ (a * weight[:, None])
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    gram = gram / np.outer(size, size)
+    k = len(shapes)
+    explained = gram[:k, k] @ np.linalg.solve(gram[:k, :k] + 1e-9 * np.eye(k), gram[:k, k])
+    return float(size[k] * np.sqrt(max(1.0 - float(explained), 0.0) / weight.sum()))
+
+
+def _descend(
+    left: Callable[[Array], float], starts: list[Array], step: Array
+) -> tuple[Array, float]:
+    """From the best start along the axes, steps halved where none is better (compass search)."""
+    values = [left(s) for s in starts]
+    best, value = starts[int(np.argmin(values))], min(values)
+    for _ in range(_HALVINGS):
+        for _ in range(_ROUNDS):
+            before = value
+            for axis in np.diag(step):
+                for trial in (best + axis, best - axis):
+                    found = left(trial)
+                    if found < value:
+                        best, value = trial, found
+            if value == before:
+                break
+        step = step / 2
+    return best, value
