@@ -30,6 +30,7 @@ PLACED = ("gap", "held")
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
+MOST_RUB = 0.5  # of it at most
 _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an arm
 _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
@@ -94,7 +95,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
     root = np.diag([1.0, FRICTION, 1.0])
     return [
         variant(WORD, f"joint {j + 1} {flanks.kind}{name}", columns[:k], scales, root[:k, :k],
-                np.eye(k)[0], _PLACED_PRIOR, **info)
+                _less_rub(k) if flanks.kind == "held" else np.eye(k)[0], _PLACED_PRIOR, **info)
         for k, name in ((2, ""), (3, ", other springs"))
     ]  # fmt: skip
 
@@ -117,8 +118,16 @@ def _zone(
         root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
         out.append(
             variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
-                    np.eye(len(columns))[0], prior, **(info | {"kind": kind}))
+                    _less_rub(len(columns)), prior, **(info | {"kind": kind}))
         )  # fmt: skip
+    return out
+
+
+def _less_rub(k: int) -> Array:
+    """(k,) of the coefficients, positive where the play is so much larger than the friction beside
+    it: more of it is hysteresis."""
+    out = np.zeros(k)
+    out[:2] = 1.0, -1.0 / MOST_RUB
     return out
 
 
