@@ -33,6 +33,7 @@ class Layout:
 
 
 _MANY = 1000
+_FURTHER = 6  # radii
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
 
 
@@ -165,11 +166,11 @@ class Bench:
 
     def radii(self, load: Array, inner: Array) -> Array:
         """Radii of plays: `inner`, and on an imposed path, which runs far beyond what yields,
-        three more up to half of its range."""
+        _FURTHER more up to half of its range: what has yielded hardens over all of it."""
         full = float(np.ptp(np.append(load, 0.0)))
         if not self.imposed or full < 2 * inner[-1]:
             return inner
-        return np.concatenate([inner, np.geomspace(1.7 * inner[-1], 0.5 * full, 3)])
+        return np.concatenate([inner, np.geomspace(1.4 * inner[-1], 0.5 * full, _FURTHER)])
 
     def add(self, column: Array) -> int:
         """Puts a stacked column into the pool; its index."""

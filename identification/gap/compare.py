@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.gap.data import Array, Flags
 from identification.gap.evidence import Engine, Level
+from identification.gap.parallel import side_by_side
 from identification.gap.variants import Variant
 
 IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a real mechanism
@@ -60,8 +61,9 @@ def _score_batch(
     engine: Engine, levels: list[Level], batch: list[Variant], already: float
 ) -> list[Scored]:
     columns, root, scales, plain, signs = _stacks(engine, batch)
-    logs = np.empty((len(levels), *scales.shape))
-    for i, level in enumerate(levels):
+
+    def of_level(i: int) -> Array:
+        level = levels[i]
         gram = _rotate(level, columns, root)
         moment = np.einsum("vji,vj->vi", root, level.moment[columns])
         values, vectors = np.linalg.eigh(gram)
@@ -74,7 +76,9 @@ def _score_batch(
         fit += _sign(signs, root, vectors, mean, s2 / gain, s2)
         turned = mean @ np.swapaxes(vectors, 1, 2)
         energy = np.sum((turned @ plain) * turned, axis=2)
-        logs[i] = level.log_base + fit + _log_level(engine.etas, i, energy + already)
+        return np.asarray(level.log_base + fit + _log_level(engine.etas, i, energy + already))
+
+    logs = np.stack(side_by_side(of_level, range(len(levels))))
     flat = logs.transpose(1, 0, 2).reshape(len(batch), -1)
     best = flat.argmax(axis=1)
     total = _logsumexp(flat) - np.log(scales.shape[1])
@@ -127,6 +131,8 @@ def _rotate(level: Level, columns: Array, root: Array) -> Array:
     if len(level.taken):
         gone = level.taken[:, columns].transpose(1, 0, 2)  # (v, r, k)
         part = part - np.swapaxes(gone, 1, 2) @ gone
+    if np.array_equal(root, np.broadcast_to(np.eye(root.shape[1]), root.shape)):
+        return np.asarray(part)
     return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
 
 
@@ -153,8 +159,11 @@ def _sign(
     if each.any():
         across = np.swapaxes(spread[each], 1, 2)
         sds = np.sqrt(variance[each] @ across**2) + 1e-300
-        alone = np.minimum(log_ndtr((mean[each] @ across) / sds) - np.log(0.5), 0.0)
-        out[each] += alone.sum(axis=2)
+        z = (mean[each] @ across) / sds
+        wrong = np.flatnonzero(z.ravel() < 0)  # the right sign costs nothing
+        alone = np.zeros(z.size)
+        alone[wrong] = log_ndtr(z.ravel()[wrong]) - np.log(0.5)
+        out[each] += alone.reshape(z.shape).sum(axis=2)
     return np.asarray(out)
 
 

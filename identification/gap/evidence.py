@@ -23,11 +23,13 @@ from numpy.typing import NDArray
 from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING, Array
+from identification.gap.parallel import side_by_side
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
 CONTINUOUS_ROW_PART = 0.3  # neighbouring rows of a running recording err alike
 _NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
+_ROOM = 3  # a third more than the first columns
 _LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
 
@@ -87,7 +89,8 @@ class Engine:
         common = np.column_stack([target, base.columns, level_columns(bench), run_columns(bench)])
         self._common = self._whiten(common)
         self._white: list[_White] = []
-        self._bases = [self._integrate(float(eta)) for eta in etas]
+        self._bases = side_by_side(self._integrate, [float(eta) for eta in etas])
+        self._room: dict[int, Array] = {}
         self.levels: list[Level] = []
         self.extend()
 
@@ -98,7 +101,7 @@ class Engine:
         fresh = np.column_stack(added) if added else np.zeros((self.bench.layout.size, 0))
         self.pool = np.column_stack([self.pool, fresh])
         white = self._whiten(fresh)
-        self.levels = [self._grown(i, white, old) for i in range(len(self.etas))]
+        self.levels = side_by_side(lambda i: self._grown(i, white, old), range(len(self.etas)))
         self._white.append(white)
 
     def _whiten(self, columns: Array) -> _White:
@@ -134,7 +137,11 @@ class Engine:
     def _gram(self, eta: float, one: _White, other: _White) -> Array:
         """(k, l) product of two sets of whitened columns under the imperfection eta."""
         u, q, contrast = self._weights(eta)
-        gram = one.fixed.T @ other.fixed + one.mean.T @ (other.mean * u[:, None])
+        if one is other:  # the same array twice: half the products
+            mean = one.mean * np.sqrt(u)[:, None]
+            gram = one.fixed.T @ one.fixed + mean.T @ mean
+        else:
+            gram = one.fixed.T @ other.fixed + one.mean.T @ (other.mean * u[:, None])
         holds = len(self._edges)
         for j, ((i, mine), (k, theirs)) in enumerate(zip(one.q, other.q, strict=True)):
             weight = q[j * holds : (j + 1) * holds, None]
@@ -175,14 +182,21 @@ class Engine:
         moment = beside[0] - fresh.T @ base.left
         corner = self._gram(eta, white, white) - fresh.T @ fresh
         self._bases[i] = replace(base, pool=np.column_stack([before, fresh]))
-        if not old:
-            return Level(eta, corner, moment, base.log_base, np.zeros((0, len(moment))))
-        earlier = np.vstack([self._gram(eta, w, white) for w in self._white])
-        edge = earlier - before.T @ fresh
-        level = self.levels[i]
-        gram = np.block([[level.gram, edge], [edge.T, corner]])
-        both = np.concatenate([level.moment, moment])
-        return Level(eta, gram, both, base.log_base, np.zeros((0, len(both))))
+        now = old + len(moment)
+        if not old:  # room for what is refined later, so that nothing is copied then
+            self._room[i] = np.empty((now + now // _ROOM, now + now // _ROOM))
+        elif now > len(self._room[i]):
+            self._room[i] = np.empty((now, now))
+            self._room[i][:old, :old] = self.levels[i].gram
+        gram = self._room[i][:now, :now]
+        gram[old:, old:] = corner
+        both = moment
+        if old:
+            earlier = np.vstack([self._gram(eta, w, white) for w in self._white])
+            edge = earlier - before.T @ fresh
+            gram[:old, old:], gram[old:, :old] = edge, edge.T
+            both = np.concatenate([self.levels[i].moment, moment])
+        return Level(eta, gram, both, base.log_base, np.zeros((0, now)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -156,7 +156,7 @@ def _interval(
     """95 % interval of the ratio from the scatter of its parts between the blocks of one setup
     (runs, or blocks of time): linearised log ratio, Student's t. So few blocks can't be
     bootstrapped, and blocks of different setups are no draws of one kind."""
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
     _, number = np.unique(blocks, return_inverse=True)
     of = setup[np.unique(number, return_index=True)[1]]
@@ -175,5 +175,5 @@ def _interval(
             return ratio, ratio
         pieces = (np.arange(len(blocks)) * BLOCKS // len(blocks)).astype(np.int64)
         return _interval(before, after, pieces, np.zeros_like(setup), weight)
-    half = float(student.ppf(0.975, freedom)) * variance**0.5
+    half = float(stdtrit(freedom, 0.975)) * variance**0.5
     return ratio * float(np.exp(-half)), ratio * float(np.exp(min(half, 700.0)))

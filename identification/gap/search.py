@@ -105,7 +105,7 @@ class Found:
 # A bolted stand slips less often than a joint or its controller gives way.
 LOG_RARE = {"base_slip": log(0.5)}
 # Friction that was never seen to make a loop; a target that warms up while it is held in place.
-LOG_UNSEEN, LOG_HELD = log(0.05), log(0.3)
+LOG_UNSEEN, LOG_HELD = log(0.05), log(0.05)
 
 
 def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:

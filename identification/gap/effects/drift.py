@@ -34,6 +34,16 @@ def paths(bench: Bench) -> dict[str, Array]:
     return every if own_clock(bench) else {"linear": every["linear"]}
 
 
+def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
+    """Sizes of a drift, of the deflection or the largest force: the usual ones; up to all that is
+    seen in a recording that runs on and on; small ones where it can't be told from a curve."""
+    if not own_clock(bench):
+        return usual[:SMALL]
+    if not bench.rows.continuous:
+        return usual
+    return (*(s for s in usual if s < 0.3), 0.3, 1.0)
+
+
 # Of the deflection, or the largest force: what amplifiers and warming arms drift in minutes.
 SMALL = 2
 

@@ -15,11 +15,11 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
-    SMALL,
     free_path,
     own_clock,
     path_root,
     paths,
+    shares,
 )
 from identification.gap.variants import Variant, variant
 
@@ -32,7 +32,7 @@ def variants(bench: Bench) -> list[Variant]:
     rates at once, and a free smooth path."""
     top = float(np.abs(bench.rows.measured_force).max())
     free = own_clock(bench)
-    scales = tuple(s * top for s in (SHARES if free else SHARES[:SMALL]))
+    scales = tuple(s * top for s in shares(bench, SHARES))
     if not top > 0:
         return []
 

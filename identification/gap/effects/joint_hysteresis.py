@@ -61,7 +61,8 @@ def variants(bench: Bench) -> list[Variant]:
             name = f"joint {j + 1}{memory}"
             path = worked_in(bench.torque[:, j], fresh) if worked else None
             found = _spectrum(bench, j, name, span, fresh, path)
-            found += _exponential(bench, j, name, span, fresh, path)
+            if not bench.once:  # a curve that saturates would be taken for friction
+                found += _exponential(bench, j, name, span, fresh, path)
             out += [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
     return out
 

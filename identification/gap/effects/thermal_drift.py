@@ -15,11 +15,11 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
-    SMALL,
     free_path,
     own_clock,
     path_root,
     paths,
+    shares,
 )
 from identification.gap.variants import Variant, variant
 
@@ -30,7 +30,7 @@ SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the deflection
 def variants(bench: Bench) -> list[Variant]:
     """Paths times directions."""
     free = own_clock(bench)
-    scales = tuple(s * bench.reach for s in (SHARES if free else SHARES[:SMALL]))
+    scales = tuple(s * bench.reach for s in shares(bench, SHARES))
     names = [s.direction for s in bench.data.setups]
     masks = [
         np.array([n == name for n in names])[bench.rows.setup].astype(float)
