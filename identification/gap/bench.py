@@ -33,6 +33,7 @@ class Layout:
 
 
 _MANY = 1000
+_STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
 
@@ -103,6 +104,16 @@ class Bench:
             return _MANY
         runs = np.unique(self.rows.run)
         return sum(passes(self.load[self.rows.run == r]) for r in runs)
+
+    @property
+    def always_moves(self) -> bool:
+        """A running recording in which the load never stands: rate and load are one thing."""
+        if not self.rows.continuous or not np.ptp(self.load) > 0:
+            return False
+        step = np.maximum(np.diff(self.rows.session), 0.0)
+        speed = np.abs(np.diff(self.load)) / np.maximum(step, 1e-300)
+        mean = float(np.ptp(self.load)) / self.session_span
+        return float(step[speed < _STANDS * mean].sum()) < _STANDS * self.session_span
 
     @property
     def line(self) -> Array:

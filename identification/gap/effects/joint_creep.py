@@ -32,7 +32,10 @@ def times(bench: Bench) -> np.ndarray:
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Per joint: single times with their neighbour, and the whole spectrum."""
+    """Per joint: single times with their neighbour, and the whole spectrum; none of one pull that
+    never stood: how fast it went and how far are one thing there, and a curve is simpler."""
+    if bench.once and bench.always_moves:
+        return []
     rest, spectrum = rests(bench.rows), times(bench)
     out = []
     for j in bench.moving_joints():

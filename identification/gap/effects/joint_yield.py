@@ -70,7 +70,7 @@ def knee_variants(
     if not top > 0:
         return []
     radius = bench.radii(load, top * np.array(THRESHOLDS))
-    out = []
+    out = _hardened(bench, load, radius, column, word, name, info)
     for memory, fresh in _memories(bench).items():
         back = [column(s) for s in after_yield(bench, load, top, fresh)]
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
@@ -86,6 +86,54 @@ def knee_variants(
                          "back": back, "knee": knee}  # fmt: skip
                 at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
                 out += _with_back(word, at, chosen, kept, share / 4, exact)
+    return out
+
+
+HARDENED = " hardened"
+_ONE_SIDED = 0.1  # of the largest load: less of the other sign is none
+
+
+def _hardened(
+    bench: Bench,
+    load: Array,
+    radius: Array,
+    column: Callable[[Array], int],
+    word: str,
+    name: str,
+    info: dict[str, Any],
+) -> list[Variant]:
+    """Metal that hardens alike in both senses (Voce 1948) and is pulled, or pressed, again and
+    again: it yields on only beyond the largest load it has seen. Benches alone."""
+    sign = 1.0 if load.max() >= -load.min() else -1.0
+    if (
+        bench.data.arm
+        or not bench.unloads
+        or -(sign * load).min() > _ONE_SIDED * np.abs(load).max()
+    ):
+        return []
+    columns = [column(s) for s in grown(load, radius, bench.moved).T]
+    out = []
+    for k in range(len(radius)):
+        root = np.diag([1.0, *[_HARDENS] * (len(radius) - k - 1)])
+        exact = {**info, "memory": HARDENED, "flow_s": 0.0, "radius": radius[k:],
+                 "centre": radius[k], "load": load, "column": column, "back": [],
+                 "knee": "hardened"}  # fmt: skip
+        out.append(
+            variant(word, f"{name}{HARDENED} beyond {radius[k]:.4g}", columns[k:], SCALES, root,
+                    np.ones(len(root)), 0.7 / len(radius), LEAST, **exact)
+        )  # fmt: skip
+    return out
+
+
+def grown(load: Array, radius: Array, fresh: Flags) -> Array:
+    """(n, k): by how much the size of the load (n,) has ever been beyond the radii (k,) since the
+    memory was fresh, with the load's sign."""
+    out = np.empty((len(load), len(radius)))
+    edges = np.append(np.flatnonzero(fresh | (np.arange(len(load)) == 0)), len(load))
+    sign = 1.0 if load.max() >= -load.min() else -1.0
+    for a, b in pairwise(edges):
+        largest = np.maximum.accumulate(np.maximum(sign * load[a:b], 0.0))
+        out[a:b] = sign * np.maximum(largest[:, None] - radius, 0.0)
     return out
 
 

@@ -11,7 +11,7 @@ from identification.gap.effects.base_compliance import moments
 from identification.gap.forms.law import ACROSS, KEPT, LOST, Law, Term, fresh_after
 from identification.gap.variants import Variant
 
-_MEMORY = {"": KEPT, " lasting": ACROSS, " taken back": LOST}
+_MEMORY = {"": KEPT, " lasting": ACROSS, " taken back": LOST, joint_yield.HARDENED: KEPT}
 
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
@@ -25,7 +25,8 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
         constants |= {"joint": int(info["joint"])}
         unit = float(bench.compliance[info["joint"]])
     radius = [float(r) for r in info["radius"]]
-    terms = [Term("compliance", {"threshold": r}) for r in radius]
+    begins = "grows_beyond" if info["memory"] == joint_yield.HARDENED else "threshold"
+    terms = [Term("compliance", {begins: r}) for r in radius]
     if len(v.columns) > len(radius):
         top = _range(bench, np.asarray(info["load"]))
         terms += [
@@ -64,6 +65,8 @@ def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     fresh = fresh_after(bench, law.constants["memory"])
     radius = np.array([t.shape["threshold"] for t in law.terms if "threshold" in t.shape])
     out = list(joint_yield.states(bench, load, radius, law.constants["flow_time"], fresh).T)
+    beyond = np.array([t.shape["grows_beyond"] for t in law.terms if "grows_beyond" in t.shape])
+    out += list(joint_yield.grown(load, beyond, fresh).T)
     for term in law.terms:
         if "after" not in term.shape:
             continue
