@@ -23,7 +23,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 
 ENOUGH = 0.3  # rms that may be left of what a straight line leaves
-CORNERS = 0.7  # and of what a smooth curve leaves: else it is one, and not a play
+CORNERS = 0.7  # and of what a smooth curve leaves beside the same friction: else it is one
 _BEYOND = 0.03  # of the load's range: so far it has to go past either corner
 _CENTRES = np.linspace(-0.25, 0.25, 9)  # starts, of the range
 _HALVES = (0.03, 0.07, 0.13, 0.2)
@@ -55,7 +55,7 @@ def shapes(bench: Bench, load: Array, flanks: Flanks) -> tuple[Array, Array]:
 
 def placed(bench: Bench, load: Array) -> Flanks | None:
     """Flanks for the load (n,) of a bench by least squares on its response; None where the play
-    leaves more than ENOUGH of what a straight line does, or hardly less than a smooth curve."""
+    leaves more than ENOUGH of what a straight line does, or hardly less than a curve."""
     weight, span = bench.rows.weight, float(np.ptp(load))
     if not span > 0 or bench.rows.n < 20:
         return None
@@ -64,7 +64,8 @@ def placed(bench: Bench, load: Array) -> Flanks | None:
         return None
     find = _gap if bench.imposed else _held
     found, left = find(bench, load, span)
-    if left > CORNERS * _left(_smooth(load), bench.response, weight):
+    curve = [*_smooth(load), shapes(bench, load, found)[1]]
+    if left > CORNERS * _left(curve, bench.response, weight):
         return None
     inside = found.zone if found.kind == "gap" else found.friction
     ends = load.min() + _BEYOND * span, load.max() - _BEYOND * span

@@ -21,10 +21,16 @@ from identification.gap.variants import Variant, smooth_root, variant
 WORD = "joint_nonlinear_stiffness"
 HINGES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 SCALES = (0.05, 0.15, 0.4, 1.0)
+# Of a rig without an arm, where rubber locks and foam buckles and is squeezed flat: close together
+# at both ends of the range, and up to a hundred times stiffer.
+FINE = (0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.86, 0.91,
+        0.95, 0.98)  # fmt: skip
+FINE_SCALES = (0.15, 1.0, 6.0, 40.0)
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Per joint: a smooth curve of several hinges, one quadratic, one cubic, one corner."""
+    """Per joint: a smooth curve of several hinges, one quadratic, one cubic, one corner; where a
+    rig without an arm came back along its curve, a finer one."""
     out = []
     for j in bench.moving_joints():
         torque = bench.torque[:, j]
@@ -56,4 +62,19 @@ def variants(bench: Bench) -> list[Variant]:
                         positive=False, prior=0.2 / (len(HINGES) - 1),
                         kinds=("line", *HINGES[k : k + 2]), **info)
             )  # fmt: skip
+        if not bench.data.arm and bench.rows.continuous and bench.unloads:
+            out.append(_fine(bench, j, line, top))
     return out
+
+
+def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
+    """A curve of FINE hinges, from where the load begins if it stays on one side."""
+    x, c = bench.torque[:, j] / top, bench.compliance[j] * top
+    start = float(np.abs(x).min()) if x.min() * x.max() > 0 else 0.0
+    places = tuple(round(start + b * (1 - start), 6) for b in FINE)
+    columns = [bench.add_joint(j, c * np.sign(x) * np.maximum(np.abs(x) - b, 0)) for b in places]
+    root = np.zeros((len(places) + 1,) * 2)
+    root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(places), 0.5)
+    return variant(WORD, f"joint {j + 1} fine curve", [line, *columns], FINE_SCALES, root,
+                   positive=False, prior=0.5, kinds=("line", *places), joint=j, torque=top,
+                   hinges=places)  # fmt: skip
