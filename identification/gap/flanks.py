@@ -30,8 +30,8 @@ _HALVES = (0.03, 0.07, 0.13, 0.2)
 _CORNERS = (0.02, 0.2)  # of the half width
 _FRICTIONS = (0.002, 0.005, 0.01, 0.02)  # radius inside the play, of the range
 _HELD = (0.003, 0.01, 0.03)  # radius that holds a flank, of the range
-_ZONES = (0.2, 0.8)  # of that radius
-_HALVINGS, _ROUNDS = 6, 4  # of the steps of the search; rounds with each
+_ZONES = (0.15, 0.4, 0.9)  # of that radius
+_DESCENTS, _HALVINGS, _ROUNDS = 3, 6, 4  # of the search; halvings of its steps; rounds each
 
 
 @dataclass(frozen=True)
@@ -148,18 +148,29 @@ def _left(shapes: list[Array], y: Array, weight: Array) -> float:
 def _descend(
     left: Callable[[Array], float], starts: list[Array], step: Array
 ) -> tuple[Array, float]:
-    """From the best start along the axes, steps halved where none is better (compass search)."""
-    values = [left(s) for s in starts]
-    best, value = starts[int(np.argmin(values))], min(values)
+    """From the best starts along the axes and the diagonals of the last two, steps halved where
+    none is better (compass search); the deepest."""
+    values = np.array([left(s) for s in starts])
+    ways = np.diag(step)
+    ways = np.vstack([ways, ways[1] + ways[2], ways[1] - ways[2]])
+    found = [
+        _compass(left, starts[i], float(values[i]), ways) for i in np.argsort(values)[:_DESCENTS]
+    ]
+    return min(found, key=lambda f: f[1])
+
+
+def _compass(
+    left: Callable[[Array], float], best: Array, value: float, ways: Array
+) -> tuple[Array, float]:
     for _ in range(_HALVINGS):
         for _ in range(_ROUNDS):
             before = value
-            for axis in np.diag(step):
-                for trial in (best + axis, best - axis):
+            for way in ways:
+                for trial in (best + way, best - way):
                     found = left(trial)
                     if found < value:
                         best, value = trial, found
             if value == before:
                 break
-        step = step / 2
+        ways = ways / 2
     return best, value
