@@ -97,6 +97,13 @@ def a_loop(imposed: str) -> Bench:
     return a_bench(loop, x, imposed) if imposed == "displacement" else a_bench(x, loop, imposed)
 
 
+def slips(imposed: str) -> Bench:
+    """Plastic loops: stiff after every turn, then hardly."""
+    x = to_and_fro()
+    loop = 0.3 * x + (x - held(x, 0.05))
+    return a_bench(loop, x, imposed)
+
+
 def one_sided() -> Bench:
     """Slack from zero on: one flank is never seen."""
     u = to_and_fro(low=0.0)
@@ -106,8 +113,8 @@ def one_sided() -> Bench:
 @pytest.mark.parametrize(
     "bench",
     [a_curve("displacement"), a_curve("force"), a_loop("displacement"), a_loop("force"),
-     one_sided(), a_bench(to_and_fro(), to_and_fro(), "force")],
-    ids=["curve, stroke", "curve, load", "loop, stroke", "loop, load", "one side", "line"],
+     slips("displacement"), one_sided(), a_bench(to_and_fro(), to_and_fro(), "force")],
+    ids=["curve, stroke", "curve, load", "loop, stroke", "loop, load", "slips", "one side", "line"],
 )  # fmt: skip
 def test_no_play_is_placed_where_there_is_none(bench: Bench) -> None:
     assert placed(bench, bench.torque[:, 0]) is None
