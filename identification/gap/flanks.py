@@ -23,7 +23,8 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 
 ENOUGH = 0.3  # rms that may be left of what a straight line leaves
-CORNERS = 0.7  # and of what a smooth curve leaves beside the same friction: else it is one
+CORNERS = 0.8  # and of what a smooth curve leaves beside the same friction: else it is one
+HOPEFUL = 0.8  # a search that starts from no better is not begun
 _BEYOND = 0.03  # of the load's range: so far it has to go past either corner
 _CENTRES = np.linspace(-0.25, 0.25, 9)  # starts, of the range
 _HALVES = (0.03, 0.07, 0.13, 0.2)
@@ -63,7 +64,7 @@ def placed(bench: Bench, load: Array) -> Flanks | None:
     if not plain > bench.noise.stated:
         return None
     find = _gap if bench.imposed else _held
-    found, left = find(bench, load, span)
+    found, left = find(bench, load, span, HOPEFUL * plain)
     curve = [*_smooth(load), shapes(bench, load, found)[1]]
     if left > CORNERS * _left(curve, bench.response, weight):
         return None
@@ -92,7 +93,7 @@ def _dead_zone(x: Array, half: float, corner: float) -> Array:
     return np.asarray(corner * (ends[0] - ends[1]))
 
 
-def _gap(bench: Bench, load: Array, span: float) -> tuple[Flanks, float]:
+def _gap(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, float]:
     y, weight = bench.response, bench.rows.weight
     rubs = load[:, None] - bench.plays(load, span * np.array(_FRICTIONS))
 
@@ -108,13 +109,13 @@ def _gap(bench: Bench, load: Array, span: float) -> tuple[Flanks, float]:
     middle = float(load.min() + load.max()) / (2 * span)
     starts = [np.array([middle + c, np.log(h), np.log(r)])
               for c in _CENTRES for h in _HALVES for r in _CORNERS]  # fmt: skip
-    best, _ = _descend(left, starts, np.array([0.03, 0.3, 0.7]))
+    best, _ = _descend(left, starts, np.array([0.03, 0.3, 0.7]), most)
     each = [left(best, k) for k in range(len(_FRICTIONS))]
     k = int(np.argmin(each))
     return flanks(best, k), each[k]
 
 
-def _held(bench: Bench, load: Array, span: float) -> tuple[Flanks, float]:
+def _held(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, float]:
     y, weight = bench.response, bench.rows.weight
 
     def flanks(p: Array) -> Flanks:
@@ -129,7 +130,7 @@ def _held(bench: Bench, load: Array, span: float) -> tuple[Flanks, float]:
     middle = float(load.min() + load.max()) / (2 * span)
     starts = [np.array([middle + c, np.log(r), np.log(z)])
               for c in _CENTRES for r in _HELD for z in _ZONES]  # fmt: skip
-    best, rest = _descend(left, starts, np.array([0.03, 0.5, 0.5]))
+    best, rest = _descend(left, starts, np.array([0.03, 0.5, 0.5]), most)
     return flanks(best), rest
 
 
@@ -146,11 +147,13 @@ def _left(shapes: list[Array], y: Array, weight: Array) -> float:
 
 
 def _descend(
-    left: Callable[[Array], float], starts: list[Array], step: Array
+    left: Callable[[Array], float], starts: list[Array], step: Array, most: float
 ) -> tuple[Array, float]:
-    """From the best starts along the axes and the diagonals of the last two, steps halved where
-    none is better (compass search); the deepest."""
+    """From the best starts, unless all leave more than `most`: along the axes and the diagonals of
+    the last two, steps halved where none is better (compass search); the deepest."""
     values = np.array([left(s) for s in starts])
+    if values.min() > most:
+        return starts[int(values.argmin())], float(values.min())
     ways = np.diag(step)
     ways = np.vstack([ways, ways[1] + ways[2], ways[1] - ways[2]])
     found = [
