@@ -16,7 +16,7 @@ import numpy as np
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
 from identification.gap.imposed import displacement_simpler
-from identification.gap.noise import Noise, estimate_noise
+from identification.gap.noise import Noise, estimate_noise, standing
 from identification.gap.rows import Rows, hold_ids, is_continuous, passes, reduce_rows
 
 
@@ -33,6 +33,7 @@ class Layout:
 
 
 _MANY = 1000
+_TREMBLES = 2.0  # stated standard deviations
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
@@ -84,7 +85,16 @@ class Bench:
     @property
     def unloads(self) -> bool:
         """Whether the load came back within some run, by a fifth of its range at least."""
-        size, span = np.abs(self.load), float(np.ptp(self.load))
+        return self._returns(self.load)
+
+    @property
+    def lets_go(self) -> bool:
+        """Whether the force came back so: where a metal flows, little of an imposed stroke is given
+        back to take the force away."""
+        return self._returns(self.rows.measured_force)
+
+    def _returns(self, values: Array) -> bool:
+        size, span = np.abs(values), float(np.ptp(values))
         for run in np.unique(self.rows.run):
             path = size[self.rows.run == run]
             if np.any(np.maximum.accumulate(path) - path > 0.2 * span):
@@ -104,6 +114,13 @@ class Bench:
             return _MANY
         runs = np.unique(self.rows.run)
         return sum(passes(self.load[self.rows.run == r]) for r in runs)
+
+    @property
+    def stands(self) -> bool:
+        """The load spreads by no more than its noise: held all the time, or none at all."""
+        meter = self.data.instruments
+        sd = meter.displacement / float(self.stated_slope.min()) if self.imposed else meter.force
+        return bool(np.std(self.load) <= _TREMBLES * sd)
 
     @property
     def always_moves(self) -> bool:
@@ -277,11 +294,13 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     slope = lever**2 @ c
     stated = lever**2 @ data.compliance
     imposed = displacement_imposed(data)
+    meter = data.instruments
     if imposed:
-        load, response = rows.displacement / stated, rows.measured_force * stated
+        driven = standing(rows, rows.displacement, meter.displacement)
+        load, response = driven / stated, rows.measured_force * stated
         scatter = rows.force_scatter * stated**2
     else:
-        load, response = rows.force, rows.displacement
+        load, response = standing(rows, rows.force, meter.force), rows.displacement
         scatter = rows.displacement_scatter
     torque = lever * load[:, None]
     layout = _layout(data, rows, imposed)

@@ -85,6 +85,42 @@ def _steepness(rows: Rows, driven: Array, answer: Array, sd: float) -> Array:
     return np.asarray(np.abs(answer[b] - answer[a]) / way)
 
 
+_LONG = 8  # rows of a stretch in which a channel stands
+_BAND, _TREND = 3.0, 1.5  # of the rows' noise: how far it strays there, and runs
+
+
+def standing(rows: Rows, driven: Array, stated: float) -> Array:
+    """What is driven (n,) with the mean of every stretch in which it stands still within its noise:
+    a model that is driven by noise answers with noise that the rig never showed. Of rows that rest
+    in holds `rows.force` is that already."""
+    if not rows.continuous or rows.n <= _LONG:
+        return driven
+    sd = min(float(np.median(np.abs(np.diff(driven, 2)))) / 0.6745 / 6**0.5, 3 * stated)
+    out, ends = driven.copy(), np.append(np.flatnonzero(rows.starts)[1:], rows.n)
+    for a, b in zip(np.flatnonzero(rows.starts), ends, strict=True):
+        first = int(a)
+        while first < b:
+            last = _stretch(driven[first:b], _BAND * sd) + first
+            mine = slice(first, last)
+            if last - first >= _LONG and _run(driven[mine]) <= _TREND * sd:
+                out[mine] = driven[mine].mean()
+            first = last
+    return out
+
+
+def _stretch(values: Array, band: float) -> int:
+    """How many values stay within `band` of the mean of those before them, at least one."""
+    mean = np.cumsum(values) / np.arange(1, len(values) + 1)
+    away = np.abs(values[1:] - mean[:-1]) > band
+    return int(away.argmax()) + 1 if away.any() else len(values)
+
+
+def _run(values: Array) -> float:
+    """By how much a straight line through the values changes along them."""
+    at = np.linspace(-0.5, 0.5, len(values))
+    return abs(float(at @ values) / float(at @ at))
+
+
 _WHITE = 1.5  # ratio of second differences' variances over two samples and over one: noise has 1
 _LEAST_SAMPLES = 300
 

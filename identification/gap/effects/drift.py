@@ -23,7 +23,10 @@ def warm_ups(bench: Bench) -> dict[str, Array]:
 
 def own_clock(bench: Bench) -> bool:
     """Whether time and load part company: the load comes and goes at least three times, in runs or
-    in cycles of one, or does not change at all. Else a path in time is a curve of the load."""
+    in cycles of one, or there is none at all. Else a path in time is a curve of the load, or the
+    creep under one that stands."""
+    if bench.stands and _never_unloaded(bench):
+        return False
     return bench.passes >= 3
 
 
@@ -39,13 +42,19 @@ def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
     seen, and steeper, in a recording that runs on and on; small ones where it is but a curve."""
     if not own_clock(bench):
         return usual[:SMALL]
-    size = np.abs(bench.rows.measured_force)
-    if not bench.rows.continuous or size.min() > _LOADED * size.max():
-        return usual  # under a load that is never taken away, most of what runs is creep
+    if not bench.rows.continuous or _never_unloaded(bench):
+        return usual
     return (*(s for s in usual if s < 0.3), 0.3, 1.0, 3.0)
 
 
 _LOADED = 0.3  # of the largest force
+
+
+def _never_unloaded(bench: Bench) -> bool:
+    size = np.abs(bench.rows.measured_force)
+    return bool(size.min() > _LOADED * size.max())
+
+
 # Of the deflection, or the largest force: what amplifiers and warming arms drift in minutes.
 SMALL = 2
 
