@@ -107,7 +107,7 @@ def _hardened(
     sign = 1.0 if load.max() >= -load.min() else -1.0
     if (
         bench.data.arm
-        or not bench.unloads
+        or not bench.lets_go
         or -(sign * load).min() > _ONE_SIDED * np.abs(load).max()
     ):
         return []
