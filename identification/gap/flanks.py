@@ -23,7 +23,9 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 
 ENOUGH = 0.3  # rms that may be left of what a straight line leaves
-CORNERS = 0.8  # and of what a smooth curve leaves beside the same friction: else it is one
+ENOUGH_BESIDE = 0.5  # and of what line and friction do
+CORNERS = 0.8  # round ones: of what a smooth curve leaves beside the same friction
+SHARP = 0.15  # corners over a smaller share of the half width are none of a smooth curve
 HOPEFUL = 0.8  # a search that starts from no better is not begun
 _BEYOND = 0.03  # of the load's range: so far it has to go past either corner
 _CENTRES = np.linspace(-0.25, 0.25, 9)  # starts, of the range
@@ -56,7 +58,7 @@ def shapes(bench: Bench, load: Array, flanks: Flanks) -> tuple[Array, Array]:
 
 def placed(bench: Bench, load: Array) -> Flanks | None:
     """Flanks for the load (n,) of a bench by least squares on its response; None where the play
-    leaves more than ENOUGH of what a straight line does, or hardly less than a curve."""
+    leaves more than ENOUGH of what a straight line does, or other laws do without it."""
     weight, span = bench.rows.weight, float(np.ptp(load))
     if not span > 0 or bench.rows.n < 20:
         return None
@@ -65,13 +67,28 @@ def placed(bench: Bench, load: Array) -> Flanks | None:
         return None
     find = _gap if bench.imposed else _held
     found, left = find(bench, load, span, HOPEFUL * plain)
-    curve = [*_smooth(load), shapes(bench, load, found)[1]]
-    if left > CORNERS * _left(curve, bench.response, weight):
-        return None
+    if left < ENOUGH * plain and _crossed(load, found) and _needed(bench, load, found, left):
+        return found
+    return None
+
+
+def _crossed(load: Array, found: Flanks) -> bool:
+    """Whether the load (n,) went clearly beyond both ends of the play."""
     inside = found.zone if found.kind == "gap" else found.friction
-    ends = load.min() + _BEYOND * span, load.max() - _BEYOND * span
-    crossed = ends[0] < found.centre - inside and found.centre + inside < ends[1]
-    return found if crossed and left < ENOUGH * plain else None
+    margin = _BEYOND * float(np.ptp(load))
+    low, high = float(load.min()) + margin, float(load.max()) - margin
+    return low < found.centre - inside and found.centre + inside < high
+
+
+def _needed(bench: Bench, load: Array, found: Flanks, left: float) -> bool:
+    """Whether neither the friction beside the play does without it, nor a smooth curve: one of
+    eight freedoms may be as good as sharp corners where both come down to the noise."""
+    y, weight = bench.response, bench.rows.weight
+    rub = shapes(bench, load, found)[1]
+    if left > ENOUGH_BESIDE * _left([load, rub], y, weight):
+        return False
+    sharp = found.kind == "held" or found.corner < SHARP * found.zone
+    return left < (1.0 if sharp else CORNERS) * _left([*_smooth(load), rub], y, weight)
 
 
 def _smooth(load: Array) -> list[Array]:
