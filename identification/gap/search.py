@@ -34,7 +34,7 @@ LOG_MORE = log(0.05)
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
 REMAINDER = 0.25
-SOFT = 4.0  # how fast, per factor e beyond that, it loses what it explains to `unknown`
+SOFT = 8.0  # how fast, per factor e beyond that, it loses what it explains to `unknown`
 # Nor can a law be met better than to a few percent of what it does.
 LAW_REMAINDER = 0.03
 # A second effect smaller than this share of the first can't be told from the first one's law.
