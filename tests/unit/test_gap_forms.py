@@ -10,7 +10,7 @@ import pytest
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData
-from identification.gap.effects import WORDS, library
+from identification.gap.effects import NEED_ARM, WORDS, library
 from identification.gap.effects.joint_yield import refined
 from identification.gap.evidence import Engine
 from identification.gap.forms import SESSION, Form, describe, law_of, lawful, realise, rows_of
@@ -75,6 +75,16 @@ def bench_without_arm(imposed: str | None = None) -> Bench:
     return make_bench(data)
 
 
+def pulled(imposed: str) -> Bench:
+    """Pulled from one side in three cycles, each further, from slack and beyond what it yields."""
+    t = np.arange(240.0)
+    way = np.abs(np.sin(t / 25)) * (1 + np.floor(t / 78.5))
+    force = 100 * np.minimum(np.maximum(way - 0.3, 0.0), 1.5) + 2.0
+    data = bench_data(force, 1e-3 * way, time=t, session=t, step=np.full(240, -1),
+                      branch=np.full(240, 3), imposed=imposed)  # fmt: skip
+    return make_bench(data)
+
+
 def assert_same(bench: Bench, words: tuple[str, ...]) -> int:
     """Every variant of the words, with coefficients of one, against its law; how many."""
     variants = library(bench, words)
@@ -100,6 +110,15 @@ def test_every_shape_of_the_library_is_its_law_on_an_arm(bench: Bench, word: str
 @pytest.mark.parametrize("imposed", [None, "displacement"])
 def test_every_shape_of_the_library_is_its_law_on_a_bench(imposed: str | None) -> None:
     assert assert_same(bench_without_arm(imposed), WORDS) > 100
+
+
+@pytest.mark.parametrize("imposed", ["force", "displacement"])
+def test_shapes_of_a_bench_that_is_pulled_are_their_laws(imposed: str) -> None:
+    bench = pulled(imposed)
+    assert assert_same(bench, tuple(w for w in WORDS if w not in NEED_ARM)) > 0
+    labels = {v.label.split(" ")[0] for v in library(bench, ["contact_seating"])}
+    assert ("slack" in labels) == (imposed == "displacement")
+    assert any("hardened" in v.label for v in library(bench, ["joint_yield"]))
 
 
 def one(word: str, law: Law, *values: float) -> Form:

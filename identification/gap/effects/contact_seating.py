@@ -31,7 +31,7 @@ def variants(bench: Bench) -> list[Variant]:
     if not top > 0:
         return []
     scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else BENCH_SHARES))
-    size, sign = _pressed(bench)
+    size, sign = pressed(bench)
     out, columns = [], []
     forces = FORCES if bench.data.arm else BENCH_FORCES
     for share in forces:
@@ -60,7 +60,7 @@ def variants(bench: Bench) -> list[Variant]:
     return [*out, *_slacks(bench, top)]
 
 
-def _pressed(bench: Bench) -> tuple[Array, Array]:
+def pressed(bench: Bench) -> tuple[Array, Array]:
     """Force (n,) N on the seat and its sense. A bench that is loaded from one side presses on it
     from where its load begins, wherever the zero of its force is."""
     low, high = float(bench.load.min()), float(bench.load.max())
@@ -70,18 +70,17 @@ def _pressed(bench: Bench) -> tuple[Array, Array]:
 
 
 def _slacks(bench: Bench, top: float) -> list[Variant]:
-    """Where the stroke is imposed, from one side: slack that is taken up before force rises, `d`
-    at the least force. The simulated load knows nothing of it, so it is told by the stroke."""
+    """Where the stroke is imposed, from one side: slack that is taken up before force rises,
+    `d min(u / d, 1)`, told by the stroke: the force that is simulated for it knows of no slack."""
     stroke = np.asarray(bench.slope * bench.load)
     if bench.data.arm or not bench.imposed or stroke.min() < -_ONE_SIDED * stroke.max():
         return []
-    out, f0 = [], BENCH_FORCES[0] * top
+    out, (size, sign) = [], pressed(bench)
     for share in SLACKS:
-        d = share * float(stroke.max())
-        shape = np.clip(stroke / d, 0.0, 1.0)
-        column = bench.add(bench.outside_column(shape))
+        d, f0 = share * float(stroke.max()), share * top
+        column = bench.add(bench.outside_column(sign * np.minimum(size / f0, 1.0)))
         out.append(variant(WORD, f"slack {share:g}", [column], (0.5 * d, d), force_N=f0,
-                           laws=(("exponential", f0),)))  # fmt: skip
+                           laws=(("slack", f0),)))  # fmt: skip
     return out
 
 

@@ -10,6 +10,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import moments
+from identification.gap.effects.contact_seating import pressed
 from identification.gap.effects.link_flexibility import STRAINS
 from identification.gap.forms.law import Law, Term, along, scaled
 from identification.gap.history import rests, retarded
@@ -128,13 +129,15 @@ def describe_seating(_: Bench, v: Variant) -> tuple[Law, Array]:
 
 
 def seating(bench: Bench, law: Law) -> list[Array]:
-    """`1 - exp(-F/F0)` or `F / (F + F0)`."""
-    size, sign = np.abs(bench.load), np.sign(bench.load)
+    """`1 - exp(-F/F0)`, `F / (F + F0)`, or slack that a stroke takes up, `min(F/F0, 1)`."""
+    size, sign = pressed(bench)
     out = []
     for t in law.terms:
-        f0 = t.shape["force_scale"]
-        exponential = t.shape["law"] == "exponential"
-        shape = 1 - np.exp(-size / f0) if exponential else size / (size + f0)
+        f0, kind = t.shape["force_scale"], t.shape["law"]
+        if kind == "slack":
+            shape = np.minimum(size / f0, 1.0)
+        else:
+            shape = 1 - np.exp(-size / f0) if kind == "exponential" else size / (size + f0)
         out.append(bench.outside_column(sign * shape))
     return out
 

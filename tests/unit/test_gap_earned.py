@@ -1,0 +1,106 @@
+"""Withheld repetitions: what is withheld, whose datum goes with it, and who loses weight by it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import make_bench
+from identification.gap.data import Array
+from identification.gap.earned import earned
+from identification.gap.evidence import Engine
+from identification.gap.heldout import ALWAYS_IN, folds, held_out
+from identification.gap.parts import Part
+from identification.gap.search import Explanation, Found, weighed
+from identification.gap.variants import variant
+from tests.unit.test_gap_operators import bench_data
+
+STEPS, REPETITIONS, SAMPLES = 8, 3, 4
+BUMP = 2e-5  # m
+
+
+def engine(extra: Array, datum: str = "setup", zeros: bool = True) -> Engine:
+    """Steps up from zero load, three times; extra (repetitions,): size of a bump in each, m."""
+    rng = np.random.default_rng(8)
+    step = np.tile(np.repeat(np.arange(STEPS), SAMPLES), REPETITIONS)
+    run = np.repeat(np.arange(REPETITIONS), STEPS * SAMPLES)
+    force = 20.0 * step
+    shape = np.exp(-(((force - 80) / 25) ** 2))
+    u = 1e-5 * force + extra[run] * shape + rng.normal(0, 5e-7, len(step))
+    branch = np.where((step == 0) & zeros, 0, 1)
+    data = bench_data(force, u, step=step, run=run, repetition=run + 1, branch=branch)
+    bench = make_bench(replace(data, datum=datum))
+    target = bench.observed - prediction(bench)
+    mine = [(bench.rows.repetition == r + 1) * np.exp(-(((bench.load - 80) / 25) ** 2))
+            for r in range(REPETITIONS)]  # fmt: skip
+    bench.add(bench.stacked(np.sum(mine, axis=0)))
+    for m in mine:
+        bench.add(bench.stacked(m))
+    return Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6]))
+
+
+def explained(columns: list[int], word: str, weight: float) -> Explanation:
+    v = variant(word, word, columns, (BUMP,), positive=False)
+    return Explanation((Part(v, BUMP),), weight, 0.0, (BUMP / 3,), weight)
+
+
+def found(e: Engine, *explanations: Explanation) -> Found:
+    none = Explanation((), -500.0, 0.0, (), -500.0)
+    words = {w: 0.0 for x in explanations for w in x.words}
+    ranked = (*sorted(explanations, key=lambda x: -x.log_weight), none)
+    return weighed(Found(e, ranked, words, {}, ranked[0], -400.0, 1e-6), {})
+
+
+def test_the_first_repetition_is_never_withheld() -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    fold = folds(e)["repetition"]
+    assert set(fold[e.bench.rows.repetition == 1]) == {ALWAYS_IN}
+    assert len(set(fold[e.bench.rows.repetition > 1])) == REPETITIONS - 1
+
+
+def test_what_repeats_is_foreseen_and_what_is_fitted_run_by_run_is_not() -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    fold = folds(e)["repetition"]
+    alike = held_out(e, explained([0], "joint_nonlinear_stiffness", 0.0), "repetition", fold)
+    each = held_out(e, explained([1, 2, 3], "zero_shift", 0.0), "repetition", fold)
+    assert alike.after < 1e-6
+    assert each.after > 5e-6
+
+
+def test_a_fit_of_the_session_loses_its_weight_to_what_foresees() -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    alike = explained([0], "joint_nonlinear_stiffness", -3.0)
+    each = explained([1, 2, 3], "zero_shift", 0.0)
+    before = found(e, alike, each)
+    after = earned(before)
+    assert before.probabilities["zero_shift"] > 0.8
+    assert after.kept[frozenset(["zero_shift"])] < 0.01
+    assert after.kept[frozenset(["joint_nonlinear_stiffness"])] > 0.99
+    assert after.probabilities["zero_shift"] < 0.05
+    # what it loses goes to no other word: nothing says that that one explains what it explained
+    assert after.probabilities["unknown"] > after.probabilities["joint_nonlinear_stiffness"]
+
+
+def test_one_repetition_is_judged_by_nothing() -> None:
+    force = np.repeat(20.0 * np.arange(8), 4)
+    data = bench_data(force, 1e-5 * force, step=np.repeat(np.arange(8), 4))
+    bench = make_bench(data)
+    bench.add(bench.stacked(np.ones(bench.rows.n)))
+    e = Engine(
+        bench, base_columns(bench), bench.observed - prediction(bench), np.array([0.0, 1e-6])
+    )
+    before = found(e, explained([0], "zero_shift", 0.0))
+    assert earned(before) is before
+
+
+@pytest.mark.parametrize(("datum", "zeros"), [("repetition", True), ("setup", False)])
+def test_a_datum_that_nobody_can_know_is_not_held_against_a_law(datum: str, zeros: bool) -> None:
+    """The last run stands 50 um off: its own laser datum, or a run that was never read unloaded."""
+    e = engine(np.zeros(REPETITIONS), datum, zeros)
+    n = e.bench.rows.n
+    e.target[:n] += np.where(e.bench.rows.repetition == 3, 5e-5, 0.0)
+    nothing = Explanation((), 0.0, 0.0, (), 0.0)
+    assert held_out(e, nothing, "repetition", folds(e)["repetition"]).after < 2e-6

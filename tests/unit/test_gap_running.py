@@ -1,0 +1,152 @@
+"""Recordings that run on, of rigs without an arm: their noise, what stands still, which drifts and
+other effects they can show at all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import Bench, make_bench
+from identification.gap.data import Array, GapData, Instruments
+from identification.gap.effects import library
+from identification.gap.effects.joint_yield import grown
+from identification.gap.noise import standing, white_noise
+from identification.gap.rows import reduce_rows
+from tests.unit.test_gap_operators import bench_data
+
+SPRING = 1e5  # N/m
+
+
+def running(force: Array, displacement: Array, **changes: object) -> GapData:
+    n = len(force)
+    return bench_data(
+        force, displacement, step=np.full(n, -1), branch=np.full(n, 3),
+        session=np.arange(n, dtype=float), **changes,
+    )  # fmt: skip
+
+
+def triangle(n: int, cycles: float) -> Array:
+    """From 0 to 1 and back, from one side."""
+    phase = np.linspace(0, cycles, n, endpoint=False) % 1.0
+    return np.asarray(1 - np.abs(1 - 2 * phase))
+
+
+def test_white_noise_of_a_dense_recording_is_found_and_motion_is_not_taken_for_it() -> None:
+    rng = np.random.default_rng(1)
+    slow = np.sin(np.linspace(0, 12, 4000))
+    assert white_noise(slow + rng.normal(0, 1e-3, 4000)) == pytest.approx(1e-3, rel=0.1)
+    assert white_noise(np.sin(np.linspace(0, 600, 4000))) == 0.0  # seven samples a radian
+    assert white_noise(rng.normal(0, 1.0, 50)) == 0.0  # too short to tell
+
+
+def test_an_understated_uncertainty_is_raised_to_what_the_samples_show() -> None:
+    rng = np.random.default_rng(2)
+    force = 100 * triangle(3000, 3)
+    data = running(force, force / SPRING + rng.normal(0, 5e-6, 3000), imposed="force")
+    assert make_bench(data).noise.stated == pytest.approx(5e-6, rel=0.25)  # 1e-6 was stated
+
+
+def test_on_a_plateau_an_imposed_displacement_adds_no_noise() -> None:
+    """5 mm of plateau: 1 um of uncertainty is 0.1 N on the flank and nothing on the plateau."""
+    u = 5e-3 * triangle(2000, 1)
+    force = np.minimum(SPRING * u, 50.0)
+    meter = Instruments(0.01, 1e-6, 0.005, 0.003)
+    noise = make_bench(running(force, u, imposed="displacement", instruments=meter)).noise
+    plateau = np.median(noise.response) * SPRING
+    assert plateau == pytest.approx(0.01, rel=0.01)
+    assert noise.response.max() * SPRING > 0.05  # the flank
+
+
+def test_what_is_driven_stands_where_it_stands_and_moves_where_it_moves() -> None:
+    rng = np.random.default_rng(3)
+    path = np.concatenate([np.linspace(0, 1, 60), np.ones(80), np.linspace(1, 0, 60)])
+    noisy = path + rng.normal(0, 1e-3, 200)
+    rows = reduce_rows(running(noisy, noisy))
+    out = standing(rows, noisy, 1e-3)
+    held = slice(65, 135)
+    assert np.ptp(out[held]) < 0.2 * np.ptp(noisy[held])
+    assert out[held].mean() == pytest.approx(1.0, abs=1e-3)
+    assert np.array_equal(out[:55], noisy[:55])
+    assert np.array_equal(out[150:], noisy[150:])
+
+
+def test_rows_that_rest_in_holds_are_left_as_they_are() -> None:
+    step = np.repeat(np.arange(1, 5), 20)
+    force = step * 10.0
+    rows = reduce_rows(bench_data(force, force / SPRING, step=step))
+    assert standing(rows, rows.force, 1.0) is rows.force
+
+
+def words_with(bench: Bench, word: str) -> list[str]:
+    return [v.label for v in library(bench, [word])]
+
+
+@pytest.mark.parametrize("word", ["thermal_drift", "force_drift"])
+def test_a_drift_of_one_pass_is_a_small_line(word: str) -> None:
+    force = 100 * triangle(400, 0.5)
+    once = make_bench(running(force, force / SPRING, imposed="force"))
+    assert once.passes == 1
+    variants = library(once, [word])
+    assert {v.label for v in variants} == {"linear"}
+    top = once.reach if word == "thermal_drift" else 100.0
+    assert max(v.scales[-1] for v in variants) <= 0.02 * top
+
+
+@pytest.mark.parametrize("word", ["thermal_drift", "force_drift"])
+def test_cycles_and_an_unloaded_rig_show_drifts_of_any_path(word: str) -> None:
+    rng = np.random.default_rng(5)
+    force = 100 * triangle(900, 3)
+    assert "free path" in words_with(make_bench(running(force, force / SPRING)), word)
+    still, moving = rng.normal(0, 0.1, 900), np.cumsum(rng.normal(0, 1e-7, 900))
+    rest = make_bench(running(still, moving, imposed="force"))
+    assert rest.stands
+    assert "free path" in words_with(rest, word)
+
+
+def test_under_a_load_that_stands_what_runs_is_creep_and_no_free_drift() -> None:
+    rng = np.random.default_rng(6)
+    force = 100 + rng.normal(0, 0.1, 900)
+    creeping = 1e-3 * (1 + 0.1 * np.log1p(np.arange(900.0)))
+    bench = make_bench(running(force, creeping, imposed="force"))
+    assert words_with(bench, "thermal_drift") == ["linear"]
+    assert words_with(bench, "joint_creep")
+
+
+def test_one_pull_that_never_stood_shows_neither_creep_nor_exponential_friction() -> None:
+    force = 100 * triangle(400, 0.5)
+    bench = make_bench(running(force, force / SPRING, imposed="force"))
+    assert bench.once
+    assert bench.always_moves
+    assert words_with(bench, "joint_creep") == []
+    assert not any("Dahl" in w or "worked in" in w for w in words_with(bench, "joint_hysteresis"))
+    cycled = make_bench(running(100 * triangle(400, 2), 1e-3 * triangle(400, 2), imposed="force"))
+    assert any("Dahl" in w for w in words_with(cycled, "joint_hysteresis"))
+
+
+def test_hardened_metal_yields_on_only_beyond_what_it_has_seen() -> None:
+    load = np.array([0.0, 3, 5, 2, 4, 6, 0, 1])
+    fresh = np.arange(8) == 0
+    assert grown(load, np.array([4.0]), fresh)[:, 0].tolist() == [0, 0, 1, 1, 1, 2, 2, 2]
+    assert grown(-load, np.array([4.0]), fresh)[:, 0].tolist() == [0, 0, -1, -1, -1, -2, -2, -2]
+
+
+def test_lag_of_a_recording_without_lag_is_not_made_of_its_noise() -> None:
+    """Noise of what is driven is in the response too; a column with that noise would explain it."""
+    rng = np.random.default_rng(7)
+    true = 100 * triangle(400, 0.9)
+    force = true + rng.normal(0, 1.0, 400)
+    bench = make_bench(running(force, true / SPRING, imposed="force"))
+    left = bench.response - bench.load / SPRING
+    lags = [v for v in library(bench, ["time_lag"]) if v.info["channel"] == "displacement"]
+    n = bench.rows.n
+    for v in lags:
+        column = bench.columns[v.columns[0]][:n]
+        assert abs(np.corrcoef(column, left)[0, 1]) < 0.3, v.label
+
+
+def test_a_bench_spring_is_neither_gone_nor_negative() -> None:
+    force = 100 * triangle(200, 2)
+    bench = make_bench(running(force, force / SPRING))
+    (spring,) = library(bench, ["joint_stiffness_error"])
+    assert spring.positive is not None
+    assert spring.least == -0.9
