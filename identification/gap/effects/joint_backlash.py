@@ -30,7 +30,7 @@ PLACED = ("gap", "held")
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
-MOST_RUB = 0.5  # of it at most
+MOST_RUB = 0.25  # of it at most
 _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an arm
 _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
