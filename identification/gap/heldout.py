@@ -71,8 +71,11 @@ def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) ->
     """Judges an explanation on every fold in turn."""
     bench, n = engine.bench, engine.bench.rows.n
     before, after = np.zeros(n), np.zeros(n)
+    judged = ~bench.rows.zero & (fold != ALWAYS_IN)
+    if name == "repetition" and np.any(judged & _within(bench)):
+        judged &= _within(bench)
     for f in np.unique(fold[fold != ALWAYS_IN]):
-        test = (fold == f) & ~bench.rows.zero
+        test = (fold == f) & judged
         if not test.any():
             continue
         out = fold == f
@@ -83,7 +86,6 @@ def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) ->
         whole = _whole(group, out)
         after[test] = _less_datum(group, left, whole & test)[test]
         before[test] = _less_datum(group, gap, whole & test)[test]
-    judged = ~bench.rows.zero & (fold != ALWAYS_IN)
     scatter = bench.scatter
     before, after = np.sqrt(before**2 + scatter), np.sqrt(after**2 + scatter)
     blocks = bench.rows.run if len(np.unique(bench.rows.run)) > 2 else fold
@@ -120,6 +122,23 @@ def _stacked_keep(engine: Engine, out: Flags) -> Flags:
     copies = (bench.layout.tangential.stop - n) // max(len(held), 1)
     keep[n : bench.layout.tangential.stop] = np.tile(held, copies)
     return keep
+
+
+def _within(bench: Bench) -> Flags:
+    """(n,) rows with a load that other repetitions of the setup have reached: a law that was found
+    below may bend beyond."""
+    rows, out = bench.rows, np.ones(bench.rows.n, dtype=bool)
+    margin = _MARGIN * float(np.ptp(bench.load))
+    for run in np.unique(rows.run):
+        mine = rows.run == run
+        others = bench.load[(rows.setup == rows.setup[mine][0]) & ~mine]
+        if others.size:
+            load = bench.load[mine]
+            out[mine] = (load >= others.min() - margin) & (load <= others.max() + margin)
+    return out
+
+
+_MARGIN = 0.02  # of the range of load
 
 
 def _own_datum(bench: Bench) -> Ints:

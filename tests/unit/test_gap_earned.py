@@ -14,7 +14,7 @@ from identification.gap.earned import earned
 from identification.gap.evidence import Engine
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
 from identification.gap.parts import Part
-from identification.gap.search import Explanation, Found, weighed
+from identification.gap.search import Explanation, Found, _cancelling, weighed
 from identification.gap.variants import variant
 from tests.unit.test_gap_operators import bench_data
 
@@ -82,6 +82,33 @@ def test_a_fit_of_the_session_loses_its_weight_to_what_foresees() -> None:
     assert after.probabilities["zero_shift"] < 0.05
     # what it loses goes to no other word: nothing says that that one explains what it explained
     assert after.probabilities["unknown"] > after.probabilities["joint_nonlinear_stiffness"]
+
+
+def test_beyond_the_loads_of_other_repetitions_nobody_is_judged() -> None:
+    """The last repetition goes twice as far, and bends there."""
+    step = np.concatenate([np.repeat(np.arange(8), 4), *2 * [np.repeat(np.arange(8), 4)]])
+    run = np.repeat(np.arange(3), 32)
+    force = 20.0 * step * np.where(run == 2, 2.0, 1.0)
+    u = 1e-5 * force + np.where(force > 145, 1e-4, 0.0)
+    data = bench_data(force, u, step=step, run=run, repetition=run + 1)
+    bench = make_bench(data)
+    bench.add(bench.stacked(np.ones(bench.rows.n)))
+    e = Engine(
+        bench, base_columns(bench), bench.observed - prediction(bench), np.array([0.0, 1e-6])
+    )
+    held = held_out(e, Explanation((), 0.0, 0.0, (), 0.0), "repetition", folds(e)["repetition"])
+    assert held.before < 1e-9
+
+
+def test_effects_that_take_each_other_back_are_charged_and_springs_are_not() -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    big = 10 * e.structural
+    mine = explained([0], "joint_nonlinear_stiffness", 0.0).parts
+    spring = explained([1], "joint_stiffness_error", 0.0).parts
+    both = np.array([e.structural, e.structural])
+    assert _cancelling(e, mine + spring, both) == 0.0
+    assert _cancelling(e, mine + spring, np.array([big, e.structural])) > 50
+    assert _cancelling(e, mine + spring, np.array([e.structural, big])) == 0.0
 
 
 def test_one_repetition_is_judged_by_nothing() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array, GapData, Instruments
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.joint_yield import grown
 from identification.gap.noise import standing, white_noise
@@ -68,6 +69,8 @@ def test_what_is_driven_stands_where_it_stands_and_moves_where_it_moves() -> Non
     assert out[held].mean() == pytest.approx(1.0, abs=1e-3)
     assert np.array_equal(out[:55], noisy[:55])
     assert np.array_equal(out[150:], noisy[150:])
+    slow = np.linspace(0, 0.05, 200) + rng.normal(0, 1e-3, 200)  # a quarter of the noise a row
+    assert np.mean(standing(rows, slow, 1e-3) != slow) < 0.2
 
 
 def test_rows_that_rest_in_holds_are_left_as_they_are() -> None:
@@ -142,6 +145,28 @@ def test_lag_of_a_recording_without_lag_is_not_made_of_its_noise() -> None:
     for v in lags:
         column = bench.columns[v.columns[0]][:n]
         assert abs(np.corrcoef(column, left)[0, 1]) < 0.3, v.label
+
+
+def test_what_is_below_the_noise_of_a_sample_is_no_effect_of_a_running_recording() -> None:
+    """A wander of a third of the noise, which thousands of samples show: 1/f noise does that."""
+    rng = np.random.default_rng(9)
+    force = 100 * triangle(3000, 6)
+    wander = 4e-7 * np.sin(np.linspace(0, 9, 3000))
+    u = force / SPRING + wander + rng.normal(0, 1e-6, 3000)
+    found = diagnose_gap(running(force, u, imposed="force"))
+    assert found.verdict == "none"
+    larger = diagnose_gap(running(force, u + 20 * wander, imposed="force"))
+    assert larger.verdict in ("thermal_drift", "force_drift")
+
+
+def test_a_bench_that_is_pressed_from_one_side_seats_from_where_its_load_begins() -> None:
+    force = 100 * triangle(300, 3)
+    u = force / SPRING
+    zero = make_bench(running(force, u, imposed="force"))
+    shifted = make_bench(running(force - 5.0, u, imposed="force"))
+    first, second = library(zero, ["contact_seating"])[0], library(shifted, ["contact_seating"])[0]
+    assert shifted.columns[second.columns[0]].min() == 0.0
+    assert zero.columns[first.columns[0]].max() > 0.9
 
 
 def test_a_bench_spring_is_neither_gone_nor_negative() -> None:

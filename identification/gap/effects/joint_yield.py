@@ -104,12 +104,8 @@ def _hardened(
 ) -> list[Variant]:
     """Metal that hardens alike in both senses (Voce 1948) and is pulled, or pressed, again and
     again: it yields on only beyond the largest load it has seen. Benches alone."""
-    sign = 1.0 if load.max() >= -load.min() else -1.0
-    if (
-        bench.data.arm
-        or not bench.lets_go
-        or -(sign * load).min() > _ONE_SIDED * np.abs(load).max()
-    ):
+    top, sign = float(np.abs(load).max()), 1.0 if load.max() >= -load.min() else -1.0
+    if bench.data.arm or not bench.lets_go or -(sign * load).min() > _ONE_SIDED * top:
         return []
     columns = [column(s) for s in grown(load, radius, bench.moved).T]
     out = []
@@ -118,9 +114,10 @@ def _hardened(
         exact = {**info, "memory": HARDENED, "flow_s": 0.0, "radius": radius[k:],
                  "centre": radius[k], "load": load, "column": column, "back": [],
                  "knee": "hardened"}  # fmt: skip
+        label = f"{name}{HARDENED} beyond {radius[k] / top:.3g}"
         out.append(
-            variant(word, f"{name}{HARDENED} beyond {radius[k]:.4g}", columns[k:], SCALES, root,
-                    np.ones(len(root)), 0.7 / len(radius), LEAST, **exact)
+            variant(word, label, columns[k:], SCALES, root, np.ones(len(root)),
+                    0.7 / len(radius), LEAST, **exact)
         )  # fmt: skip
     return out
 

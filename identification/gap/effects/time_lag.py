@@ -67,14 +67,12 @@ _SIDE = 4  # rows to either side
 
 
 def _smooth(bench: Bench, values: Array) -> Array:
-    """Values (n,) of a running recording from the rows about them, by a straight line through the
-    neighbours alone: noise of what is driven is in the response as well, and must not stand in the
-    column that is to explain it."""
+    """Means (n,) of a running recording over the rows about each: noise of what is driven is in the
+    response as well, and must not stand in the column that is to explain it."""
     if not bench.rows.continuous:
         return values
     out, edges = values.copy(), np.append(np.flatnonzero(bench.rows.starts), bench.rows.n)
     kernel = np.ones(2 * _SIDE + 1)
-    kernel[_SIDE] = 0.0
     for a, b in pairwise(edges):
         if b - a > 4 * _SIDE:
             inner = np.convolve(values[a:b], kernel / kernel.sum(), mode="valid")
