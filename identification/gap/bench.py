@@ -33,6 +33,7 @@ class Layout:
 
 
 _MANY = 1000
+_ASIDE = 0.1  # of the largest load: less of the other sign is none
 _TREMBLES = 2.0  # stated standard deviations
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
@@ -86,6 +87,14 @@ class Bench:
     def unloads(self) -> bool:
         """Whether the load came back within some run, by a fifth of its range at least."""
         return self._returns(self.load)
+
+    @property
+    def one_sided(self) -> bool:
+        """The load, and the force, keep their sign: nothing passes zero."""
+        return all(
+            min(-float(v.min()), float(v.max())) < _ASIDE * float(np.abs(v).max())
+            for v in (self.load, self.rows.measured_force)
+        )
 
     @property
     def lets_go(self) -> bool:

@@ -245,6 +245,7 @@ def _seating(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     seated = {
         "exponential": lambda scale: -np.expm1(-top / scale),
         "hyperbolic": lambda scale: top / (top + scale),
+        "slack": lambda scale: min(top / scale, 1.0),
     }
     at_top = np.array([seated[law](scale) for law, scale in part.variant.info["laws"]])
     return {

@@ -53,9 +53,11 @@ MECHANISMS = frozenset(
         "contact_seating",
     ]
 )
+# Curves of the load, which one direction without joint readings can't tell apart.
+CURVES = frozenset({"contact_seating", "joint_nonlinear_stiffness"})
 FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 # Neighbouring points of one smooth run are no independent witnesses of its law.
-TEMPER = 0.25
+TEMPER = 0.12
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 _REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 6  # words that are refined
@@ -414,7 +416,7 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     words = {one.word, other.word}
     if engine.bench.once and words <= MECHANISMS:
         return True
-    if not engine.bench.data.arm and words & LINEAR and words & MECHANISMS:
+    if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & MECHANISMS)):
         return True
     if "joint_stiffness_error" in words and words & MECHANISMS:
         return same or not engine.bench.has_q

@@ -25,7 +25,7 @@ def own_clock(bench: Bench) -> bool:
     """Whether time and load part company: the load comes and goes at least three times, in runs or
     in cycles of one, or there is none at all. Else a path in time is a curve of the load, or the
     creep under one that stands."""
-    if bench.stands and _never_unloaded(bench):
+    if bench.stands and _loaded(bench):
         return False
     return bench.passes >= 3
 
@@ -42,7 +42,7 @@ def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
     seen, and steeper, in a recording that runs on and on; small ones where it is but a curve."""
     if not own_clock(bench):
         return usual[:SMALL]
-    if not bench.rows.continuous or _never_unloaded(bench):
+    if not bench.rows.continuous or (bench.stands and _loaded(bench)):
         return usual
     return (*(s for s in usual if s < 0.3), 0.3, 1.0, 3.0)
 
@@ -50,9 +50,11 @@ def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
 _LOADED = 0.3  # of the largest force
 
 
-def _never_unloaded(bench: Bench) -> bool:
-    size = np.abs(bench.rows.measured_force)
-    return bool(size.min() > _LOADED * size.max())
+def _loaded(bench: Bench) -> bool:
+    """A recording that starts with a force: drifts are recorded from zero on."""
+    force = bench.rows.measured_force
+    first = abs(float(force[: max(1, len(force) // 100)].mean()))
+    return first > max(_LOADED * float(np.abs(force).max()), 3 * bench.data.instruments.force)
 
 
 # Of the deflection, or the largest force: what amplifiers and warming arms drift in minutes.

@@ -47,6 +47,8 @@ SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 def variants(bench: Bench) -> list[Variant]:
     """Per joint and memory: kept while the arm stands; lost in the rest between runs; there from
     the beginning, of loads like those measured (rigs are cycled before they are measured)."""
+    if bench.once and not bench.data.arm:  # one pull shows a curve, and no loop
+        return []
     memories = {"": (bench.moved, False)}
     if not bench.once:
         memories[" worked in"] = (bench.moved, True)
