@@ -46,10 +46,7 @@ CONSTANTS: dict[str, Key] = {
     "law": Key("law", "text", options=("Iwan", "Dahl", "Bouc-Wen")),
     "zone": Key("zone_Nm", "positive"),
     "crossing": Key("crossing", "text", options=("weight", "load")),
-    "kind": Key("kind", "text", options=("free", "friction", "friction 3", "soft", "gap", "held")),
-    "centre": Key("centre_Nm"),
-    "corner": Key("corner_Nm", "positive"),
-    "friction": Key("friction_Nm", "positive"),
+    "kind": Key("kind", "text", options=("free", "friction", "friction 3", "soft")),
     "weight_factor": Key("weight_over_stated", "positive"),
     "way": Key("kind", "text", options=("delay", "filter", "window")),
     "measured_to": Key("measured_to_Nm", "positive"),
@@ -79,7 +76,7 @@ SHAPES: dict[str, Key] = {
     "strain": Key("strain", "text", options=("bending", "twist")),
     "run": Key("run", "count"),
     "axis": Key("axis", "text", options=_SIDES),
-    "law": Key("law", "text", options=("exponential", "hyperbolic", "slack")),
+    "law": Key("law", "text", options=("exponential", "hyperbolic")),
     "force_scale": Key("force_scale_N", "positive"),
     "along": Key("along", "vector"),
     "across": Key("across", "vector"),
@@ -117,7 +114,7 @@ for _name, _unit in _DRIFTS.items():
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
 
 
-MAY_BE_MISSING = ("measured_to", "about", "centre", "corner", "friction")
+MAY_BE_MISSING = ("measured_to", "about")
 
 
 @dataclass(frozen=True)
@@ -148,13 +145,8 @@ GRAMMAR: dict[str, Grammar] = {
         ("joint", "law", "memory"), (("compliance", ("strength",)), ("compliance", ("reach",)))
     ),
     "joint_backlash": Grammar(
-        ("joint", "zone", "crossing", "kind", "weight_factor", "centre", "corner", "friction"),
-        (
-            ("width", ()),
-            ("rub", ()),
-            ("compliance", ()),
-            ("place", ("pose", "direction", "first")),
-        ),
+        ("joint", "zone", "crossing", "kind", "weight_factor"),
+        (("width", ()), ("rub", ()), ("place", ("pose", "direction", "first"))),
     ),
     "joint_nonlinear_stiffness": Grammar(
         ("joint", "measured_to"),

@@ -126,7 +126,7 @@ def _chosen(found: Found, verdict: str) -> Explanation:
         return next(e for e in found.explanations if not e.parts)
     mine = [e for e in found.explanations if e.parts and e.parts[0].word == verdict]
     held = [e for e in mine if found.kept.get(e.words, 1.0) > 0.5]
-    return next((e for e in [*held, *mine] if e.good), mine[0])
+    return next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
 
 
 def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explanation) -> GapResult:

@@ -24,6 +24,7 @@ from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING, Array
 from identification.gap.parallel import side_by_side
+from identification.gap.rows import rises
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
@@ -289,8 +290,9 @@ def level_covariance(bench: Bench) -> Array:
     first = np.unique(rows.level, return_index=True)[1]
     setup, branch = rows.setup[first], rows.branch[first]
     if rows.continuous:
-        branch = np.searchsorted(np.unique(rows.level), rows.level[first]) * 0 + (
-            np.gradient(bench.load)[first] >= 0
+        branch = (
+            np.searchsorted(np.unique(rows.level), rows.level[first]) * 0
+            + (rises(bench.load)[first])
         )
     span = np.ptp(bench.load) or 1.0
     near = np.exp(-np.abs(load[:, None] - load) / (_NEIGHBOUR * span))

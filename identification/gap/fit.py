@@ -18,6 +18,7 @@ from identification.gap.evidence import (
     run_columns,
 )
 from identification.gap.parts import Part, block
+from identification.gap.rows import rises
 from identification.gap.search import Explanation
 
 _LEVER_M = 0.3
@@ -116,12 +117,12 @@ def _phases(engine: Engine) -> list[Flags]:
     """Rows (n,) by their place in the hold and by whether the load rose or fell before it."""
     bench, rows = engine.bench, engine.bench.rows
     if rows.continuous:
-        rises = np.gradient(np.abs(bench.load)) >= 0
-        return [rises, ~rises]
+        up = rises(np.abs(bench.load))
+        return [up, ~up]
     first = np.flatnonzero(rows.hold_starts)[np.cumsum(rows.hold_starts) - 1]
     place = np.minimum(np.arange(rows.n) - first, _LATER)
-    rises = np.abs(bench.load[first]) >= np.abs(bench.load[np.maximum(first - 1, 0)])
-    masks = [(place == k) & (rises == up) for k in range(_LATER + 1) for up in (True, False)]
+    up = np.abs(bench.load[first]) >= np.abs(bench.load[np.maximum(first - 1, 0)])
+    masks = [(place == k) & way for k in range(_LATER + 1) for way in (up, ~up)]
     return [m for m in masks if m.any()]
 
 

@@ -59,6 +59,8 @@ def shapes(bench: Bench, load: Array, flanks: Flanks) -> tuple[Array, Array]:
 def placed(bench: Bench, load: Array) -> Flanks | None:
     """Flanks for the load (n,) of a bench by least squares on its response; None where the play
     leaves more than ENOUGH of what a straight line does, or other laws do without it."""
+    if len(bench.data.setups) > 1:  # one direction at a time is what this can place
+        return None
     weight, span = bench.rows.weight, float(np.ptp(load))
     if not span > 0 or bench.rows.n < 20:
         return None

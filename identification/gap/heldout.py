@@ -21,6 +21,7 @@ from identification.gap.fit import fit
 from identification.gap.search import Explanation
 
 BLOCKS = 5
+ALWAYS_IN = -1  # number of the fold of rows that are never withheld
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,9 @@ def folds(engine: Engine) -> dict[str, Ints]:
     poses = list(dict.fromkeys(s.pose for s in data.setups))
     out = {}
     if len(np.unique(rows.repetition)) > 1:
-        out["repetition"] = _later(rows.setup, rows.repetition)
+        later = _later(rows.setup, rows.repetition)
+        if np.any(later != ALWAYS_IN):  # else no setup was measured twice
+            out["repetition"] = later
     if len(directions) > 1:
         of = np.array([directions.index(s.direction) for s in data.setups])
         out["direction"] = of[rows.setup]
@@ -55,9 +58,6 @@ def folds(engine: Engine) -> dict[str, Ints]:
     if "repetition" not in out and rows.n >= 4 * BLOCKS:
         out["block"] = (np.arange(rows.n) * BLOCKS // rows.n).astype(np.int64)
     return out
-
-
-ALWAYS_IN = -1  # number of the fold of rows that are never withheld
 
 
 def _later(setup: Ints, repetition: Ints) -> Ints:
@@ -72,8 +72,11 @@ def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) ->
     bench, n = engine.bench, engine.bench.rows.n
     before, after = np.zeros(n), np.zeros(n)
     judged = ~bench.rows.zero & (fold != ALWAYS_IN)
-    if name == "repetition" and np.any(judged & _within(bench)):
-        judged &= _within(bench)
+    within = judged & _within(bench)
+    if name == "repetition" and within.any():
+        judged = within
+    group = _own_datum(bench)
+    gap = bench.response - stated_prediction(engine)
     for f in np.unique(fold[fold != ALWAYS_IN]):
         test = (fold == f) & judged
         if not test.any():
@@ -81,8 +84,6 @@ def held_out(engine: Engine, explanation: Explanation, name: str, fold: Ints) ->
         out = fold == f
         fitted = fit(engine, explanation, _stacked_keep(engine, out))
         left = engine.target[:n] - fitted.response
-        gap = bench.response - stated_prediction(engine)
-        group = _own_datum(bench)
         whole = _whole(group, out)
         after[test] = _less_datum(group, left, whole & test)[test]
         before[test] = _less_datum(group, gap, whole & test)[test]

@@ -127,13 +127,14 @@ def _threshold(bench: Bench, part: Part, knee: _Found) -> Parameter:
     alone is known to the step of its grid. The gain of the force acts on every threshold."""
     info = part.variant.info
     radius = np.asarray(info["radius"])
-    beyond = np.maximum(float(np.abs(info["load"]).max()) - radius, 0.0)
+    top = float(np.abs(info["load"]).max())
+    beyond = np.maximum(top - radius, 0.0)
     path, work = float(knee.w @ beyond), float(knee.w @ beyond**2)
     value, variance = float(info["centre"]), (_GRID_STEP * float(info["centre"])) ** 2 / 12
     if len(radius) > 1 and path > 0:
         mean = work / path
         slope = (mean - beyond) * beyond / path
-        value = float(np.clip(np.max(beyond + radius) - mean, radius.min(), radius.max()))
+        value = float(np.clip(top - mean, radius.min(), min(float(radius.max()), top)))
         variance = float(slope @ knee.cov @ slope)
     shared = bench.data.instruments.force_gain if not bench.imposed else 0.0
     if part.word == "base_slip" and info["axis"] < 2:

@@ -203,8 +203,13 @@ def _blocks(run: Ints) -> Ints:
 _STRETCHES = 50
 
 
+def rises(values: Array) -> Flags:
+    """(n,): whether a signal goes up there, or stands."""
+    return np.gradient(values) >= 0 if len(values) > 1 else np.ones(len(values), dtype=bool)
+
+
 def _continuous_levels(setup: Ints, force: Array) -> Ints:
-    rising = np.gradient(force) >= 0 if len(force) > 1 else np.zeros(len(force), dtype=bool)
+    rising = rises(force)
     span = np.ptp(force) or 1.0
     number = np.minimum((force - force.min()) / span * _LEVELS, _LEVELS - 1).astype(np.int64)
     return _ids(np.column_stack([setup, rising.astype(np.int64), number]))

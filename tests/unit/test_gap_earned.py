@@ -111,6 +111,23 @@ def test_effects_that_take_each_other_back_are_charged_and_springs_are_not() -> 
     assert _cancelling(e, mine + spring, np.array([e.structural, big])) == 0.0
 
 
+def test_repetitions_that_no_setup_has_twice_are_no_fold() -> None:
+    setup = bench_data(np.zeros(4), np.zeros(4)).setups[0]
+    force = np.tile(np.repeat(20.0 * np.arange(8), 4), 2)
+    run = np.repeat([0, 1], 32)
+    data = bench_data(
+        force, 1e-5 * force, step=np.tile(np.repeat(np.arange(8), 4), 2), run=run, setup=run,
+        repetition=run + 1, setups=(setup, replace(setup, direction="y")),
+    )  # fmt: skip
+    bench = make_bench(data)
+    bench.add(bench.stacked(np.ones(bench.rows.n)))
+    e = Engine(
+        bench, base_columns(bench), bench.observed - prediction(bench), np.array([0.0, 1e-6])
+    )
+    assert "repetition" not in folds(e)
+    assert "direction" in folds(e)
+
+
 def test_one_repetition_is_judged_by_nothing() -> None:
     force = np.repeat(20.0 * np.arange(8), 4)
     data = bench_data(force, 1e-5 * force, step=np.repeat(np.arange(8), 4))

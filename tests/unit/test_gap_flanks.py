@@ -150,6 +150,7 @@ def test_friction_beside_a_play_is_the_lesser_part() -> None:
         assert v.positive @ share < 0
     inside = [v for v in joint_backlash.variants(replace(gap(0.2), columns=[]))
               if v.info["kind"] == "gap"]  # fmt: skip
+    assert inside
     assert all(v.positive is not None and v.positive[1] == 0 for v in inside)
 
 

@@ -12,6 +12,8 @@ from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.joint_yield import grown
 from identification.gap.noise import standing, white_noise
+from identification.gap.parameters import parameters
+from identification.gap.parts import Part
 from identification.gap.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
@@ -142,6 +144,7 @@ def test_lag_of_a_recording_without_lag_is_not_made_of_its_noise() -> None:
     left = bench.response - bench.load / SPRING
     lags = [v for v in library(bench, ["time_lag"]) if v.info["channel"] == "displacement"]
     n = bench.rows.n
+    assert lags
     for v in lags:
         column = bench.columns[v.columns[0]][:n]
         assert abs(np.corrcoef(column, left)[0, 1]) < 0.3, v.label
@@ -167,6 +170,39 @@ def test_a_bench_that_is_pressed_from_one_side_seats_from_where_its_load_begins(
     first, second = library(zero, ["contact_seating"])[0], library(shifted, ["contact_seating"])[0]
     assert shifted.columns[second.columns[0]].min() == 0.0
     assert zero.columns[first.columns[0]].max() > 0.9
+
+
+@pytest.mark.parametrize("imposed", ["force", "displacement"])
+def test_what_is_pressed_is_what_is_pulled_the_other_way_round(imposed: str) -> None:
+    force = 100 * np.maximum(triangle(300, 3) - 0.2, 0.0)
+    u = 1e-3 * triangle(300, 3)
+    pulled = make_bench(running(force, u, imposed=imposed))
+    pressed = make_bench(running(-force, -u, imposed=imposed))
+    for word in ("contact_seating", "joint_yield", "joint_backlash"):
+        one, other = library(pulled, [word]), library(pressed, [word])
+        assert [v.label for v in one] == [v.label for v in other]
+        for v, w in zip(one, other, strict=True):
+            for i, k in zip(v.columns, w.columns, strict=True):
+                assert pressed.columns[k] == pytest.approx(-pulled.columns[i], abs=1e-15)
+
+
+@pytest.mark.parametrize("imposed", ["force", "displacement"])
+def test_every_shape_of_a_bench_has_parameters(imposed: str) -> None:
+    force = 100 * np.maximum(triangle(300, 3) * (1 + np.arange(300) // 100) - 0.2, 0.0)
+    u = 1e-3 * triangle(300, 3) * (1 + np.arange(300) // 100)
+    bench = make_bench(running(force, u, imposed=imposed))
+    variants = library(bench)
+    assert {"joint_yield", "contact_seating", "time_lag"} <= {v.word for v in variants}
+    for v in variants:
+        k = len(v.columns)
+        found = parameters(bench, Part(v, 1.0), np.full(k, 0.3), 1e-4 * np.eye(k))
+        values = [x for p in found.values() for x in (p.value, p.low, p.high)]
+        assert np.all(np.isfinite(values)), v.label
+
+
+def test_a_single_sample_is_diagnosed_as_nothing() -> None:
+    found = diagnose_gap(running(np.array([5.0]), np.array([5e-5])))
+    assert found.verdict in ("none", "unknown")
 
 
 def test_a_bench_spring_is_neither_gone_nor_negative() -> None:

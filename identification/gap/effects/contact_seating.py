@@ -63,18 +63,19 @@ def variants(bench: Bench) -> list[Variant]:
 def pressed(bench: Bench) -> tuple[Array, Array]:
     """Force (n,) N on the seat and its sense. A bench that is loaded from one side presses on it
     from where its load begins, wherever the zero of its force is."""
-    low, high = float(bench.load.min()), float(bench.load.max())
-    if bench.data.arm or low < -_ONE_SIDED * high:
+    if bench.data.arm or not bench.one_sided:
         return np.abs(bench.load), np.sign(bench.load)
-    return np.maximum(bench.load - low, 0.0), np.ones(bench.rows.n)
+    sense = 1.0 if bench.load.max() >= -bench.load.min() else -1.0
+    pushed = sense * bench.load
+    return np.asarray(pushed - pushed.min()), np.full(bench.rows.n, sense)
 
 
 def _slacks(bench: Bench, top: float) -> list[Variant]:
     """Where the stroke is imposed, from one side: slack that is taken up before force rises,
     `d min(u / d, 1)`, told by the stroke: the force that is simulated for it knows of no slack."""
-    stroke = np.asarray(bench.slope * bench.load)
-    if bench.data.arm or not bench.imposed or stroke.min() < -_ONE_SIDED * stroke.max():
+    if bench.data.arm or not bench.imposed or not bench.one_sided:
         return []
+    stroke = np.asarray(bench.slope * np.abs(bench.load))
     out, (size, sign) = [], pressed(bench)
     for share in SLACKS:
         d, f0 = share * float(stroke.max()), share * top
@@ -82,6 +83,3 @@ def _slacks(bench: Bench, top: float) -> list[Variant]:
         out.append(variant(WORD, f"slack {share:g}", [column], (0.5 * d, d), force_N=f0,
                            laws=(("slack", f0),)))  # fmt: skip
     return out
-
-
-_ONE_SIDED = 0.1

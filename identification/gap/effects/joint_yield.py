@@ -90,7 +90,6 @@ def knee_variants(
 
 
 HARDENED = " hardened"
-_ONE_SIDED = 0.1  # of the largest load: less of the other sign is none
 
 
 def _hardened(
@@ -104,8 +103,8 @@ def _hardened(
 ) -> list[Variant]:
     """Metal that hardens alike in both senses (Voce 1948) and is pulled, or pressed, again and
     again: it yields on only beyond the largest load it has seen. Benches alone."""
-    top, sign = float(np.abs(load).max()), 1.0 if load.max() >= -load.min() else -1.0
-    if bench.data.arm or not bench.lets_go or -(sign * load).min() > _ONE_SIDED * top:
+    top = float(np.abs(load).max())
+    if bench.data.arm or not bench.lets_go or not bench.one_sided:
         return []
     columns = [column(s) for s in grown(load, radius, bench.moved).T]
     out = []
