@@ -31,7 +31,7 @@ CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
 CONTINUOUS_ROW_PART = 0.3  # neighbouring rows of a running recording err alike
 _NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
 _ROOM = 3  # a third more than the first columns
-_LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
+LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ class Engine:
         part = HOLD_PART if not self.bench.rows.continuous else CONTINUOUS_HOLD_PART
         hold = self.bench.noise.hold[self._edges] ** 2 + (part * eta) ** 2
         extra_u = 1 + hold * self._length_u**2
-        lever = (eta / _LEVER_M) ** 2 if self.bench.data.arm else 0.0
+        lever = (eta / LEVER_M) ** 2 if self.bench.data.arm else 0.0
         extra_q = 1 + lever * self._length_q**2
         row_part = ROW_PART if not self.bench.rows.continuous else CONTINUOUS_ROW_PART
         factor = 1 + (row_part * eta / self._contrast_noise) ** 2

@@ -10,6 +10,7 @@ from identification.gap.compare import moved_response
 from identification.gap.data import Array, Flags
 from identification.gap.evidence import (
     HOLD_PART,
+    LEVER_M,
     ROW_PART,
     RUN_PART,
     Engine,
@@ -21,7 +22,6 @@ from identification.gap.parts import Part, block
 from identification.gap.rows import rises
 from identification.gap.search import Explanation
 
-_LEVER_M = 0.3
 _LATER = 3  # rows of a hold from here on count as one
 
 
@@ -154,6 +154,6 @@ def _holds(engine: Engine, eta: float) -> tuple[Array, Array]:
     size = bench.layout.size
     key, common = np.arange(size) + float(n), np.zeros(size)
     key[:n] = bench.rows.hold
-    common[bench.layout.q] = eta / _LEVER_M
+    common[bench.layout.q] = eta / LEVER_M
     common[:n] = np.hypot(bench.noise.hold, HOLD_PART * eta)
     return np.asarray(key, dtype=float), common

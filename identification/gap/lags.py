@@ -51,7 +51,7 @@ def _sampling_time(bench: Bench) -> float:
     return float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
 
 
-@lru_cache(maxsize=6)
+@lru_cache(maxsize=3)
 def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
     """Lags (k,) s and what each does to the responses (k, n)."""
     lags = _LAGS * _sampling_time(bench)

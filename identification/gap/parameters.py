@@ -25,7 +25,7 @@ from identification.gap.lags import closest_lag
 from identification.gap.parts import Part
 
 _GRID_STEP = 0.03  # between finely spaced thresholds, as their share
-_TWO_SIDED = 1.959964  # standard deviations of a normal 95 % interval
+TWO_SIDED = 1.959964  # standard deviations of a normal 95 % interval
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def parameters(
 
 
 def _normal(value: float, variance: float, unit: str) -> Parameter:
-    half = _TWO_SIDED * variance**0.5
+    half = TWO_SIDED * variance**0.5
     return Parameter(value, value - half, value + half, unit)
 
 
@@ -315,7 +315,7 @@ def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     does = sum((v * bench.columns[c][:n] for v, c in zip(w, part.variant.columns, strict=True)),
                np.zeros(n))  # fmt: skip
     total = found.linear(np.ones(len(w)), "1")
-    relative = (total.high - total.low) / (2 * _TWO_SIDED) / max(abs(total.value), 1e-6)
+    relative = (total.high - total.low) / (2 * TWO_SIDED) / max(abs(total.value), 1e-6)
     lags, misses, spread = np.zeros(3), np.zeros(3), np.zeros(3)
     for k, kind in enumerate(("delay", "filter", "average")):
         lags[k], misses[k] = closest_lag(bench, info["channel"], kind, does)

@@ -11,13 +11,13 @@ from identification.gap.compare import IMPERFECTION, level_prior, score
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit, fit
-from identification.gap.parameters import Parameter, Softer, parameters
+from identification.gap.parameters import TWO_SIDED, Parameter, Softer, parameters
 from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
-from identification.gap.search import SAME_JOINT, Explanation, conditioned
+from identification.gap.penalties import SAME_JOINT
+from identification.gap.search import Explanation, conditioned
 from identification.gap.variants import Variant
 
 _MOST, _LEAST_SHARE = 10, 0.01  # shapes that count, and their least share of the posterior
-_TWO_SIDED = 1.959964  # standard deviations of a normal 95 % interval
 
 
 def parameters_of(
@@ -47,7 +47,7 @@ def parameters_of(
         value = _mixture(
             [f[name] for f, m in zip(found, mine, strict=True) if m], share[mine]
         ).value
-        grid = _TWO_SIDED * abs(step[name].value - value) / 12**0.5 if name in step else 0.0
+        grid = TWO_SIDED * abs(step[name].value - value) / 12**0.5 if name in step else 0.0
         low, high = min(mixed.low - value, 0.0), max(mixed.high - value, 0.0)
         out[name] = replace(
             mixed,
@@ -167,7 +167,7 @@ def _mixture(each: list[Parameter], share: Array) -> Parameter:
         factors and np.allclose(ends[:, 2] * ends[:, 1], ends[:, 0] ** 2, rtol=0.1, atol=0)
     )
     mean, low, high = (np.log(ends) if skewed else ends).T
-    sd = np.maximum(high - low, 0.0) / (2 * _TWO_SIDED) + 1e-300
+    sd = np.maximum(high - low, 0.0) / (2 * TWO_SIDED) + 1e-300
     out = [_quantile(mean, sd, share, q) for q in (0.5, 0.025, 0.975)]
     value, least, most = (float(np.exp(v)) for v in out) if skewed else out
     return Parameter(value, least, most, each[0].unit)

@@ -15,7 +15,6 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.compare import (
-    LINEAR,
     Scored,
     condition,
     level_prior,
@@ -26,6 +25,7 @@ from identification.gap.data import Array
 from identification.gap.effects import WORDS
 from identification.gap.evidence import Engine, Level
 from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
+from identification.gap.penalties import cancelling, pettiness, trifle
 from identification.gap.variants import Variant
 
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
@@ -37,28 +37,8 @@ REMAINDER = 0.25
 SOFT = 8.0  # how fast, per factor e beyond that, it loses what it explains to `unknown`
 # Nor can a law be met better than to a few percent of what it does.
 LAW_REMAINDER = 0.03
-# A second effect smaller than this share of the first can't be told from the first one's law.
-LEAST_SHARE = 0.12
-# Mechanisms of the same kind mimic parts of each other: rate-dependent flow looks like creep.
-LEAST_SHARE_AKIN = 0.3
-CANCELLING = 1.4  # times the gap: larger effects of one explanation cancel each other
-MECHANISMS = frozenset(
-    [
-        "joint_yield",
-        "joint_backlash",
-        "joint_nonlinear_stiffness",
-        "joint_hysteresis",
-        "joint_creep",
-        "base_slip",
-        "contact_seating",
-    ]
-)
-# Curves of the load, which one direction without joint readings can't tell apart.
-CURVES = frozenset({"contact_seating", "joint_nonlinear_stiffness"})
-FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 # Neighbouring points of one smooth run are no independent witnesses of its law.
 TEMPER = 0.12
-SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 _REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 6  # words that are refined
 _PROMISING = 7  # further words of an explanation that are looked at closely
@@ -361,9 +341,9 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     fraction = float(share @ good / share.sum())
     order = np.argsort(-each, kind="stable")
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
-    weight -= _trifle(engine, float(each.max()))
+    weight -= trifle(engine, float(each.max()))
     if len(parts) > 1:
-        weight -= _pettiness(engine, parts, each) + _cancelling(engine, parts, each)
+        weight -= pettiness(engine, parts, each) + cancelling(engine, parts, each)
         weight += signs_kept(levels[best], parts)
     return Explanation(
         tuple(parts[i] for i in order),
@@ -372,57 +352,6 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
         tuple(float(each[i]) for i in order),
         weight + log(max(fraction, 1e-300)),
     )
-
-
-def _pettiness(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
-    """Penalty in nats, a steep wall, for parts that may be freedom of another one's law."""
-    penalty = 0.0
-    for i, p in enumerate(parts):
-        for k, other in enumerate(parts):
-            if i < k and _same_element(engine, p, other):
-                penalty += 1e4
-            # a small knee beside a large error of the springs is no freedom of the latter
-            if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
-                continue
-            akin = p.word in MECHANISMS and other.word in MECHANISMS
-            if akin and _joints(p) & _joints(other):
-                penalty += SAME_JOINT
-            share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
-            least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
-            penalty += 60.0 * max(0.0, float(np.log(least / share)))
-    return penalty
-
-
-def _cancelling(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
-    """Penalty in nats for effects that are larger than the gap and take each other back; what is
-    linear the springs of the base take back from it, and it is left alone."""
-    bent = max((s for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR), default=0.0)
-    share = max(float(bent) / max(engine.structural, 1e-300), 1e-6)
-    return 60.0 * max(0.0, float(np.log(share / CANCELLING)))
-
-
-def _trifle(engine: Engine, size: float) -> float:
-    """Penalty in nats for an effect below the noise of a single sample of a running recording:
-    thousands of samples would show it, but for what noise of low frequency does to them."""
-    if not engine.bench.rows.continuous:
-        return 0.0
-    return 20.0 * max(0.0, float(np.log(engine.bench.noise.stated / max(size, 1e-300))))
-
-
-def _same_element(engine: Engine, one: Part, other: Part) -> bool:
-    """Both are friction of one joint, or would be, for all that the data show; or one is the
-    linear part of the other: a mechanism's law brings its own mean stiffness."""
-    same = bool(_joints(one) & _joints(other))
-    words = {one.word, other.word}
-    if engine.bench.once and words <= MECHANISMS:
-        return True
-    if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & MECHANISMS)):
-        return True
-    if "joint_stiffness_error" in words and words & MECHANISMS:
-        return same or not engine.bench.has_q
-    if not words <= FRICTION:
-        return False
-    return same or not engine.bench.has_q
 
 
 # Of 164 verdicts of the blind check on cases with foreign laws whose posterior was above 0.97, 150
@@ -444,12 +373,6 @@ def trusted(probabilities: dict[str, float], library: set[str]) -> dict[str, flo
     for w in given:
         out[w] += 0.5 * doubt / len(given)
     return out
-
-
-def _joints(part: Part) -> set[int]:
-    """Joints that the part sits in."""
-    info = part.variant.info
-    return set(info["joints"]) if "joints" in info else {info.get("joint", -1)}
 
 
 def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:

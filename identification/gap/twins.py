@@ -17,12 +17,11 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.base_compliance import DEPTHS_M, moments
-from identification.gap.evidence import Engine
+from identification.gap.evidence import LEVER_M, Engine
 from identification.gap.forms import Form, Law, Term, law_of, rows_of
 from identification.gap.parts import Part
 
 _SAME = 1.0  # nats of misfit that another place may cost: nobody would call that evidence
-_LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
 
 @dataclass(frozen=True)
@@ -95,7 +94,7 @@ def _misfit(engine: Engine, own: Array, columns: Array, eta: float) -> float:
     bench, n = engine.bench, engine.bench.rows.n
     variance = engine.sigma**2
     variance[:n] += bench.noise.hold**2 + eta**2
-    variance[bench.layout.q] += (eta / _LEVER_M) ** 2
+    variance[bench.layout.q] += (eta / LEVER_M) ** 2
     root = 1 / np.sqrt(variance)
     size = np.linalg.norm(columns * root[:, None], axis=0)
     free = (columns * root[:, None])[:, size > 0] / size[size > 0]

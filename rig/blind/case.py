@@ -63,7 +63,8 @@ def generator(name: str) -> tuple[Draw, tuple[str, ...]]:
         except ImportError:
             raise InputError(
                 f"--generator {name} needs the engine MuJoCo, which is not installed: "
-                'pip install "stiffness-rig[engines]". The generator "hidden" needs nothing.'
+                'pip install "stiffness-rig[engines]". The generators "hidden" and "benches" need '
+                "nothing."
             ) from None
         if name == "mujoco":
             return mujoco_rig.draw_case, mujoco_rig.EFFECTS

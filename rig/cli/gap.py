@@ -59,8 +59,8 @@ _Deadline = Annotated[
 _Generator = Annotated[
     str,
     typer.Option(
-        help="hidden: worlds of this project; mujoco: another engine's; mujoco-small-turns: "
-        "that one without the curvature that large turns make."
+        help="hidden: arms of this project's own worlds; benches: rigs without an arm; mujoco: "
+        "another engine's arms; mujoco-small-turns: those without the curvature of large turns."
     ),
 ]
 _Keep = Annotated[

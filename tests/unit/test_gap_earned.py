@@ -14,7 +14,8 @@ from identification.gap.earned import earned
 from identification.gap.evidence import Engine
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
 from identification.gap.parts import Part
-from identification.gap.search import Explanation, Found, _cancelling, weighed
+from identification.gap.penalties import cancelling
+from identification.gap.search import Explanation, Found, weighed
 from identification.gap.variants import variant
 from tests.unit.test_gap_operators import bench_data
 
@@ -106,9 +107,9 @@ def test_effects_that_take_each_other_back_are_charged_and_springs_are_not() -> 
     mine = explained([0], "joint_nonlinear_stiffness", 0.0).parts
     spring = explained([1], "joint_stiffness_error", 0.0).parts
     both = np.array([e.structural, e.structural])
-    assert _cancelling(e, mine + spring, both) == 0.0
-    assert _cancelling(e, mine + spring, np.array([big, e.structural])) > 50
-    assert _cancelling(e, mine + spring, np.array([e.structural, big])) == 0.0
+    assert cancelling(e, mine + spring, both) == 0.0
+    assert cancelling(e, mine + spring, np.array([big, e.structural])) > 50
+    assert cancelling(e, mine + spring, np.array([e.structural, big])) == 0.0
 
 
 def test_repetitions_that_no_setup_has_twice_are_no_fold() -> None:

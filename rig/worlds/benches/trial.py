@@ -45,7 +45,7 @@ class Trial:
     accept: words that explain these data as well as the true one, the true one aside.
     repetition (n,) from 1; zero (n,): the specimen is released. timeless: the law asks for the
     order of the samples only, so that a table without a clock is fair. clean: the bench adds
-    nothing of its own beyond noise. true_displacement (n,): where the channel differs from it.
+    nothing of its own beyond noise.
     """
 
     time: Array
