@@ -112,6 +112,13 @@ def test_effects_that_take_each_other_back_are_charged_and_springs_are_not() -> 
     assert cancelling(e, mine + spring, np.array([e.structural, big])) == 0.0
 
 
+def test_a_drift_alone_need_not_foresee_what_another_run_brings() -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    after = earned(found(e, explained([1, 2, 3], "thermal_drift", 0.0)))
+    assert after.kept[frozenset(["thermal_drift"])] == 1.0
+    assert after.probabilities["thermal_drift"] > 0.8
+
+
 def test_repetitions_that_no_setup_has_twice_are_no_fold() -> None:
     setup = bench_data(np.zeros(4), np.zeros(4)).setups[0]
     force = np.tile(np.repeat(20.0 * np.arange(8), 4), 2)
