@@ -109,7 +109,9 @@ def _knee(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     cross = {j: c[:k] for j, c in found.softer.cross.items()}
     softer = Softer(found.softer.value, found.softer.variance, cross)
     knee = _Found(found.w[:k], found.cov[:k, :k], softer)
-    slope = knee.per_spring(np.ones(k), info.get("joint"))
+    # a radius that the load never passed says nothing of the slope
+    passed = np.asarray(info["radius"]) < float(np.abs(info["load"]).max())
+    slope = knee.per_spring(passed.astype(float), info.get("joint"))
     least = part.variant.least  # what bends less does not give way
     value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
     out = {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,17 @@ def test_a_round_knee_has_the_threshold_of_the_sharp_one_with_equal_work() -> No
     sharp = path[-1] / (80 - found.value) * np.maximum(x - found.value, 0.0)
     assert sharp[-1] == pytest.approx(path[-1])
     assert np.trapezoid(sharp, x) == pytest.approx(np.trapezoid(path, x), rel=1e-4)
+
+
+def test_a_radius_that_was_never_passed_says_nothing_of_slope_and_threshold() -> None:
+    bench = up_and_down()
+    knee = of(bench, "joint_yield", "sharp")
+    top = float(np.abs(knee.info["load"]).max())
+    info = {**knee.info, "radius": np.array([0.8 * top, 1.1 * top])}
+    two = replace(knee, columns=knee.columns[:2], root=np.eye(2), info=info)
+    found = parameters(bench, Part(two, 1.0), np.array([3.0, -50.0]), 1e-6 * np.eye(2))
+    assert found["slope_beyond_over_elastic"].value == pytest.approx(3.0)
+    assert found["threshold"].value == pytest.approx(0.8 * top)
 
 
 def test_spread_of_a_threshold_is_that_of_its_draws_and_of_the_gain() -> None:
