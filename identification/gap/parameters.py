@@ -109,13 +109,15 @@ def _knee(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     cross = {j: c[:k] for j, c in found.softer.cross.items()}
     softer = Softer(found.softer.value, found.softer.variance, cross)
     knee = _Found(found.w[:k], found.cov[:k, :k], softer)
-    # a radius that the load never passed says nothing of the slope
-    passed = np.asarray(info["radius"]) < float(np.abs(info["load"]).max())
-    slope = knee.per_spring(passed.astype(float), info.get("joint"))
+    # of the sharp knee that ends where the curve ends: a radius that the load hardly passed, or
+    # never, says nothing of the slope
+    threshold, top = _threshold(bench, part, knee), float(np.abs(info["load"]).max())
+    beyond = np.maximum(top - np.asarray(info["radius"]), 0.0)
+    slope = knee.per_spring(beyond / max(top - threshold.value, 1e-9 * top), info.get("joint"))
     least = part.variant.least  # what bends less does not give way
     value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
     out = {
-        "threshold": _threshold(bench, part, knee),
+        "threshold": threshold,
         "slope_beyond_over_elastic": Parameter(value, low, high, "1"),
     }
     if info["flow_s"]:
