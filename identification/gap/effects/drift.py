@@ -42,7 +42,7 @@ def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
     seen, and steeper, in a recording that runs on and on; small ones where it is but a curve."""
     if not own_clock(bench):
         return usual[:SMALL]
-    if not bench.rows.continuous or (bench.stands and _loaded(bench)):
+    if not bench.rows.continuous:
         return usual
     return (*(s for s in usual if s < 0.3), 0.3, 1.0, 3.0)
 
