@@ -81,6 +81,7 @@ SHAPES: dict[str, Key] = {
     "along": Key("along", "vector"),
     "across": Key("across", "vector"),
     "at_load": Key("at_N", "positive"),
+    "at_response": Key("at_mm", "positive", factor=1e3),
     "time_constant": Key("time_constant_s", "positive"),
     "at": Key("at_s"),
     "sensor": Key("sensor", "text", options=("mean", "1", "2", "3", "4", "5", "6")),
@@ -171,8 +172,8 @@ GRAMMAR: dict[str, Grammar] = {
         ("about", "about_offset", "about_angles"),
         (("offset", ("axis",)), ("angle", ("joint",))),
     ),
-    "force_scale": Grammar(("about",), (("gain", ()),)),
-    "displacement_scale": Grammar((), (("gain", ()),)),
+    "force_scale": Grammar(("about",), (("gain", ()), ("gain", ("at_load",)))),
+    "displacement_scale": Grammar((), (("gain", ()), ("gain", ("at_response",)))),
     "time_lag": Grammar(("channel", "way", "lag"), (("share", ()),)),
     "force_drift": Grammar(
         ("path", "quantity", "about"),

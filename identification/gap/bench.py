@@ -136,15 +136,31 @@ class Bench:
         """A running recording in which the load never stands: rate and load are one thing."""
         if not self.rows.continuous or not np.ptp(self.load) > 0:
             return False
-        step = np.maximum(np.diff(self.rows.session), 0.0)
-        speed = np.abs(np.diff(self.load)) / np.maximum(step, 1e-300)
-        mean = float(np.ptp(self.load)) / self.session_span
-        return float(step[speed < _STANDS * mean].sum()) < _STANDS * self.session_span
+        return self._moving_share > 1 - _STANDS
 
     @property
-    def line(self) -> Array:
-        """(n,) response that the slope measured in each setup gives for the load, m; what a gain
-        or a lag acts on, however wrong the simulated springs are."""
+    def stroke_s(self) -> float:
+        """s that one pass of the load takes, holds and pauses left out."""
+        return self._moving_share * self.session_span / self.passes
+
+    @property
+    def _moving_share(self) -> float:
+        """Share of the session in which the load moves, by means of even pieces of it: noise of the
+        driven channel moves as well."""
+        t = (self.rows.session - self.rows.session.min()) / self.session_span
+        count = int(np.clip(self.rows.n // 4, 8, max(40, 10 * self.passes)))
+        at = np.minimum((t * count).astype(np.int64), count - 1)
+        rows = np.bincount(at, minlength=count)
+        held = np.flatnonzero(rows)
+        mean = np.bincount(at, weights=self.load, minlength=count)[held] / rows[held]
+        speed = np.abs(np.diff(mean)) / np.diff(held)
+        typical = float(np.ptp(self.load)) / count
+        return float(np.diff(held)[speed >= _STANDS * typical].sum()) / max(count - 1, 1)
+
+    @property
+    def line_slope(self) -> Array:
+        """(n,) slope of the response over the load, m/N, as measured in each setup; what a gain or
+        a lag acts on, however wrong the simulated springs are."""
         out = np.zeros(self.rows.n)
         for s in range(len(self.data.setups)):
             mine = self.rows.setup == s
@@ -153,7 +169,12 @@ class Bench:
             power = float(weight @ x**2)
             if power > 0:
                 out[mine] = max(float(weight @ (x * self.response[mine])) / power, 0.0)
-        return out * self.load
+        return out
+
+    @property
+    def line(self) -> Array:
+        """(n,) response that the slope measured in each setup gives for the load, m."""
+        return self.line_slope * self.load
 
     @property
     def zero_line(self) -> Array:

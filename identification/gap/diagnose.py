@@ -16,6 +16,7 @@ from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.fit import Fit, fit
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
+from identification.gap.leftover import looked_up
 from identification.gap.locate import Where, locate
 from identification.gap.parameters import Parameter
 from identification.gap.posterior import parameters_of
@@ -96,7 +97,7 @@ def diagnose_gap(
         engine.extend()
     found = search(engine, variants)
     tell("withheld data", 0.7)
-    found = earned(found)
+    found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     if forced:
         chosen = force(engine, variants, found.explanations, forced)
@@ -120,13 +121,19 @@ def check_words(words: set[str] | frozenset[str]) -> None:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
 
 
+WORTH = 3.0  # nats that one effect more has to bring before it is named
+
+
 def _chosen(found: Found, verdict: str) -> Explanation:
     """The best explanation with the verdict as its main cause."""
     if verdict in ("none", "unknown"):
         return next(e for e in found.explanations if not e.parts)
     mine = [e for e in found.explanations if e.parts and e.parts[0].word == verdict]
     held = [e for e in mine if found.kept.get(e.words, 1.0) > 0.5]
-    return next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
+    best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
+    simpler = [e for e in held if e.good and e.words < best.words]
+    near = [e for e in simpler if e.log_weight > best.log_weight - WORTH]
+    return min(near, key=lambda e: len(e.words), default=best)
 
 
 def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explanation) -> GapResult:

@@ -20,8 +20,9 @@ from identification.gap.search import Explanation, Found, weighed
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
 CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
 SHARP = 8.0  # how fast weight is lost about the limit, per factor e
-# What drifts do in one run no other run foretells.
+# What drifts do in one run no other run foretells; nor a jump of the datum beside them.
 DRIFTS = frozenset({"force_drift", "thermal_drift"})
+FREE = DRIFTS | {"zero_shift"}
 _LOOKED_AT, _WITHIN = 6, 9.0  # explanations, and nats below the best, that are looked at
 
 
@@ -61,7 +62,7 @@ def _weighty(found: Found, kept: dict[frozenset[str], float]) -> list[Explanatio
 
 def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
     """Share of the weight that is kept after a look at withheld repetitions."""
-    if explanation.words <= DRIFTS:
+    if explanation.words & DRIFTS and explanation.words <= FREE:
         return 1.0
     engine = found.engine
     after = held_out(engine, explanation, "repetition", fold).after

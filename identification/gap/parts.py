@@ -31,9 +31,19 @@ class Part:
         return np.asarray(self.scale * self.variant.root)
 
 
-def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> tuple[Array, float]:
-    """rms (m) of each part's most probable contribution to the gap, and mean square (m^2) of all
-    contributions. What springs would take over is no gap, unless the effect is linear itself."""
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """rms (m) of each part's most probable contribution: to the gap, where what springs would take
+    over is none, unless the effect is linear itself; and as it moves. energy: mean square (m^2) of
+    all contributions, what is a law counted by its imperfection."""
+
+    gap: Array
+    moved: Array
+    energy: float
+
+
+def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
+    """How large the parts are together, at one level."""
     columns = [c for p in parts for c in p.variant.columns]
     root = block([p.root for p in parts])
     lv, plain = engine.levels[level], engine.levels[0].gram
@@ -41,21 +51,22 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> tuple[Arr
     w = root @ np.linalg.solve(inner, root.T @ lv.moment[columns])
     n, weight = engine.bench.rows.n, engine.bench.rows.weight
     precision = float(np.sum(1 / engine.sigma[:n] ** 2))
-    sizes, raw, start = [], 0.0, 0
+    sizes, moves, energy, start = [], [], 0.0, 0
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
         moved = moved_response(engine, (engine.pool[:n, c] @ part)[:, None])[:, 0]
         square = float(weight @ moved**2 / weight.sum())
+        moves.append(square**0.5)
         if p.word in LINEAR:
             sizes.append(_beyond_springs(engine, moved))
             square *= (LAW_IMPERFECTION / IMPERFECTION) ** 2
         else:
             structural = float(part @ plain[np.ix_(c, c)] @ part) / precision
             sizes.append(float(np.sqrt(min(structural, square))))
-        raw += square
+        energy += square
         start += k
-    return np.array(sizes), raw
+    return Sizes(np.array(sizes), np.array(moves), energy)
 
 
 def _beyond_springs(engine: Engine, moved: Array) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from identification.gap.compare import LINEAR
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
-from identification.gap.parts import Part
+from identification.gap.parts import Part, Sizes
 
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
@@ -32,9 +32,9 @@ FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 
 
-def pettiness(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
+def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats, a steep wall, for parts that may be freedom of another one's law."""
-    penalty = 0.0
+    penalty, sizes = 0.0, _counted(parts, found)
     for i, p in enumerate(parts):
         for k, other in enumerate(parts):
             if i < k and _same_element(engine, p, other):
@@ -59,12 +59,20 @@ def cancelling(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
     return 60.0 * max(0.0, float(np.log(share / CANCELLING)))
 
 
-def trifle(engine: Engine, size: float) -> float:
-    """Penalty in nats for an effect below the noise of a single sample of a running recording:
-    thousands of samples would show it, but for what noise of low frequency does to them."""
+def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
+    """Penalty in nats for effects below the noise of a single sample of a running recording:
+    thousands of samples would show them, but for what noise of low frequency does to them."""
     if not engine.bench.rows.continuous:
         return 0.0
-    return 20.0 * max(0.0, float(np.log(engine.bench.noise.stated / max(size, 1e-300))))
+    size = max(float(_counted(parts, found).max(initial=0.0)), 1e-300)
+    return 20.0 * max(0.0, float(np.log(engine.bench.noise.stated / size)))
+
+
+def _counted(parts: tuple[Part, ...], found: Sizes) -> Array:
+    """Size of each part; what is linear as it moves: the springs hide it in the displacement of one
+    direction, other directions and channels show it."""
+    linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
+    return np.where(linear, found.moved, found.gap)
 
 
 def _same_element(engine: Engine, one: Part, other: Part) -> bool:
@@ -72,7 +80,8 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     linear part of the other: a mechanism's law brings its own mean stiffness."""
     same = bool(_joints(one) & _joints(other))
     words = {one.word, other.word}
-    if engine.bench.once and words <= MECHANISMS:
+    holds = "joint_creep" in words and not engine.bench.always_moves
+    if engine.bench.once and words <= MECHANISMS and not holds:
         return True
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & MECHANISMS)):
         return True

@@ -118,7 +118,7 @@ def _levels(engine: Engine, explanation: Explanation, prior: float) -> _Weighed:
     """The explanation at every size of imperfection, with its log weight."""
     out = []
     for i, level in enumerate(engine.levels):
-        energy = part_sizes(engine, explanation.parts, i)[1]
+        energy = part_sizes(engine, explanation.parts, i).energy
         weight = prior + log_joint(level, explanation.parts) + level_prior(engine, i, energy)
         weight += signs_kept(level, explanation.parts)
         out.append((replace(explanation, eta=_size(engine, i, energy)), float(weight)))

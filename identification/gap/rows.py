@@ -141,8 +141,8 @@ def hold_ids(data: GapData) -> Ints:
 
 
 def is_continuous(data: GapData, hold: Ints) -> bool:
-    """Whether the force runs instead of resting at levels."""
-    if np.any(data.step < 0):
+    """Whether the force runs instead of resting at levels; or rests at one all the time."""
+    if np.any(data.step < 0) or (hold[-1] == 0 and not data.arm):
         return True
     edges = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
     count = np.diff(np.append(edges, len(hold)))

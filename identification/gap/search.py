@@ -98,7 +98,23 @@ def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
     if bench is not None:
         rare += LOG_UNSEEN * ("joint_hysteresis" in words and bench.once)
         rare += LOG_HELD * ("thermal_drift" in words and bench.imposed)
+        rare += _by_calibration(words, bench)
     return LOG_ONE + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(words))) + rare
+
+
+def _by_calibration(words: frozenset[str], bench: Bench) -> float:
+    """One direction of a rig without an arm shows one factor, whoever is off: the words share it in
+    proportion to the relative sd that is stated for each (the far tails of Cauchy priors)."""
+    meter = bench.data.instruments
+    stated = {
+        "joint_stiffness_error": float(bench.data.compliance_relative_sd.max(initial=0.0)),
+        "force_scale": meter.force_gain,
+        "displacement_scale": meter.displacement_gain,
+    }
+    total = sum(stated.values())
+    if bench.data.arm or not total > 0:
+        return 0.0
+    return sum(log(max(3 * stated[w] / total, 1e-3)) for w in words & stated.keys())
 
 
 def search(engine: Engine, variants: list[Variant]) -> Found:
@@ -320,7 +336,7 @@ def conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], f
     if not parts:
         return levels, 0.0
     weights = np.array([lv.log_base for lv in levels])
-    return levels, part_sizes(engine, parts, int(weights.argmax()))[1]
+    return levels, part_sizes(engine, parts, int(weights.argmax())).energy
 
 
 def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:
@@ -328,12 +344,15 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     larger one's law."""
     levels = engine.levels
     bases = np.array([log_joint(lv, parts) for lv in levels])
-    each, energy = part_sizes(engine, parts, int(bases.argmax()))
+    sizes = part_sizes(engine, parts, int(bases.argmax()))
+    each, energy = sizes.gap, sizes.energy
     logs = bases + [level_prior(engine, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
+    # a running recording has one run, and real rigs leave more of it: what counts there is the best
+    fewer = 1 if engine.bench.rows.continuous else max(len(parts), 1)
     least = max(
         0.6 * engine.bench.noise.stated,
-        REMAINDER * engine.structural / max(len(parts), 1),
+        REMAINDER * engine.structural / fewer,
         LAW_REMAINDER * float(each.max(initial=0.0)),
     )
     good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
@@ -341,9 +360,9 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     fraction = float(share @ good / share.sum())
     order = np.argsort(-each, kind="stable")
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
-    weight -= trifle(engine, float(each.max()))
+    weight -= trifle(engine, parts, sizes)
     if len(parts) > 1:
-        weight -= pettiness(engine, parts, each) + cancelling(engine, parts, each)
+        weight -= pettiness(engine, parts, sizes) + cancelling(engine, parts, each)
         weight += signs_kept(levels[best], parts)
     return Explanation(
         tuple(parts[i] for i in order),

@@ -183,6 +183,18 @@ def ripples(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any
     return np.zeros_like(torque), 3e-5 * np.sin(2 * np.pi * t / 47.0)
 
 
+def wanders(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """The target follows the room: up and down in a fifth of the session, never twice alike."""
+    t = np.array([s.session for s in samples]) / samples[-1].session
+    return np.zeros_like(torque), 4e-5 * (np.sin(31 * t**0.8) - 0.6 * np.sin(19 * t**1.3 + 1))
+
+
+def bends(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """The laser reads a tenth low, and at full range a hundredth lower."""
+    u = np.sum(lever * torque / STIFFNESS, axis=1)
+    return np.zeros_like(torque), -0.1 * u * (1 + 0.08 * np.abs(u) / np.abs(u).max())
+
+
 def lags(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
     """The laser is 1.5 s late: at the first sample of a hold it still shows the turning screw,
     which takes 7 s and stops half a second before."""
@@ -199,7 +211,8 @@ CASES: dict[str, tuple[Law, str]] = {
     "harden": (hardens, "joint_nonlinear_stiffness"), "drift": (drifts, "thermal_drift"),
     "jump": (jumps, "zero_shift"), "seat": (seats, "contact_seating"),
     "slip": (slips, "base_slip"), "ripple": (ripples, "unknown"),
-    "lag": (lags, "time_lag"),
+    "lag": (lags, "time_lag"), "wander": (wanders, "thermal_drift"),
+    "bend": (bends, "displacement_scale"),
 }  # fmt: skip
 
 
@@ -234,6 +247,11 @@ def test_creep_fraction_and_time(results: dict[str, GapResult]) -> None:
     parameters = results["creep"].effects[0].parameters
     assert parameters["creep_fraction"].value == pytest.approx(0.2, rel=0.25)
     assert parameters["retardation_time"].low < 20.0 < parameters["retardation_time"].high
+
+
+def test_a_gain_that_bends_is_read_as_its_straight_line(results: dict[str, GapResult]) -> None:
+    factor = results["bend"].effects[0].parameters["factor"]
+    assert factor.value == pytest.approx(1 - 0.1 * (1 + 0.75 * 0.08), abs=0.004)
 
 
 def test_named_effect_leaves_the_noise_and_beats_others_on_withheld_data(

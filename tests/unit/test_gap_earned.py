@@ -10,6 +10,7 @@ import pytest
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
 from identification.gap.data import Array
+from identification.gap.diagnose import _chosen as chosen_of
 from identification.gap.earned import earned
 from identification.gap.evidence import Engine
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
@@ -156,3 +157,26 @@ def test_a_datum_that_nobody_can_know_is_not_held_against_a_law(datum: str, zero
     e.target[:n] += np.where(e.bench.rows.repetition == 3, 5e-5, 0.0)
     nothing = Explanation((), 0.0, 0.0, (), 0.0)
     assert held_out(e, nothing, "repetition", folds(e)["repetition"]).after < 2e-6
+
+
+@pytest.mark.parametrize(("worth", "named"), [(2.0, 1), (5.0, 2)])
+def test_a_second_effect_is_named_only_if_it_brings_something(worth: float, named: int) -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    one = explained([0], "joint_nonlinear_stiffness", 0.0)
+    spring = explained([1], "joint_stiffness_error", 0.0)
+    two = replace(one, parts=one.parts + spring.parts, sizes=(BUMP / 3, 0.0),
+                  log_weight=worth, log_good=worth)  # fmt: skip
+    both = found(e, one, two)
+    assert len(chosen_of(both, "joint_nonlinear_stiffness").parts) == named
+    # one that withheld data refuse is no simpler choice
+    refused = replace(both, kept={one.words: 0.1, two.words: 1.0})
+    assert len(chosen_of(refused, "joint_nonlinear_stiffness").parts) == 2
+
+
+def test_a_drift_and_a_jump_of_the_datum_foresee_nothing_either() -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    drift = explained([1, 2], "thermal_drift", 0.0)
+    jump = explained([3], "zero_shift", 0.0)
+    both = replace(drift, parts=drift.parts + jump.parts, sizes=(BUMP / 3, BUMP / 3))
+    after = earned(found(e, both))
+    assert after.kept[both.words] == 1.0

@@ -1,22 +1,31 @@
 """Gain of the laser is off (tilt, wrong range): every direction by one factor, encoders disagree.
 
-A target tilted by 20 degrees reads 6 % off; a wrong range 20 %.
+A target tilted by 20 degrees reads 6 % off; a wrong range 20 %. Triangulation bends over its range.
 
 Size: 1 % (10 degrees of tilt: 1.5 %) to 20 %.
-Prior: either sign, sd out of SCALES, equally likely.
-Source: cosine of the target's tilt; neighbouring ranges of laser sensors.
+Prior: either sign, sd out of SCALES, equally likely; a third of it on a gain that bends.
+Source: cosine of the target's tilt; neighbouring ranges of laser sensors; their linearity.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from identification.gap.bench import Bench
+from identification.gap.effects.force_scale import BENDS, SCALES
 from identification.gap.variants import Variant, variant
 
 WORD = "displacement_scale"
-SCALES = (0.03, 0.08, 0.2)
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """One coefficient: the gain of the displacement minus one."""
-    column = bench.add(bench.outside_column(bench.line))
-    return [variant(WORD, "gain", [column], SCALES, positive=False)]
+    """The gain of the displacement minus one, alone; and with what it has more at full range."""
+    line = bench.line
+    top = float(np.abs(line).max())
+    straight = bench.add(bench.outside_column(line))
+    out = [variant(WORD, "gain", [straight], SCALES, positive=False)]
+    if bench.data.arm and top > 0:  # one spring's curve would be the same
+        bend = bench.add(bench.outside_column(line * np.abs(line) / top))
+        out.append(variant(WORD, "gain that bends", [straight, bend], SCALES, BENDS,
+                           positive=False, prior=0.5, full=top))  # fmt: skip
+    return out

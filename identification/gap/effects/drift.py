@@ -8,8 +8,11 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
-PIECES = 10  # of a free smooth path: slower than a run, faster than the session
-LONG_PIECES = 24  # of a recording that runs on and on
+# Pieces of a free smooth path: slower than a run, as slow as an air conditioner's swing. In a
+# recording that runs on and on three passes of the load tell what comes again, and every further
+# one bears three pieces.
+PIECES = {"free path": 10, "winding path": 30}
+LONG_PIECES, LEAST_PIECES = 40, 4
 
 
 def warm_ups(bench: Bench) -> dict[str, Array]:
@@ -32,9 +35,11 @@ def own_clock(bench: Bench) -> bool:
 
 def paths(bench: Bench) -> dict[str, Array]:
     """Named paths that a drift may take here: where it can't be told from a curve of the load,
-    only the straight line, and seldom (SMALL)."""
+    only the straight line, and seldom (SMALL); none in one running pull or cycle."""
     every = warm_ups(bench)
-    return every if own_clock(bench) else {"linear": every["linear"]}
+    if own_clock(bench):
+        return every
+    return {} if bench.rows.continuous else {"linear": every["linear"]}
 
 
 def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
@@ -61,21 +66,25 @@ def _loaded(bench: Bench) -> bool:
 SMALL = 2
 
 
-def pieces(bench: Bench) -> int:
-    """Of a free smooth path."""
-    return LONG_PIECES if bench.rows.continuous else PIECES
+def free_paths(bench: Bench) -> dict[str, int]:
+    """Pieces of the free smooth paths, by name; none where time and load go together."""
+    if not own_clock(bench):
+        return {}
+    if not bench.rows.continuous:
+        return PIECES
+    pieces = min(3 * (bench.passes - 3), LONG_PIECES)
+    return {"free path": pieces} if pieces >= LEAST_PIECES else {}
 
 
-def free_path(bench: Bench) -> Array:
+def free_path(bench: Bench, pieces: int) -> Array:
     """Hat functions (n, pieces) over the session; with correlated coefficients a smooth path."""
     t = (bench.rows.session - bench.rows.session.min()) / bench.session_span
-    count = pieces(bench)
-    at = np.linspace(0, 1, count)
-    return np.asarray(np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (count - 1)))
+    at = np.linspace(0, 1, pieces)
+    return np.asarray(np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (pieces - 1)))
 
 
-def path_root(bench: Bench) -> Array:
+def path_root(pieces: int) -> Array:
     """Root of a random walk's covariance over the pieces, free where it starts."""
-    at = np.linspace(0.15, 1, pieces(bench))
+    at = np.linspace(0.15, 1, pieces)
     covariance = np.minimum(at[:, None], at) + 1e-9 * np.eye(len(at))
     return np.asarray(np.linalg.cholesky(covariance), dtype=float)

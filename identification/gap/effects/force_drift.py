@@ -16,6 +16,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
     free_path,
+    free_paths,
     own_clock,
     path_root,
     paths,
@@ -56,17 +57,18 @@ def variants(bench: Bench) -> list[Variant]:
     rates = [c for label, c in common.items() if label != "root"]
     out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
-    hats = free_path(bench)
-    columns = [column(hats[:, k]) for k in range(hats.shape[1])]
-    root = path_root(bench)
-    out.append(variant(WORD, "free path", columns, scales, root, positive=False, prior=2.0,
-                       path="free", names=("",)))  # fmt: skip
-    if len(axes) > 1:
-        each = [bench.add(component(bench, axis, hats[:, k]))
-                for axis in axes.values() for k in range(hats.shape[1])]  # fmt: skip
-        root = np.kron(np.eye(len(axes)), path_root(bench)).astype(float)
-        out.append(variant(WORD, "free path, each component", each, scales, root, positive=False,
-                           path="free", names=tuple(axes)))  # fmt: skip
+    for label, pieces in free_paths(bench).items():
+        hats, root = free_path(bench, pieces), path_root(pieces)
+        columns = [column(hats[:, k]) for k in range(pieces)]
+        out.append(variant(WORD, label, columns, scales, root, positive=False, prior=2.0,
+                           path="free", names=("",), pieces=pieces))  # fmt: skip
+        if len(axes) > 1:
+            each = [bench.add(component(bench, axis, hats[:, k]))
+                    for axis in axes.values() for k in range(pieces)]  # fmt: skip
+            roots = np.kron(np.eye(len(axes)), root).astype(float)
+            out.append(variant(WORD, f"{label}, each component", each, scales, roots,
+                               positive=False, path="free", names=tuple(axes),
+                               pieces=pieces))  # fmt: skip
     return out
 
 

@@ -1,25 +1,40 @@
 """Gain of the force chain is off: every direction and pose by the same factor; encoders too.
 
-Wrong sensitivity or range of a charge amplifier: 2 to 20 %.
+Wrong sensitivity or range of a charge amplifier: 2 to 20 %. The gain may bend a little over the
+range, as amplifiers and load cells do.
 
 Size: 2 to 20 %.
-Prior: either sign, sd out of SCALES, equally likely.
-Source: tolerances and neighbouring ranges of charge amplifiers.
+Prior: either sign, sd out of SCALES, equally likely; a third of it on a gain that bends.
+Source: tolerances and neighbouring ranges of charge amplifiers; their linearity in data sheets.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from identification.gap.bench import Bench
+from identification.gap.data import Array
 from identification.gap.variants import Variant, variant
 
 WORD = "force_scale"
 SCALES = (0.03, 0.08, 0.2)
+BENDS = np.diag([1.0, 0.08])  # at full range, of what the gain is off
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """One coefficient: the gain of the force minus one."""
+    """The gain of the force minus one, alone; and with what it has more at full range."""
+    top = float(np.abs(bench.load).max())
+    straight = bench.add(shown(bench, bench.load))
+    out = [variant(WORD, "gain", [straight], SCALES, positive=False)]
+    if bench.data.arm and top > 0:  # one spring's curve would be the same
+        bend = bench.add(shown(bench, bench.load * np.abs(bench.load) / top))
+        out.append(variant(WORD, "gain that bends", [straight, bend], SCALES, BENDS,
+                           positive=False, prior=0.5, full=top))  # fmt: skip
+    return out
+
+
+def shown(bench: Bench, excess: Array) -> Array:
+    """(size,): what a share of the readings (n,) N does that is too much."""
     if bench.imposed:
-        column = bench.add(bench.stacked(bench.slope * bench.load))
-    else:
-        column = bench.add(bench.force_column(-bench.load))
-    return [variant(WORD, "gain", [column], SCALES, positive=False)]
+        return bench.stacked(bench.slope * excess)
+    return bench.force_column(-excess)

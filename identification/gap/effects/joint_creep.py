@@ -22,13 +22,26 @@ SCALES = (0.02, 0.06, 0.2, 0.6)
 
 
 def times(bench: Bench) -> np.ndarray:
-    """Retardation times s: from one sample to a third of the session, by factors of three."""
+    """Retardation times s: from one sample to a third of the session, by factors of three; of a
+    recording that runs on to three times its length, by when a viscous flow looks like a line."""
     inner = np.diff(bench.rows.time)
     step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 1.0
     longest = min(bench.session_span / 3, 1000.0 * max(step, 1.0))
-    first = max(step, 1e-6) if not bench.rows.continuous else max(step * 3, 1e-6)
+    if bench.rows.continuous and not bench.always_moves:
+        longest = 3 * bench.session_span
+    first = max(step * 3 if bench.always_moves else step, 1e-6)
     count = max(2, int(np.ceil(np.log(max(longest / first, 3.0)) / np.log(3))))
     return np.asarray(first * 3.0 ** np.arange(count))
+
+
+def scales(bench: Bench) -> tuple[float, ...]:
+    """Of the simulated spring's compliance. Tissue, gels and melts on rigs without an arm go on to
+    whatever was seen, thousands of times what the spring gives at once."""
+    simulated = float(np.ptp(bench.slope * bench.load))
+    if bench.data.arm or not simulated > 0:
+        return SCALES
+    seen = bench.reach / simulated
+    return (*SCALES, *(s for s in (2.0, seen, 4 * seen) if s > 1.5))
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -37,19 +50,19 @@ def variants(bench: Bench) -> list[Variant]:
     if bench.once and bench.always_moves:
         return []
     rest, spectrum = rests(bench.rows), times(bench)
-    out = []
+    out, sizes = [], scales(bench)
     for j in bench.moving_joints():
         load = np.tile(bench.torque[:, j][:, None], (1, len(spectrum)))
         z = retarded(load, spectrum, bench.rows, rest)
         c = bench.compliance[j]
         columns = [bench.add_joint(j, bench.sense * c * z[:, k]) for k in range(len(spectrum))]
         out.append(
-            variant(WORD, f"joint {j + 1} spectrum", columns, SCALES,
+            variant(WORD, f"joint {j + 1} spectrum", columns, sizes,
                     smooth_root(len(columns), 0.5), prior=0.5, each=True, joint=j, times_s=spectrum)
         )  # fmt: skip
         for k in range(len(columns) - 1):
             out.append(
-                variant(WORD, f"joint {j + 1} T {spectrum[k]:.3g} s", columns[k : k + 2], SCALES,
+                variant(WORD, f"joint {j + 1} T {spectrum[k]:.3g} s", columns[k : k + 2], sizes,
                         prior=0.5 / (len(columns) - 1), each=True, joint=j,
                         times_s=spectrum[k : k + 2])
             )  # fmt: skip

@@ -21,7 +21,7 @@ STIFFEST = -0.9  # relative change of what the spring gives (compliance; force, 
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Each joint alone, and all of them."""
+    """Each joint alone, all of them, and all but one, which may have a trouble of its own."""
     relative = bench.data.compliance_relative_sd
     out, columns = [], []
     for j in bench.moving_joints():
@@ -40,5 +40,11 @@ def variants(bench: Bench) -> list[Variant]:
         out.append(
             variant(WORD, "all joints", columns, scales, positive=False,
                     joints=bench.moving_joints())
+        )  # fmt: skip
+    for k, j in enumerate(bench.moving_joints() if len(columns) > 2 else ()):
+        rest = [i for i in bench.moving_joints() if i != j]
+        out.append(
+            variant(WORD, f"all joints but {j + 1}", columns[:k] + columns[k + 1 :], scales,
+                    positive=False, prior=0.5 / len(columns), joints=rest)
         )  # fmt: skip
     return out

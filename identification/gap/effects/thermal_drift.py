@@ -16,6 +16,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
     free_path,
+    free_paths,
     own_clock,
     path_root,
     paths,
@@ -48,13 +49,13 @@ def variants(bench: Bench) -> list[Variant]:
     every = [c for columns in zip(*rates, strict=True) for c in columns]
     out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
                        names=named))  # fmt: skip
-    hats = free_path(bench)
-    columns = [
-        bench.add(bench.outside_column(m * hats[:, k])) for m in masks for k in range(hats.shape[1])
-    ]
-    root: Array = np.kron(np.eye(len(masks)), path_root(bench)).astype(float)
-    out.append(variant(WORD, "free path", columns, scales, root, positive=False, prior=2.0,
-                       path="free", names=named))  # fmt: skip
+    for label, pieces in free_paths(bench).items():
+        hats = free_path(bench, pieces)
+        columns = [bench.add(bench.outside_column(m * hats[:, k])) for m in masks
+                   for k in range(pieces)]  # fmt: skip
+        root: Array = np.kron(np.eye(len(masks)), path_root(pieces)).astype(float)
+        out.append(variant(WORD, label, columns, scales, root, positive=False, prior=2.0,
+                           path="free", names=named, pieces=pieces))  # fmt: skip
     return out
 
 

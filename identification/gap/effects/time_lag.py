@@ -23,6 +23,8 @@ from identification.gap.variants import Variant, variant
 WORD = "time_lag"
 LAGS = (0.3, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 4.0, 7.0, 12.0)  # of the time between two samples
 
+_OF_STROKE = 0.5  # of the time that one pass of the load takes
+
 
 def variants(bench: Bench) -> list[Variant]:
     """Lags of laser or force, as delays and as filters; coefficient 1 is the lag itself."""
@@ -30,6 +32,8 @@ def variants(bench: Bench) -> list[Variant]:
     out = []
     for multiple in LAGS:
         lag = multiple * sample
+        if bench.rows.continuous and lag > _OF_STROKE * bench.stroke_s:
+            break  # the load would have come before anybody turned a screw
         for channel in ("displacement", "force"):
             pair = []
             for kind in ("delay", "filter"):
@@ -48,19 +52,20 @@ def variants(bench: Bench) -> list[Variant]:
 
 
 def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
-    """(size,) what a lag of a channel does: the laser shows the response of earlier loads; a force
-    that lags was in truth ahead of what was read."""
-    if channel == "displacement":
+    """(size,) what a lag of a channel does: the one that answers shows the response to earlier
+    loads; the one that is driven was in truth ahead of what was read."""
+    driven = "displacement" if bench.imposed else "force"
+    if channel != driven:
         line = _smooth(bench, bench.line)
-        return bench.stacked(bench.sense * (_behind(bench, line[:, None], kind, lag)[:, 0]
-                                            - line))  # fmt: skip
+        return bench.stacked(_behind(bench, line[:, None], kind, lag)[:, 0] - line)
     if bench.rows.continuous:
-        load = _smooth(bench, bench.load)
-        ahead = load - _behind(bench, load[:, None], kind, lag)[:, 0]
+        ahead = _ahead(bench, _smooth(bench, bench.load), kind, lag)
     else:
         ahead = _true_force(bench, kind, lag) - bench.load
+    if bench.imposed:
+        return bench.stacked(bench.line_slope * ahead)
     # unloaded, a force that lags still shows what is over
-    return bench.force_column(bench.sense * ahead) + bench.stacked(zero_force=-ahead)
+    return bench.force_column(ahead) + bench.stacked(zero_force=-ahead)
 
 
 _SIDE = 4  # rows to either side
@@ -86,6 +91,19 @@ def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
         return np.column_stack([delayed(v, lag, bench.rows) for v in values.T])
     times = np.full(values.shape[1], lag)
     return retarded(values, times, bench.rows, rests(bench.rows))
+
+
+def _ahead(bench: Bench, load: Array, kind: str, lag: float) -> Array:
+    """(n,) by how much the true load is ahead of a reading (n,) that lags: `x(t + d) - x(t)` of a
+    delay, `T dx/dt` of a filter. Where the reading stands, there is nothing to be ahead of."""
+    if kind == "delay":
+        return delayed(load, -lag, bench.rows) - load
+    out, edges = np.zeros_like(load), np.append(np.flatnonzero(bench.rows.starts), bench.rows.n)
+    for a, b in pairwise(edges):
+        time = bench.rows.time[a:b]
+        if b - a > 1 and np.all(np.diff(time) > 0):
+            out[a:b] = lag * np.gradient(load[a:b], time)
+    return out
 
 
 def _true_force(bench: Bench, kind: str, lag: float) -> Array:

@@ -6,27 +6,33 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects import force_drift, time_lag
-from identification.gap.effects.drift import RATES, pieces
+from identification.gap.effects import force_drift, force_scale, time_lag
+from identification.gap.effects.drift import RATES
 from identification.gap.forms.law import Law, Term, along
 from identification.gap.variants import Variant
 
 
-def describe_gain(_: Bench, __: Variant) -> tuple[Law, Array]:
-    """One term: the share of what is shown that is too much, `1 - 1 / gain`."""
-    return Law({}, (Term("gain"),)), np.ones(1)
+def describe_gain(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: the share of what is shown that is too much, `1 - 1 / gain`; where it bends, that
+    which comes on top in proportion to the reading."""
+    if len(v.columns) == 1:
+        return Law({}, (Term("gain"),)), np.ones(1)
+    of = "at_load" if v.word == "force_scale" else "at_response"
+    return Law({}, (Term("gain"), Term("gain", {of: float(v.info["full"])}))), np.ones(2)
 
 
-def force_gain(bench: Bench, _: Law) -> list[Array]:
+def force_gain(bench: Bench, law: Law) -> list[Array]:
     """Less force than read deflects less."""
-    if bench.imposed:
-        return [bench.stacked(bench.slope * bench.load)]
-    return [bench.force_column(-bench.load)]
+    return [force_scale.shown(bench, _bent(bench.load, t, "at_load")) for t in law.terms]
 
 
-def displacement_gain(bench: Bench, _: Law) -> list[Array]:
+def displacement_gain(bench: Bench, law: Law) -> list[Array]:
     """A share of the response to the load."""
-    return [bench.outside_column(bench.line)]
+    return [bench.outside_column(_bent(bench.line, t, "at_response")) for t in law.terms]
+
+
+def _bent(read: Array, term: Term, of: str) -> Array:
+    return read * np.abs(read) / term.shape[of] if of in term.shape else read
 
 
 def describe_lag(_: Bench, v: Variant) -> tuple[Law, Array]:
@@ -55,7 +61,7 @@ def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
             for r, name in v.info["places"]
         )
         return Law({"path": "each run", "quantity": "force"}, each_run), np.ones(len(each_run))
-    constants, terms, scale = _path(bench, str(v.info["path"]))
+    constants, terms, scale = _path(bench, v)
     law = constants | {"quantity": "force"}
     if v.info["names"] == ("",):
         return Law(law, terms), scale
@@ -66,7 +72,7 @@ def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
 
 def describe_thermal(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms of the path for every direction."""
-    constants, terms, scale = _path(bench, str(v.info["path"]))
+    constants, terms, scale = _path(bench, v)
     every: list[Term] = []
     vectors = {s.direction: s.unit_vector for s in reversed(bench.data.setups)}
     names = list(dict.fromkeys(s.direction for s in bench.data.setups))
@@ -101,9 +107,9 @@ def drift_of_displacement(bench: Bench, law: Law) -> list[Array]:
     ]
 
 
-def _path(bench: Bench, label: str) -> tuple[dict[str, object], tuple[Term, ...], Array]:
+def _path(bench: Bench, v: Variant) -> tuple[dict[str, object], tuple[Term, ...], Array]:
     """Constants, terms and scales of a path of the library, in seconds and kelvin."""
-    span = bench.session_span
+    span, label = bench.session_span, str(v.info["path"])
     if label == "linear":
         return {"path": "linear"}, (Term("drift_rate"),), np.array([1 / span])
     if label == "root":
@@ -118,15 +124,15 @@ def _path(bench: Bench, label: str) -> tuple[dict[str, object], tuple[Term, ...]
         terms = (Term("drift_rate"), *(Term("drift", {"time_constant": r * span}) for r in RATES))
         return {"path": "rates"}, terms, np.array([1 / span, *rises])
     if label == "free":
-        places = np.linspace(0, span, pieces(bench))
+        places = np.linspace(0, span, int(v.info["pieces"]))
         terms = tuple(Term("drift_knot", {"at": float(t)}) for t in places)
         return {"path": "free"}, terms, np.ones(len(terms))
     values = bench.rows.temperature
     assert values is not None
     sensor = "mean" if label.startswith("mean") else label.rsplit(maxsplit=1)[-1]
-    v = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
+    read = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
     term = Term("drift_per_kelvin", {"sensor": sensor})
-    return {"path": "temperature"}, (term,), np.array([1 / float(np.ptp(v))])
+    return {"path": "temperature"}, (term,), np.array([1 / float(np.ptp(read))])
 
 
 def _moved(bench: Bench, law: Law, term: Term) -> Array:

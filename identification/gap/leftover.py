@@ -1,0 +1,61 @@
+"""What explanations leave of a running recording, looked at row by row.
+
+The levels of imperfection are a coarse grid, and one that fits stretches of fifty rows: they rank
+explanations, but they don't say how much of the gap is left. For those that matter that is looked
+up in the data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.gap.evidence import Engine
+from identification.gap.fit import fit
+from identification.gap.penalties import CURVES
+from identification.gap.search import REMAINDER, SOFT, Explanation, Found, weighed
+
+# An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.
+SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none of noise
+_LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
+
+
+def looked_up(found: Found) -> Found:
+    """The posterior with what the best explanations of a running recording really leave."""
+    if not found.engine.bench.rows.continuous:
+        return found
+    best = found.explanations[0].log_weight
+    out = [
+        _judged(found.engine, e)
+        if e.parts and i < _LOOKED_AT and e.log_weight > best - _WITHIN
+        else e
+        for i, e in enumerate(found.explanations)
+    ]
+    return weighed(replace(found, explanations=tuple(out)), found.kept)
+
+
+def _judged(engine: Engine, explanation: Explanation) -> Explanation:
+    """With the share of its weight that it keeps by what it leaves beyond the noise."""
+    bench, n = engine.bench, engine.bench.rows.n
+    weight = bench.rows.weight / bench.rows.weight.sum()
+    left = engine.target[:n] - fit(engine, explanation).response
+    square = float(weight @ left**2) - float(weight @ bench.noise.response**2)
+    moved = max(engine.structural, *explanation.sizes, 0.0)
+    most = max(REMAINDER * moved, 0.6 * bench.noise.stated)
+    share = 1 / (1 + (np.sqrt(max(square, 0.0)) / most) ** SOFT)
+    if explanation.words & CURVES and _falls(engine):
+        share *= SNAPS
+    else:
+        share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
+    return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))
+
+
+def _falls(engine: Engine) -> bool:
+    """Whether the response goes back in a single pull whose load goes on."""
+    bench = engine.bench
+    if not bench.once or not bench.always_moves:
+        return False
+    path = np.abs(bench.response - bench.response[0])
+    back = np.maximum.accumulate(path) - path
+    return bool(back.max() > _FALL * np.ptp(bench.response))
