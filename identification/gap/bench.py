@@ -34,7 +34,9 @@ class Layout:
 
 _MANY = 1000
 _ASIDE = 0.1  # of the largest load: less of the other sign is none
-_TREMBLES = 2.0  # stated standard deviations
+_TREMBLES, _WAVERS = 2.0, 10.0  # stated standard deviations
+_CLEARLY, _A_LITTLE = 5.0, 0.005  # standard deviations, and share of the range, of a way back
+_IDLE = 0.02  # of the response: what the springs make of a load that has no bearing on it
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
@@ -113,23 +115,37 @@ class Bench:
     @property
     def once(self) -> bool:
         """Every setup was loaded once, and never unloaded: all memory is hidden."""
-        return not self.unloads and len(np.unique(self.rows.run)) <= len(self.data.setups)
+        back = self.unloads or (self.lets_go and self._reverses)
+        return not back and len(np.unique(self.rows.run)) <= len(self.data.setups)
+
+    @property
+    def _reverses(self) -> bool:
+        """An imposed stroke went back, however little: a force may fall without that."""
+        if not self.imposed:
+            return False
+        sd = self.data.instruments.displacement / float(self.stated_slope.min())
+        size = np.abs(self.load)
+        back = float((np.maximum.accumulate(size) - size).max())
+        return back > max(_CLEARLY * sd, _A_LITTLE * float(np.ptp(self.load)))
 
     @property
     def passes(self) -> int:
         """How often the load comes from zero or goes back there: one for a single pull, two for a
         cycle; runs that start anew count at least one each; many where it only trembles."""
-        if not np.ptp(self.load) > 0:
+        if not np.ptp(self.load) > 0 or self.stands:
             return _MANY
         runs = np.unique(self.rows.run)
         return sum(passes(self.load[self.rows.run == r]) for r in runs)
 
     @property
     def stands(self) -> bool:
-        """The load spreads by no more than its noise: held all the time, or none at all."""
+        """The load spreads by no more than its noise, or wavers without any bearing on what was
+        seen: held all the time, or none at all."""
         meter = self.data.instruments
         sd = meter.displacement / float(self.stated_slope.min()) if self.imposed else meter.force
-        return bool(np.std(self.load) <= _TREMBLES * sd)
+        does = float(np.std(self.slope * self.load))
+        spread, idle = float(np.std(self.load)), does < _IDLE * float(np.std(self.response))
+        return bool(spread <= _TREMBLES * sd or (spread <= _WAVERS * sd and idle))
 
     @property
     def always_moves(self) -> bool:

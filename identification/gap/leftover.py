@@ -14,7 +14,7 @@ import numpy as np
 from identification.gap.evidence import Engine
 from identification.gap.fit import fit
 from identification.gap.penalties import CURVES
-from identification.gap.search import REMAINDER, SOFT, Explanation, Found, weighed
+from identification.gap.search import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found, weighed
 
 # An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.
 SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none of noise
@@ -41,8 +41,11 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     weight = bench.rows.weight / bench.rows.weight.sum()
     left = engine.target[:n] - fit(engine, explanation).response
     square = float(weight @ left**2) - float(weight @ bench.noise.response**2)
-    moved = max(engine.structural, *explanation.sizes, 0.0)
-    most = max(REMAINDER * moved, 0.6 * bench.noise.stated)
+    most = max(
+        REMAINDER * engine.structural,
+        LAW_REMAINDER * max(explanation.sizes),
+        0.6 * bench.noise.stated,
+    )
     share = 1 / (1 + (np.sqrt(max(square, 0.0)) / most) ** SOFT)
     if explanation.words & CURVES and _falls(engine):
         share *= SNAPS

@@ -418,3 +418,10 @@ def test_sizes_stay_within_the_bounds_of_the_rig() -> None:
             top = float(np.abs(rig.force).max())
             assert top == 0 or 0.35 * form.force_N[0] < top < 1.65 * form.force_N[1]
             assert len(columns_of(rig, read(rig, 1e-9, random), random)["force_N"]) > 50
+
+
+def test_a_foam_is_finite_wherever_its_drive_swings() -> None:
+    """An eased drive swings back beyond its start by rounding: no power of a negative number."""
+    for seed in range(200):
+        trial = curves.foam(np.random.default_rng(seed))
+        assert np.isfinite(trial.force).all(), seed

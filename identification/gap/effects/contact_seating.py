@@ -20,7 +20,7 @@ WORD = "contact_seating"
 FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
 # A bench has no second direction that would tell a seat from a curved spring: only low forces.
 BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
-BENCH_SHARES = (0.01, 0.03, 0.1, 0.3)
+BENCH_SHARES = (0.01, 0.03, 0.1)
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)  # of an imposed stroke
 SHARES = (0.003, 0.01, 0.03, 0.1)  # of the deflection
 

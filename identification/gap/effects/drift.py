@@ -11,7 +11,7 @@ RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
 # Pieces of a free smooth path: slower than a run, as slow as an air conditioner's swing. In a
 # recording that runs on and on three passes of the load tell what comes again, and every further
 # one bears three pieces.
-PIECES = {"free path": 10, "winding path": 30}
+PIECES = {"free path": 10, "winding path": 20}
 LONG_PIECES, LEAST_PIECES = 40, 4
 
 

@@ -69,7 +69,8 @@ def foam(random: Generator) -> Trial:
     path = _drive(random, 0.0)
     u, first = path.value, random.uniform(0.03, 0.1)
     flat, at = random.uniform(0.1, 0.5), random.uniform(1.05, 1.3)
-    force = 1 - np.exp(-u / first) + flat * u + 0.3 * ((u / (at - u)) ** random.uniform(1.0, 2.0))
+    touching = np.maximum(u, 0.0) / (at - u)  # a drive may swing back a hair beyond its start
+    force = 1 - np.exp(-u / first) + flat * u + 0.3 * touching ** random.uniform(1.0, 2.0)
     return _curve(random, path, force, 1 / first)
 
 
