@@ -72,6 +72,7 @@ class Bench:
     scatter: Array
     observed: Array
     columns: list[Array] = field(default_factory=list)
+    flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
 
     @property
     def has_q(self) -> bool:

@@ -257,7 +257,7 @@ def _simulated(
     middle = (moved[0][: plain.rows.n] + moved[1][: plain.rows.n]) / 2
     count = plain.rows.weight.astype(np.int64)
     there = make_bench(_with_response(plain, data, np.repeat(middle, count)))
-    there = _with_noise(bench, there)
+    there = replace(_with_noise(bench, there), flows=plain.flows)  # the load is the same
     return [
         sum((realise(there, f) for f in r.forms), _spring_changes(there, r)) for r in rivals
     ], there

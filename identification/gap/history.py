@@ -153,23 +153,30 @@ def flowing_play(load: Array, radius: Array, times: Array, rows: Rows, fresh: Fl
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
     stands = np.minimum(settling_share(rows), ease)
     pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
-    part = (np.arange(_PARTS) + 0.5) / _PARTS
+    part = ((np.arange(_PARTS) + 0.5) / _PARTS)[:, None]
+    # shares (n, k) of what is beyond that flow off: before the load moves, in every part, after it
+    waits, moves = pause > 0, ease > stands + pause
+    paused = -np.expm1(-pause[:, None] / times)
+    during = -np.expm1(-np.maximum(ease - stands - pause, 0.0)[:, None] / _PARTS / times)
+    stood = -np.expm1(-stands[:, None] / times)
+    low, high = load[:, None] - radius, load[:, None] + radius
+
+    def flown(state: Array, share: Array, least: Array, most: Array) -> Array:
+        return state + share * (np.minimum(np.maximum(state, least), most) - state)
+
     for i, x in enumerate(load):
         if fresh[i]:
             state, before = np.zeros_like(state), 0.0
         elif rest[i]:  # minutes without load
             state, before = np.clip(state, -radius, radius), 0.0
-        if pause[i] > 0:
-            beyond = np.clip(state, before - radius, before + radius) - state
-            state = state - beyond * np.expm1(-pause[i] / times)
-        if ease[i] > stands[i] + pause[i]:
-            share = -np.expm1(-(ease[i] - stands[i] - pause[i]) / _PARTS / times)
-            for at in before + part * (x - before):
-                state = state + share * (np.clip(state, at - radius, at + radius) - state)
-        beyond = np.clip(state, x - radius, x + radius) - state
-        state = state - beyond * np.expm1(-stands[i] / times)
+        if waits[i]:
+            state = flown(state, paused[i], before - radius, before + radius)
+        if moves[i]:
+            at = before + part * (x - before)
+            for least, most in zip(at - radius, at + radius, strict=True):
+                state = flown(state, during[i], least, most)
+        out[i] = state = flown(state, stood[i], low[i], high[i])
         before = x
-        out[i] = state
     return out
 
 

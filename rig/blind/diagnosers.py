@@ -15,10 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from rig.threads import NAMES
+
 Status = Literal["answered", "refused", "crashed", "late"]
 START_S = 120.0  # loading the libraries on a busy machine
 ENDING_S = 2.0
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_THREADS = (*NAMES, "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,9 @@ def main() -> None:
     """Runs the command and turns every ending into its exit status; no traceback for users."""
     from rig.errors import InputError, MeasurementStopped
     from rig.intruders import refuse_intruders
+    from rig.threads import one_each
 
+    one_each()
     sys.excepthook = _report_bug
     try:
         refuse_intruders()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -193,6 +194,23 @@ def test_help_imports_nothing_heavy() -> None:
     assert "HEAVY []" in result.stdout
     for command in ("measure", "check", "analyze", "import", "export", "emulate"):
         assert command in result.stdout
+
+
+@pytest.mark.parametrize("wanted", [None, "2"])
+def test_linear_algebra_has_one_thread_unless_the_user_says_otherwise(wanted: str | None) -> None:
+    code = (
+        "import os, sys; sys.argv = ['rig', '--help']\n"
+        "from rig.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print('THREADS', os.environ['OPENBLAS_NUM_THREADS'])\n"
+    )
+    env = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    env |= {} if wanted is None else {"OPENBLAS_NUM_THREADS": wanted}
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=HOME, capture_output=True, text=True, check=True, env=env
+    )
+    assert f"THREADS {wanted or 1}" in result.stdout
 
 
 def test_packages_of_other_distributions_are_noticed(tmp_path: Path) -> None:

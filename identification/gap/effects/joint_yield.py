@@ -224,7 +224,11 @@ def states(bench: Bench, load: Array, radius: Array, flow: float, fresh: Flags) 
     """Play states (n, k) of radii (k,): reached at once, or by viscoplastic flow in `flow` s."""
     if flow == 0:
         return bench.plays(load, radius, fresh)
-    return flowing_play(load, radius, np.full(len(radius), flow), bench.rows, fresh)
+    key = b"".join(np.asarray(v).tobytes() for v in (load, radius, flow, fresh))
+    if key not in bench.flows:
+        times = np.full(len(radius), flow)
+        bench.flows[key] = flowing_play(load, radius, times, bench.rows, fresh)
+    return bench.flows[key]
 
 
 def _flowing(bench: Bench, load: Array, radius: Array, fresh: Flags) -> dict[float, Array]:
