@@ -17,7 +17,7 @@ from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
 from identification.gap.imposed import displacement_simpler
 from identification.gap.noise import Noise, estimate_noise, standing
-from identification.gap.rows import Rows, hold_ids, is_continuous, passes, reduce_rows
+from identification.gap.rows import Rows, hold_ids, is_continuous, passes, reduce_rows, turns
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,7 @@ _MANY = 1000
 _ASIDE = 0.1  # of the largest load: less of the other sign is none
 _TREMBLES, _WAVERS = 2.0, 10.0  # stated standard deviations
 _CLEARLY, _A_LITTLE = 5.0, 0.005  # standard deviations, and share of the range, of a way back
+_AS_FAST = 4.0  # times: passes that differ by less go at one rate
 _IDLE = 0.02  # of the response: what the springs make of a load that has no bearing on it
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
@@ -154,6 +155,16 @@ class Bench:
         if not self.rows.continuous or not np.ptp(self.load) > 0:
             return False
         return self._moving_share > 1 - _STANDS
+
+    @property
+    def one_rate(self) -> bool:
+        """It always moves, and all passes go about as fast."""
+        if not self.always_moves:
+            return False
+        edges = np.unique([0, *turns(self.load), self.rows.n - 1])
+        time = np.maximum(np.diff(self.rows.session[edges]), 1e-300)
+        speed = np.abs(np.diff(self.load[edges])) / time
+        return bool(speed.max() < _AS_FAST * speed.min())
 
     @property
     def stroke_s(self) -> float:

@@ -180,16 +180,31 @@ def _continuous_edges(data: GapData) -> Ints:
 
 def passes(force: Array) -> int:
     """How often the force goes up or down by a quarter of its range: passes of the cycles."""
-    coarse = force[:: max(1, len(force) // 20_000)].tolist()
+    return len(turns(force)) + 1
+
+
+def turns(force: Array) -> list[int]:
+    """Where it turns from one such pass to the next."""
+    stride = max(1, len(force) // 20_000)
+    coarse = force[::stride].tolist()
     back = 0.25 * float(np.ptp(force))
-    count, low, high, rising = 1, coarse[0], coarse[0], None
-    for x in coarse:
-        low, high = min(low, x), max(high, x)
+    out: list[int] = []
+    low, high, rising = coarse[0], coarse[0], None
+    at_low = at_high = 0
+    for i, x in enumerate(coarse):
+        if x < low:
+            low, at_low = x, i
+        if x > high:
+            high, at_high = x, i
         if rising is not False and high - x > back:
-            count, rising, low = count + (rising is True), False, x
+            if rising:
+                out.append(at_high * stride)
+            rising, low, at_low = False, x, i
         elif rising is not True and x - low > back:
-            count, rising, high = count + (rising is False), True, x
-    return count
+            if rising is False:
+                out.append(at_low * stride)
+            rising, high, at_high = True, x, i
+    return out
 
 
 def _blocks(run: Ints) -> Ints:

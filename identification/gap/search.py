@@ -89,6 +89,11 @@ LOG_RARE = {"base_slip": log(0.5)}
 # Friction that was never seen to make a loop; a target that warms up while it is held in place.
 LOG_UNSEEN, LOG_HELD = log(0.05), log(0.05)
 
+# Loops at one rate are commonly friction; what comes late differs from it in details of the curve
+# only (tempered, as all of a running recording: odds of 40).
+LOG_ONE_RATE = -30.0
+_LATE = frozenset({"joint_creep", "time_lag"})
+
 
 def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
     """log prior of one set of words; bench: data that make some of them rarer."""
@@ -98,6 +103,7 @@ def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
     if bench is not None:
         rare += LOG_UNSEEN * ("joint_hysteresis" in words and bench.once)
         rare += LOG_HELD * ("thermal_drift" in words and bench.imposed)
+        rare += LOG_ONE_RATE * (bool(words & _LATE) and bench.one_rate)
         rare += _by_calibration(words, bench)
     return LOG_ONE + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(words))) + rare
 

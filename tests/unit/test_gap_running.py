@@ -16,7 +16,8 @@ from identification.gap.effects.time_lag import late
 from identification.gap.noise import standing, white_noise
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
-from identification.gap.rows import reduce_rows
+from identification.gap.rows import passes, reduce_rows, turns
+from identification.gap.search import prior_of
 from tests.unit.test_gap_operators import bench_data
 
 SPRING = 1e5  # N/m
@@ -296,3 +297,50 @@ def test_a_bench_spring_is_neither_gone_nor_negative() -> None:
     (spring,) = library(bench, ["joint_stiffness_error"])
     assert spring.positive is not None
     assert spring.least == -0.9
+
+
+def test_turns_are_where_the_load_goes_back_by_a_quarter() -> None:
+    path = np.concatenate([np.linspace(0, 10, 50), np.linspace(10, 8, 10), np.linspace(8, 12, 20),
+                           np.linspace(12, 0, 60)])  # fmt: skip
+    assert turns(path) == [79]  # the small way back is none
+    assert passes(path) == 2
+    assert turns(np.linspace(0, 1, 30)) == []
+
+
+@pytest.mark.parametrize(("slower", "one"), [(1.5, True), (10.0, False)])
+def test_passes_that_go_about_as_fast_go_at_one_rate(slower: float, one: bool) -> None:
+    force = 100 * triangle(400, 4)
+    seconds = np.where(np.arange(400) < 200, 1.0, slower).cumsum()
+    data = bench_data(force, force / SPRING, step=np.full(400, -1), branch=np.full(400, 3),
+                      session=seconds, time=seconds, imposed="force")  # fmt: skip
+    bench = make_bench(data)
+    assert bench.one_rate is one
+    slow = prior_of(frozenset(["joint_creep"]), bench)
+    assert (slow < prior_of(frozenset(["joint_creep"])) - 20) is one
+
+
+def test_what_was_held_goes_at_no_rate() -> None:
+    force = 100 * np.minimum(np.arange(400) / 100, 1.0)
+    assert not make_bench(running(force, force / SPRING, imposed="force")).one_rate
+
+
+def test_a_stroke_that_hardly_comes_back_has_come_back() -> None:
+    """Metal under an indenter: the force goes to and fro, nearly all of the depth stays."""
+    depth = np.concatenate([np.linspace(0, 1, 100), np.linspace(1, 0.98, 50),
+                            np.linspace(0.98, 1.5, 80)]) * 1e-3  # fmt: skip
+    force = np.concatenate([np.linspace(0, 50, 100), np.linspace(50, 10, 50),
+                            np.linspace(10, 70, 80)])  # fmt: skip
+    meter = Instruments(0.1, 1e-7, 0.005, 0.003)
+    assert not make_bench(running(force, depth, imposed="displacement", instruments=meter)).once
+    slipped = np.linspace(0, 1e-3, 230)  # the force falls, the stroke goes on
+    assert make_bench(running(force, slipped, imposed="displacement", instruments=meter)).once
+
+
+def test_a_load_that_wavers_without_any_bearing_stands() -> None:
+    rng = np.random.default_rng(10)
+    force = rng.normal(0, 0.5, 400)  # five times what is stated
+    drifting = make_bench(running(force, np.linspace(0, 1e-3, 400), imposed="force"))
+    assert drifting.stands
+    assert "free path" in words_with(drifting, "thermal_drift")
+    spring = make_bench(running(force, force / SPRING, imposed="force"))
+    assert not spring.stands
