@@ -158,13 +158,14 @@ class Bench:
 
     @property
     def one_rate(self) -> bool:
-        """It always moves, and all passes go about as fast."""
+        """It always moves, and all passes go about as fast, or take about as long."""
         if not self.always_moves:
             return False
-        edges = np.unique([0, *turns(self.load), self.rows.n - 1])
+        whole = turns(self.load)  # from turn to turn; what comes before and after is cut off
+        edges = np.array(whole if len(whole) > 1 else [0, *whole, self.rows.n - 1])
         time = np.maximum(np.diff(self.rows.session[edges]), 1e-300)
         speed = np.abs(np.diff(self.load[edges])) / time
-        return bool(speed.max() < _AS_FAST * speed.min())
+        return any(v.max() < _AS_FAST * v.min() for v in (speed, time))
 
     @property
     def stroke_s(self) -> float:
@@ -182,8 +183,9 @@ class Bench:
         held = np.flatnonzero(rows)
         mean = np.bincount(at, weights=self.load, minlength=count)[held] / rows[held]
         speed = np.abs(np.diff(mean)) / np.diff(held)
-        typical = float(np.ptp(self.load)) / count
-        return float(np.diff(held)[speed >= _STANDS * typical].sum()) / max(count - 1, 1)
+        slow = np.pad(speed < _STANDS * float(np.ptp(self.load)) / count, 1)
+        stands = slow[1:-1] & (slow[:-2] | slow[2:])  # a turning point alone is no hold
+        return float(np.diff(held)[~stands].sum()) / max(count - 1, 1)
 
     @property
     def line_slope(self) -> Array:

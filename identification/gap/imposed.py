@@ -22,6 +22,9 @@ _POINTS = 1000  # bins of a recording: more do not tell the path better
 _CLOSEST = 3e-7  # of the squared range: a piece that leaves less is as good as exact
 _PER_PIECE = 0.1  # nats that one more piece costs
 _MARGIN = 0.05  # nats by which the displacement has to be simpler: half a piece
+_SLIDING = -0.4  # nats, where it slides to and fro: so much simpler the force may look by chance
+_FLAT = 0.33  # of the displacement's change, each in its range: what the force changes on a plateau
+_SPENT, _MOST = 0.15, 0.45  # of the time, and of the way, in each sense
 _STILL = 2.0  # stated standard uncertainties: a channel that spreads by no more stands still
 _MISJUDGED = 3.0  # factor by which a stated uncertainty may be too small
 _TURNS = (0.5, 0.2, 0.08)  # of the range: what counts as going back
@@ -53,7 +56,19 @@ def displacement_simpler(data: GapData) -> bool:
     )
     floor = max(_CLOSEST, *(c.noise**2 / np.sqrt(len(c.time)) for c in channels))
     by_force, by_moved = (_cost(c, floor) for c in channels)
-    return by_force - by_moved > _MARGIN
+    return by_force - by_moved > (_SLIDING if _slides(*channels) else _MARGIN)
+
+
+def _slides(force: _Channel, moved: _Channel) -> bool:
+    """Whether the displacement goes to and fro while the force hardly changes: a force that was
+    driven would hold such a plateau in one sense only, as under a weight, or run through it."""
+    went, time = np.diff(moved.values), np.diff(force.time)
+    flat = np.abs(np.diff(force.values)) < _FLAT * np.abs(went)
+    for way in (went > 0, went < 0):
+        path, spent = np.abs(went) * way, time * way
+        if flat @ spent < _SPENT * time.sum() or flat @ path < _MOST * path.sum():
+            return False
+    return True
 
 
 def _still(values: Array, sd: float) -> bool:

@@ -51,6 +51,11 @@ def rates(t: Array) -> Array:
     return triangle(np.interp(t, [0, 0.05, 0.25, 1], [0, 2, 4, 6]), 1)
 
 
+def by_hand(t: Array) -> Array:
+    """No straight lines, no half cosines: harder to follow than the plateaus of what answers."""
+    return (0.5 + t) * np.sin(2 * np.pi * (2 * t + 0.5 * t**2)) + 0.05 * np.sin(37 * t)
+
+
 def play(u: Array) -> Array:
     return u - np.clip(u, -0.3, 0.3)
 
@@ -66,6 +71,7 @@ RIGS: dict[str, Callable[[Array], tuple[Array, Array]]] = {
     "play, triangles": lambda t: (triangle(t, 5), play(triangle(t, 5))),
     "ramps and holds": lambda t: (stairs(t, 3), relaxing(t, stairs(t, 3))),
     "held from the start": lambda t: (np.ones_like(t), 0.5 + 0.5 * np.exp(-t / 0.1)),
+    "friction, by hand": lambda t: (by_hand(t), slider(by_hand(t), 0.1)),
     "rates far apart": lambda t: (rates(t), relaxing(t, rates(t))),
 }
 
@@ -172,3 +178,43 @@ def test_what_is_stated_counts() -> None:
     assert not displacement_imposed(replace(data, imposed="force"))
     turned = measured("friction, crank", by_force=True)
     assert displacement_imposed(replace(turned, imposed="displacement"))
+
+
+def damper(t: Array) -> tuple[Array, Array]:
+    """Growing strokes, and a force with the sense of motion: round plateaus, easy to follow."""
+    u = (0.4 + t) * np.sin(2 * np.pi * 2.4 * t**0.9)
+    v = np.gradient(u, t)
+    return u, np.tanh(4 * v / np.abs(v).max())
+
+
+def weight_on_and_off(t: Array) -> tuple[Array, Array]:
+    """Creep under a weight, and recovery: the force stands, the displacement goes on."""
+    force = np.where(t < 0.5, 1.0, 0.0)
+    return force, 1e-2 * force + np.where(t < 0.5, 1.0 - np.exp(-t / 0.1), np.exp((0.5 - t) / 0.1))
+
+
+@pytest.mark.parametrize(
+    ("rig", "costs", "driven"),
+    [(damper, (-5.0, -4.9), True), (damper, (-6.0, -4.9), False),
+     (lambda t: (triangle(t, 3), triangle(t, 3) ** 3), (-5.0, -4.9), False)],
+    ids=["slides", "slides, but the force is far simpler", "springs"],
+)  # fmt: skip
+def test_of_two_paths_about_as_simple_a_rig_that_slides_drove_its_stroke(
+    rig: Callable[[Array], tuple[Array, Array]],
+    costs: tuple[float, float],
+    driven: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(RIGS, "mine", rig)
+    data = measured("mine", by_force=False, n=200)
+    left = iter(costs)
+    monkeypatch.setattr("identification.gap.imposed._cost", lambda *_: next(left))
+    assert displacement_simpler(data) is driven
+
+
+def test_creep_under_a_weight_is_no_sliding() -> None:
+    t = np.arange(400) / 400
+    force, moved = weight_on_and_off(t)
+    data = bench_data(8.0 * force, 2**-10 * moved, time=t, session=t, step=np.full(400, -1))
+    known = replace(data.instruments, force=8e-4, displacement=1e-7)
+    assert not displacement_simpler(replace(data, instruments=known))

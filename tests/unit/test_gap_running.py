@@ -9,7 +9,7 @@ import pytest
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import library
+from identification.gap.effects import STANDING, library
 from identification.gap.effects.drift import free_paths
 from identification.gap.effects.joint_yield import grown
 from identification.gap.effects.time_lag import late
@@ -344,3 +344,28 @@ def test_a_load_that_wavers_without_any_bearing_stands() -> None:
     assert "free path" in words_with(drifting, "thermal_drift")
     spring = make_bench(running(force, force / SPRING, imposed="force"))
     assert not spring.stands
+
+
+def test_a_cell_at_rest_says_nothing_of_any_stiffness() -> None:
+    """Force trembles, nothing moves: that is no infinitely stiff spring."""
+    rng = np.random.default_rng(11)
+    force = np.round(rng.normal(0, 0.1, 250), 2)
+    bench = make_bench(running(force, np.zeros(250), imposed="force"))
+    assert bench.stands
+    assert {v.word for v in library(bench)} <= set(STANDING)
+    found = diagnose_gap(running(force, np.zeros(250), imposed="force"))
+    assert found.verdict in ("none", "force_drift")
+
+
+@pytest.mark.parametrize(("cycles", "many"), [(2.0, False), (3.0, True)])
+def test_several_rates_at_once_are_as_free_as_a_path_of_pieces(cycles: float, many: bool) -> None:
+    force = 100 * triangle(2000, cycles)
+    bench = make_bench(running(force, force / SPRING, imposed="force"))
+    assert ("rates" in words_with(bench, "thermal_drift")) is many
+    assert "linear" in words_with(bench, "thermal_drift")
+
+
+def test_strokes_that_grow_in_the_same_time_go_at_one_rate() -> None:
+    t = np.arange(600) / 600
+    force = 100 * (0.1 + t) * np.sin(2 * np.pi * 5 * t)
+    assert make_bench(running(force, force / SPRING, imposed="force")).one_rate

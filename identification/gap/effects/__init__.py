@@ -30,11 +30,17 @@ WORDS = (
 )
 NEED_ARM = ("link_flexibility", "base_compliance", "base_slip", "pose_error", "load_misalignment")
 
+# What a load that stands can show: where nothing is loaded anew, no stiffness is seen.
+STANDING = ("joint_creep", "force_drift", "thermal_drift", "zero_shift")
+
 
 def library(bench: Bench, words: Iterable[str] = WORDS) -> list[Variant]:
     """All variants of the words; the pool of the bench holds their columns afterwards."""
     out: list[Variant] = []
+    idle = bench.rows.continuous and bench.stands
     for word in words:
+        if idle and word not in STANDING:
+            continue
         if word in NEED_ARM and not bench.data.arm:
             continue
         out += import_module(f"identification.gap.effects.{word}").variants(bench)

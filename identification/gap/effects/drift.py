@@ -66,6 +66,11 @@ def _loaded(bench: Bench) -> bool:
 SMALL = 2
 
 
+def many_rates(bench: Bench) -> bool:
+    """Whether a path may have several rates at once: as free as a short path of pieces."""
+    return bool(free_paths(bench))
+
+
 def free_paths(bench: Bench) -> dict[str, int]:
     """Pieces of the free smooth paths, by name; none where time and load go together."""
     if not own_clock(bench):

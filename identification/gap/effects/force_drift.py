@@ -17,7 +17,7 @@ from identification.gap.data import Array
 from identification.gap.effects.drift import (
     free_path,
     free_paths,
-    own_clock,
+    many_rates,
     path_root,
     paths,
     shares,
@@ -32,7 +32,6 @@ def variants(bench: Bench) -> list[Variant]:
     """Warm-up paths, alike in all directions or per component, several
     rates at once, and a free smooth path."""
     top = float(np.abs(bench.rows.measured_force).max())
-    free = own_clock(bench)
     scales = tuple(s * top for s in shares(bench, SHARES))
     if not top > 0:
         return []
@@ -52,7 +51,7 @@ def variants(bench: Bench) -> list[Variant]:
             out.append(variant(WORD, f"{label}, each component", each, scales, positive=False,
                                path=label, names=tuple(axes)))  # fmt: skip
     out += _each_run(bench, scales)
-    if not free:
+    if not many_rates(bench):
         return out
     rates = [c for label, c in common.items() if label != "root"]
     out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",

@@ -17,7 +17,7 @@ from identification.gap.data import Array
 from identification.gap.effects.drift import (
     free_path,
     free_paths,
-    own_clock,
+    many_rates,
     path_root,
     paths,
     shares,
@@ -30,7 +30,6 @@ SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the deflection
 
 def variants(bench: Bench) -> list[Variant]:
     """Paths times directions."""
-    free = own_clock(bench)
     scales = tuple(s * bench.reach for s in shares(bench, SHARES))
     names = [s.direction for s in bench.data.setups]
     masks = [
@@ -44,7 +43,7 @@ def variants(bench: Bench) -> list[Variant]:
         out.append(variant(WORD, label, columns, scales, positive=False, path=label, names=named))
         if label.startswith("T ") or label == "linear":
             rates.append(columns)
-    if not free:
+    if not many_rates(bench):
         return out
     every = [c for columns in zip(*rates, strict=True) for c in columns]
     out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
