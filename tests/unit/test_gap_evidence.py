@@ -21,7 +21,8 @@ from identification.gap.evidence import (
     row_noise,
     run_columns,
 )
-from identification.gap.search import prior_of, search
+from identification.gap.priors import prior_of
+from identification.gap.search import search
 from identification.gap.variants import variant
 from tests.unit.test_gap_operators import bench_data
 

@@ -16,8 +16,8 @@ from identification.gap.effects.time_lag import late
 from identification.gap.noise import standing, white_noise
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
+from identification.gap.priors import prior_of
 from identification.gap.rows import passes, reduce_rows, turns
-from identification.gap.search import prior_of
 from tests.unit.test_gap_operators import bench_data
 
 SPRING = 1e5  # N/m
