@@ -19,6 +19,7 @@ from identification.gap.heldout import HeldOut, folds, held_out, stated_predicti
 from identification.gap.leftover import looked_up
 from identification.gap.locate import Where, locate
 from identification.gap.parameters import Parameter
+from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
 from identification.gap.search import Explanation, Found, force, refine, search
 from identification.gap.twins import twin_of
@@ -122,6 +123,9 @@ def check_words(words: set[str] | frozenset[str]) -> None:
 
 
 WORTH = 3.0  # nats that one effect more has to bring before it is named
+# A third effect that moves less than this of the noise, and a small share of what the largest does,
+# is how far the other two's laws are off, however plainly a channel without noise shows it.
+BELOW_NOISE = 0.6
 
 
 def _chosen(found: Found, verdict: str) -> Explanation:
@@ -133,7 +137,11 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]
     near = [e for e in simpler if e.log_weight > best.log_weight - WORTH]
-    return min(near, key=lambda e: len(e.words), default=best)
+    if near or len(best.parts) < 3:
+        return min(near, key=lambda e: len(e.words), default=best)
+    least = min(LEAST_SHARE * max(best.sizes), BELOW_NOISE * noise_of(found.engine.bench))
+    petty = {p.word for p, s in zip(best.parts, best.sizes, strict=True) if s < least}
+    return next((e for e in simpler if best.words - e.words <= petty), best)
 
 
 def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explanation) -> GapResult:

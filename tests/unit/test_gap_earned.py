@@ -180,3 +180,14 @@ def test_a_drift_and_a_jump_of_the_datum_foresee_nothing_either() -> None:
     both = replace(drift, parts=drift.parts + jump.parts, sizes=(BUMP / 3, BUMP / 3))
     after = earned(found(e, both))
     assert after.kept[both.words] == 1.0
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.05, 2), (0.3, 3)])
+def test_a_third_effect_that_hardly_moves_anything_is_not_named(share: float, named: int) -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    one = explained([0], "joint_nonlinear_stiffness", 0.0)
+    two = replace(one, parts=one.parts + explained([1], "time_lag", 0.0).parts, sizes=(1e-6, 8e-7),
+                  log_weight=10.0, log_good=10.0)  # fmt: skip
+    three = replace(two, parts=two.parts + explained([2], "load_misalignment", 0.0).parts,
+                    sizes=(*two.sizes, share * 1e-6), log_weight=500.0, log_good=500.0)  # fmt: skip
+    assert len(chosen_of(found(e, one, two, three), "joint_nonlinear_stiffness").parts) == named
