@@ -18,6 +18,7 @@ from identification.gap.fit import Fit, fit
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.leftover import looked_up
 from identification.gap.locate import Where, locate
+from identification.gap.noise import bursts
 from identification.gap.parameters import Parameter
 from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
@@ -273,6 +274,11 @@ def _notes(bench: Bench) -> tuple[str, ...]:
         out.append(f"Joint readings are {reason}: joints, links and base look alike.")
     if data.session is None and data.arm:
         out.append("No session clock: drifts are seen only within runs and from run to run.")
+    if bursts(data):
+        out.append(
+            "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "
+            "glitches, which no effect explains. See to the laser's mounting and to the cables."
+        )
     if bench.imposed:
         out.append("The displacement is imposed: force is predicted from it.")
     return tuple(out)

@@ -8,23 +8,30 @@ up in the data.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import log
 
 import numpy as np
 
 from identification.gap.evidence import Engine
 from identification.gap.fit import fit
+from identification.gap.noise import bursts
 from identification.gap.penalties import CURVES
 from identification.gap.search import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found, weighed
 
 # An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.
 SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none of noise
+IN_SPELLS = 0.1  # share that is kept by laws of load and time where readings scatter in spells
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
 
 
 def looked_up(found: Found) -> Found:
-    """The posterior with what the best explanations of a running recording really leave."""
+    """The posterior with what the best explanations of a running recording really leave; of levels
+    that rest, after a look for readings that scatter in spells, as nothing here makes them."""
     if not found.engine.bench.rows.continuous:
-        return found
+        if not bursts(found.engine.bench.data):
+            return found
+        doubted = [replace(e, log_good=e.log_good + log(IN_SPELLS)) for e in found.explanations]
+        return weighed(replace(found, explanations=tuple(doubted)), found.kept)
     best = found.explanations[0].log_weight
     out = [
         _judged(found.engine, e)

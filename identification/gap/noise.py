@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import Array, GapData, Ints
-from identification.gap.rows import Rows, hold_ids
+from identification.gap.rows import Rows, hold_ids, is_continuous
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -181,3 +181,22 @@ def _scatter(values: Array, hold: Ints) -> float | None:
         return None
     kept = squares[: int(0.95 * squares.size)]
     return float(np.sqrt(kept.mean() / 6.0) / 0.8713)
+
+
+_SETTLED = 2  # samples of a hold after which nothing jumps: a lag, or a joint that still creeps
+_BEYOND, _BURSTS = 4.5, 0.03  # robust standard deviations, and the share of steps that is too much
+_FEWEST_STEPS = 50
+
+
+def bursts(data: GapData) -> bool:
+    """Whether readings at rest scatter in spells, far beyond what they scatter mostly: vibration,
+    glitches. Steps between neighbouring samples late in a hold, where no effect jumps."""
+    hold = hold_ids(data)
+    if is_continuous(data, hold):
+        return False
+    starts = np.flatnonzero(np.diff(hold, prepend=-1))
+    within = np.arange(len(hold)) - starts[hold]
+    late = (np.diff(hold) == 0) & (within[:-1] >= _SETTLED)
+    step = np.abs(np.diff(data.displacement)[late])
+    usual = max(1.4826 * float(np.median(step)), data.instruments.displacement) if step.size else 0
+    return bool(step.size >= _FEWEST_STEPS and np.mean(step > _BEYOND * usual) > _BURSTS)

@@ -9,11 +9,13 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
-from identification.gap.data import Array
+from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import _chosen as chosen_of
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.earned import earned
 from identification.gap.evidence import Engine
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
+from identification.gap.noise import bursts
 from identification.gap.parts import Part
 from identification.gap.penalties import cancelling
 from identification.gap.search import Explanation, Found, weighed
@@ -191,3 +193,24 @@ def test_a_third_effect_that_hardly_moves_anything_is_not_named(share: float, na
     three = replace(two, parts=two.parts + explained([2], "load_misalignment", 0.0).parts,
                     sizes=(*two.sizes, share * 1e-6), log_weight=500.0, log_good=500.0)  # fmt: skip
     assert len(chosen_of(found(e, one, two, three), "joint_nonlinear_stiffness").parts) == named
+
+
+@pytest.mark.parametrize(("height", "spells"), [(0.0, False), (3e-6, True)])
+def test_readings_that_scatter_in_spells_are_explained_by_no_law(
+    height: float, spells: bool
+) -> None:
+    """A sixth of the holds rings at twenty times the noise of the others."""
+    rng = np.random.default_rng(12)
+    step = np.tile(np.repeat(np.arange(12), 8), 3)
+    run = np.repeat([0, 1, 2], 96)
+    ringing = np.isin(step, [6, 7])
+    u = 1e-5 * 20.0 * step + rng.normal(0, 1.5e-7, len(step))
+    u += height * ringing * rng.standard_normal(len(step))
+    data = bench_data(20.0 * step, u, step=step, run=run, repetition=run + 1,
+                      instruments=Instruments(0.1, 2e-7, 0.005, 0.003))  # fmt: skip
+    assert bursts(data) is spells
+    result = diagnose_gap(data)
+    p = result.probabilities
+    assert any("scatter in spells" in note for note in result.notes) is spells
+    assert (p["unknown"] > 0.5) is spells
+    assert (p["none"] > 0.5) is not spells
