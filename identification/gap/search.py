@@ -308,11 +308,9 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     each, energy = sizes.gap, sizes.energy
     logs = bases + [level_prior(engine, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
-    # a running recording has one run, and real rigs leave more of it: what counts there is the best
-    fewer = 1 if engine.bench.rows.continuous else max(len(parts), 1)
     least = max(
         0.6 * engine.bench.noise.stated,
-        REMAINDER * engine.structural / fewer,
+        REMAINDER * engine.structural / max(len(parts), 1),
         LAW_REMAINDER * float(each.max(initial=0.0)),
     )
     good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)

@@ -16,8 +16,8 @@ from identification.gap.earned import earned
 from identification.gap.evidence import Engine
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
 from identification.gap.noise import bursts
-from identification.gap.parts import Part
-from identification.gap.penalties import cancelling
+from identification.gap.parts import Part, Sizes
+from identification.gap.penalties import cancelling, pettiness, trifle
 from identification.gap.search import Explanation, Found, weighed
 from identification.gap.variants import variant
 from tests.unit.test_gap_operators import bench_data
@@ -214,3 +214,25 @@ def test_readings_that_scatter_in_spells_are_explained_by_no_law(
     assert any("scatter in spells" in note for note in result.notes) is spells
     assert (p["unknown"] > 0.5) is spells
     assert (p["none"] > 0.5) is not spells
+
+
+def test_what_is_linear_counts_as_it_moves_and_not_by_what_springs_leave_of_it() -> None:
+    """A slant of the load: the springs take all of it back, the joint readings show it."""
+    e = engine(np.full(REPETITIONS, BUMP))
+    lag = explained([0], "time_lag", 0.0).parts
+    slant = explained([1], "load_misalignment", 0.0).parts
+    drift = explained([1], "thermal_drift", 0.0).parts
+    hidden = Sizes(np.array([1e-5, 0.0]), np.array([1e-5, 8e-6]), 0.0)
+    assert pettiness(e, lag + slant, hidden) == 0.0
+    assert pettiness(e, lag + drift, hidden) > 100
+    # nor is a spring that is off a trifle where the rig runs on
+    force = 20.0 * np.arange(200.0)
+    data = bench_data(force, 1e-5 * force, step=np.full(200, -1))
+    bench = make_bench(data)
+    bench.add(bench.stacked(np.ones(bench.rows.n)))
+    running = Engine(
+        bench, base_columns(bench), bench.observed - prediction(bench), np.array([0.0, 1e-6])
+    )
+    spring = explained([0], "joint_stiffness_error", 0.0).parts
+    assert trifle(running, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0
+    assert trifle(running, spring, Sizes(np.zeros(1), np.array([1e-9]), 0.0)) > 20
