@@ -19,7 +19,7 @@ from identification.arm import tool_offset
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.effects import WORDS
+from identification.gap.effects import WORDS, library
 from rig.dataset import Dataset
 from rig.diagnose import diagnose
 from rig.errors import InputError
@@ -301,6 +301,28 @@ def test_null_is_exactly_nothing_and_columns_are_finite(tmp_path: Path, word: st
     base = base_columns(bench)
     assert np.all(np.isfinite(base.columns))
     assert np.all(np.isfinite(prediction(bench)))
+
+
+def test_an_arm_tells_a_gain_that_bends_and_springs_off_beside_one_joint(tmp_path: Path) -> None:
+    """A bench does not: there both are a curve of its one spring."""
+    from tests.unit.test_gap_operators import bench_data
+
+    arm = make_bench(gap_data(measure(tmp_path, nothing, ("P1", "P2"))))
+    for word in ("force_scale", "displacement_scale"):
+        straight, bent = library(arm, [word])
+        assert (straight.label, bent.label) == ("gain", "gain that bends")
+        full, excess = (arm.columns[i] for i in (straight.columns[0], bent.columns[1]))
+        top = int(np.abs(full[: arm.rows.n]).argmax())
+        share = np.abs(excess[top] / full[top])
+        assert 0.8 < share <= 1.0  # at full range all of it, in the middle half
+        assert np.all(np.abs(excess[: arm.rows.n]) <= np.abs(full[: arm.rows.n]) + 1e-12)
+    rest = {v.label: v.info["joints"] for v in library(arm, ["joint_stiffness_error"])}
+    assert 1 not in rest["all joints but 2"]
+    assert set(rest["all joints but 2"]) | {1} == set(rest["all joints"])
+    force = np.linspace(-100, 100, 300)
+    bench = make_bench(bench_data(force, force * 1e-5, step=np.full(300, -1)))
+    labels = {v.label for v in library(bench, ["force_scale", "displacement_scale"])}
+    assert labels == {"gain"}
 
 
 def test_json_is_plain_and_complete(results: dict[str, GapResult], tmp_path: Path) -> None:
