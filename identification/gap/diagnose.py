@@ -11,7 +11,7 @@ from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData, Ints
 from identification.gap.discriminate import NextMeasurement, Others, next_measurement
-from identification.gap.earned import earned, noise_of, sample_rms
+from identification.gap.earned import FREE, earned, noise_of, sample_rms
 from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.fit import Fit, fit
@@ -125,7 +125,8 @@ def check_words(words: set[str] | frozenset[str]) -> None:
 
 WORTH = 3.0  # nats that one effect more has to bring before it is named
 # A third effect that moves less than this of the noise, and a small share of what the largest does,
-# is how far the other two's laws are off, however plainly a channel without noise shows it.
+# is how far the other two's laws are off, however plainly a channel without noise shows it; but a
+# drift, or a jump of the datum, shows without load, where no law is off.
 BELOW_NOISE = 0.6
 
 
@@ -141,7 +142,7 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     if near or len(best.parts) < 3:
         return min(near, key=lambda e: len(e.words), default=best)
     least = min(LEAST_SHARE * max(best.sizes), BELOW_NOISE * noise_of(found.engine.bench))
-    petty = {p.word for p, s in zip(best.parts, best.sizes, strict=True) if s < least}
+    petty = {p.word for p, s in zip(best.parts, best.sizes, strict=True) if s < least} - FREE
     return next((e for e in simpler if best.words - e.words <= petty), best)
 
 

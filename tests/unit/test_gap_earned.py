@@ -193,6 +193,10 @@ def test_a_third_effect_that_hardly_moves_anything_is_not_named(share: float, na
     three = replace(two, parts=two.parts + explained([2], "load_misalignment", 0.0).parts,
                     sizes=(*two.sizes, share * 1e-6), log_weight=500.0, log_good=500.0)  # fmt: skip
     assert len(chosen_of(found(e, one, two, three), "joint_nonlinear_stiffness").parts) == named
+    # a drift shows where nothing is loaded
+    drift = explained([2], "force_drift", 0.0).parts
+    drifting = replace(three, parts=two.parts + drift)
+    assert len(chosen_of(found(e, one, two, drifting), "joint_nonlinear_stiffness").parts) == 3
 
 
 @pytest.mark.parametrize(("height", "spells"), [(0.0, False), (3e-6, True)])
