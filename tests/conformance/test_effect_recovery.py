@@ -153,14 +153,7 @@ QUICK = ("joint_backlash", "joint_hysteresis", "link_flexibility", "base_complia
          "load_misalignment", "force_drift", "displacement_scale", "pose_error")  # fmt: skip
 
 
-# One pose and two directions are two numbers. Here a gain explains them with one coefficient, at
-# odds of 110 to 1, and is named alone although the base is true: a shortfall, kept in sight.
-TAKEN_FOR_A_GAIN = ("base_compliance", "medium")
-
-
 def marks(word: str, design: str) -> tuple[pytest.MarkDecorator, ...]:
-    if (word, design) == TAKEN_FOR_A_GAIN:
-        return (pytest.mark.xfail(reason="a gain explains one pose with fewer coefficients"),)
     if design == "bench" or (design == "medium" and word in QUICK):
         return ()
     return () if (word, design) == ("base_compliance", "rich") else (pytest.mark.slow,)
