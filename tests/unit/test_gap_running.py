@@ -389,3 +389,9 @@ def test_a_melt_that_flows_on_creeps_however_far() -> None:
     found = diagnose_gap(data)
     assert found.verdict == "joint_creep"
     assert found.after < 0.1 * found.before
+
+
+def test_turning_points_of_a_crank_are_no_holds() -> None:
+    for cycles in (2, 3, 5, 8):
+        force = 100 * np.sin(2 * np.pi * cycles * np.arange(900) / 900)
+        assert make_bench(running(force, force / SPRING, imposed="force")).always_moves, cycles
