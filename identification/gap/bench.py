@@ -10,6 +10,7 @@ observation is `y = prior simulation + base columns + effect columns + imperfect
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -87,7 +88,7 @@ class Bench:
         zero = self.layout.zero_force
         return bool(zero.stop > zero.start)
 
-    @property
+    @cached_property
     def unloads(self) -> bool:
         """Whether the load came back within some run, by a fifth of its range at least."""
         return self._returns(self.load)
@@ -100,7 +101,7 @@ class Bench:
             for v in (self.load, self.rows.measured_force)
         )
 
-    @property
+    @cached_property
     def lets_go(self) -> bool:
         """Whether the force came back so: where a metal flows, little of an imposed stroke is given
         back to take the force away."""
@@ -109,12 +110,11 @@ class Bench:
     def _returns(self, values: Array) -> bool:
         size, span = np.abs(values), float(np.ptp(values))
         for run in np.unique(self.rows.run):
-            path = size[self.rows.run == run]
-            if np.any(np.maximum.accumulate(path) - path > 0.2 * span):
+            if way_back(size[self.rows.run == run]) > 0.2 * span:
                 return True
         return False
 
-    @property
+    @cached_property
     def once(self) -> bool:
         """Every setup was loaded once, and never unloaded: all memory is hidden."""
         back = self.unloads or (self.lets_go and self._reverses)
@@ -125,12 +125,18 @@ class Bench:
         """An imposed stroke went back, however little: a force may fall without that."""
         if not self.imposed:
             return False
-        sd = self.data.instruments.displacement / float(self.stated_slope.min())
-        size = np.abs(self.load)
-        back = float((np.maximum.accumulate(size) - size).max())
-        return back > max(_CLEARLY * sd, _A_LITTLE * float(np.ptp(self.load)))
+        least = max(_CLEARLY * self._load_sd, _A_LITTLE * float(np.ptp(self.load)))
+        return way_back(np.abs(self.load)) > least
 
     @property
+    def _load_sd(self) -> float:
+        """Stated standard uncertainty of one sample of the load, N."""
+        meter = self.data.instruments
+        if self.imposed:
+            return meter.displacement / float(self.stated_slope.min())
+        return meter.force
+
+    @cached_property
     def passes(self) -> int:
         """How often the load comes from zero or goes back there: one for a single pull, two for a
         cycle; runs that start anew count at least one each; many where it only trembles."""
@@ -139,24 +145,22 @@ class Bench:
         runs = np.unique(self.rows.run)
         return sum(passes(self.load[self.rows.run == r]) for r in runs)
 
-    @property
+    @cached_property
     def stands(self) -> bool:
         """The load spreads by no more than its noise, or wavers without any bearing on what was
         seen: held all the time, or none at all."""
-        meter = self.data.instruments
-        sd = meter.displacement / float(self.stated_slope.min()) if self.imposed else meter.force
-        does = float(np.std(self.slope * self.load))
+        sd, does = self._load_sd, float(np.std(self.slope * self.load))
         spread, idle = float(np.std(self.load)), does < _IDLE * float(np.std(self.response))
         return bool(spread <= _TREMBLES * sd or (spread <= _WAVERS * sd and idle))
 
-    @property
+    @cached_property
     def always_moves(self) -> bool:
         """A running recording in which the load never stands: rate and load are one thing."""
         if not self.rows.continuous or not np.ptp(self.load) > 0:
             return False
         return self._moving_share > 1 - _STANDS
 
-    @property
+    @cached_property
     def one_rate(self) -> bool:
         """It always moves, and all passes go about as fast, or take about as long."""
         if not self.always_moves:
@@ -172,7 +176,7 @@ class Bench:
         """s that one pass of the load takes, holds and pauses left out."""
         return self._moving_share * self.session_span / self.passes
 
-    @property
+    @cached_property
     def _moving_share(self) -> float:
         """Share of the session in which the load moves, by means of even pieces of it: noise of the
         driven channel moves as well."""
@@ -344,6 +348,11 @@ class Bench:
         part = np.abs(self.lever * self.elastic)
         total = part.sum(axis=1).max() or 1.0
         return [j for j in range(self.data.joints) if part[:, j].max() > 0.01 * total]
+
+
+def way_back(path: Array) -> float:
+    """How far a path (n,) falls back from the largest value before."""
+    return float((np.maximum.accumulate(path) - path).max())
 
 
 def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None = None) -> Bench:

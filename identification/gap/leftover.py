@@ -12,6 +12,7 @@ from math import log
 
 import numpy as np
 
+from identification.gap.bench import way_back
 from identification.gap.evidence import Engine
 from identification.gap.fit import fit
 from identification.gap.noise import bursts
@@ -66,6 +67,5 @@ def _falls(engine: Engine) -> bool:
     bench = engine.bench
     if not bench.once or not bench.always_moves:
         return False
-    path = np.abs(bench.response - bench.response[0])
-    back = np.maximum.accumulate(path) - path
-    return bool(back.max() > _FALL * np.ptp(bench.response))
+    fall = way_back(np.abs(bench.response - bench.response[0]))
+    return bool(fall > _FALL * np.ptp(bench.response))
