@@ -66,13 +66,9 @@ def _loaded(bench: Bench) -> bool:
 SMALL = 2
 
 
-def many_rates(bench: Bench) -> bool:
-    """Whether a path may have several rates at once: as free as a short path of pieces."""
-    return bool(free_paths(bench))
-
-
 def free_paths(bench: Bench) -> dict[str, int]:
-    """Pieces of the free smooth paths, by name; none where time and load go together."""
+    """Pieces of the free smooth paths, by name; none where time and load go together. Several rates
+    at once are as free as a short one of these."""
     if not own_clock(bench):
         return {}
     if not bench.rows.continuous:

@@ -17,7 +17,6 @@ from identification.gap.data import Array
 from identification.gap.effects.drift import (
     free_path,
     free_paths,
-    many_rates,
     path_root,
     paths,
     shares,
@@ -51,12 +50,13 @@ def variants(bench: Bench) -> list[Variant]:
             out.append(variant(WORD, f"{label}, each component", each, scales, positive=False,
                                path=label, names=tuple(axes)))  # fmt: skip
     out += _each_run(bench, scales)
-    if not many_rates(bench):
+    free = free_paths(bench)
+    if not free:
         return out
     rates = [c for label, c in common.items() if label != "root"]
     out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
-    for label, pieces in free_paths(bench).items():
+    for label, pieces in free.items():
         hats, root = free_path(bench, pieces), path_root(pieces)
         columns = [column(hats[:, k]) for k in range(pieces)]
         out.append(variant(WORD, label, columns, scales, root, positive=False, prior=2.0,

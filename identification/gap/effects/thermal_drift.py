@@ -17,7 +17,6 @@ from identification.gap.data import Array
 from identification.gap.effects.drift import (
     free_path,
     free_paths,
-    many_rates,
     path_root,
     paths,
     shares,
@@ -43,12 +42,13 @@ def variants(bench: Bench) -> list[Variant]:
         out.append(variant(WORD, label, columns, scales, positive=False, path=label, names=named))
         if label.startswith("T ") or label == "linear":
             rates.append(columns)
-    if not many_rates(bench):
+    free = free_paths(bench)
+    if not free:
         return out
     every = [c for columns in zip(*rates, strict=True) for c in columns]
     out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
                        names=named))  # fmt: skip
-    for label, pieces in free_paths(bench).items():
+    for label, pieces in free.items():
         hats = free_path(bench, pieces)
         columns = [bench.add(bench.outside_column(m * hats[:, k])) for m in masks
                    for k in range(pieces)]  # fmt: skip
