@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.arm import Arm, tool_offset
+from identification.arm import STANDARD_GRAVITY, Arm, tool_offset
 from identification.elastic import Beam
 from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
 from rig.dataset import Dataset
@@ -158,6 +158,7 @@ def arm_setup(arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Arra
         moment=np.cross(point, n),
         links=np.array([_link(arm, link, q, tool, n) for link in arm.links]),
         gravity=-arm.gravity_torques(q),  # what the weight does, not what holds it
+        tool_gravity=J.T @ np.array(STANDARD_GRAVITY),
         bent_lever=_bent(arm, q, tool, n),
         turned_offset=_turned_offset(axes, n) @ R,
     )  # fmt: skip

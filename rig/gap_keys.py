@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from identification.gap.forms.law import ACROSS, KEPT, LOST, WORKED
+from identification.gap.effects import joint_backlash
+from identification.gap.forms.law import ACROSS, HUNG, KEPT, LOST, WORKED
 
 # What an entry says besides its law; kept, not interpreted.
 ABOUT = (
@@ -35,7 +36,7 @@ class Key:
     options: tuple[str, ...] = ()
 
 
-_MEMORY = Key("memory", "text", options=(KEPT, ACROSS, LOST, WORKED))
+_MEMORY = Key("memory", "text", options=(KEPT, ACROSS, LOST, WORKED, HUNG))
 _SIDES = ("x", "y", "z")
 CONSTANTS: dict[str, Key] = {
     "joint": Key("joint", "count"),
@@ -46,8 +47,8 @@ CONSTANTS: dict[str, Key] = {
     "law": Key("law", "text", options=("Iwan", "Dahl", "Bouc-Wen")),
     "zone": Key("zone_Nm", "positive"),
     "crossing": Key("crossing", "text", options=("weight", "load")),
-    "kind": Key("kind", "text", options=("free", "friction", "friction 3", "soft")),
-    "weight_factor": Key("weight_over_stated", "positive"),
+    "kind": Key("kind", "text", options=joint_backlash.KINDS),
+    "tool": Key("tool_kg"),
     "way": Key("kind", "text", options=("delay", "filter", "window")),
     "measured_to": Key("measured_to_Nm", "positive"),
     "channel": Key("channel", "text", options=("displacement", "force")),
@@ -70,6 +71,8 @@ SHAPES: dict[str, Key] = {
     "strength": Key("friction_Nm", "positive"),
     "reach": Key("reach_Nm", "positive"),
     "beyond": Key("beyond_Nm", "positive"),
+    "net_above": Key("net_torque_above_Nm"),
+    "net_beyond": Key("net_torque_beyond_Nm", "positive"),
     "retardation_time": Key("retardation_time_s", "positive"),
     "joint": Key("joint", "count"),
     "segment": Key("segment", "count"),
@@ -115,7 +118,7 @@ for _name, _unit in _DRIFTS.items():
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
 
 
-MAY_BE_MISSING = ("measured_to", "about")
+MAY_BE_MISSING = ("measured_to", "about", "tool")
 
 
 @dataclass(frozen=True)
@@ -146,13 +149,15 @@ GRAMMAR: dict[str, Grammar] = {
         ("joint", "law", "memory"), (("compliance", ("strength",)), ("compliance", ("reach",)))
     ),
     "joint_backlash": Grammar(
-        ("joint", "zone", "crossing", "kind", "weight_factor"),
+        ("joint", "zone", "crossing", "kind", "tool"),
         (("width", ()), ("rub", ()), ("place", ("pose", "direction", "first"))),
     ),
     "joint_nonlinear_stiffness": Grammar(
-        ("joint", "measured_to"),
+        ("joint", "measured_to", "tool"),
         (
             ("compliance", ("beyond",)),
+            ("compliance", ("net_above",)),
+            ("compliance", ("net_beyond",)),
             ("compliance", ()),
             ("compliance_quadratic", ()),
             ("compliance_even", ()),

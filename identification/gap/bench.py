@@ -41,6 +41,8 @@ _AS_FAST = 4.0  # times: passes that differ by less go at one rate
 _IDLE = 0.02  # of the response: what the springs make of a load that has no bearing on it
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
+TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
+_FELT = 0.03  # of the range of the load's torque
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
 
 
@@ -327,11 +329,24 @@ class Bench:
     def _unit_elastic(self) -> Array:
         return self.lever * self.compliance
 
-    def plays(self, load: Array, radius: Array, fresh: Flags | None = None) -> Array:
+    def plays(
+        self, load: Array, radius: Array, fresh: Flags | None = None, weight: Array | None = None
+    ) -> Array:
         """Play states (n, k) of a load (n,) for radii (k,); fresh: where the memory is lost, by
-        default where the arm goes to another pose."""
+        default where the arm goes to another pose. weight (n,): that acts beside the load."""
         tiled = np.tile(load[:, None], (1, len(radius)))
-        return play(tiled, radius, self.rest, self.moved if fresh is None else fresh)
+        lost = self.moved if fresh is None else fresh
+        return play(tiled, radius, self.rest, lost, 0.0 if weight is None else weight[:, None])
+
+    def weight(self, joint: int, tool_kg: float = TOOL_KG) -> Array:
+        """(n,) Nm: what the weights of arm and tool do to a joint."""
+        each = [s.gravity + tool_kg * s.tool_gravity for s in self.data.setups]
+        return np.asarray(np.stack(each)[self.rows.setup, joint])
+
+    def feels_weight(self, joint: int) -> bool:
+        """Whether weights make a difference to a joint, beside the torques of the load."""
+        span = float(np.ptp(np.append(self.torque[:, joint], 0.0)))
+        return bool(np.abs(self.weight(joint)).max() > _FELT * span)
 
     @property
     def rest(self) -> Flags:

@@ -31,7 +31,8 @@ class Setup:
     along them. offset_lever (m, 3): change of lever per metre of tool offset in the flange frame.
     turned_lever (m, m): change of lever i per radian of joint j. moment (3,) m: moment about the
     base origin of a newton along the direction. links (l, 2) m/N: compliance along the direction
-    of each nominal link by bending and by twist. gravity (m,) Nm: torques of the arm's own weight.
+    of each nominal link by bending and by twist. gravity (m,) Nm: torques of the arm's own weight;
+    tool_gravity (m,) Nm/kg: of a mass at the point of load.
     Second order, 0 where there is none: bent_lever (m, m, m), change of turned_lever per radian;
     turned_offset (m, m, 3), change of offset_lever i per radian of joint j.
     """
@@ -47,6 +48,7 @@ class Setup:
     moment: Array
     links: Array
     gravity: Array
+    tool_gravity: Array | float = 0.0
     bent_lever: Array | float = 0.0
     turned_offset: Array | float = 0.0
 

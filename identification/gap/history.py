@@ -33,18 +33,23 @@ def moves(rows: Rows, poses: list[str]) -> Flags:
     return np.concatenate([[True], np.diff(number) != 0])
 
 
-def play(load: Array, radius: Array, rest: Flags, fresh: Flags) -> Array:
+def play(
+    load: Array, radius: Array, rest: Flags, fresh: Flags, weight: Array | float = 0.0
+) -> Array:
     """Play operator (backlash of half width `radius`), (n, k) for load (n, k), radius (k,).
 
     `p_i = max(x_i - r, min(x_i + r, p_{i-1}))`, p = 0 in the beginning (Krasnosel'skii, Pokrovskii
     1989). rest: rows before which the load was zero. fresh: rows before which the state went back
-    to zero (the arm moved to another pose, or a controller took the joint back).
+    to zero (the arm moved to another pose, or a controller took the joint back). weight (n, 1):
+    what came on beside the load then, and stays; states count from where it left them.
     """
     # Every row clips the state before it to [x - r, x + r]; clips of clips are clips, so that all
     # prefixes are found in log2(n) passes over the rows.
-    low, high = load - radius, load + radius
-    back = (np.clip(-radius, low, high), np.clip(radius, low, high))  # from within [-r, r]
-    still = np.clip(0.0, low, high)  # from zero
+    least, most = weight - radius, weight + radius
+    hung = np.clip(0.0, least, most)
+    low, high = load + least, load + most
+    back = (np.clip(least, low, high), np.clip(most, low, high))  # from anywhere without load
+    still = np.clip(hung, low, high)
     low = np.where(fresh[:, None], still, np.where(rest[:, None], back[0], low))
     high = np.where(fresh[:, None], still, np.where(rest[:, None], back[1], high))
     step = 1
@@ -53,7 +58,7 @@ def play(load: Array, radius: Array, rest: Flags, fresh: Flags) -> Array:
         upper = np.clip(high[:-step], low[step:], high[step:])
         low[step:], high[step:] = lower, upper
         step *= 2
-    return np.asarray(np.clip(0.0, low, high))
+    return np.asarray(np.clip(np.atleast_2d(hung)[:1], low, high) - hung)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +82,24 @@ def worked_in(load: Array, fresh: Flags) -> Path:
     return Path(np.concatenate(parts), np.concatenate(begins), np.concatenate(kept))
 
 
-def bristles(load: Array, reach: Array, fresh: Flags, elastic: bool) -> Array:
-    """State z in [-1, 1] of a friction whose bristles bend over `reach` (k,), (n, k).
+def bristles(
+    load: Array, reach: Array, fresh: Flags, elastic: bool, weight: Array | None = None
+) -> Array:
+    """State z in [-1, 1] of a friction whose bristles bend over `reach` (k,), (n, k); with a
+    weight (n,) that came on when it was fresh, against where that left it.
 
     `dz = (s - z) s dx / r` with s the sense of motion (Dahl); elastic: while z opposes the motion
     it falls linearly, `dz = dx / r` (Bouc-Wen with beta = gamma). Exact between rows.
     """
     out = np.empty((len(load), len(reach)))
-    z = np.zeros(len(reach))
+    hung = np.zeros(out.shape)
+    if weight is not None:
+        hung = -np.sign(weight)[:, None] * np.expm1(-np.abs(weight)[:, None] / reach)
+    z = hung[0]
     before = 0.0
     for i, x in enumerate(load):
         if fresh[i]:
-            z, before = np.zeros_like(z), 0.0
+            z, before = hung[i], 0.0
         way = np.abs(x - before) / reach
         s = np.sign(x - before)
         if elastic:
@@ -98,7 +109,7 @@ def bristles(load: Array, reach: Array, fresh: Flags, elastic: bool) -> Array:
             z = s - (s - z) * np.exp(-way)
         before = x
         out[i] = z
-    return out
+    return out - hung
 
 
 def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
@@ -140,14 +151,22 @@ def _prefix(keep: Array, gain: Array) -> Array:
     return gain
 
 
-def flowing_play(load: Array, radius: Array, times: Array, rows: Rows, fresh: Flags) -> Array:
+def flowing_play(
+    load: Array, radius: Array, times: Array, rows: Rows, fresh: Flags, weight: Array | None = None
+) -> Array:
     """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
 
     `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
     falls below it, wherever it has come to. Ramps between rows in _PARTS parts, then standing.
+    weight (n,): as in `play`.
     """
     out = np.empty((len(load), len(radius)))
-    state, before = np.zeros(len(radius)), 0.0
+    hung = np.zeros(out.shape)
+    below, above = np.broadcast_arrays(-radius, hung)[0], np.broadcast_arrays(radius, hung)[0]
+    if weight is not None:
+        below, above = weight[:, None] - radius, weight[:, None] + radius
+        hung = np.clip(0.0, below, above)
+    state, before = hung[0], 0.0
     rest = rests(rows)
     step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
@@ -159,25 +178,25 @@ def flowing_play(load: Array, radius: Array, times: Array, rows: Rows, fresh: Fl
     paused = -np.expm1(-pause[:, None] / times)
     during = -np.expm1(-np.maximum(ease - stands - pause, 0.0)[:, None] / _PARTS / times)
     stood = -np.expm1(-stands[:, None] / times)
-    low, high = load[:, None] - radius, load[:, None] + radius
+    low, high = load[:, None] + below, load[:, None] + above
 
     def flown(state: Array, share: Array, least: Array, most: Array) -> Array:
         return state + share * (np.minimum(np.maximum(state, least), most) - state)
 
     for i, x in enumerate(load):
         if fresh[i]:
-            state, before = np.zeros_like(state), 0.0
+            state, before = hung[i], 0.0
         elif rest[i]:  # minutes without load
-            state, before = np.clip(state, -radius, radius), 0.0
+            state, before = np.clip(state, below[i], above[i]), 0.0
         if waits[i]:
-            state = flown(state, paused[i], before - radius, before + radius)
+            state = flown(state, paused[i], before + below[i], before + above[i])
         if moves[i]:
             at = before + part * (x - before)
-            for least, most in zip(at - radius, at + radius, strict=True):
+            for least, most in zip(at + below[i], at + above[i], strict=True):
                 state = flown(state, during[i], least, most)
         out[i] = state = flown(state, stood[i], low[i], high[i])
         before = x
-    return out
+    return out - hung
 
 
 _PARTS = 4

@@ -4,20 +4,25 @@ What they mean, whatever shape was fitted, so that shapes can be compared and mi
 
 - threshold: of the sharp knee that, loaded once up to the largest load, comes out at the same
   end with the same work (the bilinear curve of equal area, as with push-over curves in FEMA 356);
+  of a joint, the net torque there: weights count, and nobody states the tool's. threshold_of_load:
+  what the push alone brings then;
 - slope beyond, creep: against the elastic compliance as it was found, not as it was simulated;
-- creep_fraction: late share of the elastic deflection when a load has stood as long as a run lasts;
+- creep_fraction: late share of the elastic deflection in the end, as far as the times of the law
+  reach; creep_fraction_of_run: when a load has stood as long as a run lasts;
+- width: of the whole play, in whose middle the joint rests when its weights are balanced;
 - depth (of a seat): at the largest load;
 - lag: mean delay; factor: read over true along the straight line through zero.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
+from identification.gap.bench import TOOL_SD_KG, Bench
 from identification.gap.data import Array
 from identification.gap.effects.base_slip import DEPTHS_M
 from identification.gap.effects.link_flexibility import STRAINS
@@ -111,15 +116,13 @@ def _knee(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     knee = _Found(found.w[:k], found.cov[:k, :k], softer)
     # of the sharp knee that ends where the curve ends: a radius that the load hardly passed, or
     # never, says nothing of the slope
-    threshold, top = _threshold(bench, part, knee), float(np.abs(info["load"]).max())
+    threshold, top = _threshold(bench, part, knee), _top(info)
     beyond = np.maximum(top - np.asarray(info["radius"]), 0.0)
     slope = knee.per_spring(beyond / max(top - threshold.value, 1e-9 * top), info.get("joint"))
     least = part.variant.least  # what bends less does not give way
     value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
-    out = {
-        "threshold": threshold,
-        "slope_beyond_over_elastic": Parameter(value, low, high, "1"),
-    }
+    out = _with_weight(bench, part, threshold)
+    out["slope_beyond_over_elastic"] = Parameter(value, low, high, "1")
     if info["flow_s"]:
         flow = float(info["flow_s"])
         out["flow_time"] = Parameter(flow, flow / 3, flow * 3, "s")
@@ -131,7 +134,7 @@ def _threshold(bench: Bench, part: Part, knee: _Found) -> Parameter:
     alone is known to the step of its grid. The gain of the force acts on every threshold."""
     info = part.variant.info
     radius = np.asarray(info["radius"])
-    top = float(np.abs(info["load"]).max())
+    top = _top(info)
     beyond = np.maximum(top - radius, 0.0)
     path, work = float(knee.w @ beyond), float(knee.w @ beyond**2)
     value, variance = float(info["centre"]), (_GRID_STEP * float(info["centre"])) ** 2 / 12
@@ -144,6 +147,40 @@ def _threshold(bench: Bench, part: Part, knee: _Found) -> Parameter:
     if part.word == "base_slip" and info["axis"] < 2:
         shared = float(np.hypot(shared, _depth_sd(bench, np.asarray(info["load"]))))
     return _normal(value, max(variance, 0.0) + (shared * value) ** 2, _torque_unit(bench))
+
+
+def _top(info: Mapping[str, Any]) -> float:
+    """Largest size of what a knee's radii are compared with: load, or net torque."""
+    return float(np.abs(np.asarray(info["load"]) + info.get("weight", 0.0)).max())
+
+
+def _with_weight(bench: Bench, part: Part, found: Parameter) -> dict[str, Parameter]:
+    """The threshold as net torque and as what the push brings, where weights make them two: for
+    the sense, and in the setups, of the largest push."""
+    info = part.variant.info
+    joint = info.get("joint")
+    if joint is None or not bench.data.arm or not bench.feels_weight(joint):
+        return {"threshold": found}
+    load, weight = np.asarray(info["load"]), bench.weight(joint)
+    net = load + weight if "weight" in info else load
+    sense = float(np.sign(net[int(np.abs(net).argmax())]))
+    hangs = float(np.mean(weight[sense * load > 0.5 * (sense * load).max()]))
+    per_kg = float(np.abs(bench.weight(joint, 1.0) - bench.weight(joint, 0.0)).max())
+    half = TWO_SIDED * TOOL_SD_KG * per_kg
+    if "weight" in info:  # both are near: what of the tool is wrong in one is wrong in the other
+        push = _moved(found, -sense * hangs, 0.0)
+        return {"threshold": _moved(found, 0.0, half), "threshold_of_load": push}
+    value = abs(found.value + sense * hangs)
+    low, high = value - (found.value - found.low), value + (found.high - found.value)
+    net_of = _moved(Parameter(value, low, high, found.unit), 0.0, half)
+    return {"threshold": net_of, "threshold_of_load": found}
+
+
+def _moved(p: Parameter, shift: float, half: float) -> Parameter:
+    """Shifted, its interval wider by what is independent of it."""
+    low, high = np.hypot(p.value - p.low, half), np.hypot(p.high - p.value, half)
+    value = p.value + shift
+    return Parameter(value, value - float(low), value + float(high), p.unit)
 
 
 def _depth_sd(bench: Bench, moment: Array) -> float:
@@ -165,17 +202,9 @@ def _hysteresis(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]
     }
 
 
-def _backlash(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
-    """Of the play, what the loads went through: a joint that is pushed to one side only shows
-    half of it, and what lies beyond is a matter of the law."""
-    arm, joint = bench.data.arm, int(part.variant.info["joint"])
-    lever, moved = bench.lever[:, joint], bench.columns[part.variant.columns[0]][: bench.rows.n]
-    seen = np.abs(lever) > _LEAST_LEVER * np.abs(lever).max()
-    went = min(float(np.ptp(moved[seen] / lever[seen])), 1.0)
-    return {"width": found.one(0, "rad" if arm else "mm", went * (1.0 if arm else 1e3))}
-
-
-_LEAST_LEVER = 0.1  # of the largest: a joint hardly moves what has less
+def _backlash(bench: Bench, _: Part, found: _Found) -> dict[str, Parameter]:
+    arm = bench.data.arm
+    return {"width": found.one(0, "rad" if arm else "mm", 1.0 if arm else 1e3)}
 
 
 def _curve(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
@@ -192,10 +221,11 @@ def _creep(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     mean = (
         float(np.exp(power @ np.log(times) / power.sum())) if power.sum() > 0 else float(times[0])
     )
-    after = found.per_spring(-np.expm1(-seconds / times), part.variant.info.get("joint"))
+    joint = part.variant.info.get("joint")
     return {
-        "creep_fraction": after,
-        "creep_fraction_after": Parameter(seconds, seconds, seconds, "s"),
+        "creep_fraction": found.per_spring(np.ones(len(times)), joint),
+        "creep_fraction_of_run": found.per_spring(-np.expm1(-seconds / times), joint),
+        "run": Parameter(seconds, seconds, seconds, "s"),
         "retardation_time": Parameter(mean, mean / 3, mean * 3, "s"),
     }
 
@@ -212,14 +242,20 @@ def run_seconds(bench: Bench) -> float:
 
 
 def _stiffness(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
-    """Factor on the simulated stiffness: of compliance where force is imposed, else of force."""
+    """Factor on the stiffness: of compliance where force is imposed, else of force. The spring it
+    acts on is known to its stated relative sd only, by which the factor can be told no better."""
     out = {}
     for i, j in enumerate(part.variant.info["joints"]):
-        c = found.one(i, "1")
-        ends = [1 / max(1 + v, 0.02) for v in (c.value, c.high, c.low)]
-        if bench.imposed:
-            ends = [max(1 + v, 0.0) for v in (c.value, c.low, c.high)]
-        out[f"factor_joint{j + 1}"] = Parameter(ends[0], ends[1], ends[2], "1")
+        change, variance = float(found.w[i]), float(found.cov[i, i])
+        stated = 0.0
+        if j in found.softer.value:  # what the spring itself was given belongs to the whole
+            change += found.softer.value[j]
+            variance += found.softer.variance[j] + 2 * float(found.softer.cross[j][i])
+            stated = float(bench.data.compliance_relative_sd[j])
+        whole = max(1 + change, 0.02)
+        spread = np.exp(TWO_SIDED * float(np.hypot(max(variance, 0.0) ** 0.5 / whole, stated)))
+        value = whole if bench.imposed else 1 / whole
+        out[f"factor_joint{j + 1}"] = Parameter(value, value / spread, value * spread, "1")
     return out
 
 

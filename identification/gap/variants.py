@@ -10,6 +10,8 @@ import numpy as np
 
 from identification.gap.data import Array
 
+UNDER_WEIGHT = " under weight"  # a memory that begins with the weight coming on
+
 
 @dataclass(frozen=True, eq=False)
 class Variant:

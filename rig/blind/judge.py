@@ -21,6 +21,7 @@ SHARED = {
     ("base_slip", "threshold_Nm"): "threshold",
     ("joint_backlash", "width_rad"): "width",
     ("joint_creep", "creep_fraction"): "creep_fraction",
+    ("joint_creep", "creep_fraction_of_run"): "creep_fraction_of_run",
     ("contact_seating", "depth_mm"): "depth",
     ("force_scale", "factor"): "factor",
     ("displacement_scale", "factor"): "factor",

@@ -2,9 +2,11 @@
 
 Net torque = load and, in an upright arm, its own weight. The joint lies at one side of its play w
 or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where it was pushed until
-the torque has turned: a play of radius `zone` on the torque, cut at the ends of the play. Gears
-with play rub too: a stop operator of the zone's strength rides along. Without torque the joint
-lies anywhere in its play: a free place per setup at its first zero load, and at later ones.
+the torque has turned: a play of radius `zone` on the torque, cut at the ends of the play, or of
+0.7 zones with soft ends. Gears with play rub too: a stop operator of the zone's strength rides
+along. Without torque the joint lies anywhere in its play, a free place per setup at its first zero
+load and at later ones, or where the rubbing left it. The tool's mass is not known: the torque at
+which the weights are balanced is sought among masses of 0 to 3 kg.
 Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
 force: such plays are placed by the data (flanks.py), with the springs that they bring.
 
@@ -19,14 +21,17 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
+from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
 from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
-KINDS = ("free", "friction", "friction 3", "soft")
+KINDS = ("free", "friction", "friction 3", "soft", "rubbing")
 PLACED = ("gap", "held")
+HELD = ("rubbing",)  # stays where it was left: no free place
+TOOLS_KG = (0.0, 1.5, 3.0)
+_TOOL_STEPS_KG = np.linspace(-0.7, 0.7, 13)
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
@@ -42,45 +47,60 @@ def variants(bench: Bench) -> list[Variant]:
         return []
     out = []
     for j in bench.moving_joints():
-        torque, g = bench.torque[:, j], _weight(bench, j)
+        torque = bench.torque[:, j]
         span = bench.reach_of(torque)
         if not span > 0:
             continue
-        # a joint that its weight preloads beyond the load never crosses zero
-        crossings = {"weight": torque + g} if _crosses(torque + g, torque) else {}
-        if np.abs(g).max() < 0.5 * span:
-            crossings["load"] = torque
         places: dict[bytes, list[int]] = {}
-        for name, x in crossings.items():
+        for name, kg, x, share in _crossings(bench, j, span):
             for zone in ZONES:
                 info: dict[str, Any] = {"joint": j, "zone_Nm": zone * span, "crossing": name,
-                                        "weight_factor": 1.0}  # fmt: skip
-                label = f"joint {j + 1} {name}"
-                out += _zone(bench, x, KINDS, label, f"{zone:g}", 1.0, info, places)
+                                        "tool_kg": kg}  # fmt: skip
+                label = f"joint {j + 1} {name}" + (f" tool {kg:g} kg" if share < 1 else "")
+                out += _zone(bench, x, KINDS, label, f"{zone:g}", share, info, places)
         if not bench.data.arm and bench.rows.continuous:
             flanks = placed(bench, torque)
             out += [] if flanks is None else _placed(bench, j, flanks)
     return out
 
 
+def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Array, float]]:
+    """What may cross zero: name, mass of the tool, torque (n,), prior."""
+    torque, plain, per_kg = bench.torque[:, j], bench.weight(j, 0.0), _per_kg(bench, j)
+    masses = TOOLS_KG if np.abs(per_kg).max() * max(TOOLS_KG) > ZONES[0] * span else (TOOL_KG,)
+    net = [(kg, torque + plain + kg * per_kg) for kg in masses]
+    out = [
+        ("weight", kg, x, 1.0 / len(masses))
+        for kg, x in net
+        if _crosses(x, torque)  # one that its weight preloads beyond the load never does
+    ]
+    if np.abs(plain).max() < 0.5 * span:
+        out.append(("load", TOOL_KG, torque, 1.0))
+    return out
+
+
+def _per_kg(bench: Bench, j: int) -> Array:
+    return bench.weight(j, 1.0) - bench.weight(j, 0.0)
+
+
 def refined(bench: Bench, found: Variant) -> list[Variant]:
-    """Zones about one that was found; where the weight decides about the crossing, at weights that
-    are a few percent off: they are known no better, and the zone is small beside them."""
+    """Zones about one that was found; where weights decide about the crossing, at masses of the
+    tool in between: the zone is small beside what they do."""
     info, j = dict(found.info), int(found.info["joint"])
     if info["kind"] in PLACED:
         return []
-    torque, g = bench.torque[:, j], _weight(bench, j)
-    weighty = info["crossing"] == "weight" and np.any(g)
-    factors = np.linspace(0.92, 1.08, 9) if weighty else np.ones(1)
+    torque = bench.torque[:, j]
+    weighty = info["crossing"] == "weight" and np.any(_per_kg(bench, j))
+    masses = float(info["tool_kg"]) + (_TOOL_STEPS_KG if weighty else np.zeros(1))
     zones = float(info["zone_Nm"]) * np.array([0.6, 0.8, 1.0, 1.25, 1.6])
     kinds, out = tuple(dict.fromkeys([info["kind"], "soft"])), []
-    share = 4.0 / (len(factors) * len(zones) * len(kinds))
+    share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
-    for factor in factors:
-        x = torque + factor * g if info["crossing"] == "weight" else torque
+    for kg in masses:
+        x = torque + bench.weight(j, kg) if info["crossing"] == "weight" else torque
         for zone in zones:
-            exact = info | {"zone_Nm": float(zone), "weight_factor": float(factor)}
-            label = f"joint {j + 1} {info['crossing']} x {factor:.2f}"
+            exact = info | {"zone_Nm": float(zone), "tool_kg": float(kg)}
+            label = f"joint {j + 1} {info['crossing']} tool {kg:.2f} kg"
             out += _zone(bench, x, kinds, label, f"{zone:.3g} Nm fine", share, exact, places)
     return out
 
@@ -92,7 +112,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
     columns = [bench.add_joint(j, part) for part in (*parts, torque / float(np.ptp(torque)))]
     scales = tuple(s * bench.reach for s in _SHARES)
     info: dict[str, Any] = {
-        "joint": j, "zone_Nm": flanks.zone, "crossing": "load", "weight_factor": 1.0,
+        "joint": j, "zone_Nm": flanks.zone, "crossing": "load", "tool_kg": TOOL_KG,
         "kind": flanks.kind, "flanks": flanks, "span": float(np.ptp(torque)),
     }  # fmt: skip
     root = np.diag([1.0, FRICTION, 1.0])
@@ -101,10 +121,6 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
                 _less_rub(k) if flanks.kind == "held" else np.eye(k)[0], _PLACED_PRIOR, **info)
         for k, name in ((2, ""), (3, ", other springs"))
     ]  # fmt: skip
-
-
-def _weight(bench: Bench, joint: int) -> Array:
-    return np.asarray(np.stack([s.gravity for s in bench.data.setups])[bench.rows.setup, joint])
 
 
 def _zone(
@@ -117,7 +133,8 @@ def _zone(
     floating = _floating(bench, j, np.abs(x) < width, places)
     shapes = _shapes(bench, x, width)
     for kind in kinds:
-        columns = [bench.add_joint(j, bench.sense * part) for part in shapes[kind]] + floating
+        columns = [bench.add_joint(j, bench.sense * part) for part in shapes[kind]]
+        columns += floating if kind not in HELD else []
         root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
         out.append(
             variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
@@ -142,13 +159,14 @@ def _crosses(net: Array, torque: Array) -> bool:
 
 def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
     """Per kind: the play itself, and the friction beside it."""
-    state = bench.plays(x, zone * np.array([1.0, 3.0]))
+    state = bench.plays(x, zone * np.array([1.0, 3.0, 0.7]))
     rub = -(x - state[:, 0]) / (2 * zone)
     return {
         "free": [np.tanh(x / zone) / 2, rub],
         "friction": [np.clip(state[:, 0] / zone, -1, 1) / 2, rub],
         "friction 3": [np.tanh(state[:, 1] / zone) / 2, rub],
         "soft": [-np.sign(x) * np.expm1(-np.abs(x) / zone) / 2, rub],
+        "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
     }
 
 

@@ -1,5 +1,8 @@
 """Rate-independent friction beside a joint's spring, from the first load on.
 
+A joint that carries the arm's weight has slipped under it before the rig pushes: the first push
+against it is then a reversal.
+
 A friction element of strength r carries `S_r(tau) = tau - P_r(tau)` (stop operator; P play): the
 spring feels so much less, and deflects less. A spectrum of strengths makes any loop that obeys
 Masing's rules (Iwan 1967). Friction that does not obey them: an asperity model whose bristles
@@ -19,9 +22,9 @@ from dataclasses import replace
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Flags
+from identification.gap.data import Array, Flags
 from identification.gap.history import Path, bristles, play, worked_in
-from identification.gap.variants import Variant, smooth_root, variant
+from identification.gap.variants import UNDER_WEIGHT, Variant, smooth_root, variant
 
 WORD = "joint_hysteresis"
 RADII = (
@@ -45,8 +48,9 @@ SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Per joint and memory: kept while the arm stands; lost in the rest between runs; there from
-    the beginning, of loads like those measured (rigs are cycled before they are measured)."""
+    """Per joint and memory: kept while the arm stands, from no load or from the weight that came
+    on first; lost in the rest between runs; there from the beginning, of loads like those measured
+    (rigs are cycled before they are measured)."""
     if bench.once and not bench.data.arm:  # one pull shows a curve, and no loop
         return []
     memories = {"": (bench.moved, False)}
@@ -60,25 +64,36 @@ def variants(bench: Bench) -> list[Variant]:
         if not span > 0:
             continue
         for memory, (fresh, worked) in memories.items():
-            name = f"joint {j + 1}{memory}"
             path = worked_in(bench.torque[:, j], fresh) if worked else None
-            found = _spectrum(bench, j, name, span, fresh, path)
-            if not bench.once:  # a curve that saturates would be taken for friction
-                found += _exponential(bench, j, name, span, fresh, path)
-            out += [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
+            out += _laws(bench, j, span, memory, fresh, path)
+        if bench.feels_weight(j):
+            out += _laws(bench, j, span, UNDER_WEIGHT, bench.moved, None, bench.weight(j))
     return out
 
 
+def _laws(
+    bench: Bench, joint: int, span: float, memory: str, fresh: Flags, path: Path | None,
+    weight: Array | None = None,
+) -> list[Variant]:  # fmt: skip
+    """All laws of one joint and memory."""
+    name = f"joint {joint + 1}{memory}"
+    found = _spectrum(bench, joint, name, span, fresh, path, weight)
+    if not bench.once:  # a curve that saturates would be taken for friction
+        found += _exponential(bench, joint, name, span, fresh, path, weight)
+    return [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
+
+
 def _spectrum(
-    bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None
-) -> list[Variant]:
+    bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None,
+    weight: Array | None,
+) -> list[Variant]:  # fmt: skip
     """The whole spectrum of strengths, and each strength with its neighbour."""
     torque, c = bench.torque[:, joint], bench.compliance[joint]
     radius = span * np.array(RADII if bench.unloads else RADII[:_SMALL])
     radius = bench.radii(torque, radius) if bench.unloads else radius
     radius = np.append(radius, NEVER * span)
     if path is None:
-        states = bench.plays(torque, radius, fresh)
+        states = bench.plays(torque, radius, fresh, weight)
     else:
         tiled = np.tile(path.load[:, None], (1, len(radius)))
         states = play(tiled, radius, path.fresh, path.fresh)[path.kept]
@@ -102,15 +117,16 @@ def _spectrum(
 
 
 def _exponential(
-    bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None
-) -> list[Variant]:
+    bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None,
+    weight: Array | None,
+) -> list[Variant]:  # fmt: skip
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches."""
     torque, c = bench.torque[:, joint], bench.compliance[joint]
     reach = span * np.array(REACHES if bench.unloads else REACHES[:2])
     out = []
     for law in ("Dahl", "Bouc-Wen"):
         if path is None:
-            z = bristles(torque, reach, fresh, elastic=law == "Bouc-Wen")
+            z = bristles(torque, reach, fresh, elastic=law == "Bouc-Wen", weight=weight)
         else:
             z = bristles(path.load, reach, path.fresh, elastic=law == "Bouc-Wen")[path.kept]
         columns = [

@@ -1,8 +1,9 @@
 """Elastic, reversible, curved: gears harden with torque (K1 < K2 < K3), other parts soften.
 
-The deflection beyond the linear spring is a smooth curve of the torque (with the arm's own weight:
-of the net torque): hinges `max(|tau| - b, 0) sgn(tau)` over the range and a cubic; coefficients in
-units of the joint's compliance. Gear catalogues: K3/K1 = 1.5 to 1.85.
+The deflection beyond the linear spring is a smooth curve of the torque: hinges
+`max(|tau| - b, 0) sgn(tau)` over the range and a cubic; coefficients in units of the joint's
+compliance. A joint that carries the arm's weight has its curve over the net torque, which is the
+same only while it is pushed to one side in one pose. Gear catalogues: K3/K1 = 1.5 to 1.85.
 
 Size: K3/K1 = 1.5 to 1.85 in gears; 5 to 100 % of the compliance allowed, either sign.
 Prior: curve smooth, either sign, sd out of SCALES, equally likely; half of it on the free curve.
@@ -15,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
+from identification.gap.bench import TOOL_KG, Bench
+from identification.gap.data import Array
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
@@ -43,10 +45,8 @@ def variants(bench: Bench) -> list[Variant]:
         ]
         info: dict[str, Any] = {"joint": j, "torque": top, "hinges": HINGES}
         line = bench.add_joint(j, c * x)
-        root = np.zeros((len(HINGES) + 1,) * 2)
-        root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(HINGES), 0.5)
         out.append(
-            variant(WORD, f"joint {j + 1} curve", [line, *columns], SCALES, root,
+            variant(WORD, f"joint {j + 1} curve", [line, *columns], SCALES, _root(),
                     positive=False, prior=0.5, kinds=("line", *HINGES), **info)
         )  # fmt: skip
         for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
@@ -64,7 +64,66 @@ def variants(bench: Bench) -> list[Variant]:
             )  # fmt: skip
         if not bench.data.arm and bench.rows.continuous and bench.unloads:
             out.append(_fine(bench, j, line, top))
+        if bench.feels_weight(j):
+            out += _net(bench, j, line)
     return out
+
+
+def _net(bench: Bench, j: int, line: int) -> list[Variant]:
+    """Curves of the net torque: alike in both senses, which tells most where it passes zero, for
+    several masses of the tool; and free over all of its range, so that nobody need know weights
+    well (none where the joint is pushed to one side only, under one weight)."""
+    torque, weight, c = bench.torque[:, j], bench.weight(j), bench.compliance[j]
+    top, net = float(np.abs(torque).max()), torque + weight
+    info: dict[str, Any] = {"joint": j, "torque": top}
+    out = []
+    for kg in TOOLS_KG:
+        hung = bench.weight(j, kg)
+        most = float(np.abs(torque + hung).max())
+        columns = [bench.add_joint(j, c * beyond(torque, hung, b * most)) for b in HINGES]
+        kinds = ("line", *(("beyond", b * most) for b in HINGES))
+        out.append(
+            variant(WORD, f"joint {j + 1} odd curve, tool {kg:g} kg", [line, *columns], SCALES,
+                    _root(), positive=False, prior=0.3 / len(TOOLS_KG), kinds=kinds, tool_kg=kg,
+                    **info)
+        )  # fmt: skip
+    both = min(float(torque.max()), -float(torque.min())) > _BOTH * top
+    if both or float(np.ptp(weight)) > _UNLIKE * top:
+        places = float(net.min()) + float(np.ptp(net)) * np.array(HINGES)
+        columns = [bench.add_joint(j, c * above(torque, weight, b)) for b in places]
+        kinds = ("line", *(("above", float(b)) for b in places))
+        out.append(
+            variant(WORD, f"joint {j + 1} curve of the net torque", [line, *columns], SCALES,
+                    _root(), positive=False, prior=0.4, kinds=kinds, tool_kg=TOOL_KG, **info)
+        )  # fmt: skip
+    return out
+
+
+def _root() -> Array:
+    """Prior of a line and HINGES."""
+    root = np.zeros((len(HINGES) + 1,) * 2)
+    root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(HINGES), 0.5)
+    return root
+
+
+TOOLS_KG = (0.5, 1.5, 2.5)
+_BOTH, _UNLIKE = 0.2, 0.03  # of the joint's largest torque
+
+
+def beyond(torque: Array, weight: Array, bend: float) -> Array:
+    """(n,) by how much the size of the net torque is beyond a bend, with its sign, more than under
+    the weight (n,) alone."""
+    net = torque + weight
+    return np.asarray(_hinge(net, bend) - _hinge(weight, bend))
+
+
+def _hinge(x: Array, bend: float) -> Array:
+    return np.asarray(np.sign(x) * np.maximum(np.abs(x) - bend, 0.0))
+
+
+def above(torque: Array, weight: Array, bend: float) -> Array:
+    """(n,) by how much the net torque is above a bend more than under the weight (n,) alone."""
+    return np.asarray(np.maximum(torque + weight - bend, 0.0) - np.maximum(weight - bend, 0.0))
 
 
 def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:

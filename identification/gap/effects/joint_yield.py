@@ -24,12 +24,12 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.history import flowing_play
-from identification.gap.variants import Variant, variant
+from identification.gap.variants import UNDER_WEIGHT, Variant, variant
 
 WORD = "joint_yield"
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 # A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
-_LIKELY = {"": 1.0, " lasting": 0.5, " taken back": 0.3}
+_LIKELY = {"": 1.0, " lasting": 0.5, " taken back": 0.3, UNDER_WEIGHT: 1.0}
 _HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 _FIRST = 2  # lower ones only round off the knees above them
 # Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
@@ -48,10 +48,36 @@ def variants(bench: Bench) -> list[Variant]:
         def column(state: Array, j: int = j, c: float = float(c)) -> int:
             return bench.add_joint(j, bench.sense * c * state)
 
-        out += knee_variants(
-            bench, bench.lever[:, j] * bench.true_load, column, WORD, f"joint {j + 1}", {"joint": j}
-        )
+        load = bench.lever[:, j] * bench.true_load
+        out += knee_variants(bench, load, column, WORD, f"joint {j + 1}", {"joint": j})
+        if bench.feels_weight(j):
+            out += _under_weight(bench, load, column, j)
     return out
+
+
+def _under_weight(
+    bench: Bench, load: Array, column: Callable[[Array], int], joint: int
+) -> list[Variant]:
+    """Thresholds on the net torque: the push that reaches them differs between poses, and between
+    pushes with the weight and against it. Pushed to one side in one pose, there is no difference:
+    then none."""
+    weight = bench.weight(joint)
+    top, alone = float(np.abs(load).max()), float(np.abs(weight).max())
+    both = min(float(load.max()), -float(load.min())) > _BOTH * top
+    most = float(np.abs(load + weight).max())
+    if most - alone < _BOTH * top or not (both or float(np.ptp(weight)) > _UNLIKE * top):
+        return []
+    radius = alone + (most - alone) * np.array(THRESHOLDS)
+    info = {"joint": joint, "memory": UNDER_WEIGHT, "flow_s": 0.0, "load": load,
+            "column": column, "weight": weight}  # fmt: skip
+    span = bench.reach_of(load)
+    back = [column(s) for s in after_yield(bench, load, span, bench.moved)]
+    states = bench.plays(load, radius, bench.moved, weight)
+    label = f"joint {joint + 1}{UNDER_WEIGHT}"
+    return _knees(WORD, label, [column(s) for s in states.T], radius, back, info)
+
+
+_BOTH, _UNLIKE = 0.2, 0.03  # of the joint's largest torque
 
 
 def knee_variants(
@@ -74,18 +100,26 @@ def knee_variants(
     for memory, fresh in _memories(bench).items():
         back = [column(s) for s in after_yield(bench, load, top, fresh)]
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
-        label, share = f"{name}{memory}", 0.7 / len(radius) * _LIKELY[memory]
-        extra = list(range(len(THRESHOLDS), len(radius)))
-        for k in range(_FIRST, len(THRESHOLDS)):
-            for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
-                inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
-                place = [*inside, *extra]
-                kept = [*inside.values(), *[_HARDENS] * len(extra)]
-                exact = {**info, "memory": memory, "flow_s": 0.0, "radius": radius[place],
-                         "centre": radius[k], "load": load, "column": column,
-                         "back": back, "knee": knee}  # fmt: skip
-                at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
-                out += _with_back(word, at, chosen, kept, share / 4, exact)
+        exact = {**info, "memory": memory, "flow_s": 0.0, "load": load, "column": column}
+        out += _knees(word, f"{name}{memory}", columns, radius, back, exact)
+    return out
+
+
+def _knees(
+    word: str, label: str, columns: list[int], radius: Array, back: list[int], info: dict[str, Any]
+) -> list[Variant]:
+    """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them."""
+    share = 0.7 / len(radius) * _LIKELY[info["memory"]]
+    extra, out = list(range(len(THRESHOLDS), len(radius))), []
+    for k in range(_FIRST, len(THRESHOLDS)):
+        for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
+            inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
+            place = [*inside, *extra]
+            kept = [*inside.values(), *[_HARDENS] * len(extra)]
+            exact = {**info, "radius": radius[place], "centre": radius[k], "back": back,
+                     "knee": knee}  # fmt: skip
+            at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
+            out += _with_back(word, at, chosen, kept, share / 4, exact)
     return out
 
 
@@ -160,10 +194,12 @@ BACK_FROM = 0.25  # of the range: a load from which on a joint may have yielded
 def refined(bench: Bench, found: Variant) -> list[Variant]:
     """Finely spaced thresholds and flow times about a variant that was found."""
     info = dict(found.info)
-    radius = float(info["centre"]) * np.linspace(0.84, 1.2, FINE)
-    fresh = _memories(bench)[info["memory"]]
+    weight = info.get("weight")
+    alone = 0.0 if weight is None else float(np.abs(weight).max())
+    radius = alone + (float(info["centre"]) - alone) * np.linspace(0.84, 1.2, FINE)
+    fresh = _memories(bench).get(info["memory"], bench.moved)
     name, out = found.label.split(" at ")[0].split(" flow")[0], []
-    for flow, states in _flowing(bench, info["load"], radius, fresh).items():
+    for flow, states in _flowing(bench, info["load"], radius, fresh, weight).items():
         columns = [info["column"](s) for s in states.T]
         share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S))
         for k in range(FINE):
@@ -220,24 +256,30 @@ def _memories(bench: Bench) -> dict[str, Flags]:
     return out
 
 
-def states(bench: Bench, load: Array, radius: Array, flow: float, fresh: Flags) -> Array:
+def states(
+    bench: Bench, load: Array, radius: Array, flow: float, fresh: Flags,
+    weight: Array | None = None,
+) -> Array:  # fmt: skip
     """Play states (n, k) of radii (k,): reached at once, or by viscoplastic flow in `flow` s."""
     if flow == 0:
-        return bench.plays(load, radius, fresh)
-    key = b"".join(np.asarray(v).tobytes() for v in (load, radius, flow, fresh))
+        return bench.plays(load, radius, fresh, weight)
+    given = (load, radius, flow, fresh, 0.0 if weight is None else weight)
+    key = b"".join(np.asarray(v).tobytes() for v in given)
     if key not in bench.flows:
         times = np.full(len(radius), flow)
-        bench.flows[key] = flowing_play(load, radius, times, bench.rows, fresh)
+        bench.flows[key] = flowing_play(load, radius, times, bench.rows, fresh, weight)
     return bench.flows[key]
 
 
-def _flowing(bench: Bench, load: Array, radius: Array, fresh: Flags) -> dict[float, Array]:
+def _flowing(
+    bench: Bench, load: Array, radius: Array, fresh: Flags, weight: Array | None
+) -> dict[float, Array]:
     """Flow time s -> play states (n, k), for no flow and all flow times in one go."""
-    out = {0.0: bench.plays(load, radius, fresh)}
+    out = {0.0: bench.plays(load, radius, fresh, weight)}
     if bench.rows.continuous:
         return out
     every = flowing_play(load, np.tile(radius, len(FLOWS_S)),
-                         np.repeat(FLOWS_S, len(radius)), bench.rows, fresh)  # fmt: skip
+                         np.repeat(FLOWS_S, len(radius)), bench.rows, fresh, weight)  # fmt: skip
     return out | dict(zip(FLOWS_S, np.split(every, len(FLOWS_S), axis=1), strict=True))
 
 

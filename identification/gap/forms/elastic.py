@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
+from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array
 from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import moments
 from identification.gap.effects.contact_seating import pressed
+from identification.gap.effects.joint_nonlinear_stiffness import above, beyond
 from identification.gap.effects.link_flexibility import STRAINS
 from identification.gap.forms.law import Law, Term, along, scaled
 from identification.gap.history import rests, retarded
@@ -20,25 +21,31 @@ _POWERS = {"quadratic": 2, "cubic": 3, "even": 2}
 
 
 def describe_curve(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: a line, hinges `beyond` a torque, powers; `measured_to`: where they were seen."""
+    """Terms: a line, hinges `beyond` a torque or above a net one, powers; `measured_to`: where they
+    were seen."""
     joint, top = int(v.info["joint"]), float(v.info["torque"])
     c = float(bench.compliance[joint])
     terms, unit = [], []
     for kind in v.info["kinds"]:
         if kind == "line":
             terms.append(Term("compliance"))
+        elif isinstance(kind, tuple):
+            terms.append(Term("compliance", {f"net_{kind[0]}": kind[1]}))
         elif isinstance(kind, float):
             terms.append(Term("compliance", {"beyond": kind * top}))
         else:
             terms.append(Term(f"compliance_{kind}"))
         unit.append(c / top ** (_POWERS.get(kind, 1) - 1))
-    return Law({"joint": joint, "measured_to": top}, tuple(terms)), scaled(unit)
+    constants = {"joint": joint, "measured_to": top}
+    if "tool_kg" in v.info:
+        constants["tool"] = float(v.info["tool_kg"])
+    return Law(constants, tuple(terms)), scaled(unit)
 
 
 def curve(bench: Bench, law: Law) -> list[Array]:
     """Deflection of the joint over its torque."""
     joint = law.constants["joint"]
-    x = bench.torque[:, joint]
+    x, weight = bench.torque[:, joint], bench.weight(joint, law.constants.get("tool", TOOL_KG))
     shapes = {
         "compliance_quadratic": x * np.abs(x),
         "compliance_cubic": x**3,
@@ -46,8 +53,10 @@ def curve(bench: Bench, law: Law) -> list[Array]:
     }
     out = []
     for t in law.terms:
-        beyond = t.shape.get("beyond", 0.0)
-        hinge = np.sign(x) * np.maximum(np.abs(x) - beyond, 0.0)
+        hinge = np.sign(x) * np.maximum(np.abs(x) - t.shape.get("beyond", 0.0), 0.0)
+        for key, bend in (("net_above", above), ("net_beyond", beyond)):
+            if key in t.shape:
+                hinge = bend(x, weight, t.shape[key])
         out.append(bench.joint_column(joint, shapes.get(t.coefficient, hinge)))
     return out
 

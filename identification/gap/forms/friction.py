@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.bench import Bench
+from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effects import joint_backlash
 from identification.gap.flanks import Flanks, shapes
-from identification.gap.forms.law import KEPT, LOST, WORKED, Law, Term, fresh_after
+from identification.gap.forms.law import HUNG, KEPT, LOST, WORKED, Law, Term, fresh_after
 from identification.gap.history import bristles, play, worked_in
-from identification.gap.variants import Variant
+from identification.gap.variants import UNDER_WEIGHT, Variant
 
-_MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST}
+_MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG}
 
 
 def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
@@ -31,15 +31,18 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
     torque, fresh = bench.torque[:, joint], fresh_after(bench, c["memory"])
     size = np.array([t.shape["strength" if iwan else "reach"] for t in law.terms])
     load, kept = torque, np.ones(len(torque), dtype=bool)
-    rest = bench.rest
+    rest, weight = bench.rest, None
+    if c["memory"] == HUNG:
+        weight = bench.weight(joint)
     if c["memory"] == WORKED:
         path = worked_in(torque, fresh)
         load, fresh, kept, rest = path.load, path.fresh, path.kept, path.fresh
     if iwan:
-        state = play(np.tile(load[:, None], (1, len(size))), size, rest, fresh)
+        tiled = np.tile(load[:, None], (1, len(size)))
+        state = play(tiled, size, rest, fresh, 0.0 if weight is None else weight[:, None])
         held = (load[:, None] - state)[kept]
     else:
-        held = (size * bristles(load, size, fresh, elastic=c["law"] == "Bouc-Wen"))[kept]
+        held = (size * bristles(load, size, fresh, c["law"] == "Bouc-Wen", weight))[kept]
     return [bench.joint_column(joint, -bench.sense * h) for h in held.T]
 
 
@@ -51,7 +54,7 @@ def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
         "zone": float(info["zone_Nm"]),
         "crossing": str(info["crossing"]),
         "kind": str(info["kind"]),
-        "weight_factor": float(info["weight_factor"]),
+        "tool": float(info["tool_kg"]),
     }
     if info["kind"] in joint_backlash.PLACED:
         flanks = info["flanks"]
@@ -61,7 +64,7 @@ def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
         return Law(constants, tuple(terms[:count])), np.array([1.0, 1.0, unit])[:count]
     terms = [Term("width"), Term("rub")]
     law = Law(constants, ())
-    for s, first in _places(bench, law):
+    for s, first in _places(bench, law) if info["kind"] not in joint_backlash.HELD else []:
         setup = bench.data.setups[s]
         terms.append(
             Term("place", {"pose": setup.pose, "direction": setup.direction, "first": first})
@@ -99,8 +102,7 @@ def _net(bench: Bench, law: Law) -> Array:
     torque = bench.torque[:, joint]
     if law.constants["crossing"] == "load":
         return torque
-    weight = np.array([s.gravity[joint] for s in bench.data.setups])
-    return np.asarray(torque + law.constants["weight_factor"] * weight[bench.rows.setup])
+    return np.asarray(torque + bench.weight(joint, law.constants.get("tool", TOOL_KG)))
 
 
 def _places(bench: Bench, law: Law) -> list[tuple[int, bool]]:

@@ -8,10 +8,11 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects import base_slip, joint_yield
 from identification.gap.effects.base_compliance import moments
-from identification.gap.forms.law import ACROSS, KEPT, LOST, Law, Term, fresh_after
-from identification.gap.variants import Variant
+from identification.gap.forms.law import ACROSS, HUNG, KEPT, LOST, Law, Term, fresh_after
+from identification.gap.variants import UNDER_WEIGHT, Variant
 
-_MEMORY = {"": KEPT, " lasting": ACROSS, " taken back": LOST, joint_yield.HARDENED: KEPT}
+_MEMORY = {"": KEPT, " lasting": ACROSS, " taken back": LOST, joint_yield.HARDENED: KEPT,
+           UNDER_WEIGHT: HUNG}  # fmt: skip
 
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
@@ -64,7 +65,10 @@ def columns(bench: Bench, law: Law) -> list[Array]:
 def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     fresh = fresh_after(bench, law.constants["memory"])
     radius = np.array([t.shape["threshold"] for t in law.terms if "threshold" in t.shape])
-    out = list(joint_yield.states(bench, load, radius, law.constants["flow_time"], fresh).T)
+    weight = None
+    if law.constants["memory"] == HUNG:
+        weight = bench.weight(law.constants["joint"])
+    out = list(joint_yield.states(bench, load, radius, law.constants["flow_time"], fresh, weight).T)
     beyond = np.array([t.shape["grows_beyond"] for t in law.terms if "grows_beyond" in t.shape])
     out += list(joint_yield.grown(load, beyond, fresh).T)
     for term in law.terms:

@@ -37,10 +37,11 @@ Columns = Callable[[Bench, Law], list[Array]]
 """A law on any bench -> one stacked column per term, for a coefficient of one SI unit."""
 
 KEPT, ACROSS, LOST, WORKED = "kept", "kept across poses", "lost between runs", "worked in"
+HUNG = "under weight"
 
 
 def fresh_after(bench: Bench, memory: str) -> Flags:
-    """(n,) rows before which the mechanism forgets, for one of the four kinds of memory."""
+    """(n,) rows before which the mechanism forgets, for one of the kinds of memory."""
     if memory == ACROSS:
         return np.zeros(bench.rows.n, dtype=bool)
     if memory == LOST:

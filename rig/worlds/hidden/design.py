@@ -60,7 +60,7 @@ class Plan:
 
     poses: name -> commanded joint angles (6) rad; tcp_mm (3) in the flange frame; steps up to the
     largest load; hold and zero in samples; springs Nm/rad as the simulator believes them, and as
-    they are.
+    they are. tool_kg: mass of what is screwed to the flange; nobody wrote it down.
     """
 
     name: str
@@ -78,6 +78,7 @@ class Plan:
     believed: Array
     relative_sd: float
     springs: Array
+    tool_kg: float
 
 
 def draw_plan(random: Generator, design: str | None) -> Plan:
@@ -108,6 +109,7 @@ def draw_plan(random: Generator, design: str | None) -> Plan:
         believed=believed,
         relative_sd=relative_sd,
         springs=springs,
+        tool_kg=round(random.uniform(0.0, 3.0), 2),
     )
 
 

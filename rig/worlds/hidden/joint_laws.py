@@ -19,6 +19,8 @@ from rig.worlds.hidden.effect import Drawn, Form, Unsuited, draw_joint, one_join
 from rig.worlds.hidden.meaning import equal_work_threshold, run_seconds, straight_factor
 from rig.worlds.hidden.scene import Change, Index, Scene
 
+_HUNG = 0.75
+_PUSHED = 0.2  # of a joint's torque: less beyond its weight shows nothing
 _STEEPEST = 12.0  # of a curve that may also take deflection away
 
 Parameters = Callable[[float], dict[str, Any]]
@@ -42,14 +44,23 @@ def _in_joint(
 
 
 def onset(scene: Scene, joint: int, threshold: float) -> dict[str, float]:
-    """Force per direction at which the joint's torque comes to the threshold, where it does."""
-    lever = np.abs(np.einsum("sj,sj->s", scene.levers[:, joint], scene.unit))
+    """Force per direction at which the joint's net torque comes to the threshold, where it does."""
+    lever = np.einsum("sj,sj->s", scene.levers[:, joint], scene.unit)
     out: dict[str, float] = {}
-    for setup, arm in zip(scene.plan.setups, lever, strict=True):
-        if arm * setup.top_N > threshold:
-            force = threshold / arm
-            out[setup.direction] = min(force, out.get(setup.direction, math.inf))
+    for setup, arm, weight in zip(scene.plan.setups, lever, scene.weight[:, joint], strict=True):
+        left = threshold - math.copysign(weight, arm * weight)  # what the push must bring
+        if abs(arm) * setup.top_N > left:
+            out[setup.direction] = min(left / abs(arm), out.get(setup.direction, math.inf))
     return out
+
+
+def _reached(scene: Scene, joint: int, share: float) -> float:
+    """A net torque of that share of the way from what weights do alone to the largest one."""
+    alone = float(np.abs(scene.weight[:, joint]).max())
+    most = float(np.abs(scene.net[:, joint]).max())
+    if most < alone + _PUSHED * _top(scene, joint):
+        raise Unsuited  # every push takes load off the joint
+    return alone + share * (most - alone)
 
 
 # yield
@@ -60,8 +71,9 @@ def yields(law: str) -> Callable[[Scene, Generator], Drawn]:
 
     def draw(scene: Scene, random: Generator) -> Drawn:
         joint = draw_joint(scene, random)
-        limit = _top(scene, joint) * random.uniform(0.4, 0.88)
-        path, extra = knee_path(scene, scene.torque[:, joint], limit, law, random)
+        limit = _reached(scene, joint, random.uniform(0.4, 0.88))
+        path, extra = knee_path(scene, scene.net[:, joint], limit, law, random)
+        path = scene.since_standing(path)
 
         def parameters(size: float) -> dict[str, Any]:
             return {"hardening_ratio": 1.0 / (1.0 + size), **extra}
@@ -126,7 +138,9 @@ def friction(law: str) -> Callable[[Scene, Generator], Drawn]:
 
     def draw(scene: Scene, random: Generator) -> Drawn:
         joint = draw_joint(scene, random)
-        torque, top = scene.torque[:, joint], _top(scene, joint)
+        top = _top(scene, joint)
+        # the weight came on last, or a controller that dithers let friction settle under it
+        torque = (scene.net if random.random() < _HUNG else scene.torque)[:, joint]
         fresh = scene.standing
         if law in ("dahl", "bouc_wen", "stribeck_bristles"):
             reach = top * float(np.exp(random.uniform(np.log(0.08), np.log(0.8))))
@@ -143,8 +157,10 @@ def friction(law: str) -> Callable[[Scene, Generator], Drawn]:
 
             # bristles and spring side by side: at most as stiff as the spring itself
             limit = min(1.0, 0.5 * reach / most)
-            return _in_joint(scene, joint, -most * state, parameters, (0.003, limit))
+            held = -most * scene.since_standing(state)
+            return _in_joint(scene, joint, held, parameters, (0.003, limit))
         path, extra = _loop_path(scene, torque, top, law, random)
+        path = scene.since_standing(path)
         return _in_joint(scene, joint, path, lambda size: {"share": size, **extra}, (0.005, 1.5))
 
     return draw
@@ -206,9 +222,12 @@ def creep(law: str) -> Callable[[Scene, Generator], Drawn]:
         path = memory.retarded(scene.history.time, load, times, weights)
         seconds = run_seconds(scene)
         after = part * float(weights @ -np.expm1(-seconds / times))  # of a load that stands so long
+        ends = law not in ("power", "logarithmic")
 
         def parameters(size: float) -> dict[str, Any]:
-            found = {"creep_fraction": size * after, "after_s": seconds, "law_size": size}
+            found = {"creep_fraction_of_run": size * after, "run_s": seconds, "law_size": size}
+            if ends:
+                found["creep_fraction"] = size * part * float(weights.sum())
             return found | (extra or {"times_s": times, "weights": weights})
 
         return _in_joint(scene, joint, path, parameters, (0.003, 0.8))
@@ -244,14 +263,14 @@ def curved(law: str) -> Callable[[Scene, Generator], Drawn]:
 
     def draw(scene: Scene, random: Generator) -> Drawn:
         joint = draw_joint(scene, random)
-        top = _top(scene, joint)
+        top = float(np.abs(scene.net[:, joint]).max())
         shape, extra = _curve(law, random)
         grid = np.linspace(0.0, 1.0, 2001)
         steepest = float(np.diff(shape(grid)).max() / grid[1])
         sense = float(random.choice([-1.0, 1.0])) if steepest < _STEEPEST else 1.0
         # deflection never falls as the torque grows
         most = 0.6 if sense > 0 else min(0.6, 0.8 / steepest)
-        path = sense * top * shape(scene.torque[:, joint] / top)
+        path = scene.since_standing(sense * top * shape(scene.net[:, joint] / top))
 
         def parameters(size: float) -> dict[str, Any]:
             return {"extra_share_at_top": sense * size, "torque_top_Nm": top, **extra}
@@ -291,9 +310,7 @@ def lost_motion(law: str) -> Callable[[Scene, Generator], Drawn]:
     """Play of width `size` (rad) taken up where the joint's net torque passes zero."""
 
     def draw(scene: Scene, random: Generator) -> Drawn:
-        weight = scene.weight[scene.history.setup]
-        net = scene.torque + weight
-        top = np.abs(scene.torque).max(axis=0)
+        net, top = scene.net, np.abs(scene.torque).max(axis=0)
         crosses = (net.min(axis=0) < 0.03 * top) & (net.max(axis=0) > -0.03 * top)
         able = np.flatnonzero(crosses & (share_of_joints(scene) > 0.05))
         if not len(able):
@@ -303,11 +320,9 @@ def lost_motion(law: str) -> Callable[[Scene, Generator], Drawn]:
         x = net[:, joint]
         place = _taken_up(law, x, zone, scene, random)
         rad = one_joint(joint, place)
-        went = float(np.ptp(place[scene.history.sample]))  # pushed to one side only, it shows half
 
         def parameters(size: float) -> dict[str, Any]:
-            return {"width_rad": size * went, "zone_Nm": zone, "law_size_rad": size,
-                    "crossing_N": _crossing(scene, joint)}  # fmt: skip
+            return {"width_rad": size, "zone_Nm": zone, "crossing_N": _crossing(scene, joint)}
 
         return Drawn(
             lambda size: Change(joints=size * rad), parameters, (4e-6, 1.5e-3), (joint + 1,)

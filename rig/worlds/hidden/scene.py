@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from rig.worlds.arm import Array, place
+from rig.worlds.arm import GRAVITY_M_PER_S2, Array, place
 from rig.worlds.hidden.design import Plan
 
 Index = NDArray[np.int64]
@@ -48,7 +48,8 @@ class History:
 @dataclass(frozen=True)
 class Scene:
     """Plan, history and nominal geometry: of each setup levers (s, 6, 3) m per rad, tool (s, 3) m
-    over the base, unit (s, 3), weight (s, 6) Nm on the joints; poses (s) as numbers."""
+    over the base, unit (s, 3), weight (s, 6) Nm on the joints, of arm and tool; poses (s) as
+    numbers."""
 
     plan: Plan
     history: History
@@ -65,9 +66,19 @@ class Scene:
         return np.asarray(along[self.history.setup] * self.history.load[:, None])
 
     @cached_property
+    def net(self) -> Array:
+        """(n, 6) Nm: what the joints really carry, the weights with it."""
+        return np.asarray(self.torque + self.weight[self.history.setup])
+
+    @cached_property
     def standing(self) -> Index:
         """(n) counts up whenever the arm drives to another pose."""
         return self.pose[self.history.setup]
+
+    def since_standing(self, path: Array) -> Array:
+        """A path (n) against where it was when the arm came to stand, under its weight alone."""
+        begins = np.diff(self.standing, prepend=-1) != 0
+        return np.asarray(path - path[begins][np.cumsum(begins) - 1])
 
     @cached_property
     def elastic(self) -> Array:
@@ -115,7 +126,8 @@ def make_scene(plan: Plan, random: Generator) -> Scene:
         tool = arm.tool(plan.tcp_mm * 1e-3)
         tools.append(tool)
         levers.append(arm.levers(tool))
-        weights.append(arm.gravity_torques())
+        carried = plan.tool_kg * GRAVITY_M_PER_S2
+        weights.append(arm.gravity_torques() + arm.levers(tool) @ carried)
     return Scene(
         plan=plan,
         history=history,

@@ -47,18 +47,27 @@ def _torque(seen: Observed) -> Array:
     return np.asarray(lever[seen.scene.history.setup] * seen.force[:, None])
 
 
+def _weights(seen: Observed) -> Array:
+    return np.asarray(seen.scene.weight[seen.scene.history.setup])
+
+
 def _one(seen: Observed, joint: int, torque_like: Array) -> Array:
-    return seen.joint(joint, torque_like / float(seen.scene.plan.believed[joint]))
+    path = seen.scene.since_standing(torque_like)
+    return seen.joint(joint, path / float(seen.scene.plan.believed[joint]))
 
 
 def _knees(
-    loads: Array, seen: Observed, column: Callable[[int, Array], Array]
+    loads: Array,
+    seen: Observed,
+    column: Callable[[int, Array], Array],
+    alone: Array | float = 0.0,
 ) -> list[Explanation]:
-    """Of loads (n, c): neighbouring thresholds together; kept while the arm stands, taken back in
-    rests, or reached late. `column` turns the state of load c into a column."""
+    """Of loads (n, c): neighbouring thresholds together, from what stands `alone` (c) on; kept
+    while the arm stands, taken back in rests, or reached late. `column` turns the state of load c
+    into a column."""
     count = len(THRESHOLDS)
-    tops = np.abs(loads).max(axis=0)
-    widths = (tops[:, None] * THRESHOLDS).ravel()
+    tops, least = np.abs(loads).max(axis=0), np.broadcast_to(alone, loads.shape[1:])
+    widths = (least[:, None] + (tops - least)[:, None] * THRESHOLDS).ravel()
     many = np.repeat(loads, count, axis=1)
     out = []
     standing = seen.scene.standing
@@ -80,8 +89,16 @@ def _pairs(columns: list[Array]) -> list[Explanation]:
 
 
 def _yield(seen: Observed) -> list[Explanation]:
-    joints = _joints(seen)
-    return _knees(_torque(seen)[:, joints], seen, lambda c, state: _one(seen, joints[c], state))
+    weights = _weights(seen)
+    net = _torque(seen) + weights
+    pushed = np.abs(net).max(axis=0) > 1.02 * np.abs(weights).max(axis=0)
+    joints = [j for j in _joints(seen) if pushed[j]]
+    if not joints:
+        return []
+    return _knees(
+        net[:, joints], seen, lambda c, state: _one(seen, joints[c], state),
+        np.abs(weights[:, joints]).max(axis=0),
+    )  # fmt: skip
 
 
 def _slip(seen: Observed) -> list[Explanation]:
@@ -97,17 +114,16 @@ def _slip(seen: Observed) -> list[Explanation]:
 
 
 def _hysteresis(seen: Observed) -> list[Explanation]:
-    joints = _joints(seen)
-    torque = _torque(seen)[:, joints]
+    joints, out = _joints(seen), []
+    torque, weights = _torque(seen)[:, joints], _weights(seen)[:, joints]
     shares = np.array([0.02, 0.06, 0.12, 0.2, 0.32, 0.5])
     widths = (np.abs(torque).max(axis=0)[:, None] * shares).ravel()
-    states = plays(np.repeat(torque, len(shares), axis=1), widths, seen.scene.standing)
-    return [
-        _form(
-            [_one(seen, j, states[:, c * len(shares) + k]) for k in range(len(shares))], _POSITIVE
-        )
-        for c, j in enumerate(joints)
-    ]
+    for load in (torque, torque + weights):
+        states = plays(np.repeat(load, len(shares), axis=1), widths, seen.scene.standing)
+        for c, j in enumerate(joints):
+            each = states[:, c * len(shares) : (c + 1) * len(shares)].T
+            out.append(_form([_one(seen, j, state) for state in each], _POSITIVE))
+    return out
 
 
 def _creep(seen: Observed) -> list[Explanation]:
@@ -120,7 +136,7 @@ def _creep(seen: Observed) -> list[Explanation]:
 
 
 def _curved(seen: Observed) -> list[Explanation]:
-    torque, out = _torque(seen), []
+    torque, out = _torque(seen) + _weights(seen), []
     for j in _joints(seen):
         top = float(np.abs(torque[:, j]).max())
         x = torque[:, j] / top
@@ -134,12 +150,11 @@ def _curved(seen: Observed) -> list[Explanation]:
 
 
 def _lost_motion(seen: Observed) -> list[Explanation]:
-    torque, out = _torque(seen), []
+    torque, weights, out = _torque(seen), _weights(seen), []
     scene = seen.scene
-    weight = scene.weight[scene.history.setup]
     for j in _joints(seen):
         top = float(np.abs(torque[:, j]).max())
-        net = torque[:, j] + weight[:, j]
+        net = torque[:, j] + weights[:, j]
         if net.min() > 0.05 * top or net.max() < -0.05 * top:
             continue
         zones = top * np.array([0.003, 0.007, 0.015, 0.03, 0.06, 0.1])
