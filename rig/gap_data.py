@@ -13,6 +13,7 @@ from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, I
 from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.model import load_robot
+from rig.storage.columns import SAMPLE_NUMBER
 
 MM = 1e-3
 _WIDE_STEP_RAD = 1e-3  # of second derivatives
@@ -68,6 +69,7 @@ def gap_data(dataset: Dataset) -> GapData:
         datum=meta.datum,
         tare=meta.tare,
         imposed=meta.imposed,
+        timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
     )
 
 

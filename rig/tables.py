@@ -20,6 +20,7 @@ from rig.storage.columns import (
     BRANCHES,
     KNOWN,
     NO_STEP,
+    SAMPLE_NUMBER,
     TABLE_COLUMNS,
     Column,
     Values,
@@ -95,7 +96,7 @@ def _dataset(
         meta=meta,
         columns=columns,
         units={name: unit_of(name) for name in columns},
-        long_names={name: _long_name(name) for name in columns},
+        long_names={name: _long_name(name) for name in columns} | table.stand_ins,
         events=events,
         texts=texts,
         software=software_version(),
@@ -117,6 +118,7 @@ class _Table:
         self._meta_name = meta_name
         self.comments: list[str] = []
         self.notes: list[str] = []
+        self.stand_ins: dict[str, str] = {}  # meanings of columns that were not given
 
     def read(self, progress: Progress) -> dict[str, Values]:
         """All columns, checked and completed."""
@@ -239,6 +241,8 @@ class _Table:
                 columns[name] = given.pop(name)
             elif name in defaults:
                 columns[name] = defaults[name]()
+                if name == "time_s":
+                    self.stand_ins[name] = SAMPLE_NUMBER
         self._note_order(columns)
         return columns | given
 

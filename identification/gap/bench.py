@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
-from identification.gap.imposed import displacement_simpler
+from identification.gap.imposed import displacement_simpler, on_plateau
 from identification.gap.noise import Noise, estimate_noise, standing
 from identification.gap.rows import Rows, hold_ids, is_continuous, passes, reduce_rows, turns
 
@@ -41,6 +41,7 @@ _AS_FAST = 4.0  # times: passes that differ by less go at one rate
 _IDLE = 0.02  # of the response: what the springs make of a load that has no bearing on it
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
+_HELD = 2  # samples
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
 _FELT = 0.03  # of the range of the load's torque
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
@@ -155,6 +156,17 @@ class Bench:
         spread, idle = float(np.std(self.load)), does < _IDLE * float(np.std(self.response))
         return bool(spread <= _TREMBLES * sd or (spread <= _WAVERS * sd and idle))
 
+    @property
+    def timeless(self) -> bool:
+        """Nobody knows when a level was read: nothing can be said of rates, lags and creep."""
+        return not self.data.timed and not self.rows.continuous
+
+    @cached_property
+    def never_held(self) -> bool:
+        """The load never stood while more than one sample was taken, and never came again."""
+        seldom = not self.rows.continuous and int(self.rows.hold_weight.max()) < _HELD
+        return self.once and (self.always_moves or seldom)
+
     @cached_property
     def always_moves(self) -> bool:
         """A running recording in which the load never stands: rate and load are one thing."""
@@ -239,10 +251,15 @@ class Bench:
                 out[mine] = np.interp(rows.session[mine], time, force)
         return out
 
-    @property
+    @cached_property
     def true_load(self) -> Array:
         """(n,) N: the load without the drift of its reading."""
-        return self.load - self.zero_line
+        return np.asarray(self.load - self.zero_line)
+
+    @cached_property
+    def true_torque(self) -> Array:
+        """(n, m) Nm on the joints without it: what thresholds, plays and friction answer to."""
+        return np.asarray(self.lever * self.true_load[:, None])
 
     def reach_of(self, load: Array) -> float:
         """Range of a load with zero in it. Where the displacement is imposed: of what the rig
@@ -425,9 +442,10 @@ def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:
 
 def displacement_imposed(data: GapData) -> bool:
     """Whether the rig drove the displacement: as stated, else as the data show (imposed.py). A rig
-    that rests at levels, or an arm, is loaded through its screw and read at rest: force."""
+    that rests at levels of force, or an arm, is loaded through its screw and read at rest."""
     if data.imposed is not None:
         return data.imposed == "displacement"
-    if data.arm or not is_continuous(data, hold_ids(data)):
+    if data.arm:
         return False
-    return displacement_simpler(data)
+    hold = hold_ids(data)
+    return displacement_simpler(data) if is_continuous(data, hold) else on_plateau(data, hold)

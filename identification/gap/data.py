@@ -72,6 +72,7 @@ class GapData:
     across it. q (n, m) rad or None: joint readings minus commanded pose. temperature (n, m) degC.
     compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
     simulated (n,) m or None: displacement that another simulator predicts for every sample.
+    timed: whether `time` was recorded; it counts samples otherwise.
     """
 
     arm: bool
@@ -96,6 +97,7 @@ class GapData:
     tare: Literal["session", "run"] = "session"
     imposed: Literal["force", "displacement"] | None = None
     simulated: Array | None = None
+    timed: bool = True
     notes: tuple[str, ...] = field(default=())
 
     @property

@@ -275,6 +275,8 @@ def _notes(bench: Bench) -> tuple[str, ...]:
         out.append(f"Joint readings are {reason}: joints, links and base look alike.")
     if data.session is None and data.arm:
         out.append("No session clock: drifts are seen only within runs and from run to run.")
+    if bench.timeless:
+        out.append("No time was recorded: lags, creep and how fast it flowed are left out.")
     if bursts(data):
         out.append(
             "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "

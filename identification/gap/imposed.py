@@ -59,6 +59,20 @@ def displacement_simpler(data: GapData) -> bool:
     return by_force - by_moved > (_SLIDING if _slides(*channels) else _MARGIN)
 
 
+def on_plateau(data: GapData, hold: Ints) -> bool:
+    """Whether levels follow one another on which the force is the same and the displacement is not:
+    nobody finds these by setting a force. hold (n,): consecutive ids."""
+    starts = np.flatnonzero(np.diff(hold, prepend=-1))
+    on = np.diff(data.run[starts]) == 0
+    went = [np.abs(np.diff(v[starts])) / (np.ptp(v) or 1.0)
+            for v in (data.force, data.displacement)]  # fmt: skip
+    flat = on & (went[0] < _SAME) & (went[1] > _OTHER)
+    return bool(np.any(flat[:-2] & flat[1:-1] & flat[2:]))
+
+
+_SAME, _OTHER = 0.01, 0.03  # of the ranges of force and displacement
+
+
 def _slides(force: _Channel, moved: _Channel) -> bool:
     """Whether the displacement goes to and fro while the force hardly changes: a force that was
     driven would hold such a plateau in one sense only, as under a weight, or run through it."""

@@ -1,4 +1,4 @@
-"""What explanations leave of a running recording, looked at row by row.
+"""What explanations leave of a recording without an arm, looked at row by row.
 
 The levels of imperfection are a coarse grid, and one that fits stretches of fifty rows: they rank
 explanations, but they don't say how much of the gap is left. For those that matter that is looked
@@ -26,13 +26,15 @@ _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that ar
 
 
 def looked_up(found: Found) -> Found:
-    """The posterior with what the best explanations of a running recording really leave; of levels
-    that rest, after a look for readings that scatter in spells, as nothing here makes them."""
-    if not found.engine.bench.rows.continuous:
-        if not bursts(found.engine.bench.data):
-            return found
+    """The posterior with what the best explanations of a recording without an arm really leave; of
+    levels that rest, after a look for readings that scatter in spells, as nothing here makes them.
+    """
+    data = found.engine.bench.data
+    if bursts(data):
         doubted = [replace(e, log_good=e.log_good + log(IN_SPELLS)) for e in found.explanations]
         return weighed(replace(found, explanations=tuple(doubted)), found.kept)
+    if data.arm:
+        return found
     best = found.explanations[0].log_weight
     out = [
         _judged(found.engine, e)

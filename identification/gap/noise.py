@@ -184,19 +184,22 @@ def _scatter(values: Array, hold: Ints) -> float | None:
 
 
 _SETTLED = 2  # samples of a hold after which nothing jumps: a lag, or a joint that still creeps
-_BEYOND, _BURSTS = 4.5, 0.03  # robust standard deviations, and the share of steps that is too much
+_BEYOND, _BURSTS = 4.5, 0.03  # robust standard deviations, and the share that is too much
 _FEWEST_STEPS = 50
 
 
 def bursts(data: GapData) -> bool:
     """Whether readings at rest scatter in spells, far beyond what they scatter mostly: vibration,
-    glitches. Steps between neighbouring samples late in a hold, where no effect jumps."""
+    glitches. Samples late in a hold, where no effect jumps, against the straight line between
+    their neighbours, which creep follows closely."""
     hold = hold_ids(data)
     if is_continuous(data, hold):
         return False
     starts = np.flatnonzero(np.diff(hold, prepend=-1))
     within = np.arange(len(hold)) - starts[hold]
-    late = (np.diff(hold) == 0) & (within[:-1] >= _SETTLED)
-    step = np.abs(np.diff(data.displacement)[late])
-    usual = max(1.4826 * float(np.median(step)), data.instruments.displacement) if step.size else 0
-    return bool(step.size >= _FEWEST_STEPS and np.mean(step > _BEYOND * usual) > _BURSTS)
+    late = (hold[2:] == hold[:-2]) & (within[:-2] >= _SETTLED)
+    u, t = data.displacement, data.time
+    share = np.clip((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-300), 0.0, 1.0)
+    away = np.abs(u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]
+    usual = max(1.4826 * float(np.median(away)), data.instruments.displacement) if away.size else 0
+    return bool(away.size >= _FEWEST_STEPS and np.mean(away > _BEYOND * usual) > _BURSTS)

@@ -69,7 +69,7 @@ def reduce_rows(data: GapData) -> Rows:
     """Rows of the data, in their order."""
     hold = hold_ids(data)
     continuous = is_continuous(data, hold)
-    edges = _continuous_edges(data) if continuous else _hold_edges(hold)
+    edges = _continuous_edges(data) if continuous else _hold_edges(hold, data.time)
     count = np.diff(np.append(edges, len(data.force)))
 
     def mean(values: Array) -> Array:
@@ -151,12 +151,26 @@ def is_continuous(data: GapData, hold: Ints) -> bool:
     return bool(np.any((count > 2) & (width > _RUNNING_SHARE * span) & (span > 0)))
 
 
-def _hold_edges(hold: Ints) -> Ints:
-    """Bins of 1, 1, 2, 4, 8 ... samples from the start of every hold."""
+def _hold_edges(hold: Ints, time: Array) -> Ints:
+    """Bins of 1, 1, 2, 4, 8 ... samples from the start of every hold; where these are taken ever
+    more seldom, as creep often is, no bin over more than twice its time since then."""
     starts = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
-    within = np.arange(len(hold)) - np.repeat(starts, np.diff(np.append(starts, len(hold))))
+    count = np.diff(np.append(starts, len(hold)))
+    within = np.arange(len(hold)) - np.repeat(starts, count)
     edge = (within & (within - 1)) == 0  # 0, 1, 2, 4, 8 ...
+    since = np.maximum(time - np.repeat(time[starts], count), 0.0)
+    begin = np.flatnonzero(edge)
+    size = np.diff(np.append(begin, len(hold)))
+    ratio = since / np.repeat(np.maximum(since[begin], 1e-300), size)
+    last = np.repeat(np.maximum.reduceat(ratio, begin), size)
+    doubled = np.where(
+        (last > _SELDOM) & (within > 0), np.floor(np.log2(np.maximum(ratio, 1.0))), 0
+    )
+    edge |= np.diff(doubled, prepend=0.0) > 0
     return np.flatnonzero(edge).astype(np.int64)
+
+
+_SELDOM = 3.0  # times: samples evenly spaced keep a bin below 2
 
 
 def _continuous_edges(data: GapData) -> Ints:

@@ -17,6 +17,7 @@ Values = NDArray[Any]
 Kind = Literal["number", "count", "word", "flag"]
 
 BRANCHES = ("zero", "loading", "unloading", "cycle")
+SAMPLE_NUMBER = "number of the sample; no time was recorded"  # in place of what time_s means
 NO_STEP = -1  # in the column `step`: a continuous measurement, not held at any level
 AXES = ("x", "y", "z")
 JOINTS = range(1, 7)

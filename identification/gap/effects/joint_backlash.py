@@ -47,7 +47,7 @@ def variants(bench: Bench) -> list[Variant]:
         return []
     out = []
     for j in bench.moving_joints():
-        torque = bench.torque[:, j]
+        torque = bench.true_torque[:, j]
         span = bench.reach_of(torque)
         if not span > 0:
             continue
@@ -66,7 +66,7 @@ def variants(bench: Bench) -> list[Variant]:
 
 def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Array, float]]:
     """What may cross zero: name, mass of the tool, torque (n,), prior."""
-    torque, plain, per_kg = bench.torque[:, j], bench.weight(j, 0.0), _per_kg(bench, j)
+    torque, plain, per_kg = bench.true_torque[:, j], bench.weight(j, 0.0), _per_kg(bench, j)
     masses = TOOLS_KG if np.abs(per_kg).max() * max(TOOLS_KG) > ZONES[0] * span else (TOOL_KG,)
     net = [(kg, torque + plain + kg * per_kg) for kg in masses]
     out = [
@@ -89,7 +89,7 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
     info, j = dict(found.info), int(found.info["joint"])
     if info["kind"] in PLACED:
         return []
-    torque = bench.torque[:, j]
+    torque = bench.true_torque[:, j]
     weighty = info["crossing"] == "weight" and np.any(_per_kg(bench, j))
     masses = float(info["tool_kg"]) + (_TOOL_STEPS_KG if weighty else np.zeros(1))
     zones = float(info["zone_Nm"]) * np.array([0.6, 0.8, 1.0, 1.25, 1.6])
@@ -107,7 +107,7 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
 
 def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
     """With the springs as they are, and with others beside the play."""
-    torque = bench.torque[:, j]
+    torque = bench.true_torque[:, j]
     parts = [bench.sense * part for part in shapes(bench, torque, flanks)]
     columns = [bench.add_joint(j, part) for part in (*parts, torque / float(np.ptp(torque)))]
     scales = tuple(s * bench.reach for s in _SHARES)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.history import rests, retarded
+from identification.gap.history import half_sample, rests, retarded
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_creep"
@@ -23,11 +23,14 @@ SCALES = (0.02, 0.06, 0.2, 0.6)
 
 def times(bench: Bench) -> np.ndarray:
     """Retardation times s: from one sample to a third of the session, by factors of three; of a
-    recording that runs on to three times its length, by when a viscous flow looks like a line."""
+    recording that runs on, or a bench's, to three times its length, by when a viscous flow looks
+    like a line."""
     inner = np.diff(bench.rows.time)
     step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 1.0
     longest = min(bench.session_span / 3, 1000.0 * max(step, 1.0))
-    if bench.rows.continuous and not bench.always_moves:
+    if not (bench.data.arm or bench.rows.continuous):
+        step = 2 * half_sample(bench.rows)  # of rows there are the fewer, the longer it stood
+    if not (bench.data.arm or bench.always_moves):
         longest = 3 * bench.session_span
     first = max(step * 3 if bench.always_moves else step, 1e-6)
     count = max(2, int(np.ceil(np.log(max(longest / first, 3.0)) / np.log(3))))
@@ -47,12 +50,12 @@ def scales(bench: Bench) -> tuple[float, ...]:
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: single times with their neighbour, and the whole spectrum; none of one pull that
     never stood: how fast it went and how far are one thing there, and a curve is simpler."""
-    if bench.once and bench.always_moves:
+    if bench.never_held or bench.timeless:
         return []
     rest, spectrum = rests(bench.rows), times(bench)
     out, sizes = [], scales(bench)
     for j in bench.moving_joints():
-        load = np.tile(bench.torque[:, j][:, None], (1, len(spectrum)))
+        load = np.tile(bench.true_torque[:, j][:, None], (1, len(spectrum)))
         z = retarded(load, spectrum, bench.rows, rest)
         c = bench.compliance[j]
         columns = [bench.add_joint(j, bench.sense * c * z[:, k]) for k in range(len(spectrum))]

@@ -60,11 +60,11 @@ def variants(bench: Bench) -> list[Variant]:
         memories[" rested"] = (bench.moved | bench.rest, False)
     out = []
     for j in bench.moving_joints():
-        span = bench.reach_of(bench.torque[:, j])
+        span = bench.reach_of(bench.true_torque[:, j])
         if not span > 0:
             continue
         for memory, (fresh, worked) in memories.items():
-            path = worked_in(bench.torque[:, j], fresh) if worked else None
+            path = worked_in(bench.true_torque[:, j], fresh) if worked else None
             out += _laws(bench, j, span, memory, fresh, path)
         if bench.feels_weight(j):
             out += _laws(bench, j, span, UNDER_WEIGHT, bench.moved, None, bench.weight(j))
@@ -88,7 +88,7 @@ def _spectrum(
     weight: Array | None,
 ) -> list[Variant]:  # fmt: skip
     """The whole spectrum of strengths, and each strength with its neighbour."""
-    torque, c = bench.torque[:, joint], bench.compliance[joint]
+    torque, c = bench.true_torque[:, joint], bench.compliance[joint]
     radius = span * np.array(RADII if bench.unloads else RADII[:_SMALL])
     radius = bench.radii(torque, radius) if bench.unloads else radius
     radius = np.append(radius, NEVER * span)
@@ -121,7 +121,7 @@ def _exponential(
     weight: Array | None,
 ) -> list[Variant]:  # fmt: skip
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches."""
-    torque, c = bench.torque[:, joint], bench.compliance[joint]
+    torque, c = bench.true_torque[:, joint], bench.compliance[joint]
     reach = span * np.array(REACHES if bench.unloads else REACHES[:2])
     out = []
     for law in ("Dahl", "Bouc-Wen"):

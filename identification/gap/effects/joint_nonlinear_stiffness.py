@@ -35,7 +35,7 @@ def variants(bench: Bench) -> list[Variant]:
     rig without an arm came back along its curve, a finer one."""
     out = []
     for j in bench.moving_joints():
-        torque = bench.torque[:, j]
+        torque = bench.true_torque[:, j]
         top = float(np.abs(torque).max())
         if not top > 0:
             continue
@@ -73,7 +73,7 @@ def _net(bench: Bench, j: int, line: int) -> list[Variant]:
     """Curves of the net torque: alike in both senses, which tells most where it passes zero, for
     several masses of the tool; and free over all of its range, so that nobody need know weights
     well (none where the joint is pushed to one side only, under one weight)."""
-    torque, weight, c = bench.torque[:, j], bench.weight(j), bench.compliance[j]
+    torque, weight, c = bench.true_torque[:, j], bench.weight(j), bench.compliance[j]
     top, net = float(np.abs(torque).max()), torque + weight
     info: dict[str, Any] = {"joint": j, "torque": top}
     out = []
@@ -128,7 +128,7 @@ def above(torque: Array, weight: Array, bend: float) -> Array:
 
 def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
     """A curve of FINE hinges, from where the load begins if it stays on one side."""
-    x, c = bench.torque[:, j] / top, bench.compliance[j] * top
+    x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
     start = float(np.abs(x).min()) if x.min() * x.max() > 0 else 0.0
     places = tuple(round(start + b * (1 - start), 6) for b in FINE)
     columns = [bench.add_joint(j, c * np.sign(x) * np.maximum(np.abs(x) - b, 0)) for b in places]

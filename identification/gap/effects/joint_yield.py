@@ -48,7 +48,7 @@ def variants(bench: Bench) -> list[Variant]:
         def column(state: Array, j: int = j, c: float = float(c)) -> int:
             return bench.add_joint(j, bench.sense * c * state)
 
-        load = bench.lever[:, j] * bench.true_load
+        load = bench.true_torque[:, j]
         out += knee_variants(bench, load, column, WORD, f"joint {j + 1}", {"joint": j})
         if bench.feels_weight(j):
             out += _under_weight(bench, load, column, j)
@@ -276,7 +276,7 @@ def _flowing(
 ) -> dict[float, Array]:
     """Flow time s -> play states (n, k), for no flow and all flow times in one go."""
     out = {0.0: bench.plays(load, radius, fresh, weight)}
-    if bench.rows.continuous:
+    if bench.rows.continuous or bench.timeless:
         return out
     every = flowing_play(load, np.tile(radius, len(FLOWS_S)),
                          np.repeat(FLOWS_S, len(radius)), bench.rows, fresh, weight)  # fmt: skip

@@ -28,6 +28,8 @@ _OF_STROKE = 0.5  # of the time that one pass of the load takes
 
 def variants(bench: Bench) -> list[Variant]:
     """Lags of laser or force, as delays and as filters; coefficient 1 is the lag itself."""
+    if bench.timeless:
+        return []
     sample = 2 * half_sample(bench.rows) if not bench.rows.continuous else _typical_step(bench)
     out = []
     for multiple in LAGS:

@@ -45,7 +45,7 @@ def describe_curve(bench: Bench, v: Variant) -> tuple[Law, Array]:
 def curve(bench: Bench, law: Law) -> list[Array]:
     """Deflection of the joint over its torque."""
     joint = law.constants["joint"]
-    x, weight = bench.torque[:, joint], bench.weight(joint, law.constants.get("tool", TOOL_KG))
+    x, weight = bench.true_torque[:, joint], bench.weight(joint, law.constants.get("tool", TOOL_KG))
     shapes = {
         "compliance_quadratic": x * np.abs(x),
         "compliance_cubic": x**3,
@@ -72,7 +72,7 @@ def creep(bench: Bench, law: Law) -> list[Array]:
     """Retarded torques on the session clock."""
     joint = law.constants["joint"]
     times = np.array([t.shape["retardation_time"] for t in law.terms])
-    load = np.tile(bench.torque[:, joint][:, None], (1, len(times)))
+    load = np.tile(bench.true_torque[:, joint][:, None], (1, len(times)))
     z = retarded(load, times, bench.rows, rests(bench.rows))
     return [bench.joint_column(joint, bench.sense * column) for column in z.T]
 

@@ -28,7 +28,7 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
     """What the friction holds back: `S_r(tau)` (stop operator), or reach times bristle state."""
     c = law.constants
     joint, iwan = c["joint"], c["law"] == "Iwan"
-    torque, fresh = bench.torque[:, joint], fresh_after(bench, c["memory"])
+    torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
     size = np.array([t.shape["strength" if iwan else "reach"] for t in law.terms])
     load, kept = torque, np.ones(len(torque), dtype=bool)
     rest, weight = bench.rest, None
@@ -99,7 +99,7 @@ def backlash(bench: Bench, law: Law) -> list[Array]:
 
 def _net(bench: Bench, law: Law) -> Array:
     joint = law.constants["joint"]
-    torque = bench.torque[:, joint]
+    torque = bench.true_torque[:, joint]
     if law.constants["crossing"] == "load":
         return torque
     return np.asarray(torque + bench.weight(joint, law.constants.get("tool", TOOL_KG)))

@@ -49,7 +49,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     """Column of every play: state of radius `threshold` on the torque (or moment), lagging."""
     c = law.constants
     if "joint" in c:
-        load = bench.lever[:, c["joint"]] * bench.true_load
+        load = bench.true_torque[:, c["joint"]]
     else:
         lever = moments(bench, c["depth"])[:, "xyz".index(c["axis"])]
         load = lever * bench.true_load
