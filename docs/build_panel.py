@@ -43,7 +43,7 @@ def from_a_run() -> None:
     with tempfile.TemporaryDirectory() as folder, chromium(1920, 1080) as driver:
         output = Path(folder) / "run.h5"
         words = ["measure", str(HOME / "protocols" / "paper_xy.yaml"), "--station", "emulated"]
-        words += ["--speed", "20"]  # as fast as any machine keeps up with, browser beside it
+        words += ["--speed", "10"]  # so that no slot is missed, with a browser beside it
         run = subprocess.Popen(
             [sys.executable, "-m", "rig", *words, "--panel", "-o", str(output)],
             cwd=HOME, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
