@@ -69,7 +69,7 @@ def _within(chapters: list[Section], session: Session, index: int) -> Section:
     """The chapters of one data set as parts of one, with identifiers of their own."""
     prefix = f"set-{index + 1}"
     parts: tuple[Block, ...] = tuple(_renamed(c, prefix) for c in chapters)
-    return Section(prefix, session.label, parts, session.dataset.banners(), own_page=True)
+    return Section(prefix, session.label, parts, session.dataset.banners())
 
 
 def _renamed(section: Section, prefix: str) -> Section:

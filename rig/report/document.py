@@ -99,14 +99,12 @@ class Verbatim:
 
 @dataclass(frozen=True)
 class Section:
-    """A chapter, or a part of one. ident: unique in the report; banners: what it must say first;
-    own_page: on paper it begins on a new page."""
+    """A chapter, or a part of one. ident: unique in the report; banners: what it must say first."""
 
     ident: str
     title: str
     blocks: tuple[Block, ...]
     banners: tuple[str, ...] = ()
-    own_page: bool = False
 
 
 Block = Paragraph | Bullets | Facts | Table | Figure | Verbatim | Section

@@ -89,7 +89,7 @@ def _section(section: Section, level: int) -> str:
     tag = f"h{min(level, 6)}"
     inner = "\n".join(_block(b, level) for b in section.blocks)
     return (
-        f'<section id="{escape(section.ident)}" class="{"set" if section.own_page else "part"}">'
+        f'<section id="{escape(section.ident)}">'
         f"<{tag}>{escape(section.title)}</{tag}>"
         f"{_banners(section.banners, 'mark')}\n{inner}\n</section>"
     )

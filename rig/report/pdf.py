@@ -93,7 +93,7 @@ def _block(block: Block) -> dict[str, Any]:
         case Verbatim():
             return {"kind": "verbatim", "title": _clean(block.title), "text": _clean(block.text)}
         case Section():
-            return {"kind": "section", "own_page": block.own_page, "title": _clean(block.title),
+            return {"kind": "section", "title": _clean(block.title),
                     "banners": [_clean(b) for b in block.banners],
                     "blocks": [_block(b) for b in block.blocks]}  # fmt: skip
 
