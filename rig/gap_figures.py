@@ -17,6 +17,7 @@ from rig.gap_layout import (
     first_column,
     label_below,
     log_axis,
+    noise_axis,
     panels,
     set_title,
     shared_legend,
@@ -47,6 +48,7 @@ BLUE, ORANGE, GREEN = COLOURS[0], COLOURS[1], COLOURS[2]
 GREY = "0.45"
 LEAST_PROBABILITY = 0.005
 _SENSES = ((RISING, "loading", BLUE, BLUE, "o"), (FALLING, "unloading", ORANGE, "white", "s"))
+_NOISE = "noise, ±2 standard deviations"
 _MANY = 400  # points of a panel beyond which markers hide each other
 
 
@@ -112,15 +114,18 @@ class _Drawing:
 
 def curve(r: GapResult, p: Points) -> Figure:
     """Measurement and simulation before and after, one panel per pose and direction; below each,
-    measured minus simulated, which the curves alone would hide.
+    measured minus simulated, which the curves alone would hide, beside the noise.
 
     Displacement over force; where the displacement was imposed, force over displacement.
     """
     figure, grid, shown = panels(len(r.bench.data.setups), below=True)
+    scale = _axes_of(r, p)[2]
+    noise = 2 * float(np.median(p.noise * scale))
     for (upper, lower), s in zip(grid, shown, strict=True):
         _curve_panel(r, p, upper, s)
-        _gap_panel(r, p, lower, s)
+        _gap_panel(r, p, lower, s, noise)
         upper.set_title(setup_name(r, s), fontsize=10)
+    noise_axis(grid[0][1], noise, float(np.abs(p.gap_before * scale).max()))  # they share it
     for upper, lower in first_column(grid):
         upper.set_ylabel("Force in N" if r.bench.imposed else "Displacement in mm")
         lower.set_ylabel("Gap in N" if r.bench.imposed else "Gap in mm")
@@ -153,20 +158,36 @@ def _curve_panel(r: GapResult, p: Points, axes: Any, s: int) -> None:
     order = np.flatnonzero(mine)[np.argsort(x[mine], kind="stable")]
     axes.plot(x[order], (p.before * scale)[order], "--", color="black", linewidth=1.2,
               label="simulated before", zorder=3)  # fmt: skip
-    for i, run in enumerate(np.unique(p.run[mine])):
-        path = mine & (p.run == run)
-        axes.plot(x[path], (p.after * scale)[path], "-", color=GREEN, linewidth=1.1, zorder=3,
+    for i, leg in enumerate(legs(p, x, s)):
+        axes.plot(x[leg], (p.after * scale)[leg], "-" if len(leg) > 1 else ".", color=GREEN,
+                  linewidth=1.1, markersize=4, zorder=3,
                   label="_" if i else "simulated after (each run)")  # fmt: skip
 
 
-def _gap_panel(r: GapResult, p: Points, axes: Any, s: int) -> None:
-    """Measured minus simulated, before and after, run by run."""
+def _gap_panel(r: GapResult, p: Points, axes: Any, s: int, noise: float) -> None:
+    """Measured minus simulated, before and after, run by run; noise: half as wide as its band."""
     x, _, scale = _axes_of(r, p)
+    axes.axhspan(-noise, noise, color="0.88", zorder=0, label=_NOISE)
     axes.axhline(0, color="0.4", linewidth=0.8)
+    for leg in legs(p, x, s):
+        lone = "." if len(leg) == 1 else ""
+        axes.plot(x[leg], (p.gap_before * scale)[leg], f"--{lone}", color="black", linewidth=0.9,
+                  markersize=4)  # fmt: skip
+        axes.plot(x[leg], (p.gap_after * scale)[leg], f"-{lone}", color=GREEN, linewidth=1.1,
+                  markersize=4)  # fmt: skip
+
+
+def legs(p: Points, x: Any, s: int) -> Iterator[Any]:
+    """Of every run of a setup the numbers of the points that a line may join: it ends where the
+    load was taken off with no look on the way.
+
+    x (n,): what drives the rig.
+    """
     for run in np.unique(p.run[p.setup == s]):
-        path = p.run == run
-        axes.plot(x[path], (p.gap_before * scale)[path], "--", color="black", linewidth=0.9)
-        axes.plot(x[path], (p.gap_after * scale)[path], "-", color=GREEN, linewidth=1.1)
+        path = np.flatnonzero(p.run == run)
+        off = (p.sense[path[:-1]] == RISING) & (p.sense[path[1:]] == 0)
+        far = np.abs(np.diff(x[path])) > 0.5 * np.ptp(x[path])
+        yield from np.split(path, 1 + np.flatnonzero(off & far))
 
 
 def residual(r: GapResult, p: Points) -> Figure:
@@ -176,7 +197,7 @@ def residual(r: GapResult, p: Points) -> Figure:
     band = 2 * float(np.median(p.noise))
     minutes, unit = session_clock(p)
     for axes, x in ((left, p.displacement if r.bench.imposed else p.force), (right, minutes)):
-        axes.axhspan(-band, band, color="0.88", zorder=0, label="noise, ±2 standard deviations")
+        axes.axhspan(-band, band, color="0.88", zorder=0, label=_NOISE)
         axes.axhline(0, color="0.4", linewidth=0.8, zorder=1)
         _residual_points(r, p, axes, x)
     left.set_xlabel("Displacement in mm" if r.bench.imposed else "Force in N")
@@ -221,7 +242,7 @@ def probabilities(r: GapResult) -> Figure:
         axes.barh(i, p, 0.7, color=BLUE if chosen else "0.75", linewidth=0,
                   hatch="//" if word in alike else None, edgecolor="white")  # fmt: skip
         note = "  verdict" if chosen else "  can't be told from it here" if word in alike else ""
-        axes.text(p + 0.01, i, f"{p:.1%}{note}", va="center", fontsize=9,
+        axes.text(p + 0.01, i, f"{100 * p:.1f} %{note}", va="center", fontsize=9,
                   fontweight="bold" if chosen else "normal")  # fmt: skip
     axes.set_yticks(range(len(ranked)), list(ranked))
     axes.set_ylim(max(len(ranked), 3) - 0.4, -0.6)
@@ -230,32 +251,29 @@ def probabilities(r: GapResult) -> Figure:
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("Probability of being the main cause")
     rest = 1 - sum(ranked.values())
-    axes.set_title(f"Which effect causes the gap (all others together {max(rest, 0):.1%})",
+    axes.set_title(f"Which effect causes the gap (all others together {100 * max(rest, 0):.1f} %)",
                    fontsize=11)  # fmt: skip
     return figure
 
 
 def withheld(r: GapResult) -> Figure:
     """Before and after, fitted and withheld in turn, beside other effects; noise as a line."""
-    entries = [("fitted", r.before, r.after, "", GREEN)]
+    entries = [("fitted", r.before, r.after, change(r.before, r.after), GREEN)]
     for h in r.held_out:
-        low, high = h.ci95
-        text = f"shrinks by {h.shrink:.3g} ({low:.3g} to {high:.3g})"
+        text = change(h.before, h.after, h.ci95)
         entries.append((f"withheld {h.fold}", h.before, h.after, text, GREEN))
     for word, after in r.runners_up.items():
-        entries.append((f"withheld {r.held_out[0].fold},\nwith {word} instead",
-                        r.held_out[0].before, after, "", COLOURS[3]))  # fmt: skip
+        main = r.held_out[0]
+        entries.append((f"withheld {main.fold},\nwith {word} instead", main.before, after,
+                        change(main.before, after), COLOURS[3]))  # fmt: skip
     figure = blank(8.5, 1.9 + 0.5 * len(entries))
     axes = figure.add_subplot()
-    for i, (_, before, after, text, colour) in enumerate(entries):
+    for i, (_, before, after, _, colour) in enumerate(entries):
         b, a = before * MM, after * MM
         axes.plot([a, b], [i, i], "-", color="0.7", linewidth=2, zorder=1)
         axes.plot(b, i, "o", color="black", markerfacecolor="white", markersize=8,
                   label="_" if i else "before")  # fmt: skip
         axes.plot(a, i, "o", color=colour, markersize=8)
-        middle = (float(np.sqrt(max(a * b, 1e-300))), i)
-        axes.annotate(text or f"{b / a if a > 0 else 1:.3g}", middle, xytext=(0, 5),
-                      textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
     axes.plot([], [], "o", color=GREEN, label=f"after, {_after(r)}")
     if r.runners_up:
         axes.plot([], [], "o", color=COLOURS[3], label="after, with another effect instead")
@@ -263,10 +281,33 @@ def withheld(r: GapResult) -> Figure:
     axes.set_yticks(range(len(entries)), [e[0] for e in entries])
     axes.set_ylim(len(entries) - 0.5, -0.7)
     log_axis(axes)
+    for i, (_, before, after, text, _) in enumerate(entries):
+        _above(axes, float(np.sqrt(max(before * after * MM**2, 1e-300))), i, text)
     axes.set_xlabel(_gap_label(r, "Gap", "rms in mm"))
     axes.set_title(f"How far the gap shrinks {_after(r)}", fontsize=11)
     shared_legend(figure, [axes])
     return figure
+
+
+def change(before: float, after: float, ci95: tuple[float, float] | None = None) -> str:
+    """`26.5 times smaller (18 to 38.9)`. ci95: of before over after; none where it is not known."""
+    if before <= 0 or after <= 0:
+        return "unchanged" if before == after else ""
+    grows = after > before
+    factor, word = (after / before, "larger") if grows else (before / after, "smaller")
+    text = f"{factor:.3g} times {word}"
+    if ci95 is None or not 0 < ci95[0] <= ci95[1] < np.inf:
+        return text
+    low, high = (1 / ci95[1], 1 / ci95[0]) if grows else ci95
+    return f"{text} ({low:.3g} to {high:.3g})"
+
+
+def _above(axes: Any, x: float, y: float, text: str) -> None:
+    """Text above a point of a logarithmic x axis; near an edge it runs inwards."""
+    low, high = np.log(axes.get_xlim())
+    share = (np.log(x) - low) / (high - low)
+    side = "right" if share > 0.75 else "left" if share < 0.25 else "center"
+    axes.annotate(text, (x, y), xytext=(0, 5), textcoords="offset points", ha=side, fontsize=8)
 
 
 def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
@@ -276,7 +317,7 @@ def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
     for (axes,), s in zip(grid, shown, strict=True):
         axes.axhline(0, color="0.4", linewidth=0.8)
         for sense, label, edge, fill, marker in _SENSES:
-            _left_by_runs(r, p, axes, s, sense)
+            _left_by_runs(r, p, axes, s, sense, f"{label}: single runs")
             here = np.flatnonzero((m.setup == s) & _of_sense(m, sense))
             here = here[np.argsort(m.load[here], kind="stable")]
             if not here.size:
@@ -295,15 +336,16 @@ def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
     return figure
 
 
-def _left_by_runs(r: GapResult, p: Points, axes: Any, s: int, sense: int) -> None:
+def _left_by_runs(r: GapResult, p: Points, axes: Any, s: int, sense: int, label: str) -> None:
     """Residual of every run as a faint line."""
     x, _, _ = _axes_of(r, p)
     colour = BLUE if sense == RISING else ORANGE
-    for run in np.unique(p.run[p.setup == s]):
+    for run in np.unique(p.run[(p.setup == s) & (p.sense == sense)]):
         path = (p.run == run) & (p.sense == sense)
         # a running recording would join the ends of its cycles
         style = "," if r.bench.rows.continuous else "-"
-        axes.plot(x[path], p.gap_after[path], style, color=colour, linewidth=0.7, alpha=0.45)
+        axes.plot(x[path], p.gap_after[path], style, color=colour, linewidth=0.7, alpha=0.45,
+                  label=label)  # fmt: skip
 
 
 def _of_sense(m: Remainder, sense: int) -> Any:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -19,7 +21,7 @@ def panels(setups: int, *, below: bool = False) -> tuple[Figure, list[list[Any]]
     lines = -(-len(shown) // columns)
     figure = blank(7.5 if columns == 1 else 4.2 * columns + 0.6,
                      1.4 + (4.4 if below else 3.3) * lines)  # fmt: skip
-    heights = [3.0, 1.3] * lines if below else None
+    heights = [3.0, 1.6] * lines if below else None
     deep = 2 if below else 1
     axes = figure.subplots(lines * deep, columns, squeeze=False, height_ratios=heights,
                            sharey=False if below else "all")  # fmt: skip
@@ -74,6 +76,21 @@ def shared_legend(figure: Figure, everywhere: list[Any]) -> None:
         fitting = int(13 * figure.get_size_inches()[0] / (max(map(len, found)) + 6))
         figure.legend(list(found.values()), list(found), loc="outside lower center", frameon=False,
                       fontsize=8, ncols=max(1, min(len(found), fitting)))  # fmt: skip
+
+
+def noise_axis(axes: Any, noise: float, most: float) -> None:
+    """A y axis for what reaches from the noise to `most`: linear within the noise, logarithmic
+    beyond it; linear throughout where that is less than a decade."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    if not 0 < 10 * noise < most < np.inf:
+        return
+    axes.set_yscale("symlog", linthresh=noise, linscale=0.5)
+    lowest, highest = np.ceil(np.log10(2 * noise)), np.floor(np.log10(most))
+    decades = 10.0 ** np.arange(highest, lowest - 1, -np.ceil((highest - lowest + 1) / 3))
+    axes.yaxis.set_major_locator(FixedLocator([*-decades, 0.0, *decades[::-1]]))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(lambda v, _: f"{v:g}".replace("-", "\N{MINUS SIGN}"))
 
 
 def log_axis(axes: Any) -> None:

@@ -43,7 +43,7 @@ def gap_map(r: GapResult, p: Points) -> Figure:
     _ticks(bar, norm)
     how = " (force over simulated stiffness)" if r.bench.imposed else ""
     bar.set_label(f"Measured minus simulated in mm{how}; pale: within the noise")
-    figure.suptitle("Where the gap lies: one strip per repetition", fontsize=11)
+    figure.suptitle("Where the gap lies: one strip per repetition, the first on top", fontsize=11)
     return figure
 
 
@@ -144,5 +144,5 @@ def _ticks(bar: Any, norm: Any) -> None:
     decades = 10.0 ** np.arange(np.ceil(np.log10(noise * 2.5)), np.log10(most))
     ticks = np.concatenate([[noise], decades])
     bar.set_ticks(np.concatenate([-ticks[::-1], [0.0], ticks]))
-    bar.ax.yaxis.set_major_formatter(lambda v, _: f"{v:.2g}")
+    bar.ax.yaxis.set_major_formatter(lambda v, _: f"{v:.2g}".replace("-", "\N{MINUS SIGN}"))
     bar.ax.minorticks_off()

@@ -6,6 +6,7 @@ import csv
 import io
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from identification.gap.base import prediction
 from rig import cli
 from rig.dataset import write
 from rig.diagnose import Diagnosis, diagnose
-from rig.gap_figures import draw
+from rig.gap_figures import change, draw, legs
+from rig.gap_layout import blank, noise_axis
 from rig.gap_map import _cells
 from rig.gap_points import held_table, point_table, points, remainder_table, write_table
 from rig.tables import import_table
@@ -175,6 +177,57 @@ def test_cells_cover_the_range_without_holes() -> None:
     assert cells[0][0] == 0.0
     assert cells[-1][1] == 1.0
     assert all(low <= value <= high for low, high, value in cells)
+
+
+def test_no_line_crosses_what_nobody_looked_at(tmp_path: Path) -> None:
+    steps = [("zero", 0, 0.0), *(("loading", i, 20.0 * i) for i in (1, 2, 3)), ("zero", 0, 0.0)]
+    rows = [f"x,{r},{b},{s},{i},{f},{f / 95}" for r in (1, 2) for i, (b, s, f) in enumerate(steps)]
+    text = "\n".join([table().splitlines()[0], *rows, ""])
+    p = points(diagnosed(tmp_path, text).result)
+    found = [leg.tolist() for leg in legs(p, p.force, 0)]
+    assert found == [[0, 1, 2, 3], [4], [5, 6, 7, 8], [9]]
+
+
+@pytest.mark.parametrize(
+    ("sense", "load", "found"),
+    [
+        ([0, 1, 1, 0], [0, 10, 100, 0], [[0, 1, 2], [3]]),  # a large step up is a step
+        ([0, 1, 1, 0], [0, 100, 40, 0], [[0, 1, 2, 3]]),  # a cycle's last small step
+        ([0, 1, 2, 0], [0, 100, 90, 0], [[0, 1, 2, 3]]),
+    ],
+)
+def test_only_the_load_taken_off_at_once_ends_a_line(
+    sense: list[int], load: list[float], found: list[list[int]]
+) -> None:
+    nil = np.zeros(4, int)
+    run: Any = SimpleNamespace(setup=nil, run=nil, sense=np.array(sense))
+    assert [leg.tolist() for leg in legs(run, np.array(load), 0)] == found
+
+
+def test_lines_follow_the_load_step_by_step(slipped: Diagnosis) -> None:
+    p = points(slipped.result)
+    runs = [np.flatnonzero((p.setup == 1) & (p.run == i)) for i in np.unique(p.run[p.setup == 1])]
+    assert [leg.tolist() for leg in legs(p, p.force, 1)] == [run.tolist() for run in runs]
+
+
+def test_change_of_the_gap_in_words() -> None:
+    assert change(1.8, 0.0679, (18.04, 38.86)) == "26.5 times smaller (18 to 38.9)"
+    assert change(1.0, 1.25, (0.5, 0.8)) == "1.25 times larger (1.25 to 2)"
+    assert change(2.0, 1.0) == "2 times smaller"
+    assert change(2.0, 1.0, (0.0, 3.0)) == "2 times smaller"
+    assert change(0.0, 0.0) == "unchanged"
+
+
+def test_small_gaps_show_beside_large_ones() -> None:
+    axes = blank(4, 3).add_subplot()
+    axes.plot([0, 1], [0.0, 6.0])
+    noise_axis(axes, 1.0, 6.0)
+    assert axes.get_yscale() == "linear"
+    axes.plot([0, 1], [-0.02, 6.0])
+    noise_axis(axes, 0.003, 6.0)
+    assert axes.get_yscale() == "symlog"
+    assert axes.get_yticks().tolist() == [-1, -0.1, -0.01, 0, 0.01, 0.1, 1]
+    assert axes.yaxis.get_major_formatter()(-0.01) == "\N{MINUS SIGN}0.01"
 
 
 def test_tables_keep_nine_digits_and_leave_out_what_is_not_defined(tmp_path: Path) -> None:
