@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,9 +29,12 @@ class Ending:
 
 
 class ChildProcess:
-    """`python -m MODULE` in this interpreter, which finds the project as this process does."""
+    """`python -m MODULE` in this interpreter, which finds the project as this process does.
 
-    def __init__(self, module: str) -> None:
+    environment: what it finds set beside, or instead of, this process's own variables.
+    """
+
+    def __init__(self, module: str, environment: Mapping[str, str] | None = None) -> None:
         root = str(Path(__file__).resolve().parent.parent)
         path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (`close` does)
@@ -39,7 +43,7 @@ class ChildProcess:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._log,
-            env={**os.environ, "PYTHONPATH": path},
+            env={**os.environ, "PYTHONPATH": path, **(environment or {})},
             start_new_session=True,
         )
         assert self._process.stdin is not None

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import queue
-import subprocess
-import sys
-import tempfile
 import threading
 import time
 from collections.abc import Sequence
@@ -15,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from rig.child_process import ChildProcess
 from rig.threads import NAMES
 
 Status = Literal["answered", "refused", "crashed", "late"]
@@ -36,22 +33,21 @@ class Reply:
 class Diagnoser:
     """One process; started when it is first needed, and again after a crash or a missed deadline.
 
-    command: the program, for tests; left out: `rig.blind.worker` in this interpreter.
+    module: the program; another one only in tests.
     """
 
-    def __init__(self, deadline_s: float, command: Sequence[str] | None = None) -> None:
+    def __init__(self, deadline_s: float, module: str = "rig.blind.worker") -> None:
         self._deadline_s = deadline_s
-        self._command = tuple(command or (sys.executable, "-m", "rig.blind.worker"))
-        self._child: subprocess.Popen[str] | None = None
-        self._lines: queue.Queue[str | None] = queue.Queue()
-        self._log: IO[str] | None = None
+        self._module = module
+        self._child: ChildProcess | None = None
+        self._reader: threading.Thread | None = None
+        self._lines: queue.Queue[bytes | None] = queue.Queue()
         self._closed = threading.Event()
 
     def diagnose(self, path: Path, withhold: Sequence[str]) -> Reply:
         """The reply for one data set; never raises for what happens in the other process."""
         if self._closed.is_set():
             return Reply("crashed", 0.0, reason="the check was stopped")
-        start = time.monotonic()
         if self._child is None:
             failure = self._start()
             if failure is not None:
@@ -64,7 +60,7 @@ class Diagnoser:
         except queue.Empty:
             self._end()
             return Reply("late", self._deadline_s, reason=f"not done after {self._deadline_s:g} s")
-        except OSError:
+        except (OSError, ValueError):  # it has ended; or another thread has closed it
             line = None
         if line is None:
             return self._crashed(time.monotonic() - start)
@@ -77,22 +73,10 @@ class Diagnoser:
 
     def _start(self) -> Reply | None:
         """Starts the process and waits until it is ready; a reply if it does not come to that."""
-        self._log = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
-        root = str(Path(__file__).parents[2])
-        path = os.pathsep.join(p for p in (root, os.environ.get("PYTHONPATH")) if p)
         self._lines = queue.Queue()
-        child = subprocess.Popen(
-            self._command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._log,
-            text=True,
-            encoding="utf-8",
-            env={**os.environ, "PYTHONPATH": path, **dict.fromkeys(_THREADS, "1")},
-            start_new_session=True,  # Ctrl-C is the parent's to answer
-        )
-        self._child = child
-        threading.Thread(target=_pump, args=(child.stdout, self._lines), daemon=True).start()
+        self._child = child = ChildProcess(self._module, dict.fromkeys(_THREADS, "1"))
+        self._reader = threading.Thread(target=_pump, args=(child.output, self._lines), daemon=True)
+        self._reader.start()
         try:
             ready = self._lines.get(timeout=START_S)
         except queue.Empty:
@@ -102,45 +86,30 @@ class Diagnoser:
 
     def _write(self, question: str) -> None:
         child = self._child
-        if child is None or child.stdin is None:
+        if child is None:
             raise BrokenPipeError
-        child.stdin.write(question + "\n")
-        child.stdin.flush()
+        child.send(question.encode() + b"\n")
 
     def _crashed(self, seconds: float) -> Reply:
-        reason = "it ended without a word"
-        if self._log is not None and not self._log.closed:
-            self._log.seek(0)
-            said = [line for line in self._log.read().splitlines() if line.strip()]
-            reason = said[-1] if said else reason
+        child = self._child
+        said = "" if child is None else child.ending().line
         self._end()
-        return Reply("crashed", seconds, reason=reason)
+        return Reply("crashed", seconds, reason=said or "it ended without a word")
 
     def _end(self) -> None:
         child, self._child = self._child, None
-        log, self._log = self._log, None
-        if child is not None:
-            child.kill()
-            child.wait(timeout=ENDING_S + START_S)
-            if child.stdin is not None:
-                _close(child.stdin)
-        if log is not None:
-            log.close()
+        if child is None:
+            return
+        child.kill()
+        if self._reader is not None:
+            self._reader.join(ENDING_S)
+        child.close()
 
 
-def _close(pipe: IO[str]) -> None:
-    try:
-        pipe.close()
-    except OSError:  # what was left to send has no reader any more
-        return
-
-
-def _pump(pipe: IO[str] | None, lines: queue.Queue[str | None]) -> None:
+def _pump(output: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
     """Hands on line by line; None at the end."""
-    if pipe is not None:
-        with pipe:
-            for line in pipe:
-                lines.put(line)
+    for line in output:
+        lines.put(line)
     lines.put(None)
 
 

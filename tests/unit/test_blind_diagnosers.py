@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,8 +29,16 @@ for line in sys.stdin:
 
 
 @pytest.fixture
-def diagnoser() -> Iterator[Diagnoser]:
-    out = Diagnoser(20.0, [sys.executable, "-c", STAND_IN])
+def stand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A module that answers in the worker's place."""
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (tmp_path / "stand_in.py").write_text(STAND_IN)
+    return "stand_in"
+
+
+@pytest.fixture
+def diagnoser(stand_in: str) -> Iterator[Diagnoser]:
+    out = Diagnoser(20.0, stand_in)
     yield out
     out.close()
 
@@ -61,8 +69,8 @@ def test_refusals_keep_their_reason(diagnoser: Diagnoser) -> None:
     assert (reply.status, reply.reason) == ("refused", "no simulation")
 
 
-def test_a_late_answer_is_given_up_and_the_process_with_it() -> None:
-    diagnoser = Diagnoser(0.5, [sys.executable, "-c", STAND_IN])
+def test_a_late_answer_is_given_up_and_the_process_with_it(stand_in: str) -> None:
+    diagnoser = Diagnoser(0.5, stand_in)
     try:
         reply = diagnoser.diagnose(Path("slow"), ())
         assert (reply.status, reply.reason) == ("late", "not done after 0.5 s")
@@ -70,8 +78,9 @@ def test_a_late_answer_is_given_up_and_the_process_with_it() -> None:
         diagnoser.close()
 
 
-def test_a_program_that_does_not_start_is_a_crash() -> None:
-    diagnoser = Diagnoser(5.0, [sys.executable, "-c", "raise SystemExit('no such thing')"])
+def test_a_program_that_does_not_start_is_a_crash(stand_in: str, tmp_path: Path) -> None:
+    (tmp_path / "stand_in.py").write_text("raise SystemExit('no such thing')")
+    diagnoser = Diagnoser(5.0, stand_in)
     try:
         reply = diagnoser.diagnose(Path("a"), ())
         assert (reply.status, reply.reason) == ("crashed", "no such thing")
@@ -82,3 +91,13 @@ def test_a_program_that_does_not_start_is_a_crash() -> None:
 def test_nothing_is_asked_after_the_end(diagnoser: Diagnoser) -> None:
     diagnoser.close()
     assert diagnoser.diagnose(Path("a"), ()).status == "crashed"
+
+
+def test_a_case_under_way_when_the_check_stops_comes_back(diagnoser: Diagnoser) -> None:
+    assert diagnoser.diagnose(Path("a"), ()).status == "answered"
+    stop = threading.Timer(0.3, diagnoser.close)
+    stop.start()
+    reply = diagnoser.diagnose(Path("slow"), ())
+    stop.join()
+    assert reply.status == "crashed"
+    assert reply.seconds < 5
