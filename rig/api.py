@@ -281,7 +281,7 @@ def _joint_tables(out: Answer) -> None:
 
 def _gap_tables(out: Answer) -> None:
     from identification.gap.remainder import remainder
-    from rig.gap_points import held_table, remainder_table
+    from rig.gap_points import held_table, remainder_table, shown
 
     found, r = out.json, out.result.result
     ranked = sorted(found["probabilities"].items(), key=lambda item: -item[1])
@@ -296,8 +296,8 @@ def _gap_tables(out: Answer) -> None:
              "unit", "indistinguishable_from")  # fmt: skip
     out._add("effects", "Effects in the explanation", names, rows)
     for name, title, table in (
-        ("gap", "How far the gap shrinks", held_table(r)),
-        ("remainder", "What remains", remainder_table(r, remainder(r.engine, r.fit))),
+        ("gap", "How far the gap shrinks", held_table(shown(r))),
+        ("remainder", "What remains", remainder_table(shown(r), remainder(r.engine, r.fit))),
     ):
         columns = {key: list(values) for key, values in table.items()}
         out.tables[name] = Table(columns, title=title, banners=out.banners)

@@ -28,21 +28,20 @@ from rig.gap_points import (
     MM,
     RISING,
     Points,
+    Shown,
     Table,
     held_table,
     point_table,
     points,
     remainder_table,
     session_clock,
-    setup_name,
+    shown,
     write_table,
 )
 from rig.plotting import COLOURS, write_figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from identification.gap.diagnose import GapResult
 
 BLUE, ORANGE, GREEN = COLOURS[0], COLOURS[1], COLOURS[2]
 GREY = "0.45"
@@ -77,9 +76,10 @@ class _Drawing:
 
     def __init__(self, diagnosis: Diagnosis, name: str) -> None:
         self.banners, self.name = diagnosis.banners, name
-        self.r: GapResult = diagnosis.result
-        self.points: Points = points(self.r)
-        self.remainder: Remainder = remainder(self.r.engine, self.r.fit)
+        result = diagnosis.result
+        self.r: Shown = shown(result)
+        self.points: Points = points(result)
+        self.remainder: Remainder = remainder(result.engine, result.fit)
 
     def figures(self) -> Iterator[tuple[str, Figure]]:
         """(name, figure) one after the other: only one is held in memory."""
@@ -112,37 +112,37 @@ class _Drawing:
         return figure
 
 
-def curve(r: GapResult, p: Points) -> Figure:
+def curve(r: Shown, p: Points) -> Figure:
     """Measurement and simulation before and after, one panel per pose and direction; below each,
     measured minus simulated, which the curves alone would hide, beside the noise.
 
     Displacement over force; where the displacement was imposed, force over displacement.
     """
-    figure, grid, shown = panels(len(r.bench.data.setups), below=True)
+    figure, grid, numbers = panels(len(r.setups), below=True)
     scale = _axes_of(r, p)[2]
     noise = 2 * float(np.median(p.noise * scale))
-    for (upper, lower), s in zip(grid, shown, strict=True):
+    for (upper, lower), s in zip(grid, numbers, strict=True):
         _curve_panel(r, p, upper, s)
         _gap_panel(r, p, lower, s, noise)
-        upper.set_title(setup_name(r, s), fontsize=10)
+        upper.set_title(r.setup_name(s), fontsize=10)
     noise_axis(grid[0][1], noise, float(np.abs(p.gap_before * scale).max()))  # they share it
     for upper, lower in first_column(grid):
-        upper.set_ylabel("Force in N" if r.bench.imposed else "Displacement in mm")
-        lower.set_ylabel("Gap in N" if r.bench.imposed else "Gap in mm")
-    label_below(grid, "Displacement in mm" if r.bench.imposed else "Force in N")
+        upper.set_ylabel("Force in N" if r.imposed else "Displacement in mm")
+        lower.set_ylabel("Gap in N" if r.imposed else "Gap in mm")
+    label_below(grid, "Displacement in mm" if r.imposed else "Force in N")
     set_title(figure, f"Measured, and simulated before and after ({_after(r)})")
     shared_legend(figure, [axes for pair in grid for axes in pair])
     return figure
 
 
-def _axes_of(r: GapResult, p: Points) -> tuple[Any, Any, Any]:
+def _axes_of(r: Shown, p: Points) -> tuple[Any, Any, Any]:
     """What drives the rig, what answers (n,), and mm to the answer's unit (n,)."""
-    if r.bench.imposed:
+    if r.imposed:
         return p.displacement, p.force, 1 / p.stated
     return p.force, p.displacement, np.ones(len(p.force))
 
 
-def _curve_panel(r: GapResult, p: Points, axes: Any, s: int) -> None:
+def _curve_panel(r: Shown, p: Points, axes: Any, s: int) -> None:
     mine = p.setup == s
     x, y, scale = _axes_of(r, p)
     many = np.count_nonzero(mine) > _MANY
@@ -164,7 +164,7 @@ def _curve_panel(r: GapResult, p: Points, axes: Any, s: int) -> None:
                   label="_" if i else "simulated after (each run)")  # fmt: skip
 
 
-def _gap_panel(r: GapResult, p: Points, axes: Any, s: int, noise: float) -> None:
+def _gap_panel(r: Shown, p: Points, axes: Any, s: int, noise: float) -> None:
     """Measured minus simulated, before and after, run by run; noise: half as wide as its band."""
     x, _, scale = _axes_of(r, p)
     axes.axhspan(-noise, noise, color="0.88", zorder=0, label=_NOISE)
@@ -190,18 +190,18 @@ def legs(p: Points, x: Any, s: int) -> Iterator[Any]:
         yield from np.split(path, 1 + np.flatnonzero(off & far))
 
 
-def residual(r: GapResult, p: Points) -> Figure:
+def residual(r: Shown, p: Points) -> Figure:
     """What the chosen explanation leaves, over force and over the session's time."""
     figure = blank(11.0, 4.6)
     left, right = figure.subplots(1, 2, sharey=True)
     band = 2 * float(np.median(p.noise))
     minutes, unit = session_clock(p)
-    for axes, x in ((left, p.displacement if r.bench.imposed else p.force), (right, minutes)):
+    for axes, x in ((left, p.displacement if r.imposed else p.force), (right, minutes)):
         axes.axhspan(-band, band, color="0.88", zorder=0, label=_NOISE)
         axes.axhline(0, color="0.4", linewidth=0.8, zorder=1)
         _residual_points(r, p, axes, x)
-    left.set_xlabel("Displacement in mm" if r.bench.imposed else "Force in N")
-    assumed = not r.bench.rows.clock and len(np.unique(p.run)) > 1
+    left.set_xlabel("Displacement in mm" if r.imposed else "Force in N")
+    assumed = not r.clock and len(np.unique(p.run)) > 1
     right.set_xlabel(f"Time in the session in {unit}" + ", rests assumed" * assumed)
     left.set_ylabel(_gap_label(r, "Left"))
     set_title(
@@ -213,8 +213,8 @@ def residual(r: GapResult, p: Points) -> Figure:
     return figure
 
 
-def _residual_points(r: GapResult, p: Points, axes: Any, x: Any) -> None:
-    count = len(r.bench.data.setups)
+def _residual_points(r: Shown, p: Points, axes: Any, x: Any) -> None:
+    count = len(r.setups)
     many = len(x) > _MANY
     for s in range(count):
         for sense, label, _, _, marker in _SENSES:
@@ -225,13 +225,13 @@ def _residual_points(r: GapResult, p: Points, axes: Any, x: Any) -> None:
             axes.plot(x[here], p.gap_after[here], marker, color=colour,
                       markerfacecolor=colour if sense == RISING else "white",
                       markersize=2 if many else 4, markeredgewidth=0.6 if many else 0.9,
-                      label=f"{setup_name(r, s)}: {label}", rasterized=many)  # fmt: skip
+                      label=f"{r.setup_name(s)}: {label}", rasterized=many)  # fmt: skip
     zero = p.sense == 0
     if zero.any():
         axes.plot(x[zero], p.gap_after[zero], "x", color=GREY, markersize=4, label="zero load")
 
 
-def probabilities(r: GapResult) -> Figure:
+def probabilities(r: Shown) -> Figure:
     """Probability of every word above half a percent of being the main cause; verdict marked."""
     ranked = _ranked(r, LEAST_PROBABILITY)
     alike = {w for e in r.effects if e.name == r.verdict for w in e.indistinguishable_from}
@@ -256,7 +256,7 @@ def probabilities(r: GapResult) -> Figure:
     return figure
 
 
-def withheld(r: GapResult) -> Figure:
+def withheld(r: Shown) -> Figure:
     """Before and after, fitted and withheld in turn, beside other effects; noise as a line."""
     entries = [("fitted", r.before, r.after, change(r.before, r.after), GREEN)]
     for h in r.held_out:
@@ -310,11 +310,11 @@ def _above(axes: Any, x: float, y: float, text: str) -> None:
     axes.annotate(text, (x, y), xytext=(0, 5), textcoords="offset points", ha=side, fontsize=8)
 
 
-def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
+def remaining(r: Shown, p: Points, m: Remainder) -> Figure:
     """What repeats of the residual, as a smooth curve with its uncertainty, over the residuals of
     all runs, setup by setup."""
-    figure, grid, shown = panels(len(r.bench.data.setups))
-    for (axes,), s in zip(grid, shown, strict=True):
+    figure, grid, numbers = panels(len(r.setups))
+    for (axes,), s in zip(grid, numbers, strict=True):
         axes.axhline(0, color="0.4", linewidth=0.8)
         for sense, label, edge, fill, marker in _SENSES:
             _left_by_runs(r, p, axes, s, sense, f"{label}: single runs")
@@ -322,28 +322,28 @@ def remaining(r: GapResult, p: Points, m: Remainder) -> Figure:
             here = here[np.argsort(m.load[here], kind="stable")]
             if not here.size:
                 continue
-            x = m.displacement[here] * MM if r.bench.imposed else m.load[here]
+            x = m.displacement[here] * MM if r.imposed else m.load[here]
             mean, sd = m.mean[here] * MM, m.sd[here] * MM
             axes.plot(x, m.residual[here] * MM, marker, color=edge, markerfacecolor=fill,
                       markersize=4, label=f"{label}: mean")  # fmt: skip
             axes.fill_between(x, mean - 2 * sd, mean + 2 * sd, color=edge, alpha=0.2, linewidth=0)
             axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
-        axes.set_title(setup_name(r, s), fontsize=10)
-    label_below(grid, "Displacement in mm" if r.bench.imposed else "Force in N")
+        axes.set_title(r.setup_name(s), fontsize=10)
+    label_below(grid, "Displacement in mm" if r.imposed else "Force in N")
     figure.supylabel(_gap_label(r, "Left unexplained"), fontsize=10)
     set_title(figure, _remainder_title(r, m))
     shared_legend(figure, [axes for (axes,) in grid])
     return figure
 
 
-def _left_by_runs(r: GapResult, p: Points, axes: Any, s: int, sense: int, label: str) -> None:
+def _left_by_runs(r: Shown, p: Points, axes: Any, s: int, sense: int, label: str) -> None:
     """Residual of every run as a faint line."""
     x, _, _ = _axes_of(r, p)
     colour = BLUE if sense == RISING else ORANGE
     for run in np.unique(p.run[(p.setup == s) & (p.sense == sense)]):
         path = (p.run == run) & (p.sense == sense)
         # a running recording would join the ends of its cycles
-        style = "," if r.bench.rows.continuous else "-"
+        style = "," if r.continuous else "-"
         axes.plot(x[path], p.gap_after[path], style, color=colour, linewidth=0.7, alpha=0.45,
                   label=label)  # fmt: skip
 
@@ -354,7 +354,7 @@ def _of_sense(m: Remainder, sense: int) -> Any:
     return known == sense
 
 
-def _remainder_title(r: GapResult, m: Remainder) -> str:
+def _remainder_title(r: Shown, m: Remainder) -> str:
     low, high = (edge * MM for edge in m.ci95)
     differs = _unrepeated(m)
     if m.largest is None:
@@ -362,7 +362,7 @@ def _remainder_title(r: GapResult, m: Remainder) -> str:
         return f"Left {_after(r)}: {seen}; {differs}"
     e = m.largest
     where = ", ".join(w for w in (e.pose, e.direction, BRANCH_NAMES[e.branch]) if w)
-    at = f"{e.displacement * MM:.3g} mm" if r.bench.imposed else f"{e.force:.4g} N"
+    at = f"{e.displacement * MM:.3g} mm" if r.imposed else f"{e.force:.4g} N"
     return (
         f"Left {_after(r)}: {m.rms * MM:.2g} mm rms repeat (95 %: {low:.2g} to {high:.2g}), "
         f"most at {where}, {at}: {e.mean * MM:.2g} mm; {differs}"
@@ -377,17 +377,17 @@ def _unrepeated(m: Remainder) -> str:
     return f"another {m.unrepeated_rms * MM:.2g} mm rms is finer or does not repeat"
 
 
-def _ranked(r: GapResult, least: float) -> dict[str, float]:
+def _ranked(r: Shown, least: float) -> dict[str, float]:
     ranked = sorted(r.probabilities.items(), key=lambda item: -item[1])
     return {word: p for word, p in ranked if p >= least or word == r.verdict}
 
 
-def _after(r: GapResult) -> str:
+def _after(r: Shown) -> str:
     """What stands in the simulation after."""
     if r.effects:
         return "with " + " + ".join(e.name for e in r.effects)
     return "with springs and gains refitted"
 
 
-def _gap_label(r: GapResult, what: str, unit: str = "in mm") -> str:
-    return f"{what} {unit}" + (" (force over simulated stiffness)" if r.bench.imposed else "")
+def _gap_label(r: Shown, what: str, unit: str = "in mm") -> str:
+    return f"{what} {unit}" + (" (force over simulated stiffness)" if r.imposed else "")

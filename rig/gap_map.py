@@ -7,19 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.gap.data import Array, Flags
-from rig.gap_points import FALLING, MM, RISING, Points, session_clock, setup_name
+from rig.gap_points import FALLING, MM, RISING, Points, Shown, session_clock
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from identification.gap.diagnose import GapResult
 
 _BINS = 40  # of force, for running recordings
 _COLOURS = "PuOr_r"  # orange against purple: told apart by colour-blind readers
 _BRANCHES = {RISING: "loading", FALLING: "unloading"}
 
 
-def gap_map(r: GapResult, p: Points) -> Figure:
+def gap_map(r: Shown, p: Points) -> Figure:
     """Gap before and after as colours: above over force, line by line; below over time.
 
     Colours are linear within the noise, logarithmic beyond it, alike in all panels: what is pale
@@ -41,13 +39,13 @@ def gap_map(r: GapResult, p: Points) -> Figure:
     panels[0, 0].set_ylim(len(lines) - 0.4, -0.6)
     bar = figure.colorbar(image, ax=panels, shrink=0.8, aspect=40)
     _ticks(bar, norm)
-    how = " (force over simulated stiffness)" if r.bench.imposed else ""
+    how = " (force over simulated stiffness)" if r.imposed else ""
     bar.set_label(f"Measured minus simulated in mm{how}; pale: within the noise")
     figure.suptitle("Where the gap lies: one strip per repetition, the first on top", fontsize=11)
     return figure
 
 
-def _lines(r: GapResult, p: Points) -> list[tuple[str, Flags]]:
+def _lines(r: Shown, p: Points) -> list[tuple[str, Flags]]:
     """(name, points) per setup and branch; zero load before the highest load of a run belongs to
     loading, that after it to unloading."""
     sense = p.sense.copy()
@@ -57,11 +55,11 @@ def _lines(r: GapResult, p: Points) -> list[tuple[str, Flags]]:
         zero = path[p.sense[path] == 0]
         sense[zero] = np.where(zero <= top, RISING, FALLING)
     out = []
-    for s in range(len(r.bench.data.setups)):
+    for s in range(len(r.setups)):
         for branch, word in _BRANCHES.items():
             mine = (p.setup == s) & (sense == branch)
             if mine.any():
-                out.append((f"{setup_name(r, s)}: {word}", mine))
+                out.append((f"{r.setup_name(s)}: {word}", mine))
     return out
 
 
@@ -74,7 +72,7 @@ def _norm(p: Points) -> Any:
 
 
 def _strips(
-    r: GapResult, p: Points, axes: Any, lines: list[tuple[str, Flags]], gap: Array, norm: Any
+    r: Shown, p: Points, axes: Any, lines: list[tuple[str, Flags]], gap: Array, norm: Any
 ) -> Any:
     """One rectangle per point: as wide as its share of the force, as high as its repetition's."""
     from matplotlib.collections import PolyCollection
@@ -98,7 +96,7 @@ def _strips(
     axes.autoscale_view()
     axes.set_facecolor("0.93")
     axes.grid(visible=False)
-    axes.set_xlabel("Displacement in mm" if r.bench.imposed else "Force in N")
+    axes.set_xlabel("Displacement in mm" if r.imposed else "Force in N")
     return image
 
 
@@ -124,18 +122,18 @@ def _cells(x: Array, gap: Array, span: float) -> list[tuple[float, float, float]
     return list(zip(at - left, at + right, values, strict=True))
 
 
-def _over_time(r: GapResult, p: Points, axes: Any, gap: Array, norm: Any) -> None:
+def _over_time(r: Shown, p: Points, axes: Any, gap: Array, norm: Any) -> None:
     time, unit = session_clock(p)
     axes.scatter(time, _driven(r, p), c=gap, cmap=_COLOURS, norm=norm, s=14, linewidths=0.3,
                  edgecolors="0.5", rasterized=len(time) > 1000)  # fmt: skip
     axes.set_facecolor("0.93")
     axes.set_xlabel(f"Time in the session in {unit}")
     if axes.get_subplotspec().is_first_col():
-        axes.set_ylabel("Displacement in mm" if r.bench.imposed else "Force in N")
+        axes.set_ylabel("Displacement in mm" if r.imposed else "Force in N")
 
 
-def _driven(r: GapResult, p: Points) -> Array:
-    return p.displacement if r.bench.imposed else p.force
+def _driven(r: Shown, p: Points) -> Array:
+    return p.displacement if r.imposed else p.force
 
 
 def _ticks(bar: Any, norm: Any) -> None:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from identification.gap.bench import Bench
 from identification.gap.data import BRANCH_NAMES, ZERO, Array, Ints
-from identification.gap.diagnose import GapResult
-from identification.gap.heldout import stated_prediction
+from identification.gap.diagnose import Effect, GapResult
+from identification.gap.heldout import HeldOut, stated_prediction
 from identification.gap.remainder import Remainder, branches
 
 MM = 1e3  # mm per m
@@ -60,6 +60,44 @@ class Points:
         return self.measured - self.after
 
 
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What figures and tables show of a diagnosis beside its points: no samples.
+
+    setups: (pose, direction) each. imposed: whether the rig drove the displacement; clock: whether
+    the session's time was recorded; continuous: a running recording. before, after, noise: m rms.
+    """
+
+    setups: tuple[tuple[str, str], ...]
+    imposed: bool
+    clock: bool
+    continuous: bool
+    verdict: str
+    probabilities: dict[str, float]
+    effects: tuple[Effect, ...]
+    noise: float
+    before: float
+    after: float
+    held_out: tuple[HeldOut, ...]
+    runners_up: dict[str, float]
+
+    def setup_name(self, number: int) -> str:
+        """`P1, x`; without an arm, `x`."""
+        pose, direction = self.setups[number]
+        return f"{pose}, {direction}" if pose else direction
+
+
+def shown(r: GapResult) -> Shown:
+    """Of a diagnosis."""
+    rows = r.bench.rows
+    return Shown(
+        setups=tuple((s.pose, s.direction) for s in r.bench.data.setups), imposed=r.bench.imposed,
+        clock=rows.clock, continuous=rows.continuous, verdict=r.verdict,
+        probabilities=r.probabilities, effects=r.effects, noise=r.noise, before=r.before,
+        after=r.after, held_out=r.held_out, runners_up=r.runners_up,
+    )  # fmt: skip
+
+
 def points(r: GapResult) -> Points:
     """The points of a diagnosis."""
     bench, rows = r.bench, r.bench.rows
@@ -92,12 +130,6 @@ def _sense(bench: Bench) -> Ints:
     return sense if bench.rows.continuous else np.where(bench.rows.zero, ZERO, sense)
 
 
-def setup_name(r: GapResult, number: int) -> str:
-    """`P1, x`; without an arm, `x`."""
-    s = r.bench.data.setups[number]
-    return f"{s.pose}, {s.direction}" if s.pose else s.direction
-
-
 def session_clock(p: Points) -> tuple[Array, str]:
     """(n,) time since the first point, and its unit."""
     seconds = p.session - p.session.min()
@@ -108,12 +140,11 @@ def session_clock(p: Points) -> tuple[Array, str]:
     return seconds, "s"
 
 
-def point_table(r: GapResult, p: Points) -> Table:
+def point_table(r: Shown, p: Points) -> Table:
     """One row per point; lengths in mm."""
-    setups = r.bench.data.setups
     table: dict[str, Sequence[Any] | NDArray[Any]] = {
-        "pose": [setups[s].pose for s in p.setup],
-        "direction": [setups[s].direction for s in p.setup],
+        "pose": [r.setups[s][0] for s in p.setup],
+        "direction": [r.setups[s][1] for s in p.setup],
         "repetition": p.repetition,
         "branch": [BRANCH_NAMES[b] for b in p.branch],
         "step": p.step,
@@ -121,7 +152,7 @@ def point_table(r: GapResult, p: Points) -> Table:
         "force_N": p.force,
         "displacement_mm": p.displacement,
     }
-    if r.bench.imposed:
+    if r.imposed:
         table["simulated_before_N"] = p.before / p.stated
         table["simulated_after_N"] = p.after / p.stated
     else:
@@ -131,12 +162,11 @@ def point_table(r: GapResult, p: Points) -> Table:
             "noise_sd_mm": p.noise}  # fmt: skip
 
 
-def remainder_table(r: GapResult, m: Remainder) -> Table:
+def remainder_table(r: Shown, m: Remainder) -> Table:
     """One row per level: residual mean, and the posterior of what repeats."""
-    setups = r.bench.data.setups
     return {
-        "pose": [setups[s].pose for s in m.setup],
-        "direction": [setups[s].direction for s in m.setup],
+        "pose": [r.setups[s][0] for s in m.setup],
+        "direction": [r.setups[s][1] for s in m.setup],
         "branch": [BRANCH_NAMES[b] for b in m.branch],
         "load_N": m.load,
         "samples": m.samples,
@@ -147,7 +177,7 @@ def remainder_table(r: GapResult, m: Remainder) -> Table:
     }
 
 
-def held_table(r: GapResult) -> Table:
+def held_table(r: Shown) -> Table:
     """Before and after, fitted, per way of withholding, and with other effects instead."""
     nan = float("nan")
     named = " + ".join(e.name for e in r.effects) or r.verdict

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from identification.gap.diagnose import GapResult
 from identification.gap.remainder import Remainder, remainder
 from rig.diagnose import Diagnosis
 from rig.gap_figures import curve, remaining, withheld
 from rig.gap_map import gap_map
-from rig.gap_points import Points, held_table, point_table, points, remainder_table
+from rig.gap_points import (
+    Points,
+    Shown,
+    held_table,
+    point_table,
+    points,
+    remainder_table,
+    shown,
+)
 from rig.report.document import Figure
 from rig.report.drawing import draw
 from rig.report.figures import watermark
@@ -28,11 +35,10 @@ Rows = tuple[tuple[object, ...], ...]
 class GapView:
     """What the figures of a diagnosis are drawn from, small enough to be handed to another process.
 
-    result: without engine, fit, candidates and pool, which no figure asks for any more. stem: what
-    the figures' names begin with.
+    stem: what the figures' names begin with.
     """
 
-    result: GapResult
+    shown: Shown
     points: Points
     rest: Remainder
     banners: tuple[str, ...]
@@ -42,17 +48,14 @@ class GapView:
 
 def view_of(diagnosis: Diagnosis, stem: str, *, png: bool) -> GapView:
     """Of a diagnosis."""
-    r, nothing = diagnosis.result, cast(Any, None)
-    light = replace(
-        r, engine=nothing, fit=nothing, found=nothing, bench=replace(r.bench, columns=[])
-    )
+    r = diagnosis.result
     rest = remainder(r.engine, r.fit)
-    return GapView(light, points(r), rest, diagnosis.banners, stem, png)
+    return GapView(shown(r), points(r), rest, diagnosis.banners, stem, png)
 
 
 def gap_figures(view: GapView, names: Sequence[str]) -> Iterator[Figure]:
     """Curve, map, withheld data, remainder, as far as they are named."""
-    r, p, rest = view.result, view.points, view.rest
+    r, p, rest = view.shown, view.points, view.rest
     known: dict[str, tuple[str, Callable[[], Plot], Callable[[], Table]]] = {
         "curve": ("Measurement, and the simulation before and after the effects.",
                   lambda: curve(r, p), lambda: point_table(r, p)),

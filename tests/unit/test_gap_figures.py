@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import pickle
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,7 +21,15 @@ from rig.diagnose import Diagnosis, diagnose
 from rig.gap_figures import change, draw, legs
 from rig.gap_layout import blank, noise_axis
 from rig.gap_map import _cells
-from rig.gap_points import held_table, point_table, points, remainder_table, write_table
+from rig.gap_points import (
+    held_table,
+    point_table,
+    points,
+    remainder_table,
+    shown,
+    write_table,
+)
+from rig.report.gap_pictures import view_of
 from rig.tables import import_table
 
 META = """robot: none
@@ -32,7 +41,7 @@ IMPOSED = META.replace("robot: none", "robot: none\nimposed: displacement")
 FIGURES = ("curve", "map", "residual", "probabilities", "withheld", "remainder")
 
 
-def table(*, slip_mm: float = 0.08, repetitions: int = 2) -> str:
+def table(*, slip_mm: float = 0.08, repetitions: int = 2, samples: int = 2) -> str:
     """Steps up and down; y slips by `slip_mm` beyond 60 N, for good; x is linear."""
     rng = np.random.default_rng(5)
     out = ["direction,repetition,branch,step,time_s,force_N,displacement_mm"]
@@ -46,9 +55,10 @@ def table(*, slip_mm: float = 0.08, repetitions: int = 2) -> str:
                 if direction == "y" and force > 60:
                     lasting = max(lasting, slip_mm * (force - 60) / 40)
                 u = force / k + lasting + rng.normal(0, 0.002)
+                at = 10 * t + 2 * np.arange(samples) / samples
                 out += [
-                    f"{direction},{repetition},{branch},{step},{10 * t + s},{force + e:.4f},{u:.6f}"
-                    for s, e in enumerate(rng.normal(0, 0.1, 2))
+                    f"{direction},{repetition},{branch},{step},{s},{force + e:.4f},{u:.6f}"
+                    for s, e in zip(at, rng.normal(0, 0.1, samples), strict=True)
                 ]
     return "\n".join(out) + "\n"
 
@@ -91,7 +101,7 @@ def test_points_are_the_measurement_and_its_simulations(slipped: Diagnosis) -> N
 
 def test_table_of_points_has_units_and_names(slipped: Diagnosis) -> None:
     p = points(slipped.result)
-    t: dict[str, Any] = dict(point_table(slipped.result, p))
+    t: dict[str, Any] = dict(point_table(shown(slipped.result), p))
     assert "simulated_after_mm" in t
     assert "simulated_after_N" not in t
     assert set(t["direction"]) == {"x", "y"}
@@ -100,11 +110,20 @@ def test_table_of_points_has_units_and_names(slipped: Diagnosis) -> None:
 
 def test_withheld_table_begins_with_the_fit_and_ends_with_the_rivals(slipped: Diagnosis) -> None:
     r = slipped.result
-    t = held_table(r)
+    t = held_table(shown(r))
     assert t["judged_on"][0] == "fitted"
     assert t["before_rms_mm"][0] == pytest.approx(r.before * 1e3)
     assert list(t["explanation"][len(t["explanation"]) - len(r.runners_up) :]) == list(r.runners_up)
     assert t["after_rms_mm"][1] == pytest.approx(r.held_out[0].after * 1e3)
+
+
+def test_what_a_report_draws_travels_without_the_samples(tmp_path: Path) -> None:
+    sizes = []
+    for samples in (2, 60):  # of a hold
+        found = diagnosed(tmp_path, table(samples=samples))
+        sizes.append(len(pickle.dumps(view_of(found, "a", png=False))))
+    assert sizes[1] < sizes[0] + 1000
+    assert sizes[0] < 20_000
 
 
 def test_every_figure_is_written_with_its_numbers(slipped: Diagnosis, tmp_path: Path) -> None:
@@ -137,7 +156,7 @@ def test_emulated_data_are_marked_in_every_figure_and_table(
 def test_imposed_displacement_is_told_in_newtons(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, cycles(), IMPOSED)
     p = points(found.result)
-    t: dict[str, Any] = dict(point_table(found.result, p))
+    t: dict[str, Any] = dict(point_table(shown(found.result), p))
     assert np.allclose(t["simulated_before_N"], 95 * p.displacement, atol=1e-6)
     assert np.allclose(t["gap_before_mm"], p.force / 95 - p.displacement, atol=1e-6)
     # rising while the displacement rises, though on the plateau the force only scatters
@@ -145,7 +164,7 @@ def test_imposed_displacement_is_told_in_newtons(tmp_path: Path) -> None:
     moving = np.abs(speed) > 0.3 * np.abs(speed).max()
     assert np.mean((p.sense == 1) == (speed > 0), where=moving) > 0.95
     assert len(draw(found, tmp_path / "figures")) == 16
-    assert len(remainder_table(found.result, _remainder(found))["load_N"]) > 10
+    assert len(remainder_table(shown(found.result), _remainder(found))["load_N"]) > 10
 
 
 def _remainder(found: Diagnosis) -> Any:
