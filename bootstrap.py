@@ -59,11 +59,21 @@ def _install(extras: str) -> None:
     if done == wanted or (done.startswith("[dev]") and done[len("[dev]") :] == wanted):
         return
     print("Setting up .venv (some minutes the first time)", file=sys.stderr, flush=True)
-    if not PYTHON.exists():
+    if not STAMP.exists():  # also where an earlier attempt was interrupted
         subprocess.check_call([sys.executable, "-m", "venv", str(VENV)])
     install = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     subprocess.check_call([*install, "-c", "constraints.txt", "-e", f".{extras}"], cwd=HOME)
     STAMP.write_text(wanted)
+
+
+def _call(command: list[str]) -> int:
+    """Ctrl-C reaches the command too, which ends in its own way: it is waited for."""
+    with subprocess.Popen(command, cwd=HOME) as child:
+        while True:
+            try:
+                return child.wait()
+            except KeyboardInterrupt:
+                continue
 
 
 def _demo() -> int:
@@ -73,7 +83,7 @@ def _demo() -> int:
     rig = str(BIN / "rig")
     measure = [rig, "measure", "protocols/paper_xy.yaml", "--station", "emulated", "-o", data]
     analyze = [rig, "analyze", data, "--figures", figures]
-    return subprocess.call(measure, cwd=HOME) or subprocess.call(analyze, cwd=HOME)
+    return _call(measure) or _call(analyze)
 
 
 def _test(words: list[str]) -> int:
@@ -86,11 +96,14 @@ def _test(words: list[str]) -> int:
     ]
     for check in checks:
         print("+", " ".join(check), flush=True)
-        status = subprocess.call([str(BIN / check[0]), *check[1:]], cwd=HOME)
+        status = _call([str(BIN / check[0]), *check[1:]])
         if status:
             return status
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)

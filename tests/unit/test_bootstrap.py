@@ -1,0 +1,37 @@
+"""The command that a newcomer types first, and leaves with Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parents[2]
+COMMAND = """
+import signal, sys, time
+try:
+    print("ready", flush=True)
+    time.sleep(30)
+except KeyboardInterrupt:
+    time.sleep(1)  # as long as it takes to close a file
+    print("kept", flush=True)
+    sys.exit(4)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_ctrl_c_lets_the_command_end_in_its_own_way() -> None:
+    code = f"import sys, bootstrap\nsys.exit(bootstrap._call([sys.executable, '-c', {COMMAND!r}]))"
+    started = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=HOME, text=True, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert started.stdout is not None
+    assert started.stdout.readline() == "ready\n"
+    os.killpg(started.pid, signal.SIGINT)
+    said, complaints = started.communicate(timeout=30)
+    assert (said, complaints, started.returncode) == ("kept\n", "", 4)
