@@ -114,7 +114,6 @@ def resume(
             rig.onlooker.record(record.kind, record.data)
         journal = Journal.reopen(journal_file)
         journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
-        say(f"resuming after {progress.rows} rows")
         return _carry_out(Job(path, protocol, station, journal, progress), rig, say)
 
 
@@ -167,7 +166,10 @@ def _opened(
             loader = LoaderWithBar(loader, protocol, len(progress.steps))
         loader = onlooker.operator(loader, clock, scripted=scripted)
         stack.callback(loader.close)
-        loader.open()
+        if progress.rows:
+            say(f"resuming after {progress.rows} rows")
+        say(SAFETY_NOTE)
+        loader.open()  # from here on the screen moves, and what is said would be painted over
         yield _Rig(station, devices, loader, clock, onlooker)
 
 
@@ -225,7 +227,6 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     reason, complete = "a bug", False
     try:
         job.journal.append("descriptor", _descriptor(rig))
-        say(SAFETY_NOTE)
         with _signals(runner.interrupt, _end):
             runner.run()
         reason, complete = "all runs done", True

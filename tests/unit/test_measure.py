@@ -1,0 +1,35 @@
+"""What `rig measure` says, and when."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from rig import measure
+from rig.procedure.progress import Progress
+from rig.protocol import load_protocol
+from rig.station import load_station
+
+PROTOCOL = Path(__file__).parents[2] / "protocols" / "paper_xy.yaml"
+
+
+def test_what_must_be_read_is_said_before_the_screen_moves(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said: list[str] = []
+    loader = SimpleNamespace(open=lambda: said.append("(screen)"), close=lambda: None)
+    stand_ins = {
+        "emulated_rig": lambda station, _protocol: nullcontext(station),
+        "make_devices": lambda *_: None,
+        "open_devices": lambda *_: None,
+        "make_loader": lambda *_: loader,
+        "LoaderWithBar": lambda inner, *_: inner,
+    }
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(measure, name, stand_in)
+    protocol, station = load_protocol(PROTOCOL), load_station("emulated")
+    with measure._opened(protocol, station, Progress(rows=225), said.append, None):
+        assert said[-3:] == ["resuming after 225 rows", measure.SAFETY_NOTE, "(screen)"]
