@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 from math import nan
 
+from rig.panel.picture import BANNER, LABELS
 from rig.panel.state import (
     Choice,
     DeviceState,
@@ -26,6 +27,7 @@ from rig.panel.state import (
     Turn,
     to_json,
 )
+from rig.procedure.supervision import PAUSE_ANSWERS
 
 ARM = ((0, 0, 0), (0, 0, 181), (102, 24, 784), (540, 127, 426), (500, 290, 426), (750, 0, 400))
 FORCES = tuple(float(n) for n in range(20, 240, 20))
@@ -33,10 +35,7 @@ PAUSED = PromptState(
     "7",
     "paused",
     "Paused. The arm may be under load.",
-    tuple(
-        Choice(k, k.replace("_", " "))
-        for k in ("continue", "redo_step", "redo_repetition", "skip", "abort")
-    ),
+    tuple(Choice(k, LABELS[k]) for k in PAUSE_ANSWERS),
 )
 MOUNT = PromptState(
     "1",
@@ -44,7 +43,7 @@ MOUNT = PromptState(
     "Bring the arm to pose P1 (13.43, -99.84, -108.10, -62.06, 90.00, -76.57 deg), then let it "
     "stand. Set up screw, dynamometer and laser along x (1, 0, 0), not touching. Check that screw, "
     "dynamometer and laser point along the direction of this run.",
-    (Choice("ok", "ok"),),
+    (Choice("ok", LABELS["ok"]),),
 )
 LASER_FAULT = DeviceState(
     "laser",
@@ -63,7 +62,7 @@ def turning() -> State:
     """In mid-step, a little below the band."""
     return State(
         emulated=True,
-        banner="EMULATED: no measurement of a real arm",
+        banner=BANNER,
         speed=50.0,
         protocol="Static stiffness of a UR10e along x and y",
         robot="ur10e",

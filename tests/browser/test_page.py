@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
+from rig.panel.picture import BANNER
 from rig.panel.state import Displacement, Force, PromptState, Slots, State, Turn
 from tests.browser import scenes
 from tests.browser.browser import resize, theme
@@ -37,7 +38,7 @@ def test_values_are_on_the_page(page: Viewer, feed: Feed) -> None:
     assert page.text("step") == "7 of 11"
     assert page.text("repetition") == "3 of 3"
     assert page.text("direction") == "+x"
-    assert page.text("emulated") == "EMULATED: no measurement of a real arm"
+    assert page.text("emulated") == BANNER
     assert "Software monitoring is no safety function" in page.text("safety")
     assert page.text("limits").splitlines()[:2] == ["▲ joint temperature", "9 of 60 °C → stop"]
     assert "114 of 240 N" in page.text("limits")
@@ -385,3 +386,14 @@ def test_phone_keeps_controls_in_sight(driver: Chrome, page: Viewer) -> None:
         assert box["height"] >= 44
     finally:
         resize(driver, 1920, 1080)
+
+
+def test_names_of_devices_are_not_torn_on_a_tablet(page: Viewer, feed: Feed) -> None:
+    resize(page.here(), 1024, 768)
+    feed.state = scenes.laser_failed()
+    page.wait(lambda: "FAULT" in page.text("devices"), "the fault")
+    lines = page.script(
+        "return [...document.querySelectorAll('#devices .name')].map(n => n.getClientRects()[0]"
+        ".height / parseFloat(getComputedStyle(n).lineHeight))"
+    )
+    assert lines == pytest.approx([1.0] * len(lines), abs=0.2)

@@ -26,7 +26,7 @@ export class Bands {
   }
 
   draw(state, connection) {
-    const emulated = state?.emulated ? state.banner || "EMULATED: no measurement of a real arm" : "";
+    const emulated = state?.emulated ? state.banner || "EMULATED: no real arm, no real measurement" : "";
     setHidden(byId("emulated"), !emulated);
     setText(byId("emulated"), emulated);
     const list = [...connectionBand(connection, state), ...deviceBands(state)];
