@@ -170,11 +170,10 @@ def _gap_panel(r: Shown, p: Points, axes: Any, s: int, noise: float) -> None:
     axes.axhspan(-noise, noise, color="0.88", zorder=0, label=_NOISE)
     axes.axhline(0, color="0.4", linewidth=0.8)
     for leg in legs(p, x, s):
-        lone = "." if len(leg) == 1 else ""
-        axes.plot(x[leg], (p.gap_before * scale)[leg], f"--{lone}", color="black", linewidth=0.9,
-                  markersize=4)  # fmt: skip
-        axes.plot(x[leg], (p.gap_after * scale)[leg], f"-{lone}", color=GREEN, linewidth=1.1,
-                  markersize=4)  # fmt: skip
+        look = {"marker": "." if len(leg) == 1 else "", "markersize": 4}
+        before, after = (p.gap_before * scale)[leg], (p.gap_after * scale)[leg]
+        axes.plot(x[leg], before, linestyle="--", color="black", linewidth=0.9, **look)
+        axes.plot(x[leg], after, linestyle="-", color=GREEN, linewidth=1.1, **look)
 
 
 def legs(p: Points, x: Any, s: int) -> Iterator[Any]:

@@ -18,7 +18,7 @@ from identification.gap.base import prediction
 from rig import cli
 from rig.dataset import write
 from rig.diagnose import Diagnosis, diagnose
-from rig.gap_figures import change, draw, legs
+from rig.gap_figures import change, curve, draw, legs
 from rig.gap_layout import blank, noise_axis
 from rig.gap_map import _cells
 from rig.gap_points import (
@@ -202,9 +202,15 @@ def test_no_line_crosses_what_nobody_looked_at(tmp_path: Path) -> None:
     steps = [("zero", 0, 0.0), *(("loading", i, 20.0 * i) for i in (1, 2, 3)), ("zero", 0, 0.0)]
     rows = [f"x,{r},{b},{s},{i},{f},{f / 95}" for r in (1, 2) for i, (b, s, f) in enumerate(steps)]
     text = "\n".join([table().splitlines()[0], *rows, ""])
-    p = points(diagnosed(tmp_path, text).result)
+    result = diagnosed(tmp_path, text).result
+    p = points(result)
     found = [leg.tolist() for leg in legs(p, p.force, 0)]
     assert found == [[0, 1, 2, 3], [4], [5, 6, 7, 8], [9]]
+    upper, lower = curve(shown(result), p).axes[:2]
+    for axes in (upper, lower):  # a point that no line reaches is drawn all the same
+        lone = [line for line in axes.lines if len(line.get_xdata()) == 1]
+        assert len(lone) == (2 if axes is upper else 4)
+        assert {line.get_marker() for line in lone} == {"."}
 
 
 @pytest.mark.parametrize(
