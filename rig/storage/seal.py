@@ -30,6 +30,10 @@ def damaged(path: Path, what: str) -> InputError:
 
 def check_bytes(path: Path) -> None:
     """Magic number and seal, before the HDF5 library sees the file; InputError where they fail."""
+    if path.is_dir():
+        raise InputError(
+            f"{path}: a folder; a data set (.h5) is wanted. `rig list {path}` shows those in it."
+        )
     try:
         with path.open("rb") as file:
             head = file.read(len(_MAGIC))

@@ -360,6 +360,10 @@ def test_a_column_of_another_length(path: Path) -> None:
 
 def test_files_that_are_no_data_set(tmp_path: Path) -> None:
     path = tmp_path / "x.h5"
+    with pytest.raises(InputError) as folder:
+        load(tmp_path)
+    words = f"{tmp_path}: a folder; a data set (.h5) is wanted. `rig list {tmp_path}` shows"
+    assert str(folder.value) == f"{words} those in it."
     with pytest.raises(InputError, match=r"x\.h5: cannot be read: no such file"):
         load(path)
     path.write_bytes(b"")
@@ -372,8 +376,6 @@ def test_files_that_are_no_data_set(tmp_path: Path) -> None:
         file["a"] = 1
     with pytest.raises(InputError, match="of another program"):
         load(path)
-    with pytest.raises(InputError, match="cannot be read: Is a directory"):
-        load(tmp_path)
     table = tmp_path / "x.csv"
     table.write_text("force_N,displacement_mm\n")
     with pytest.raises(InputError, match="`rig import`"):
