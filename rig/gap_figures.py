@@ -342,9 +342,9 @@ def _left_by_runs(r: Shown, p: Points, axes: Any, s: int, sense: int, label: str
     for run in np.unique(p.run[(p.setup == s) & (p.sense == sense)]):
         path = (p.run == run) & (p.sense == sense)
         # a running recording would join the ends of its cycles
-        style = "," if r.continuous else "-"
-        axes.plot(x[path], p.gap_after[path], style, color=colour, linewidth=0.7, alpha=0.45,
-                  label=label)  # fmt: skip
+        style = "." if r.continuous else "-"
+        axes.plot(x[path], p.gap_after[path], style, color=colour, linewidth=0.7, markersize=2,
+                  alpha=0.45, label=label, rasterized=np.count_nonzero(path) > _MANY)  # fmt: skip
 
 
 def _of_sense(m: Remainder, sense: int) -> Any:

@@ -39,8 +39,8 @@ def gap_map(r: Shown, p: Points) -> Figure:
     panels[0, 0].set_ylim(len(lines) - 0.4, -0.6)
     bar = figure.colorbar(image, ax=panels, shrink=0.8, aspect=40)
     _ticks(bar, norm)
-    how = " (force over simulated stiffness)" if r.imposed else ""
-    bar.set_label(f"Measured minus simulated in mm{how}; pale: within the noise")
+    how = "\n(force over simulated stiffness)" if r.imposed else ""
+    bar.set_label(f"Measured minus simulated in mm{how};\npale: within the noise")
     figure.suptitle("Where the gap lies: one strip per repetition, the first on top", fontsize=11)
     return figure
 
