@@ -169,14 +169,16 @@ def schedule(result: CouplingResult) -> Figure:
     axes.step(plan.time, plan.required / 1e3, where="post", color="black", label="required")
     axes.plot(plan.time, plan.single / 1e3, color=COLOURS[0], label="single")
     axes.plot(plan.time, plan.coupled / 1e3, color=COLOURS[1], label="coupled")
-    shades = {"couple": (COLOURS[1], "coupled"), "infeasible": ("red", "infeasible")}
+    # told apart without their colours, too
+    shades = {"couple": (COLOURS[1], "coupled", ""), "infeasible": ("red", "infeasible", "///")}
     named: set[str] = set()
     for interval in plan.intervals():
         if interval.state in shades:
-            colour, word = shades[interval.state]
+            colour, word, hatch = shades[interval.state]
             # a label that begins with _ stays out of the legend: each state is named once
             label = f"_{word}" if word in named else f"state: {word}"
-            axes.axvspan(interval.start, interval.end, color=colour, alpha=0.15, lw=0, label=label)
+            axes.axvspan(interval.start, interval.end, color=colour, alpha=0.15, lw=0,
+                         hatch=hatch, label=label)  # fmt: skip
             named.add(word)
     axes.set_yscale("log")
     _plain_numbers(axes.yaxis)
