@@ -71,10 +71,12 @@ def compare(sets: Sequence[tuple[Dataset, Analysis]]) -> list[Pair]:
     first_data, first = sets[0]
     for i, (data, analysis) in enumerate(sets[1:], start=1):
         shared = same_instruments(first_data, data)
-        for key, a in first.directions.items():
-            b = _counterpart(key, a, analysis)
-            if b is not None and a.result.k is not None and b.result.k is not None:
-                found.append(paired(0, i, key, a.result, b.result, shared=shared))
+        for key, (mine, other) in aligned([first, analysis]).items():
+            if mine is None or other is None:
+                continue
+            a, b = first.directions[mine].result, analysis.directions[other].result
+            if a.k is not None and b.k is not None:
+                found.append(paired(0, i, key, a, b, shared=shared))
     return adjusted(found)
 
 
@@ -89,12 +91,34 @@ def same_instruments(a: Dataset, b: Dataset) -> bool:
     return True
 
 
-def _counterpart(key: str, a: Direction, other: Analysis) -> Direction | None:
-    """The same pose and direction; else the same key, if poses have other names."""
-    for b in other.directions.values():
-        if (b.pose, b.direction) == (a.pose, a.direction):
-            return b
-    return other.directions.get(key)
+def aligned(sets: Sequence[Analysis]) -> dict[str, list[str | None]]:
+    """Directions side by side: name -> what each data set calls it, None where it has none.
+
+    The same pose and direction are one, by the name that it has first (`x` in a data set with one
+    pose is `P1/x` in another one); else the same name, if poses have other names.
+    """
+    found: dict[str, list[str | None]] = {}
+    for i, analysis in enumerate(sets):
+        for key, direction in analysis.directions.items():
+            name = _known(found, sets, direction) or key
+            if name in found and found[name][i] is not None:
+                name = f"{direction.pose}/{direction.direction}"
+            found.setdefault(name, [None] * len(sets))[i] = key
+    return found
+
+
+def _known(
+    found: dict[str, list[str | None]], sets: Sequence[Analysis], direction: Direction
+) -> str | None:
+    """The name of the same pose and direction in an earlier data set."""
+    for name, keys in found.items():
+        for key, analysis in zip(keys, sets, strict=True):
+            if key is None:
+                continue
+            other = analysis.directions[key]
+            if (other.pose, other.direction) == (direction.pose, direction.direction):
+                return name
+    return None
 
 
 def paired(first: int, second: int, key: str, a: Stiffness, b: Stiffness, *, shared: bool) -> Pair:

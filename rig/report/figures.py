@@ -10,6 +10,7 @@ import numpy as np
 from rig.analyze import MM, N_PER_MM, Analysis
 from rig.dataset import Dataset
 from rig.plotting import COLOURS, MARKERS
+from rig.report.compare import aligned
 from rig.report.quality import RunZeros
 
 if TYPE_CHECKING:
@@ -161,14 +162,14 @@ def _temperature(axes: Any, dataset: Dataset, _: Sequence[RunZeros]) -> None:
 
 def compared_k(sets: Sequence[tuple[str, Analysis]], banners: Sequence[str]) -> Figure:
     """k of every data set and direction with its 95 % interval."""
-    keys = list(dict.fromkeys(key for _, a in sets for key in a.directions))
+    names = aligned([a for _, a in sets])
     figure, axes = _axes(7.5, 3.8, "Direction", "Stiffness k in N/mm")
     step = 0.6 / max(1, len(sets))
     for i, (label, analysis) in enumerate(sets):
         at, value, low, high = [], [], [], []
-        for n, key in enumerate(keys):
-            direction = analysis.directions.get(key)
-            k = direction.result.k if direction is not None else None
+        for n, keys in enumerate(names.values()):
+            key = keys[i]
+            k = None if key is None else analysis.directions[key].result.k
             if k is not None:
                 at.append(n + (i - (len(sets) - 1) / 2) * step)
                 value.append(k.value * N_PER_MM)
@@ -176,20 +177,26 @@ def compared_k(sets: Sequence[tuple[str, Analysis]], banners: Sequence[str]) -> 
                 high.append((k.interval[1] - k.value) * N_PER_MM)
         axes.errorbar(at, value, (low, high), fmt=MARKERS[i % len(MARKERS)], capsize=4,
                       color=COLOURS[i % len(COLOURS)], markersize=6, label=label)  # fmt: skip
-    axes.set_xticks(range(len(keys)), keys)
-    axes.set_xlim(-0.6, len(keys) - 0.4)
+    axes.set_xticks(range(len(names)), list(names))
+    axes.set_xlim(-0.6, len(names) - 0.4)
     axes.grid(visible=False, axis="x")
     axes.legend(frameon=False, fontsize=8)
     return watermark(figure, banners)
 
 
 def compared_curves(
-    key: str, sets: Sequence[tuple[str, Analysis]], banners: Sequence[str]
+    name: str,
+    keys: Sequence[str | None],
+    sets: Sequence[tuple[str, Analysis]],
+    banners: Sequence[str],
 ) -> Figure:
-    """The curves of one direction over each other, with their standard deviations."""
+    """The curves of one direction over each other, with their standard deviations.
+
+    keys: what each data set calls it.
+    """
     figure, axes = _axes(7.5, 3.8, "Force in N", "Displacement in mm")
-    for i, (label, analysis) in enumerate(sets):
-        direction = analysis.directions.get(key)
+    for i, ((label, analysis), key) in enumerate(zip(sets, keys, strict=True)):
+        direction = None if key is None else analysis.directions[key]
         for branch, line in (("loading", "-"), ("unloading", ":")):
             levels = [] if direction is None else direction.result.levels
             mine = [p for p in levels if p.branch == branch]
@@ -199,7 +206,7 @@ def compared_curves(
                               marker=MARKERS[i % len(MARKERS)], markersize=4, capsize=3,
                               color=COLOURS[i % len(COLOURS)], linewidth=1,
                               label=f"{label}: {branch}")  # fmt: skip
-    axes.set_title(f"Direction {key}", fontsize=10)
+    axes.set_title(f"Direction {name}", fontsize=10)
     axes.legend(frameon=False, fontsize=8)
     return watermark(figure, banners)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rig.report.compare import aligned
 from rig.report.document import Block, Bullets, Facts, Paragraph, Row, Section, Table, Word, row
 from rig.report.findings import K
 from rig.report.gather import Gathered, Session
@@ -100,19 +101,19 @@ def comparison(gathered: Gathered, data: Node, pictures: Pictures) -> Section:
 
 
 def _overview(sessions: Sequence[Session], data: Node) -> Table:
-    keys = list(dict.fromkeys(k for s in sessions for k in s.analysis.directions))
+    names = aligned([s.analysis for s in sessions])
     rows: list[Row] = []
-    for session, one in zip(sessions, data["datasets"], strict=True):
+    for i, (session, one) in enumerate(zip(sessions, data["datasets"], strict=True)):
         found = one["analyze"]["directions"]
+        keys = [each[i] for each in names.values()]
         cells = [
-            quantity(found[k]["stiffness_N_per_mm"]) if k in found.value else (NOTHING,)
-            for k in keys
+            (NOTHING,) if k is None else quantity(found[k]["stiffness_N_per_mm"]) for k in keys
         ]
         verdict = one["diagnose"]["verdict"].text() if one["diagnose"] else NOTHING
         state = Word("complete", "good") if session.dataset.complete else Word("incomplete", "bad")
         where = one["created"].text()[:10]
         rows.append(row(session.label, where, one["origin"].text(), state, verdict, *cells))
-    header = ("data set", "date", "origin", "state", "verdict", *(f"k in {k} N/mm" for k in keys))
+    header = ("data set", "date", "origin", "state", "verdict", *(f"k in {n} N/mm" for n in names))
     return Table("The data sets", header, tuple(rows), 5)
 
 

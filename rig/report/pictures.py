@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rig import figures as analysis_figures
 from rig.analyze import Analysis
 from rig.report import figures, setup_drawing
+from rig.report.compare import aligned
 from rig.report.document import Figure
 from rig.report.drawing import draw
 from rig.report.gather import Gathered, Session
@@ -154,11 +155,13 @@ class Pictures:
         plot = lambda: figures.compared_k(sets, gathered.banners)  # noqa: E731
         yield self._draw("compared_k", None, caption, caption, plot, header, rows)
         header = ("dataset", "branch", "force_N", "displacement_mm", "sd_mm")
-        for key in _shared_keys(sets):
-            caption = f"Direction {key}: the curves of the data sets over each other."
-            curves = partial(figures.compared_curves, key, sets, gathered.banners)
-            rows = _curve_rows(key, sets)
-            yield self._draw(f"compared_{key}", None, caption, caption, curves, header, rows)
+        for name, keys in aligned([a for _, a in sets]).items():
+            if keys[0] is None or not any(keys[1:]):
+                continue
+            caption = f"Direction {name}: the curves of the data sets over each other."
+            curves = partial(figures.compared_curves, name, keys, sets, gathered.banners)
+            rows = _curve_rows(keys, sets)
+            yield self._draw(f"compared_{name}", None, caption, caption, curves, header, rows)
 
     def _draw(
         self,
@@ -209,14 +212,9 @@ def _no_formula(name: str) -> str:
     return name.replace("$", r"\$")
 
 
-def _shared_keys(sets: Sequence[tuple[str, Analysis]]) -> list[str]:
-    """Directions that the first data set shares with another."""
-    return [k for k in sets[0][1].directions if any(k in a.directions for _, a in sets[1:])]
-
-
-def _curve_rows(key: str, sets: Sequence[tuple[str, Analysis]]) -> Rows:
+def _curve_rows(keys: Sequence[str | None], sets: Sequence[tuple[str, Analysis]]) -> Rows:
     found: list[tuple[object, ...]] = []
-    for label, analysis in sets:
+    for (label, analysis), key in zip(sets, keys, strict=True):
         direction: dict[str, Any] = analysis.to_json()["directions"].get(key, {"curve": []})
         found += [
             (label, p["branch"], p["force_N"], p["displacement_mm"], p["sd_mm"])

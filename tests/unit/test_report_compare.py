@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from identification.estimate import Choice
 from identification.stiffness import Stiffness
 from identification.uncertainty import Contribution, Quantity, combined
 from rig.dataset import Dataset, load
-from rig.report.compare import Pair, adjusted, paired, probability, same_instruments
+from rig.report.compare import Pair, adjusted, aligned, paired, probability, same_instruments
 from rig.report.report import make
 from rig.report.wishes import Wishes
 from tests.unit.report_sets import Page, bench, linear, rewritten
@@ -143,3 +144,17 @@ def test_nothing_to_compare(tmp_path: Path) -> None:
     report = make([bench(tmp_path / "a.h5"), zero], Wishes(gap=False))
     assert report.to_json()["comparison"] == []
     assert "No pose and direction has a stiffness in the first" in Page(report.to_html()).text
+
+
+def test_the_same_pose_and_direction_are_one_under_any_name() -> None:
+    def named(**poses: str) -> Any:
+        parts = {key.replace("_", "/"): pose.split() for key, pose in poses.items()}
+        found = {k: SimpleNamespace(pose=p, direction=d) for k, (p, d) in parts.items()}
+        return SimpleNamespace(directions=found)
+
+    one, two = named(x="P1 x", y="P1 y"), named(P1_x="P1 x", P2_x="P2 x")
+    assert aligned([one, two]) == {"x": ["x", "P1/x"], "y": ["y", None], "P2/x": [None, "P2/x"]}
+    assert aligned([two, one]) == {"P1/x": ["P1/x", "x"], "P2/x": ["P2/x", None], "y": [None, "y"]}
+    elsewhere = named(x="Q x")  # poses by other names
+    assert aligned([one, elsewhere]) == {"x": ["x", "x"], "y": ["y", None]}
+    assert aligned([]) == {}
