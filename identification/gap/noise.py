@@ -197,7 +197,7 @@ def bursts(data: GapData) -> bool:
         return False
     starts = np.flatnonzero(np.diff(hold, prepend=-1))
     within = np.arange(len(hold)) - starts[hold]
-    late = (hold[2:] == hold[:-2]) & (within[:-2] >= _SETTLED)
+    late = (hold[2:] == hold[:-2]) & (within[1:-1] >= _SETTLED)
     u, t = data.displacement, data.time
     share = np.clip((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-300), 0.0, 1.0)
     away = np.abs(u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]

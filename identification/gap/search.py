@@ -120,23 +120,54 @@ def refine(engine: Engine, variants: list[Variant]) -> list[Variant]:
     by_word = _by_word(score(engine, engine.levels, variants))
     least = engine.levels[0].log_base + _WINDOW
     ranked = sorted(by_word, key=lambda w: -_marginal(by_word[w]))[:_LEADING]
+    beside = _beside_first(engine, by_word, ranked)
     out: list[Variant] = []
     for word in ranked:
         if _marginal(by_word[word]) < least:
             continue
-        found = sorted(by_word[word], key=lambda s: -s.log_evidence)
+        found = sorted(beside.get(word, by_word[word]), key=lambda s: -s.log_evidence)
         if word in ("joint_yield", "base_slip"):
             sharp = [s for s in found if s.variant.info["knee"] == "sharp"]
             for s in _places(sharp):
                 out += joint_yield.refined(engine.bench, s.variant)
         elif word == "joint_backlash":
             for s in _places(found):
-                out += joint_backlash.refined(engine.bench, s.variant)
+                finer = joint_backlash.refined(engine.bench, s.variant)
+                engine.extend()
+                best = max(_scored_beside(engine, by_word, ranked, finer), key=_evidence)
+                out += [*finer, *joint_backlash.refined(engine.bench, best.variant, _CLOSE)]
         elif word == "pose_error":
             kinds = {str(s.variant.info["kind"]): s for s in reversed(found)}
             for s in kinds.values():
                 out += pose_error.refined(engine.bench, s.variant, partial(_estimate, engine))
     return out
+
+
+def _beside_first(
+    engine: Engine, by_word: dict[str, list[Scored]], ranked: list[str]
+) -> dict[str, list[Scored]]:
+    """Scores of the words that grids meet badly beside the leading word: what that does must not
+    decide where a smaller effect is looked for."""
+    family = [s.variant for w in ranked[1:] if w in _GRIDS for s in by_word[w]]
+    return _by_word(_scored_beside(engine, by_word, ranked, family)) if family else {}
+
+
+def _scored_beside(
+    engine: Engine, by_word: dict[str, list[Scored]], ranked: list[str], family: list[Variant]
+) -> list[Scored]:
+    first = _closest(by_word[ranked[0]])
+    if not family or family[0].word == ranked[0]:
+        return score(engine, engine.levels, family)
+    levels, energy = conditioned(engine, (Part(first.variant, first.scale),))
+    return score(engine, levels, family, energy)
+
+
+def _evidence(scored: Scored) -> float:
+    return scored.log_evidence
+
+
+_GRIDS = ("joint_yield", "base_slip", "joint_backlash")
+_CLOSE = 0.15  # of the first look's steps
 
 
 def _estimate(engine: Engine, variant: Variant) -> tuple[Array, Array]:

@@ -179,7 +179,10 @@ IN_NM = ("base_compliance", "base_slip")  # priors in rad/Nm: the units of natur
 def more_newtons(data: GapData, a: float) -> GapData:
     """The same rig with forces in another unit: all that holds newtons goes along."""
     meter = replace(data.instruments, force=data.instruments.force * a)
-    setups = tuple(replace(s, links=s.links / a, gravity=s.gravity * a) for s in data.setups)
+    setups = tuple(
+        replace(s, links=s.links / a, gravity=s.gravity * a, tool_gravity=s.tool_gravity * a)
+        for s in data.setups
+    )
     return replace(
         data, force=data.force * a, compliance=data.compliance / a, instruments=meter,
         setups=setups, tangential=None if data.tangential is None else data.tangential * a,

@@ -96,15 +96,16 @@ def test_spread_of_a_threshold_is_that_of_its_draws_and_of_the_gain() -> None:
     assert sd(found) == pytest.approx(np.hypot(values.std(), gain), rel=0.03)
 
 
-def test_creep_is_what_came_late_when_a_load_stood_as_long_as_a_run() -> None:
+def test_creep_is_what_comes_late_in_the_end_and_in_a_run() -> None:
     bench = up_and_down()
     assert run_seconds(bench) == 52.0
     spectrum = of(bench, "joint_creep", "spectrum")
     times = np.asarray(spectrum.info["times_s"])
     w = np.linspace(0.02, 0.05, len(times))
     found = parameters(bench, Part(spectrum, 1.0), w, no_spread(w))
-    assert found["creep_fraction"].value == pytest.approx(w @ (1 - np.exp(-52.0 / times)))
-    assert found["creep_fraction_after"].value == 52.0
+    assert found["creep_fraction"].value == pytest.approx(w.sum())
+    assert found["creep_fraction_of_run"].value == pytest.approx(w @ (1 - np.exp(-52.0 / times)))
+    assert found["run"].value == 52.0
 
 
 def test_creep_is_counted_against_the_spring_as_it_is() -> None:
@@ -115,7 +116,7 @@ def test_creep_is_counted_against_the_spring_as_it_is() -> None:
     full = np.array([[4e-4, 1e-4, 5e-4], [1e-4, 3e-4, -2e-4], [5e-4, -2e-4, 1e-2]])
     w, joint = np.array([0.15, 0.1]), int(single.info["joint"])
     softer = Softer({joint: 0.25}, {joint: full[2, 2]}, {joint: full[2, :2]})
-    found = parameters(bench, Part(single, 1.0), w, full[:2, :2], softer)["creep_fraction"]
+    found = parameters(bench, Part(single, 1.0), w, full[:2, :2], softer)["creep_fraction_of_run"]
     after = 1 - np.exp(-52.0 / np.asarray(single.info["times_s"]))
     drawn = np.array([*w, 0.25]) + rng.normal(size=(40000, 3)) @ np.linalg.cholesky(full).T
     values = drawn[:, :2] @ after / (1 + drawn[:, 2])

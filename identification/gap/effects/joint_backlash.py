@@ -83,16 +83,17 @@ def _per_kg(bench: Bench, j: int) -> Array:
     return bench.weight(j, 1.0) - bench.weight(j, 0.0)
 
 
-def refined(bench: Bench, found: Variant) -> list[Variant]:
+def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Zones about one that was found; where weights decide about the crossing, at masses of the
-    tool in between: the zone is small beside what they do."""
+    tool in between: the zone is small beside what they do. close: share of the steps."""
     info, j = dict(found.info), int(found.info["joint"])
     if info["kind"] in PLACED:
         return []
     torque = bench.true_torque[:, j]
     weighty = info["crossing"] == "weight" and np.any(_per_kg(bench, j))
-    masses = float(info["tool_kg"]) + (_TOOL_STEPS_KG if weighty else np.zeros(1))
-    zones = float(info["zone_Nm"]) * np.array([0.6, 0.8, 1.0, 1.25, 1.6])
+    steps = _TOOL_STEPS_KG if weighty else np.zeros(1)
+    masses = float(info["tool_kg"]) + close * steps
+    zones = float(info["zone_Nm"]) * np.array([0.65, 1.0, 1.5]) ** max(close, 0.4)
     kinds, out = tuple(dict.fromkeys([info["kind"], "soft"])), []
     share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}

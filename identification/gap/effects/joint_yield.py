@@ -70,8 +70,7 @@ def _under_weight(
     radius = alone + (most - alone) * np.array(THRESHOLDS)
     info = {"joint": joint, "memory": UNDER_WEIGHT, "flow_s": 0.0, "load": load,
             "column": column, "weight": weight}  # fmt: skip
-    span = bench.reach_of(load)
-    back = [column(s) for s in after_yield(bench, load, span, bench.moved)]
+    back = [column(s) for s in after_yield(bench, load, top, bench.moved)]
     states = bench.plays(load, radius, bench.moved, weight)
     label = f"joint {joint + 1}{UNDER_WEIGHT}"
     return _knees(WORD, label, [column(s) for s in states.T], radius, back, info)
