@@ -14,7 +14,7 @@ from identification.gap.data import BRANCH_NAMES, GapData
 from identification.gap.diagnose import Effect, GapResult, check_words, diagnose_gap
 from identification.gap.forms.known import less_known
 from identification.gap.heldout import HeldOut
-from identification.gap.parameters import Parameter
+from identification.gap.interval import Parameter
 from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.gap_data import gap_data

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from identification.gap.diagnose import Effect, GapResult
 from identification.gap.discriminate import ENOUGH
-from identification.gap.parameters import Parameter
+from identification.gap.interval import Parameter
 
 MM = 1e3
 

@@ -164,7 +164,13 @@ GRAMMAR: dict[str, Grammar] = {
             ("compliance_cubic", ()),
         ),
     ),
-    "joint_creep": Grammar(("joint",), (("compliance", ("retardation_time",)),)),
+    "joint_creep": Grammar(
+        ("joint",),
+        (
+            ("compliance", ("retardation_time",)),
+            ("compliance_quadratic", ("retardation_time",)),
+        ),
+    ),
     "joint_stiffness_error": Grammar((), (("compliance", ("joint",)),)),
     "link_flexibility": Grammar((), (("over_nominal", ("segment", "strain")),)),
     "base_compliance": Grammar(("depth",), (("compliance", ("axis",)),)),

@@ -16,10 +16,10 @@ from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.fit import Fit, fit
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
+from identification.gap.interval import Parameter
 from identification.gap.leftover import looked_up
 from identification.gap.locate import Where, locate
 from identification.gap.noise import bursts
-from identification.gap.parameters import Parameter
 from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
 from identification.gap.search import Explanation, Found, force, refine, search

@@ -16,79 +16,17 @@ What they mean, whatever shape was fitted, so that shapes can be compared and mi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
-from identification.gap.bench import TOOL_SD_KG, Bench
+from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.base_slip import DEPTHS_M
 from identification.gap.effects.link_flexibility import STRAINS
+from identification.gap.interval import NOMINAL, TWO_SIDED, Found, Parameter, Softer, normal
 from identification.gap.lags import closest_lag
 from identification.gap.parts import Part
-
-_GRID_STEP = 0.03  # between finely spaced thresholds, as their share
-TWO_SIDED = 1.959964  # standard deviations of a normal 95 % interval
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """value with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-    unit: str
-
-
-@dataclass(frozen=True, eq=False)
-class Softer:
-    """Relative changes of the springs' compliance beside an effect, by joint: value, variance, and
-    covariance (k,) with the effect's coefficients. A joint without a spring of its own is absent.
-    """
-
-    value: dict[int, float]
-    variance: dict[int, float]
-    cross: dict[int, Array]
-
-
-NOMINAL = Softer({}, {}, {})
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """Coefficients (k,) of a part, their covariance (k, k), and the springs beside it."""
-
-    w: Array
-    cov: Array
-    softer: Softer
-
-    def linear(self, functional: Array, unit: str, scale: float = 1.0) -> Parameter:
-        """A linear function of the coefficients."""
-        square = max(float(functional @ self.cov @ functional), 0.0)
-        return _normal(float(functional @ self.w) * scale, square * scale**2, unit)
-
-    def one(self, index: int, unit: str, scale: float = 1.0) -> Parameter:
-        """A single coefficient."""
-        return self.linear(np.eye(len(self.w))[index], unit, scale)
-
-    def per_spring(self, functional: Array, joint: int | None, unit: str = "1") -> Parameter:
-        """A linear function of coefficients that are in units of a joint's simulated compliance,
-        over the compliance that was found: `f / (1 + s)`, by its derivatives."""
-        value = float(functional @ self.w)
-        square = float(functional @ self.cov @ functional)
-        if joint is None or joint not in self.softer.value:
-            return _normal(value, max(square, 0.0), unit)
-        softer = max(1 + self.softer.value[joint], _LEAST_COMPLIANCE)
-        ratio = value / softer
-        square += ratio**2 * self.softer.variance[joint]
-        square -= 2 * ratio * float(functional @ self.softer.cross[joint])
-        return _normal(ratio, max(square, 0.0) / softer**2, unit)
-
-
-_LEAST_COMPLIANCE = 0.1  # of the simulated one
+from identification.gap.thresholds import of_knee, torque_unit
 
 
 def parameters(
@@ -96,118 +34,25 @@ def parameters(
 ) -> dict[str, Parameter]:
     """Named parameters of one part; units are written out in the result. w (k,), cov (k, k): its
     coefficients and their covariance; softer: what the springs turned out to be."""
-    return _TABLE[part.word](bench, part, _Found(w, cov, softer))
+    return _TABLE[part.word](bench, part, Found(w, cov, softer))
 
 
-def _normal(value: float, variance: float, unit: str) -> Parameter:
-    half = TWO_SIDED * variance**0.5
-    return Parameter(value, value - half, value + half, unit)
-
-
-def _torque_unit(bench: Bench) -> str:
-    return "Nm" if bench.data.arm else "N"
-
-
-def _knee(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
-    info = part.variant.info
-    k = len(info["radius"])  # the rest flows back
-    cross = {j: c[:k] for j, c in found.softer.cross.items()}
-    softer = Softer(found.softer.value, found.softer.variance, cross)
-    knee = _Found(found.w[:k], found.cov[:k, :k], softer)
-    # of the sharp knee that ends where the curve ends: a radius that the load hardly passed, or
-    # never, says nothing of the slope
-    threshold, top = _threshold(bench, part, knee), _top(info)
-    beyond = np.maximum(top - np.asarray(info["radius"]), 0.0)
-    slope = knee.per_spring(beyond / max(top - threshold.value, 1e-9 * top), info.get("joint"))
-    least = part.variant.least  # what bends less does not give way
-    value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
-    out = _with_weight(bench, part, threshold)
-    out["slope_beyond_over_elastic"] = Parameter(value, low, high, "1")
-    if info["flow_s"]:
-        flow = float(info["flow_s"])
-        out["flow_time"] = Parameter(flow, flow / 3, flow * 3, "s")
-    return out
-
-
-def _threshold(bench: Bench, part: Part, knee: _Found) -> Parameter:
-    """`top - sum w (top - r)^2 / sum w (top - r)` of plays of radii r, by its derivatives; one
-    alone is known to the step of its grid. The gain of the force acts on every threshold."""
-    info = part.variant.info
-    radius = np.asarray(info["radius"])
-    top = _top(info)
-    beyond = np.maximum(top - radius, 0.0)
-    path, work = float(knee.w @ beyond), float(knee.w @ beyond**2)
-    value, variance = float(info["centre"]), (_GRID_STEP * float(info["centre"])) ** 2 / 12
-    if len(radius) > 1 and path > 0:
-        mean = work / path
-        slope = (mean - beyond) * beyond / path
-        value = float(np.clip(top - mean, radius.min(), min(float(radius.max()), top)))
-        variance = float(slope @ knee.cov @ slope)
-    shared = bench.data.instruments.force_gain if not bench.imposed else 0.0
-    if part.word == "base_slip" and info["axis"] < 2:
-        shared = float(np.hypot(shared, _depth_sd(bench, np.asarray(info["load"]))))
-    return _normal(value, max(variance, 0.0) + (shared * value) ** 2, _torque_unit(bench))
-
-
-def _top(info: Mapping[str, Any]) -> float:
-    """Largest size of what a knee's radii are compared with: load, or net torque."""
-    return float(np.abs(np.asarray(info["load"]) + info.get("weight", 0.0)).max())
-
-
-def _with_weight(bench: Bench, part: Part, found: Parameter) -> dict[str, Parameter]:
-    """The threshold as net torque and as what the push brings, where weights make them two: for
-    the sense, and in the setups, of the largest push."""
-    info = part.variant.info
-    joint = info.get("joint")
-    if joint is None or not bench.data.arm or not bench.feels_weight(joint):
-        return {"threshold": found}
-    load, weight = np.asarray(info["load"]), bench.weight(joint)
-    net = load + weight if "weight" in info else load
-    sense = float(np.sign(net[int(np.abs(net).argmax())]))
-    hangs = float(np.mean(weight[sense * load > 0.5 * (sense * load).max()]))
-    per_kg = float(np.abs(bench.weight(joint, 1.0) - bench.weight(joint, 0.0)).max())
-    half = TWO_SIDED * TOOL_SD_KG * per_kg
-    if "weight" in info:  # both are near: what of the tool is wrong in one is wrong in the other
-        push = _moved(found, -sense * hangs, 0.0)
-        return {"threshold": _moved(found, 0.0, half), "threshold_of_load": push}
-    value = abs(found.value + sense * hangs)
-    low, high = value - (found.value - found.low), value + (found.high - found.value)
-    net_of = _moved(Parameter(value, low, high, found.unit), 0.0, half)
-    return {"threshold": net_of, "threshold_of_load": found}
-
-
-def _moved(p: Parameter, shift: float, half: float) -> Parameter:
-    """Shifted, its interval wider by what is independent of it."""
-    low, high = np.hypot(p.value - p.low, half), np.hypot(p.high - p.value, half)
-    value = p.value + shift
-    return Parameter(value, value - float(low), value + float(high), p.unit)
-
-
-def _depth_sd(bench: Bench, moment: Array) -> float:
-    """Relative sd of a moment (n,) about a lying axis whose depth is known to a step of its grid:
-    the moment is the force times height over the axis."""
-    loaded = np.abs(bench.load) > 0.5 * np.abs(bench.load).max()
-    lever = float(np.median(np.abs(moment[loaded] / bench.load[loaded])))
-    step = DEPTHS_M[1] - DEPTHS_M[0]
-    return step / 12**0.5 / max(lever, step)
-
-
-def _hysteresis(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _hysteresis(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Of the strengths that slip within the range."""
     radius, joint = np.asarray(part.variant.info["radius"]), int(part.variant.info["joint"])
     slips = (radius < float(np.ptp(np.append(bench.torque[:, joint], 0.0)))).astype(float)
     return {
-        "friction": found.linear(slips * radius, _torque_unit(bench)),
+        "friction": found.linear(slips * radius, torque_unit(bench)),
         "share_through_friction": found.per_spring(slips, joint),
     }
 
 
-def _backlash(bench: Bench, _: Part, found: _Found) -> dict[str, Parameter]:
+def _backlash(bench: Bench, _: Part, found: Found) -> dict[str, Parameter]:
     arm = bench.data.arm
     return {"width": found.one(0, "rad" if arm else "mm", 1.0 if arm else 1e3)}
 
 
-def _curve(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _curve(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """What the compliance at the largest torque has more than at none: a hinge adds itself, a
     power its exponent, a line nothing."""
     grows = {"line": 0.0, "quadratic": 2.0, "even": 2.0, "cubic": 3.0}
@@ -215,16 +60,17 @@ def _curve(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     return {"change_of_compliance_over_range": found.linear(change, "1", bench.sense)}
 
 
-def _creep(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _creep(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     times, seconds = np.asarray(part.variant.info["times_s"]), run_seconds(bench)
     power = np.maximum(found.w, 0.0)
     mean = (
         float(np.exp(power @ np.log(times) / power.sum())) if power.sum() > 0 else float(times[0])
     )
     joint = part.variant.info.get("joint")
+    line = _BENT if part.variant.info.get("bent") else 1.0
     return {
-        "creep_fraction": found.per_spring(np.ones(len(times)), joint),
-        "creep_fraction_of_run": found.per_spring(-np.expm1(-seconds / times), joint),
+        "creep_fraction": found.per_spring(np.full(len(times), line), joint),
+        "creep_fraction_of_run": found.per_spring(-line * np.expm1(-seconds / times), joint),
         "run": Parameter(seconds, seconds, seconds, "s"),
         "retardation_time": Parameter(mean, mean / 3, mean * 3, "s"),
     }
@@ -241,7 +87,7 @@ def run_seconds(bench: Bench) -> float:
     return float(np.mean(last - first))
 
 
-def _stiffness(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _stiffness(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Factor on the stiffness: of compliance where force is imposed, else of force. The spring it
     acts on is known to its stated relative sd only, by which the factor can be told no better."""
     out = {}
@@ -259,15 +105,18 @@ def _stiffness(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     return out
 
 
-def _gain(bench: Bench, _: Part, found: _Found) -> dict[str, Parameter]:
+_BENT = 0.75  # slope of the straight line of least squares through zero of x |x|, 0 to 1
+
+
+def _gain(bench: Bench, _: Part, found: Found) -> dict[str, Parameter]:
     """Read over true. The columns are shares of what was read, but for an imposed displacement.
-    Of a gain that bends, the straight line of least squares: `x |x|` counts as 3/4 of x."""
-    g = found.linear(np.array([1.0, 0.75])[: len(found.w)], "1")
+    Of a gain that bends, the straight line of least squares."""
+    g = found.linear(np.array([1.0, _BENT])[: len(found.w)], "1")
     ends = [1 + v if bench.imposed else 1 / max(1 - v, 0.02) for v in (g.value, g.low, g.high)]
     return {"factor": Parameter(ends[0], ends[1], ends[2], "1")}
 
 
-def _links(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _links(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     return {
         f"{strain}_compliance_over_nominal_segment{k + 1}": found.one(2 * i + s, "1")
         for i, k in enumerate(part.variant.info["segments"])
@@ -275,14 +124,14 @@ def _links(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     }
 
 
-def _base(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _base(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     return {
         f"compliance_about_{'xyz'[a]}": found.one(i, "rad/Nm")
         for i, a in enumerate(part.variant.info["axes"])
     }
 
 
-def _seating(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _seating(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     f0, top = float(part.variant.info["force_N"]), float(np.abs(bench.load).max())
     seated = {
         "exponential": lambda scale: -np.expm1(-top / scale),
@@ -296,7 +145,7 @@ def _seating(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     }
 
 
-def _misalignment(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _misalignment(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Tangents at the largest load."""
     names, turns = part.variant.info["directions"], part.variant.info["at_N"] is not None
     per = 4 if turns else 2
@@ -310,7 +159,7 @@ def _misalignment(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     }
 
 
-def _drift(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _drift(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Change from start to end of the session, per direction where it has its own."""
     unit, scale = ("N", 1.0) if part.word == "force_drift" else ("mm", 1e3)
     names, path = part.variant.info["names"], part.variant.info["path"]
@@ -339,14 +188,14 @@ def _end(bench: Bench, path: str) -> float:
     return float((v[-1] - v[0]) / np.ptp(v))
 
 
-def _shift(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _shift(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     if len(found.w) == 1:
         run = part.variant.info["runs"][0] + 1
         return {f"shift_before_run{run}": found.one(0, "mm", 1e3)}
     return {f"shift{i + 1}": found.one(i, "mm", 1e3) for i in range(len(found.w))}
 
 
-def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _lag(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
     a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
     is read as the delay, the filter and the moving average that do the same, each the more the
@@ -368,10 +217,10 @@ def _lag(bench: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     share /= share.sum()
     value = float(share @ lags)
     variance = float(share @ (spread**2 + (lags - value) ** 2))
-    return {"lag": _normal(value, variance, "s")}
+    return {"lag": normal(value, variance, "s")}
 
 
-def _pose(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
+def _pose(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Tool offset and angles of the joints."""
     kind = part.variant.info["kind"]
     out: dict[str, Parameter] = {}
@@ -385,9 +234,9 @@ def _pose(_: Bench, part: Part, found: _Found) -> dict[str, Parameter]:
     return out
 
 
-_TABLE: dict[str, Callable[[Bench, Part, _Found], dict[str, Parameter]]] = {
-    "joint_yield": _knee,
-    "base_slip": _knee,
+_TABLE: dict[str, Callable[[Bench, Part, Found], dict[str, Parameter]]] = {
+    "joint_yield": of_knee,
+    "base_slip": of_knee,
     "joint_hysteresis": _hysteresis,
     "joint_backlash": _backlash,
     "joint_nonlinear_stiffness": _curve,

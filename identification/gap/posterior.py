@@ -11,7 +11,8 @@ from identification.gap.compare import IMPERFECTION, level_prior, score
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit, fit
-from identification.gap.parameters import TWO_SIDED, Parameter, Softer, parameters
+from identification.gap.interval import TWO_SIDED, Parameter, Softer
+from identification.gap.parameters import parameters
 from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
 from identification.gap.penalties import SAME_JOINT
 from identification.gap.search import Explanation, conditioned

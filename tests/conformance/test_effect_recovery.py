@@ -18,7 +18,8 @@ from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.evidence import Engine
 from identification.gap.fit import fit
-from identification.gap.parameters import Parameter, parameters
+from identification.gap.interval import Parameter
+from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.search import Explanation
 from identification.gap.variants import Variant

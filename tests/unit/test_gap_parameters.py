@@ -18,7 +18,8 @@ from identification.gap.evidence import (
     row_noise,
 )
 from identification.gap.fit import fit
-from identification.gap.parameters import Parameter, Softer, parameters, run_seconds
+from identification.gap.interval import Parameter, Softer
+from identification.gap.parameters import parameters, run_seconds
 from identification.gap.parts import Part
 from identification.gap.posterior import _mixture, parameters_of
 from identification.gap.search import Explanation

@@ -1,8 +1,9 @@
 """Deflection that grows while the load is held (or force that relaxes), and recovers after it.
 
 Kelvin-Voigt elements behind a joint's spring: `T z' = tau - z`; any linear creep compliance is a
-spectrum of retardation times (Prony series, power and log laws included; Findley 1976). The
-coefficients are compliances in units of the joint's own: polymers, grease and gears 1 to 50 %.
+spectrum of retardation times (Prony series, power and log laws included; Findley 1976). Large
+stresses creep more than in proportion: the same of the squared torque. The coefficients are
+compliances in units of the joint's own: polymers, grease and gears 1 to 50 %.
 
 Size: 1 to 50 % of the elastic deflection: polymers, grease, gears.
 Prior: shares positive in sum, sd out of SCALES, equally likely; half of it on the whole spectrum.
@@ -14,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.data import Array
 from identification.gap.history import half_sample, rests, retarded
 from identification.gap.variants import Variant, smooth_root, variant
 
@@ -63,10 +65,30 @@ def variants(bench: Bench) -> list[Variant]:
             variant(WORD, f"joint {j + 1} spectrum", columns, sizes,
                     smooth_root(len(columns), 0.5), prior=0.5, each=True, joint=j, times_s=spectrum)
         )  # fmt: skip
-        for k in range(len(columns) - 1):
-            out.append(
-                variant(WORD, f"joint {j + 1} T {spectrum[k]:.3g} s", columns[k : k + 2], sizes,
-                        prior=0.5 / (len(columns) - 1), each=True, joint=j,
-                        times_s=spectrum[k : k + 2])
-            )  # fmt: skip
+        out += _pairs(j, "", columns, spectrum, sizes, 0.3)
+        if bench.data.arm:
+            states = retarded(bent(load), spectrum, bench.rows, rest)
+            more = [bench.add_joint(j, bench.sense * c * y) for y in states.T]
+            out += _pairs(j, BENT, more, spectrum, sizes, 0.2)
     return out
+
+
+def _pairs(
+    joint: int, name: str, columns: list[int], times_s: Array, sizes: tuple[float, ...],
+    prior: float,
+) -> list[Variant]:  # fmt: skip
+    """Each time with its neighbour."""
+    return [
+        variant(WORD, f"joint {joint + 1}{name} T {times_s[k]:.3g} s", columns[k : k + 2], sizes,
+                prior=prior / (len(columns) - 1), each=True, joint=joint,
+                times_s=times_s[k : k + 2], bent=bool(name))
+        for k in range(len(columns) - 1)
+    ]  # fmt: skip
+
+
+BENT = " more than in proportion"
+
+
+def bent(load: Array) -> Array:
+    """Loads (n, k) by their squares, with their signs, alike at the largest."""
+    return np.asarray(load * np.abs(load) / (float(np.abs(load).max()) or 1.0))

@@ -63,16 +63,21 @@ def curve(bench: Bench, law: Law) -> list[Array]:
 
 def describe_creep(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: Kelvin-Voigt elements with their retardation time."""
-    joint = int(v.info["joint"])
-    terms = tuple(Term("compliance", {"retardation_time": float(t)}) for t in v.info["times_s"])
-    return Law({"joint": joint}, terms), np.full(len(terms), float(bench.compliance[joint]))
+    joint, unit = int(v.info["joint"]), float(bench.compliance[int(v.info["joint"])])
+    name = "compliance"
+    if v.info.get("bent"):
+        name, unit = "compliance_quadratic", unit / float(np.abs(bench.true_torque[:, joint]).max())
+    terms = tuple(Term(name, {"retardation_time": float(t)}) for t in v.info["times_s"])
+    return Law({"joint": joint}, terms), np.full(len(terms), unit)
 
 
 def creep(bench: Bench, law: Law) -> list[Array]:
-    """Retarded torques on the session clock."""
+    """Retarded torques, or their squares, on the session clock."""
     joint = law.constants["joint"]
     times = np.array([t.shape["retardation_time"] for t in law.terms])
-    load = np.tile(bench.true_torque[:, joint][:, None], (1, len(times)))
+    bent = np.array([t.coefficient == "compliance_quadratic" for t in law.terms])
+    torque = bench.true_torque[:, joint][:, None]
+    load = np.where(bent, torque * np.abs(torque), torque)
     z = retarded(load, times, bench.rows, rests(bench.rows))
     return [bench.joint_column(joint, bench.sense * column) for column in z.T]
 

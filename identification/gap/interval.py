@@ -1,0 +1,75 @@
+"""A value with its interval, and what the coefficients of an effect say of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.data import Array
+
+TWO_SIDED = 1.959964  # standard deviations of a normal 95 % interval
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Softer:
+    """Relative changes of the springs' compliance beside an effect, by joint: value, variance, and
+    covariance (k,) with the effect's coefficients. A joint without a spring of its own is absent.
+    """
+
+    value: dict[int, float]
+    variance: dict[int, float]
+    cross: dict[int, Array]
+
+
+NOMINAL = Softer({}, {}, {})
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Coefficients (k,) of a part, their covariance (k, k), and the springs beside it."""
+
+    w: Array
+    cov: Array
+    softer: Softer
+
+    def linear(self, functional: Array, unit: str, scale: float = 1.0) -> Parameter:
+        """A linear function of the coefficients."""
+        square = max(float(functional @ self.cov @ functional), 0.0)
+        return normal(float(functional @ self.w) * scale, square * scale**2, unit)
+
+    def one(self, index: int, unit: str, scale: float = 1.0) -> Parameter:
+        """A single coefficient."""
+        return self.linear(np.eye(len(self.w))[index], unit, scale)
+
+    def per_spring(self, functional: Array, joint: int | None, unit: str = "1") -> Parameter:
+        """A linear function of coefficients that are in units of a joint's simulated compliance,
+        over the compliance that was found: `f / (1 + s)`, by its derivatives."""
+        value = float(functional @ self.w)
+        square = float(functional @ self.cov @ functional)
+        if joint is None or joint not in self.softer.value:
+            return normal(value, max(square, 0.0), unit)
+        softer = max(1 + self.softer.value[joint], _LEAST_COMPLIANCE)
+        ratio = value / softer
+        square += ratio**2 * self.softer.variance[joint]
+        square -= 2 * ratio * float(functional @ self.softer.cross[joint])
+        return normal(ratio, max(square, 0.0) / softer**2, unit)
+
+
+_LEAST_COMPLIANCE = 0.1  # of the simulated one
+
+
+def normal(value: float, variance: float, unit: str) -> Parameter:
+    """A value with the 95 % interval of a normal law of that variance."""
+    half = TWO_SIDED * variance**0.5
+    return Parameter(value, value - half, value + half, unit)
