@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,11 +60,11 @@ def score(
 def _score_batch(
     engine: Engine, levels: list[Level], batch: list[Variant], already: float
 ) -> list[Scored]:
-    columns, root, scales, plain, signs = _stacks(engine, batch)
+    columns, root, scales, plain, signs, squares = _stacks(engine, batch)
 
     def of_level(i: int) -> Array:
         level = levels[i]
-        gram = _rotate(level, columns, root)
+        gram = _rotate(level, squares[i], columns, root)
         moment = np.einsum("vji,vj->vi", root, level.moment[columns])
         values, vectors = np.linalg.eigh(gram)
         values = np.maximum(values, 0.0)
@@ -100,12 +100,13 @@ class _Signs:
     each: Flags
 
 
-_Stacks = tuple[Array, Array, Array, Array, "_Signs | None"]
+_Stacks = tuple[Array, Array, Array, Array, "_Signs | None", list[Array]]
 
 
 def _stacks(engine: Engine, batch: list[Variant]) -> _Stacks:
     """Columns (v, k), roots (v, k, k), scales (v, s), mean squares (v, k, k) and signs of a batch,
-    made once: batches come again with every effect that is added."""
+    and per level its products (v, k, k), made once: batches come again with every effect that is
+    added."""
     key = ("batch", tuple(map(id, batch)))
     if key not in engine.stacks:
         k = len(batch[0].columns)
@@ -115,19 +116,20 @@ def _stacks(engine: Engine, batch: list[Variant]) -> _Stacks:
             np.stack(sums), np.array([v.least for v in batch]), wanted,
             np.array([v.each for v in batch]) & (k > 1),
         )  # fmt: skip
+        columns = np.array([v.columns for v in batch])
         engine.stacks[key] = (
-            np.array([v.columns for v in batch]),
+            columns,
             np.stack([v.root for v in batch]),
             np.array([v.scales for v in batch]),
             np.stack([raw_gram(engine, v) for v in batch]),
             signs if wanted.any() else None,
+            engine.squares(columns),
         )
     found: _Stacks = engine.stacks[key]
     return found
 
 
-def _rotate(level: Level, columns: Array, root: Array) -> Array:
-    part = level.gram[columns[:, :, None], columns[:, None, :]]
+def _rotate(level: Level, part: Array, columns: Array, root: Array) -> Array:
     if len(level.taken):
         gone = level.taken[:, columns].transpose(1, 0, 2)  # (v, r, k)
         part = part - np.swapaxes(gone, 1, 2) @ gone
@@ -184,13 +186,12 @@ def raw_gram(engine: Engine, variant: Variant) -> Array:
 def moved_response(engine: Engine, response: Array) -> Array:
     """Responses (n, k) less their mean per setup: the datum says nothing."""
     rows = engine.bench.rows
-    count = len(engine.bench.data.setups)
-    total = np.bincount(rows.setup, weights=rows.weight, minlength=count)
-    out = np.empty_like(response)
-    for k in range(response.shape[1]):
-        sums = np.bincount(rows.setup, weights=rows.weight * response[:, k], minlength=count)
-        out[:, k] = response[:, k] - (sums / np.maximum(total, 1e-300))[rows.setup]
-    return out
+    if "setups" not in engine.cache:
+        share = (rows.setup[:, None] == np.arange(len(engine.bench.data.setups))) * rows.weight[
+            :, None
+        ]
+        engine.cache["setups"] = share / np.maximum(share.sum(axis=0), 1e-300)
+    return np.asarray(response - (engine.cache["setups"].T @ response)[rows.setup])
 
 
 def level_prior(engine: Engine, i: int, energy: float) -> float:
@@ -225,17 +226,16 @@ def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float)
     c = np.array(columns)
     T = scale * root
     gone = level.taken[:, c]
-    beside = T.T @ (level.gram[c] - gone.T @ level.taken)
+    beside = T.T @ (level.beside(columns) - gone.T @ level.taken)
     inner = np.eye(len(c)) + beside[:, c] @ T
     factor = np.linalg.cholesky(inner)
     cross = np.linalg.solve(factor, beside)
     left = np.linalg.solve(factor, T.T @ level.moment[c])
-    return Level(
-        level.eta,
-        level.gram,
-        level.moment - cross.T @ left,
-        level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum()),
-        np.vstack([level.taken, cross]),
+    return replace(
+        level,
+        moment=level.moment - cross.T @ left,
+        log_base=level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum()),
+        taken=np.vstack([level.taken, cross]),
     )
 
 

@@ -242,7 +242,7 @@ def _discrimination(bench: Bench, design: Design, rivals: tuple[_Rival, _Rival])
 
 def _told(level: Level, place: int) -> Level:
     """The level of a bench on which nothing was observed, had the pool's column been observed."""
-    moment = level.gram[:, place]
+    moment = level.beside([place])[0]
     return replace(level, moment=moment, log_base=level.log_base - 0.5 * float(moment[place]))
 
 

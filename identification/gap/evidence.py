@@ -7,13 +7,14 @@ imperfection of a model (no formula is the rig) has a size eta on a grid of leve
   mistakes differ from run to run, but alike along one);
 - per hold: each hold off by 0.3 eta; within holds: every row off by 0.3 eta more than its noise;
 - joint readings: each hold off by eta over the joint's lever.
-For every level the base (with the repeatable part) is integrated out of the Gram matrices of the
-pool; then the evidence of any set of columns with prior covariance `s^2 T T^T` costs one small
-eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
+For every level the base (with the repeatable part) is integrated out of the products of the pool
+(`products`); then the evidence of any set of columns with prior covariance `s^2 T T^T` costs one
+small eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,46 +25,40 @@ from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING, Array
 from identification.gap.parallel import side_by_side
+from identification.gap.products import Some, Weights, White
 from identification.gap.rows import rises
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
 CONTINUOUS_ROW_PART = 0.3  # neighbouring rows of a running recording err alike
 _NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
-_ROOM = 3  # a third more than the first columns
 LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Pool and data with the base integrated out, for one size of imperfection eta (m).
+    """Pool and data with the base integrated out, for one size of imperfection eta (m), the
+    `number`th of its engine.
 
-    gram (p, p), moment (p,): of the pool; log_base: evidence of the base alone, nats.
-    taken (r, p): what effects that were integrated out as well take from the Gram matrix,
-    `gram - taken' taken`; no full matrix is made for a candidate that is looked at once.
+    moment (p,): of the pool; log_base: evidence of the base alone, nats. taken (r, p): what effects
+    that were integrated out as well take from the Gram matrix, `gram - taken' taken`; no full
+    matrix is ever made.
     """
 
+    engine: Engine
+    number: int
     eta: float
-    gram: Array
     moment: Array
     log_base: float
     taken: Array
 
+    def square(self, columns: Sequence[int]) -> Array:
+        """(k, k) part of the pool's Gram matrix of columns (k,), but for what was taken."""
+        return self.engine.square(tuple(columns))[self.number]
 
-@dataclass(frozen=True, eq=False)
-class _White:
-    """Whitened stacked columns, taken apart: what is common to a hold and what differs in it.
-
-    mean (holds, k): of the response; q: per joint the columns that touch its readings and their
-    values (holds, k''); fixed (rest, k): channels without imperfection; contrast (rows, k'):
-    deviations within holds of the columns `varying` (k',).
-    """
-
-    mean: Array
-    q: list[tuple[NDArray[np.intp], Array]]
-    fixed: Array
-    contrast: Array
-    varying: NDArray[np.intp]
+    def beside(self, columns: Sequence[int]) -> Array:
+        """(k, p) rows of the pool's Gram matrix of columns (k,), but for what was taken."""
+        return self.engine.beside(tuple(columns))[self.number]
 
 
 class Engine:
@@ -87,25 +82,58 @@ class Engine:
         self._alone = counts[self._hold] == 1
         self._contrast_noise = self.sigma[:n][~self._alone]
         self._freedom = n - len(self._edges)
-        common = np.column_stack([target, base.columns, level_columns(bench), run_columns(bench)])
-        self._common = self._whiten(common)
-        self._white: list[_White] = []
-        self._bases = side_by_side(self._integrate, [float(eta) for eta in etas])
-        self._room: dict[int, Array] = {}
-        self.levels: list[Level] = []
+        self._squares: dict[tuple[int, ...], list[Array]] = {}
+        self._rows: dict[tuple[int, ...], list[Array]] = {}
+        self._weights = [self._left(float(eta)) for eta in etas]
+        self._first = self._whiten(np.column_stack([target, base.columns]))
+        self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
+        self._bases = side_by_side(self._integrate, range(len(etas)))
+        self._white = self._whiten(self.pool)
+        none = np.zeros(0)
+        self.levels = [
+            Level(self, i, float(eta), none, b.log_base, np.zeros((0, 0)))
+            for i, (eta, b) in enumerate(zip(etas, self._bases, strict=True))
+        ]
         self.extend()
 
     def extend(self) -> None:
         """Takes in the columns that were put into the bench's pool since."""
-        old = self.pool.shape[1]
-        added = self.bench.columns[old:]
-        fresh = np.column_stack(added) if added else np.zeros((self.bench.layout.size, 0))
+        added = self.bench.columns[self.pool.shape[1] :]
+        if not added:
+            return
+        fresh = np.column_stack(added)
         self.pool = np.column_stack([self.pool, fresh])
         white = self._whiten(fresh)
-        self.levels = side_by_side(lambda i: self._grown(i, white, old), range(len(self.etas)))
-        self._white.append(white)
+        self.levels = side_by_side(lambda level: self._grown(level, white), self.levels)
+        self._white = self._white.joined(white)
+        self._rows.clear()
 
-    def _whiten(self, columns: Array) -> _White:
+    def squares(self, columns: NDArray[np.intp]) -> list[Array]:
+        """Per level (v, k, k): parts of the Gram matrix of the columns (v, k) of every variant."""
+        made = self._white.squares(columns, self._weights)
+        for base, square in zip(self._bases, made, strict=True):
+            shared = base.pool[columns]
+            np.subtract(square, shared @ np.swapaxes(shared, 1, 2), out=square)
+        return made
+
+    def square(self, columns: tuple[int, ...]) -> list[Array]:
+        """Per level (k, k): the part of the Gram matrix of some columns, kept for the next time."""
+        if columns not in self._squares:
+            made = self.squares(np.array([columns], dtype=np.intp))
+            self._squares[columns] = [m[0] for m in made]
+        return self._squares[columns]
+
+    def beside(self, columns: tuple[int, ...]) -> list[Array]:
+        """Per level (k, p): rows of the Gram matrix, kept until the pool grows."""
+        if columns not in self._rows:
+            at = np.array(columns, dtype=np.intp)
+            made = self._white.picked(at).between(self._white, self._weights)
+            for base, rows in zip(self._bases, made, strict=True):
+                np.subtract(rows, base.pool[at] @ base.pool.T, out=rows)
+            self._rows[columns] = made
+        return self._rows[columns]
+
+    def _whiten(self, columns: Array) -> White:
         bench, n, q = self.bench, self.bench.rows.n, self.bench.layout.q
         white = columns / self.sigma[:, None]
         response, inverse = white[:n], self._inverse
@@ -113,47 +141,37 @@ class Engine:
         means /= self._length_u[:, None]
         direction = inverse / self._length_u[self._hold]
         contrast = (response - direction[:, None] * means[self._hold])[~self._alone]
-        # most columns stand still within a hold: only the others need the product
+        # most columns stand still within a hold
         size = np.abs(contrast).max(axis=0) if len(contrast) else np.zeros(contrast.shape[1])
         top = np.abs(response).max(axis=0) if bench.rows.n else size
-        varying = np.flatnonzero(size > 1e-9 * (1 + top))
-        readings, holds = [], len(self._edges)
-        for start in range(q.start, q.stop, holds):  # a column touches the readings of few joints
-            part = white[start : start + holds]
-            columns_q = np.flatnonzero(np.any(part != 0, axis=0))
-            readings.append((columns_q, part[:, columns_q]))
-        return _White(means, readings, white[q.stop :], contrast[:, varying], varying)
+        contrast[:, size <= 1e-9 * (1 + top)] = 0.0
+        holds = len(self._edges)
+        readings = tuple(
+            Some.of(white[start : start + holds]) for start in range(q.start, q.stop, holds)
+        )
+        even = np.vstack([means, white[q.stop :]]).T
+        return White(np.ascontiguousarray(even), readings, Some.of(contrast), holds)
 
-    def _weights(self, eta: float) -> tuple[Array, Array, Array]:
-        """Precision left to hold means (holds,), joint readings, and contrasts (rows,)."""
+    def _left(self, eta: float) -> Weights:
+        """What an imperfection leaves of the precision."""
         part = HOLD_PART if not self.bench.rows.continuous else CONTINUOUS_HOLD_PART
         hold = self.bench.noise.hold[self._edges] ** 2 + (part * eta) ** 2
-        extra_u = 1 + hold * self._length_u**2
         lever = (eta / LEVER_M) ** 2 if self.bench.data.arm else 0.0
-        extra_q = 1 + lever * self._length_q**2
         row_part = ROW_PART if not self.bench.rows.continuous else CONTINUOUS_ROW_PART
-        factor = 1 + (row_part * eta / self._contrast_noise) ** 2
-        return 1 / extra_u, 1 / extra_q, 1 / factor
+        return Weights(
+            1 / (1 + hold * self._length_u**2),
+            1 / (1 + lever * self._length_q**2),
+            1 / (1 + (row_part * eta / self._contrast_noise) ** 2),
+        )
 
-    def _gram(self, eta: float, one: _White, other: _White) -> Array:
-        """(k, l) product of two sets of whitened columns under the imperfection eta."""
-        u, q, contrast = self._weights(eta)
-        if one is other:  # the same array twice: half the products
-            mean = one.mean * np.sqrt(u)[:, None]
-            gram = one.fixed.T @ one.fixed + mean.T @ mean
-        else:
-            gram = one.fixed.T @ other.fixed + one.mean.T @ (other.mean * u[:, None])
-        holds = len(self._edges)
-        for j, ((i, mine), (k, theirs)) in enumerate(zip(one.q, other.q, strict=True)):
-            weight = q[j * holds : (j + 1) * holds, None]
-            gram[np.ix_(i, k)] += mine.T @ (theirs * weight)
-        varying = np.ix_(one.varying, other.varying)
-        gram[varying] += one.contrast.T @ (other.contrast * contrast[:, None])
-        return np.asarray(gram)
+    def _common(self, white: White, w: Weights) -> Array:
+        """(c, p) products with target, base and repeatable imperfection."""
+        return np.vstack([self._first.between(white, [w])[0], self._second.sparsely(white, w)])
 
-    def _integrate(self, eta: float) -> _Integrated:
+    def _integrate(self, number: int) -> _Integrated:
         """Base and repeatable imperfection, integrated out of target and, later, of the pool."""
-        gram = self._gram(eta, self._common, self._common)
+        eta, w = float(self.etas[number]), self._weights[number]
+        gram = np.hstack([self._common(self._first, w), self._common(self._second, w)])
         kb = self.base.columns.shape[1]
         covariance = level_covariance(self.bench)
         levels = covariance.shape[0]
@@ -166,44 +184,30 @@ class Engine:
         b = slice(1, 1 + kb + count)
         factor = np.asarray(np.linalg.cholesky(np.eye(kb + count) + root.T @ gram[b, b] @ root))
         left = np.asarray(np.linalg.solve(factor, root.T @ gram[b, 0]))
-        u, q, contrast = self._weights(eta)
-        share = self._freedom / max(len(contrast), 1)
-        log_noise = -0.5 * (np.log(u).sum() + np.log(q).sum() + share * np.log(contrast).sum())
+        share = self._freedom / max(len(w.contrast), 1)
+        log_noise = -0.5 * (np.log(w.hold).sum() + np.log(w.q).sum())
+        log_noise -= 0.5 * share * np.log(w.contrast).sum()
         log_base = -0.5 * (gram[0, 0] - left @ left) - np.log(np.diag(factor)).sum() - log_noise
-        none = np.zeros((kb + count, 0))
+        none = np.zeros((0, kb + count))
         return _Integrated(root, factor.astype(float), left.astype(float), float(log_base), none)
 
-    def _grown(self, i: int, white: _White, old: int) -> Level:
-        """Level i with further columns."""
-        eta, base = float(self.etas[i]), self._bases[i]
-        beside = self._gram(eta, self._common, white)
+    def _grown(self, level: Level, white: White) -> Level:
+        """A level with further columns."""
+        i = level.number
+        base = self._bases[i]
+        beside = self._common(white, self._weights[i])
         b = slice(1, 1 + base.root.shape[0])
         fresh = np.linalg.solve(base.factor, base.root.T @ beside[b])
-        before = base.pool
         moment = beside[0] - fresh.T @ base.left
-        corner = self._gram(eta, white, white) - fresh.T @ fresh
-        self._bases[i] = replace(base, pool=np.column_stack([before, fresh]))
-        now = old + len(moment)
-        if not old:  # room for what is refined later, so that nothing is copied then
-            self._room[i] = np.empty((now + now // _ROOM, now + now // _ROOM))
-        elif now > len(self._room[i]):
-            self._room[i] = np.empty((now, now))
-            self._room[i][:old, :old] = self.levels[i].gram
-        gram = self._room[i][:now, :now]
-        gram[old:, old:] = corner
-        both = moment
-        if old:
-            earlier = np.vstack([self._gram(eta, w, white) for w in self._white])
-            edge = earlier - before.T @ fresh
-            gram[:old, old:], gram[old:, :old] = edge, edge.T
-            both = np.concatenate([self.levels[i].moment, moment])
-        return Level(eta, gram, both, base.log_base, np.zeros((0, now)))
+        self._bases[i] = replace(base, pool=np.vstack([base.pool, fresh.T]))
+        both = np.concatenate([level.moment, moment])
+        return replace(level, moment=both, taken=np.zeros((0, len(both))))
 
 
 @dataclass(frozen=True, eq=False)
 class _Integrated:
     """Prior root (k, k) of base and imperfection, Cholesky factor (k, k) of their precision, what
-    the target (k,) and the pool (k, p) share with them, evidence of the base alone."""
+    the target (k,) and the pool (p, k) share with them, evidence of the base alone."""
 
     root: Array
     factor: Array

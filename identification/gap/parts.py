@@ -46,8 +46,9 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     """How large the parts are together, at one level."""
     columns = [c for p in parts for c in p.variant.columns]
     root = block([p.root for p in parts])
-    lv, plain = engine.levels[level], engine.levels[0].gram
-    inner = np.eye(len(columns)) + root.T @ lv.gram[np.ix_(columns, columns)] @ root
+    squares = engine.square(tuple(columns))
+    lv, plain = engine.levels[level], squares[0]
+    inner = np.eye(len(columns)) + root.T @ squares[level] @ root
     w = root @ np.linalg.solve(inner, root.T @ lv.moment[columns])
     n, weight = engine.bench.rows.n, engine.bench.rows.weight
     precision = float(np.sum(1 / engine.sigma[:n] ** 2))
@@ -62,7 +63,8 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
             sizes.append(_beyond_springs(engine, moved))
             square *= (LAW_IMPERFECTION / IMPERFECTION) ** 2
         else:
-            structural = float(part @ plain[np.ix_(c, c)] @ part) / precision
+            mine = slice(start, start + k)
+            structural = float(part @ plain[mine, mine] @ part) / precision
             sizes.append(float(np.sqrt(min(structural, square))))
         energy += square
         start += k
@@ -89,7 +91,7 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
 
     columns = [c for p in parts for c in p.variant.columns]
     root = block([p.root for p in parts])
-    precision = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
+    precision = np.eye(len(columns)) + root.T @ level.square(columns) @ root
     covariance = root @ np.linalg.solve(precision, root.T)
     w = root @ np.linalg.solve(precision, root.T @ level.moment[columns])
     out, start = 0.0, 0
@@ -112,7 +114,7 @@ def log_joint(level: Level, parts: tuple[Part, ...]) -> float:
     """log evidence of all parts together with fixed scales at one level."""
     columns = [c for p in parts for c in p.variant.columns]
     root = block([p.root for p in parts])
-    inner = np.eye(len(columns)) + root.T @ level.gram[np.ix_(columns, columns)] @ root
+    inner = np.eye(len(columns)) + root.T @ level.square(columns) @ root
     factor = np.linalg.cholesky(inner)
     left = np.linalg.solve(factor, root.T @ level.moment[columns])
     return level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum())

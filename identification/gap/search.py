@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from math import log
 
 import numpy as np
@@ -55,7 +55,7 @@ class Explanation:
         """It leaves little enough."""
         return self.log_good > self.log_weight - log(2)
 
-    @property
+    @cached_property
     def words(self) -> frozenset[str]:
         """Names of its effects."""
         return frozenset(p.word for p in self.parts)

@@ -1,0 +1,167 @@
+"""Products of whitened columns under every size of imperfection, made where they are asked for.
+
+A pool has thousands of columns, and an explanation takes a few of them: all products of all columns
+would be most of the work, and gigabytes. What is asked for are the small squares of the variants,
+once, and whole rows for the few columns that an effect is built from.
+
+Columns are taken apart into what is common to a hold and what differs in it; an imperfection of
+holds and rows is then a weight of every part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.data import Array
+from identification.gap.parallel import side_by_side
+
+_AT_ONCE = 1_000_000  # numbers of columns that are gathered at a time
+_FEW = 500  # rows
+_SPARSE = 0.2  # share of numbers that are not zero, below which zeros are left out
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """What an imperfection leaves of the precision: of hold means (holds,), of joint readings
+    (6 holds,), and of contrasts (rows,)."""
+
+    hold: Array
+    q: Array
+    contrast: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Some:
+    """Few of many columns: at (p,) the place of every column in `values`, the last one (a row of
+    zeros) for those that are not among them; values (k + 1, rows), a column to a row."""
+
+    at: NDArray[np.intp]
+    values: Array
+
+    @classmethod
+    def of(cls, columns: Array) -> Some:
+        """Of columns (rows, p), those that are not all zero."""
+        kept = np.flatnonzero(np.any(columns != 0, axis=0))
+        at = np.full(columns.shape[1], len(kept), dtype=np.intp)
+        at[kept] = np.arange(len(kept))
+        return cls(at, np.vstack([columns[:, kept].T, np.zeros((1, len(columns)))]))
+
+    def joined(self, other: Some) -> Some:
+        """With the columns of another after them."""
+        mine, last = len(self.values) - 1, len(self.values) + len(other.values) - 2
+        at = np.concatenate([
+            np.where(self.at == mine, last, self.at),
+            np.where(other.at == len(other.values) - 1, last, other.at + mine),
+        ])  # fmt: skip
+        return Some(at, np.vstack([self.values[:-1], other.values]))
+
+    def picked(self, columns: NDArray[np.intp]) -> Some:
+        """Some of all columns (k,)."""
+        at = self.at[columns]
+        here = np.flatnonzero(at != self.none)
+        place = np.full(len(at), len(here), dtype=np.intp)
+        place[here] = np.arange(len(here))
+        return Some(place, self.values[np.append(at[here], self.none)])
+
+    @property
+    def none(self) -> int:
+        """Place of what is not there."""
+        return len(self.values) - 1
+
+
+def _together(mine: Array, other: Array, weights: Sequence[Array]) -> list[Array]:
+    """`(mine * w) @ other.T` for every w; few rows of mine go through the other ones in one go."""
+    if len(mine) * len(weights) > _FEW:
+        return [np.asarray((mine * w) @ other.T) for w in weights]
+    stacked = np.vstack([mine * w for w in weights]) @ other.T
+    return np.split(stacked, len(weights))
+
+
+@dataclass(frozen=True, eq=False)
+class White:
+    """Whitened stacked columns (p): even (p, holds + rest), means of the response per hold and the
+    channels without imperfection; q: per joint those that touch its readings; contrast: those
+    that vary within holds. holds: how many of `even` are means."""
+
+    even: Array
+    q: tuple[Some, ...]
+    contrast: Some
+    holds: int
+
+    def __len__(self) -> int:
+        return len(self.even)
+
+    def joined(self, other: White) -> White:
+        """With the columns of another after them."""
+        return White(
+            np.vstack([self.even, other.even]),
+            tuple(a.joined(b) for a, b in zip(self.q, other.q, strict=True)),
+            self.contrast.joined(other.contrast),
+            self.holds,
+        )
+
+    def between(self, columns: White, weights: list[Weights]) -> list[Array]:
+        """Per set of weights (k, p): products of all these columns with all those of another."""
+        evens = [self._even(w) for w in weights]
+        out = _together(self.even, columns.even, evens)
+        qs = list(zip(*(self._q(w) for w in weights), strict=True))
+        parts = [*zip(self.q, columns.q, qs, strict=True),
+                 (self.contrast, columns.contrast, [w.contrast for w in weights])]  # fmt: skip
+        for mine, other, each in parts:
+            if mine.none and other.none:
+                products = _together(mine.values, other.values, each)
+                for rows, product in zip(out, products, strict=True):
+                    np.add(rows, product[np.ix_(mine.at, other.at)], out=rows)
+        return out
+
+    def sparsely(self, columns: White, w: Weights) -> Array:
+        """The same, where most numbers of these columns are zero."""
+        from scipy import sparse
+
+        if np.count_nonzero(self.even) > _SPARSE * self.even.size:
+            return self.between(columns, [w])[0]
+        out = np.asarray(sparse.csr_matrix(self.even * self._even(w)) @ columns.even.T)
+        mine, other = self.contrast, columns.contrast
+        if mine.none and other.none:
+            product = np.asarray(sparse.csr_matrix(mine.values * w.contrast) @ other.values.T)
+            out += product[np.ix_(mine.at, other.at)]
+        return out
+
+    def picked(self, columns: NDArray[np.intp]) -> White:
+        """Some of these columns (k,)."""
+        q = tuple(s.picked(columns) for s in self.q)
+        return White(self.even[columns], q, self.contrast.picked(columns), self.holds)
+
+    def squares(self, columns: NDArray[np.intp], weights: list[Weights]) -> list[Array]:
+        """(v, k, k) per set of weights: products of the columns (v, k) of every variant."""
+        v, k = columns.shape
+        step = max(1, _AT_ONCE // max(k * self.even.shape[1], 1))
+        chunks = [columns[i : i + step] for i in range(0, v, step)]
+        made = side_by_side(lambda c: self._squares(c, weights), chunks)
+        return [np.concatenate([m[i] for m in made]) for i in range(len(weights))]
+
+    def _squares(self, columns: NDArray[np.intp], weights: list[Weights]) -> list[Array]:
+        even = self.even[columns]
+        across = np.swapaxes(even, 1, 2)
+        out = [(even * self._even(w)) @ across for w in weights]
+        for j, some in enumerate((*self.q, self.contrast)):
+            at = some.at[columns]
+            mine = np.flatnonzero((at != some.none).any(axis=1))
+            if not mine.size:
+                continue
+            part = some.values[at[mine]]
+            across = np.swapaxes(part, 1, 2)
+            for square, w in zip(out, weights, strict=True):
+                weight = w.contrast if j == len(self.q) else self._q(w)[j]
+                square[mine] += (part * weight) @ across
+        return out
+
+    def _even(self, w: Weights) -> Array:
+        return np.concatenate([w.hold, np.ones(self.even.shape[1] - self.holds)])
+
+    def _q(self, w: Weights) -> list[Array]:
+        return np.split(w.q, len(self.q)) if self.q else []
