@@ -394,13 +394,25 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     for e in ranked:
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         good *= kept.get(e.words, 1.0)
-        mass[e.parts[0].word if e.parts else "none"] += good
+        for word, share in _main(e).items():
+            mass[word] += share * good
         mass[_heir(e, ranked, kept)] += whole - good
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
     total = sum(mass.values())
     probabilities = trusted({w: m / total for w, m in mass.items()}, set(found.alone))
     return replace(found, probabilities=probabilities, kept=kept)
+
+
+def _main(explanation: Explanation) -> dict[str, float]:
+    """Which effect of an explanation is its main one: each in proportion to its share of the gap,
+    since how large an effect is alone is a matter of what else may take its place."""
+    if not explanation.parts:
+        return {"none": 1.0}
+    square = np.array(explanation.sizes) ** 2
+    square[0] = max(float(square[0]), 1e-300)
+    share = square / square.sum()
+    return {p.word: float(s) for p, s in zip(explanation.parts, share, strict=True)}
 
 
 def _heir(
