@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.compare import LINEAR
+from identification.gap.compare import LINEAR, moved_response
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, Sizes
@@ -37,7 +37,7 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     penalty, sizes = 0.0, _counted(parts, found)
     for i, p in enumerate(parts):
         for k, other in enumerate(parts):
-            if i < k and _same_element(engine, p, other):
+            if i < k and _same_element(engine, p, other) and not _on_its_own(parts, found, i, k):
                 penalty += 1e4
             # a small knee beside a large error of the springs is no freedom of the latter
             if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
@@ -85,11 +85,41 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
         return True
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & MECHANISMS)):
         return True
-    if "joint_stiffness_error" in words and words & MECHANISMS:
-        return same or not engine.bench.has_q
-    if not words <= FRICTION:
+    springs = "joint_stiffness_error" in words and words & MECHANISMS
+    if not (springs or words <= FRICTION):
         return False
-    return same or not engine.bench.has_q
+    return same or not (engine.bench.has_q or _apart(engine, one, other))
+
+
+def _on_its_own(parts: tuple[Part, ...], found: Sizes, i: int, k: int) -> bool:
+    """One of them is wrong springs that move the arm far more than the mechanism beside them: no
+    linear part of its law."""
+    for a, b in ((i, k), (k, i)):
+        if parts[a].word == "joint_stiffness_error" and parts[b].word not in LINEAR:
+            return bool(found.moved[a] > _FAR_MORE * found.moved[b])
+    return False
+
+
+_FAR_MORE = 5.0  # times
+
+
+def _apart(engine: Engine, one: Part, other: Part) -> bool:
+    """They move the arm in different directions: seen apart without joint readings."""
+    shares = [_by_direction(engine, p) for p in (one, other)]
+    return float(np.minimum(*shares).sum()) < _SHARED
+
+
+def _by_direction(engine: Engine, part: Part) -> Array:
+    """Share of what a part can do, in every direction."""
+    names = [s.direction for s in engine.bench.data.setups]
+    number = np.array([names.index(n) for n in names])[engine.bench.rows.setup]
+    does = engine.pool[: engine.bench.rows.n, list(part.variant.columns)] @ part.root
+    square = np.sum(moved_response(engine, does) ** 2, axis=1)
+    sums = np.bincount(number, weights=square, minlength=len(names))
+    return np.asarray(sums / max(float(sums.sum()), 1e-300))
+
+
+_SHARED = 0.2
 
 
 def _joints(part: Part) -> set[int]:
