@@ -183,7 +183,7 @@ class Engine:
             root[kb + levels :, kb + levels :] = RUN_PART * eta * np.eye(count - levels)
         b = slice(1, 1 + kb + count)
         factor = np.asarray(np.linalg.cholesky(np.eye(kb + count) + root.T @ gram[b, b] @ root))
-        left = np.asarray(np.linalg.solve(factor, root.T @ gram[b, 0]))
+        left = _forward(factor, root.T @ gram[b, 0])
         share = self._freedom / max(len(w.contrast), 1)
         log_noise = -0.5 * (np.log(w.hold).sum() + np.log(w.q).sum())
         log_noise -= 0.5 * share * np.log(w.contrast).sum()
@@ -197,11 +197,18 @@ class Engine:
         base = self._bases[i]
         beside = self._common(white, self._weights[i])
         b = slice(1, 1 + base.root.shape[0])
-        fresh = np.linalg.solve(base.factor, base.root.T @ beside[b])
+        fresh = _forward(base.factor, base.root.T @ beside[b])
         moment = beside[0] - fresh.T @ base.left
         self._bases[i] = replace(base, pool=np.vstack([base.pool, fresh.T]))
         both = np.concatenate([level.moment, moment])
         return replace(level, moment=both, taken=np.zeros((0, len(both))))
+
+
+def _forward(factor: Array, values: Array) -> Array:
+    """`L^-1 values` of a lower triangle L."""
+    from scipy.linalg import solve_triangular
+
+    return np.asarray(solve_triangular(factor, values, lower=True, check_finite=False))
 
 
 @dataclass(frozen=True, eq=False)

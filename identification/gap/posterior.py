@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.compare import IMPERFECTION, level_prior, score
+from identification.gap.compare import IMPERFECTION, LINEAR, level_prior, score
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit, fit
@@ -48,15 +48,22 @@ def parameters_of(
         value = _mixture(
             [f[name] for f, m in zip(found, mine, strict=True) if m], share[mine]
         ).value
-        grid = TWO_SIDED * abs(step[name].value - value) / 12**0.5 if name in step else 0.0
+        grid = abs(step[name].value - value) / 12**0.5 if name in step else 0.0
+        meant = 0.0 if chosen.parts[index].word in LINEAR else DEFINED * abs(value)
+        more = TWO_SIDED * float(np.hypot(grid, meant)) if mixed.low < mixed.high else 0.0
         low, high = min(mixed.low - value, 0.0), max(mixed.high - value, 0.0)
         out[name] = replace(
             mixed,
             value=value,
-            low=value - float(np.hypot(low, grid)),
-            high=value + float(np.hypot(high, grid)),
+            low=value - float(np.hypot(low, more)),
+            high=value + float(np.hypot(high, more)),
         )
     return out
+
+
+# Standard uncertainty of what a mechanism's parameter means, as its share (VIM 2.27): where a knee
+# begins, how long a lag is, how far a play goes depends on who draws the line.
+DEFINED = 0.01
 
 
 def _read(engine: Engine, explanation: Explanation, index: int) -> dict[str, Parameter]:

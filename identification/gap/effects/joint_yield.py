@@ -36,7 +36,7 @@ _FIRST = 2  # lower ones only round off the knees above them
 # Bauschinger's effect: after a reversal metal yields earlier than at first.
 _SHARP = {0: 1.0, 1: 0.5}
 _ROUND = {-6: 0.1, -4: 0.15, -2: 0.25, -1: 0.5, 0: 1.0, 1: 0.5, 2: 0.25}
-SCALES = (0.5, 1.5, 6.0, 25.0)
+SCALES = (0.07, 0.25, 0.9, 3.5, 14.0)
 
 
 def variants(bench: Bench) -> list[Variant]:
