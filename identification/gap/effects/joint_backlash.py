@@ -93,7 +93,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     weighty = info["crossing"] == "weight" and np.any(_per_kg(bench, j))
     steps = _TOOL_STEPS_KG if weighty else np.zeros(1)
     masses = float(info["tool_kg"]) + close * steps
-    zones = float(info["zone_Nm"]) * np.array([0.65, 1.0, 1.5]) ** max(close, 0.4)
+    zones = float(info["zone_Nm"]) * np.array([0.65, 1.0, 1.5]) ** max(close, 0.75)
     kinds, out = tuple(dict.fromkeys([info["kind"], "soft"])), []
     share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
