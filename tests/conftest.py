@@ -1,4 +1,5 @@
-"""For all tests: nothing is remembered in the user's own cache."""
+"""For all tests: nothing is remembered in the user's own cache; linear algebra in one thread, as
+the commands have it."""
 
 from __future__ import annotations
 
@@ -7,6 +8,10 @@ import tempfile
 from collections.abc import Iterator
 
 import pytest
+
+from rig.threads import one_each
+
+one_each()  # before anything imports numpy
 
 
 @pytest.fixture(scope="session", autouse=True)

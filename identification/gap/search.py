@@ -401,7 +401,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
         good *= kept.get(e.words, 1.0)
         for word, share in _main(e).items():
             mass[word] += share * good
-        mass[_heir(e, ranked, kept)] += whole - good
+        mass[_heir(e, ranked, kept, found.engine.bench.noise.stated)] += whole - good
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
     total = sum(mass.values())
@@ -422,16 +422,18 @@ def _main(explanation: Explanation) -> dict[str, float]:
 
 
 def _heir(
-    explanation: Explanation, ranked: Sequence[Explanation], kept: Mapping[frozenset[str], float]
-) -> str:
+    explanation: Explanation, ranked: Sequence[Explanation],
+    kept: Mapping[frozenset[str], float], noise: float,
+) -> str:  # fmt: skip
     """Who gets the weight of an explanation that leaves too much for its number of effects: the
     best one with fewer of the same effects that explains enough for itself, else unknown."""
     for e in ranked:
         fewer = e.parts and e.words < explanation.words
-        near = e.log_weight > explanation.log_weight - _INHERITS
+        near = e.log_weight > explanation.log_weight - _INHERITS or e.eta < _CLOSELY * noise
         if fewer and near and e.good and kept.get(e.words, 1.0) > 0.5:
             return e.parts[0].word
     return "unknown"
 
 
-_INHERITS = 40.0  # nats: what explains so much less is no explanation of the same
+_INHERITS = 40.0  # nats: what explains so much less is no explanation of the same,
+_CLOSELY = 2.0  # but where it leaves no more than so many times the noise of one sample

@@ -65,7 +65,7 @@ def variants(bench: Bench) -> list[Variant]:
             variant(WORD, f"joint {j + 1} spectrum", columns, sizes,
                     smooth_root(len(columns), 0.5), prior=0.5, each=True, joint=j, times_s=spectrum)
         )  # fmt: skip
-        out += _pairs(j, "", columns, spectrum, sizes, 0.3)
+        out += _pairs(j, "", columns, spectrum, sizes, 0.3 if bench.data.arm else 0.5)
         if bench.data.arm:
             states = retarded(bent(load), spectrum, bench.rows, rest)
             more = [bench.add_joint(j, bench.sense * c * y) for y in states.T]
