@@ -1,0 +1,219 @@
+"""Levels read at rest, of rigs without an arm: holds read ever more seldom, tables without a clock,
+plateaus of a driven displacement; and what several effects of one explanation owe each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import displacement_imposed, make_bench
+from identification.gap.data import Array
+from identification.gap.effects import library
+from identification.gap.effects.joint_creep import times
+from identification.gap.evidence import Engine
+from identification.gap.noise import bursts
+from identification.gap.parts import Part, Sizes
+from identification.gap.penalties import _apart, _on_its_own
+from identification.gap.products import White
+from identification.gap.rows import reduce_rows
+from identification.gap.search import Explanation, _heir, _main
+from identification.gap.variants import Variant, variant
+from rig.dataset import load
+from rig.gap_data import gap_data
+from rig.tables import import_table
+from tests.unit.test_gap_evidence import small_bench, small_engine
+from tests.unit.test_gap_operators import bench_data
+from tests.unit.test_gap_weights import UP, hanging
+
+
+def creeping(n: int = 200) -> tuple[Array, Array]:
+    """Times s, ever more seldom, and creep by their logarithm, m."""
+    t = np.concatenate([[0.0], np.geomspace(1.0, 1e5, n)])
+    return t, 4e-5 * np.log1p(t)
+
+
+def one_hold(t: Array, u: Array) -> dict[str, Array]:
+    n = len(t)
+    on = (t > 0).astype(np.int64)
+    return {"time": t, "step": on, "branch": on, "force": 100.0 * on, "displacement": u,
+            "run": np.zeros(n, dtype=np.int64)}  # fmt: skip
+
+
+def test_rows_of_a_hold_follow_its_clock_when_samples_grow_seldom() -> None:
+    t, u = creeping()
+    given = one_hold(t, u)
+    rows = reduce_rows(bench_data(given.pop("force"), given.pop("displacement"), **given))
+    assert len(rows.time) > 17
+    later = rows.time[rows.step == 1][2:]
+    assert (later[1:] / later[:-1]).max() < 4.0
+    even = np.arange(201.0)
+    given = one_hold(even, u)
+    same = reduce_rows(bench_data(given.pop("force"), given.pop("displacement"), **given))
+    assert same.weight.tolist() == [1, 1, 1, 2, 4, 8, 16, 32, 64, 72]  # 1, 1, 2, 4 ... as ever
+
+
+def test_creep_of_a_hold_is_no_burst_and_bursts_are() -> None:
+    t, u = creeping()
+    given = one_hold(t, u)
+    assert not bursts(bench_data(given.pop("force"), given.pop("displacement"), **given))
+    shaken = u + np.where(np.arange(len(u)) % 11 == 5, 4e-5, 0.0)
+    given = one_hold(t, shaken)
+    assert bursts(bench_data(given.pop("force"), given.pop("displacement"), **given))
+
+
+def test_creep_times_of_a_bench_reach_from_a_sample_to_beyond_the_session() -> None:
+    t, u = creeping()
+    given = one_hold(t, u)
+    found = times(make_bench(bench_data(given.pop("force"), given.pop("displacement"), **given)))
+    assert found[0] <= 1.5
+    assert found[-1] > 5e4  # a third of the session would be 3e4
+
+
+HEAD = "direction,repetition,branch,step,force_N,displacement_mm"
+META = """robot: none
+directions: {x: [1, 0, 0]}
+instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.001}}
+simulation: {stiffness_N_per_mm: {x: 100.0}, stiffness_relative_sd: 0.1}
+"""
+
+
+@pytest.mark.parametrize("clock", [True, False])
+def test_a_table_without_a_clock_says_nothing_of_lags_and_creep(
+    tmp_path: Path, clock: bool
+) -> None:
+    forces = [0, 20, 40, 60, 40, 20, 0]
+    branches = ["zero", *["loading"] * 3, *["unloading"] * 2, "zero"]
+    lines = [("time_s," if clock else "") + HEAD]
+    for i, (f, b) in enumerate(zip(forces, branches, strict=True)):
+        lines += [(f"{7 * i + k}," if clock else "") + f"x,1,{b},{i},{f},{f / 90}"
+                  for k in range(3)]  # fmt: skip
+    (tmp_path / "t.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (tmp_path / "m.yaml").write_text(META, encoding="utf-8")
+    import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
+    data = gap_data(load(tmp_path / "d.h5"))
+    assert data.timed is clock
+    bench = make_bench(data)
+    assert bench.timeless is not clock
+    words = {v.word for v in library(bench, ["joint_creep", "time_lag", "joint_hysteresis"])}
+    assert ({"joint_creep", "time_lag"} <= words) is clock
+    assert "joint_hysteresis" in words
+
+
+def test_one_reading_a_level_in_a_single_pull_shows_no_creep() -> None:
+    force = np.arange(10) * 20.0
+    once = make_bench(bench_data(force, 1e-5 * force))
+    assert once.never_held
+    assert not library(once, ["joint_creep"])
+    twice = make_bench(bench_data(np.repeat(force, 2), 1e-5 * np.repeat(force, 2),
+                                  step=np.repeat(np.arange(10), 2) + 1))  # fmt: skip
+    assert not twice.never_held
+    assert library(twice, ["joint_creep"])
+
+
+def test_levels_on_a_plateau_were_set_by_the_displacement() -> None:
+    force = np.array([0, 500, 900, 1000, 1001, 1001, 1002, 1002.0])
+    moved = 1e-3 * np.array([0, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 2.5])
+    assert displacement_imposed(bench_data(force, moved))
+    assert not displacement_imposed(bench_data(np.arange(8) * 130.0, moved))  # weights hung on
+    assert not displacement_imposed(bench_data(force, moved, imposed="force"))
+
+
+def test_products_are_those_of_the_columns() -> None:
+    bench = small_bench()
+    engine = small_engine(bench, (0.0, 3e-6, 1e-5))
+    for k in range(4):
+        bench.add(bench.stacked(1e-5 * np.sin((k + 2) * np.arange(bench.rows.n))))
+    engine.extend()
+    dense = small_engine(small_bench(), (0.0, 3e-6, 1e-5))
+    for column in bench.columns[2:]:
+        dense.bench.add(column)
+    whole = Engine(dense.bench, dense.base, dense.target, np.array([0.0, 3e-6, 1e-5]))
+    for level, other in zip(engine.levels, whole.levels, strict=True):
+        rows = level.beside((0, 3))
+        assert rows == pytest.approx(other.beside(tuple(range(6)))[[0, 3]], rel=1e-9)
+        assert level.square((0, 3)) == pytest.approx(rows[:, [0, 3]], rel=1e-9)
+        many = engine.squares(np.array([[0, 3], [5, 2]]))[level.number]
+        assert many[1] == pytest.approx(other.square((5, 2)), rel=1e-9)
+        assert level.moment == pytest.approx(other.moment, rel=1e-9)
+
+
+def test_zeros_left_out_of_products_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    thin = small_engine(small_bench()).levels[1]
+    monkeypatch.setattr(White, "sparsely", lambda self, columns, w: self.between(columns, [w])[0])
+    full = small_engine(small_bench()).levels[1]
+    assert thin.log_base == pytest.approx(full.log_base, rel=1e-12)
+    assert thin.moment == pytest.approx(full.moment, rel=1e-12)
+
+
+def part(word: str, columns: list[int], **info: object) -> Part:
+    return Part(variant(word, word, columns, (1.0,), **info), 1.0)
+
+
+def said(parts: tuple[Part, ...], sizes: tuple[float, ...], weight: float = 0.0,
+         eta: float = 0.0) -> Explanation:  # fmt: skip
+    return Explanation(parts, weight, eta, sizes, weight)
+
+
+def test_the_main_cause_of_two_is_shared_by_what_they_do() -> None:
+    two = (part("joint_yield", [0]), part("thermal_drift", [1]))
+    assert _main(said(two, (2e-5, 1e-5))) == pytest.approx(
+        {"joint_yield": 0.8, "thermal_drift": 0.2}
+    )
+    assert _main(said(two, (0.0, 0.0)))["joint_yield"] == 1.0
+    assert _main(said((), ())) == {"none": 1.0}
+
+
+def test_what_explains_far_less_inherits_nothing_unless_it_fits_closely() -> None:
+    both = (part("thermal_drift", [0]), part("joint_yield", [1]))
+    failed = said(both, (2e-5, 1e-5), 0.0)
+    for weight, eta, heir in ((-10.0, 9e-6, "thermal_drift"), (-90.0, 9e-6, "unknown"),
+                              (-90.0, 3e-6, "thermal_drift")):  # fmt: skip
+        alone = said(both[:1], (2e-5,), weight, eta)
+        assert _heir(failed, [failed, alone], {failed.words: 0.0}, 2e-6) == heir
+
+
+def test_two_frictions_without_readings_are_apart_in_different_directions() -> None:
+    bench = hanging(UP, poses=(1.0, 1.0))
+    setups = tuple(replace(s, direction=d) for s, d in zip(bench.data.setups, "xy", strict=True))
+    bench = make_bench(replace(bench.data, setups=setups))
+    only = [(bench.rows.setup == s) * 1e-5 * bench.load for s in (0, 1)]
+    for column in (*only, only[0] + only[1]):
+        bench.add(bench.stacked(column))
+    engine = small_engine_of(bench)
+    yields, slips = part("joint_yield", [0], joint=0), part("base_slip", [1], axis=2)
+    assert _apart(engine, yields, slips)
+    assert not _apart(engine, yields, part("base_slip", [2], axis=2))
+
+
+def small_engine_of(bench: object) -> Engine:
+    from identification.gap.base import base_columns, prediction
+    from identification.gap.bench import Bench
+
+    assert isinstance(bench, Bench)
+    target = bench.observed - prediction(bench)
+    return Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
+
+
+def test_springs_far_off_stand_on_their_own_beside_a_mechanism() -> None:
+    springs, rubs = part("joint_stiffness_error", [0]), part("joint_hysteresis", [1])
+    far = Sizes(np.zeros(2), np.array([12e-5, 1e-5]), 0.0)
+    near = Sizes(np.zeros(2), np.array([3e-5, 1e-5]), 0.0)
+    assert _on_its_own((springs, rubs), far, 0, 1)
+    assert not _on_its_own((springs, rubs), near, 0, 1)
+    assert not _on_its_own((part("joint_yield", [0]), rubs), far, 0, 1)
+
+
+def test_creep_that_grows_with_the_square_is_among_the_shapes_of_an_arm() -> None:
+    bench = hanging(UP)
+    found: list[Variant] = library(bench, ["joint_creep"])
+    bent = [v for v in found if v.info.get("bent")]
+    plain = [v for v in found if not v.info.get("bent") and " T " in v.label]
+    assert len(bent) == len(plain)
+    small, large = (
+        np.abs(bench.columns[v.columns[0]][: bench.rows.n]) for v in (bent[0], plain[0])
+    )
+    low, top = bench.load == 20.0, bench.load == 80.0
+    assert (small[low].max() / small[top].max()) < 0.5 * (large[low].max() / large[top].max())

@@ -1,0 +1,154 @@
+"""Joints carry the weights of arm and tool: friction, knees and plays act on the net torque."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
+from identification.gap.data import Array, Setup
+from identification.gap.effects import library
+from identification.gap.effects.joint_backlash import TOOLS_KG
+from identification.gap.effects.joint_nonlinear_stiffness import above, beyond
+from identification.gap.history import bristles, flowing_play, play
+from identification.gap.interval import TWO_SIDED
+from identification.gap.parameters import parameters
+from identification.gap.parts import Part
+from identification.gap.rows import reduce_rows
+from tests.unit.test_gap_operators import bench_data, fresh
+
+PATH = np.array([0.0, 4.0, 9.0, 15.0, 8.0, 0.0, -6.0, 3.0])
+
+
+def after_weight(path: Array, weight: float) -> Array:
+    """The path with the weight coming on before it, as its own first row."""
+    return np.concatenate([[weight], path + weight])
+
+
+@pytest.mark.parametrize("weight", [-7.0, 0.0, 2.0, 12.0])
+def test_a_play_under_weight_is_one_whose_load_began_with_it(weight: float) -> None:
+    radius, n = np.array([3.0, 5.0]), len(PATH)
+    none = np.zeros(n + 1, dtype=bool)
+    whole = play(np.tile(after_weight(PATH, weight)[:, None], 2), radius, none, fresh(n + 1))
+    found = play(np.tile(PATH[:, None], 2), radius, none[1:], fresh(n), np.full((n, 1), weight))
+    assert found == pytest.approx(whole[1:] - whole[0])
+
+
+def test_a_rest_takes_the_push_off_and_leaves_the_weight() -> None:
+    rest = np.arange(len(PATH)) == 4
+    longer = np.insert(PATH, 4, 0.0)
+    none = np.zeros(len(longer), dtype=bool)
+    whole = play(after_weight(longer, -9.0)[:, None], np.array([5.0]), np.append(none, False),
+                 fresh(len(longer) + 1))[1:, 0]  # fmt: skip
+    weight = np.full((len(PATH), 1), -9.0)
+    found = play(PATH[:, None], np.array([5.0]), rest, fresh(len(PATH)), weight)[:, 0]
+    assert found == pytest.approx(np.delete(whole, 4) + 4.0)  # the weight alone had left -4
+
+
+@pytest.mark.parametrize("elastic", [False, True])
+@pytest.mark.parametrize("weight", [-7.0, 2.0])
+def test_bristles_under_weight_are_bent_by_it_first(weight: float, elastic: bool) -> None:
+    reach, n = np.array([4.0]), len(PATH)
+    whole = bristles(after_weight(PATH, weight), reach, fresh(n + 1), elastic)
+    found = bristles(PATH, reach, fresh(n), elastic, np.full(n, weight))
+    assert found == pytest.approx(whole[1:] - whole[0])
+
+
+def test_flow_under_weight_comes_to_the_same_state_in_the_end() -> None:
+    rows = reduce_rows(bench_data(PATH, 1e-5 * PATH, time=1e4 * np.arange(len(PATH))))
+    weight, radius = np.full(len(PATH), -9.0), np.array([5.0])
+    found = flowing_play(PATH, radius, np.array([0.01]), rows, fresh(len(PATH)), weight)
+    none = np.zeros(len(PATH), dtype=bool)
+    still = play(PATH[:, None], radius, none, fresh(len(PATH)), weight[:, None])
+    assert found == pytest.approx(still)
+
+
+def test_curves_of_the_net_torque_start_where_the_weight_left_them() -> None:
+    torque, weight = np.linspace(-20, 60, 81), np.full(81, -30.0)
+    net = torque + weight
+    for shape, law in ((beyond, lambda x: np.sign(x) * np.maximum(np.abs(x) - 10, 0)),
+                       (above, lambda x: np.maximum(x - 10, 0))):  # fmt: skip
+        assert shape(torque, weight, 10.0) == pytest.approx(law(net) - law(weight))
+        assert shape(np.zeros(1), weight[:1], 10.0) == 0.0
+
+
+def hanging(levels: Array, gravity: float = -30.0, poses: tuple[float, ...] = (1.0,)) -> Bench:
+    """One joint of an arm with a lever of 1 m, pushed to levels, 4 samples each, once per pose, in
+    which the weight is so many times what it is in the first."""
+    one = bench_data(PATH, PATH).setups[0]
+    setups: tuple[Setup, ...] = tuple(
+        replace(one, pose=f"P{i}", gravity=np.array([gravity * p]), tool_gravity=np.array([-5.0]))
+        for i, p in enumerate(poses)
+    )
+    n = 4 * len(levels)
+    number = np.repeat(np.arange(len(poses)), n)
+    force = np.tile(np.repeat(levels, 4), len(poses))
+    step = np.tile(np.repeat(np.arange(len(levels)), 4), len(poses))
+    data = bench_data(force, 1e-5 * force, setups=setups, arm=True, setup=number, run=number,
+                      step=step, time=np.tile(np.arange(float(n)), len(poses)))  # fmt: skip
+    return make_bench(data)
+
+
+UP = np.array([0, 20, 40, 60, 80, 60, 40, 20, 0.0])
+
+
+def labels(bench: Bench, word: str) -> list[str]:
+    return [v.label for v in library(bench, [word])]
+
+
+def test_weights_count_where_the_joint_feels_them() -> None:
+    heavy, light = hanging(UP), hanging(UP, gravity=7.5)  # with the tool: -37.5 and 0 Nm
+    assert heavy.weight(0)[0] == pytest.approx(-30.0 - 5.0 * TOOL_KG)
+    assert heavy.feels_weight(0)
+    assert not light.feels_weight(0)
+    for word in ("joint_hysteresis", "joint_nonlinear_stiffness"):
+        new = set(labels(heavy, word)) - set(labels(light, word))
+        assert any("under weight" in v or "tool" in v for v in new)
+
+
+def test_thresholds_on_the_net_torque_are_others_between_poses_and_senses() -> None:
+    def under(bench: Bench) -> int:
+        return sum("under weight" in v for v in labels(bench, "joint_yield"))
+
+    along = hanging(UP, gravity=30.0)  # the push adds to the weight
+    assert not under(along)
+    assert under(hanging(UP, gravity=30.0, poses=(1.0, 1.3)))
+    assert under(hanging(np.concatenate([UP, -UP]), gravity=30.0))
+
+
+def test_a_threshold_is_the_net_torque_and_knows_no_more_of_it_than_of_the_tool() -> None:
+    bench = hanging(UP, gravity=30.0)  # the tool takes 7.5 Nm off: the joint carries 22.5
+    sharp = next(v for v in library(bench, ["joint_yield"]) if "at 0.5 sharp" in v.label)
+    info = {**sharp.info, "radius": np.array([40.0])}
+    knee = replace(sharp, columns=sharp.columns[:1], root=np.eye(1), info=info)
+    found = parameters(bench, Part(knee, 1.0), np.array([1.0]), np.zeros((1, 1)))
+    push, net = found["threshold_of_load"], found["threshold"]
+    assert push.value == pytest.approx(40.0, rel=0.01)
+    assert net.value == pytest.approx(push.value + 22.5)
+    wide = np.hypot(push.high - push.value, TWO_SIDED * TOOL_SD_KG * 5.0)
+    assert net.high - net.value == pytest.approx(wide, rel=1e-6)
+
+
+def test_plays_cross_where_some_tool_balances_the_weights() -> None:
+    bench = hanging(UP)
+    found = [v for v in library(bench, ["joint_backlash"]) if v.info["crossing"] == "weight"]
+    assert {v.info["tool_kg"] for v in found} == set(TOOLS_KG)
+    too_heavy = hanging(UP, gravity=-300.0)
+    assert not [v for v in library(too_heavy, ["joint_backlash"]) if v.info["crossing"] == "weight"]
+
+
+def test_thresholds_answer_to_the_load_without_the_drift_of_its_reading() -> None:
+    """3 N of drift over the run, plain at zero load before and after."""
+    levels = np.array([0, 20, 40, 60, 80, 60, 40, 20, 0.0])
+    force = np.repeat(levels, 4)
+    drift = np.linspace(0.0, 3.0, len(force))
+    branch = np.where(force == 0, 0, 1)
+    step = np.where(force == 0, 0, np.repeat(np.arange(9), 4))
+    data = bench_data(force + drift, 1e-5 * force, branch=branch, step=step)
+    bench = make_bench(data)
+    rows = bench.rows
+    expected = np.array([levels[s] for s in rows.step])
+    assert bench.true_torque[:, 0] == pytest.approx(expected, abs=0.15)
+    assert np.abs(bench.torque[:, 0] - expected).max() > 2.0
