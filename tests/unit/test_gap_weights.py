@@ -36,15 +36,16 @@ def test_a_play_under_weight_is_one_whose_load_began_with_it(weight: float) -> N
     assert found == pytest.approx(whole[1:] - whole[0])
 
 
-def test_a_rest_takes_the_push_off_and_leaves_the_weight() -> None:
-    rest = np.arange(len(PATH)) == 4
-    longer = np.insert(PATH, 4, 0.0)
-    none = np.zeros(len(longer), dtype=bool)
-    whole = play(after_weight(longer, -9.0)[:, None], np.array([5.0]), np.append(none, False),
-                 fresh(len(longer) + 1))[1:, 0]  # fmt: skip
-    weight = np.full((len(PATH), 1), -9.0)
-    found = play(PATH[:, None], np.array([5.0]), rest, fresh(len(PATH)), weight)[:, 0]
-    assert found == pytest.approx(np.delete(whole, 4) + 4.0)  # the weight alone had left -4
+@pytest.mark.parametrize("weight", [-9.0, 9.0])
+def test_a_rest_takes_the_push_off_and_leaves_the_weight(weight: float) -> None:
+    path = np.sign(-weight) * PATH  # against it first
+    rest, longer = np.arange(len(path)) == 4, np.insert(path, 4, 0.0)
+    n = len(longer) + 1
+    load = after_weight(longer, weight)[:, None]
+    whole = play(load, np.array([5.0]), np.zeros(n, dtype=bool), fresh(n))[:, 0]
+    hung = np.full((len(path), 1), weight)
+    found = play(path[:, None], np.array([5.0]), rest, fresh(len(path)), hung)[:, 0]
+    assert found == pytest.approx(np.delete(whole[1:], 4) - whole[0])
 
 
 @pytest.mark.parametrize("elastic", [False, True])
