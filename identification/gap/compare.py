@@ -248,5 +248,6 @@ def log_mean(values: list[float], weights: list[float] | None = None) -> float:
     """log of the (weighted) mean of exp(values)."""
     v = np.array(values)
     w = np.ones(len(v)) if weights is None else np.array(weights)
-    top = v.max()
+    top = v[w > 0].max()
+    v = np.minimum(v, top)  # what weighs nothing decides nothing
     return float(top + np.log(np.sum(w * np.exp(v - top)) / w.sum()))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from identification.gap.bench import displacement_imposed, make_bench
+from identification.gap.compare import log_mean
 from identification.gap.data import Array
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import times
@@ -217,3 +218,8 @@ def test_creep_that_grows_with_the_square_is_among_the_shapes_of_an_arm() -> Non
     )
     low, top = bench.load == 20.0, bench.load == 80.0
     assert (small[low].max() / small[top].max()) < 0.5 * (large[low].max() / large[top].max())
+
+
+def test_a_mean_of_evidence_leaves_out_what_weighs_nothing() -> None:
+    assert log_mean([0.0, -2000.0], [0.0, 1.0]) == pytest.approx(-2000.0)
+    assert log_mean([-1.0, -1.0]) == pytest.approx(-1.0)
