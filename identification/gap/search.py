@@ -399,8 +399,10 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     for e in ranked:
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         good *= kept.get(e.words, 1.0)
+        many = THREE if len(e.parts) > 2 else 1.0
         for word, share in _main(e).items():
-            mass[word] += share * good
+            mass[word] += many * share * good
+        mass["unknown"] += (1 - many) * good
         mass[_heir(e, ranked, kept, found.engine.bench.noise.stated)] += whole - good
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
@@ -408,6 +410,12 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     doubt = DOUBT if found.engine.bench.data.arm else BENCH_DOUBT
     probabilities = trusted({w: m / total for w, m in mass.items()}, set(found.alone), doubt)
     return replace(found, probabilities=probabilities, kept=kept)
+
+
+# Of what is left of three troubles at once: one that the library lacks is likelier than that. Of 40
+# such explanations on two seeds of the blind check with and without withheld words, 12 were of a
+# known gap, 28 stood in for a word that was taken away.
+THREE = 0.65
 
 
 def _main(explanation: Explanation) -> dict[str, float]:

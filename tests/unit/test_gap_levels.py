@@ -20,7 +20,7 @@ from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import _apart, _on_its_own
 from identification.gap.products import White
 from identification.gap.rows import reduce_rows
-from identification.gap.search import Explanation, _heir, _main
+from identification.gap.search import THREE, Explanation, _heir, _main, search, weighed
 from identification.gap.variants import Variant, variant
 from rig.dataset import load
 from rig.gap_data import gap_data
@@ -223,3 +223,14 @@ def test_creep_that_grows_with_the_square_is_among_the_shapes_of_an_arm() -> Non
 def test_a_mean_of_evidence_leaves_out_what_weighs_nothing() -> None:
     assert log_mean([0.0, -2000.0], [0.0, 1.0]) == pytest.approx(-2000.0)
     assert log_mean([-1.0, -1.0]) == pytest.approx(-1.0)
+
+
+def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
+    bench = small_bench()
+    variants = library(bench, ["joint_creep", "joint_hysteresis"])
+    found = search(small_engine_of(bench), variants)
+    three = tuple(part(w, [0]) for w in ("joint_yield", "thermal_drift", "force_drift"))
+    for parts, share in ((three, 1 - THREE), (three[:2], 0.0)):
+        sizes = tuple(1e-5 / (i + 1) for i in range(len(parts)))
+        one = replace(found, explanations=(said(parts, sizes, 0.0),), unknown=-800.0, alone={})
+        assert weighed(one, {}).probabilities["unknown"] == pytest.approx(share)
