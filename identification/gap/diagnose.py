@@ -135,7 +135,7 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     if verdict in ("none", "unknown"):
         return next(e for e in found.explanations if not e.parts)
     mine = [e for e in found.explanations if e.parts and e.parts[0].word == verdict]
-    held = [e for e in mine if found.kept.get(e.words, 1.0) > 0.5]
+    held = [e for e in mine if _held(found, e)]
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]
     near = [e for e in simpler if e.log_weight > best.log_weight - WORTH]
@@ -144,6 +144,15 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     least = min(LEAST_SHARE * max(best.sizes), BELOW_NOISE * noise_of(found.engine.bench))
     petty = {p.word for p, s in zip(best.parts, best.sizes, strict=True) if s < least} - FREE
     return next((e for e in simpler if best.words - e.words <= petty), best)
+
+
+def _held(found: Found, explanation: Explanation) -> bool:
+    """Whether it foresees withheld repetitions; where nobody looked, whether nothing that failed is
+    contained in it: what is added to a failure does not mend it."""
+    kept = found.kept.get(explanation.words)
+    if kept is not None:
+        return kept > 0.5
+    return not any(k <= 0.5 and w <= explanation.words for w, k in found.kept.items())
 
 
 def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explanation) -> GapResult:

@@ -12,6 +12,7 @@ import pytest
 from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.compare import log_mean
 from identification.gap.data import Array
+from identification.gap.diagnose import _held
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
@@ -234,3 +235,16 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         sizes = tuple(1e-5 / (i + 1) for i in range(len(parts)))
         one = replace(found, explanations=(said(parts, sizes, 0.0),), unknown=-800.0, alone={})
         assert weighed(one, {}).probabilities["unknown"] == pytest.approx(share)
+
+
+def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    yields, drifts, links = (part(w, [0]) for w in ("joint_yield", "thermal_drift", "force_scale"))
+    two, three, other = (
+        said(parts, (1e-5,) * len(parts))
+        for parts in ((yields, drifts), (yields, drifts, links), (yields, links))
+    )
+    found = replace(found, kept={two.words: 0.1, frozenset({"joint_creep"}): 0.9})
+    assert [_held(found, e) for e in (two, three, other)] == [False, False, True]
