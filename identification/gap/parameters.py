@@ -23,6 +23,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.link_flexibility import STRAINS
+from identification.gap.history import half_sample, settling_share, standing_on
 from identification.gap.interval import NOMINAL, TWO_SIDED, Found, Parameter, Softer, normal
 from identification.gap.lags import closest_lag
 from identification.gap.parts import Part
@@ -217,7 +218,21 @@ def _lag(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     share /= share.sum()
     value = float(share @ lags)
     variance = float(share @ (spread**2 + (lags - value) ** 2))
-    return {"lag": normal(value, variance, "s")}
+    return {"lag": normal(value, variance + _turning_sd(bench, value) ** 2, "s")}
+
+
+def _turning_sd(bench: Bench, lag: float) -> float:
+    """s by which a lag is uncertain because nobody recorded when the load began to move: between
+    two samples, so that it took half a sample more or less. What a lag shows at the first sample of
+    a hold is the share of that way which it is late."""
+    rows = bench.rows
+    begins = rows.hold_starts & ~rows.starts
+    if rows.continuous or not begins.any():
+        return 0.0
+    half = half_sample(rows)
+    gaps = np.diff(rows.session, prepend=rows.session[0])
+    way = float(np.median((gaps - settling_share(rows) - standing_on(rows))[begins]))
+    return 0.5 * half / max(way, half) * max(lag - half, 0.0)
 
 
 def _pose(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
