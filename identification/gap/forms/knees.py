@@ -66,7 +66,7 @@ def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     fresh = fresh_after(bench, law.constants["memory"])
     radius = np.array([t.shape["threshold"] for t in law.terms if "threshold" in t.shape])
     weight = None
-    if law.constants["memory"] == HUNG:
+    if law.constants["memory"] == HUNG and "joint" in law.constants:  # its twin may sit elsewhere
         weight = bench.weight(law.constants["joint"])
     out = list(joint_yield.states(bench, load, radius, law.constants["flow_time"], fresh, weight).T)
     beyond = np.array([t.shape["grows_beyond"] for t in law.terms if "grows_beyond" in t.shape])
