@@ -15,7 +15,7 @@ from identification.gap.effects.joint_yield import refined
 from identification.gap.evidence import Engine
 from identification.gap.forms import SESSION, Form, describe, law_of, lawful, realise, rows_of
 from identification.gap.forms.known import less_known
-from identification.gap.forms.law import Law, Term
+from identification.gap.forms.law import HUNG, KEPT, Law, Term
 from identification.gap.parts import Part
 from identification.gap.twins import twin_of
 from tests.unit.test_gap_operators import bench_data
@@ -254,3 +254,13 @@ def test_yield_of_joint_1_and_slip_about_the_vertical_are_twins_without_readings
     own = engine.pool @ w
     form = describe(there, part, w, np.eye(len(w)))
     np.testing.assert_allclose(realise(there, twin.form(form)), own, atol=1e-9 * np.abs(own).max())
+
+
+def test_a_knee_under_weight_may_be_tried_in_the_mounting(bench: Bench) -> None:
+    """As a twin: the mounting's moment is counted without the arm's weight."""
+    hung, kept = (
+        Law({"axis": "z", "depth": 0.0, "memory": memory, "flow_time": 0.0},
+            (Term("compliance", {"threshold": 30.0}),))
+        for memory in (HUNG, KEPT)
+    )  # fmt: skip
+    assert np.array_equal(rows_of(bench, "base_slip", hung), rows_of(bench, "base_slip", kept))
