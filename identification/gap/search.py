@@ -400,7 +400,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         good *= kept.get(e.words, 1.0)
         many = THREE if len(e.parts) > 2 else 1.0
-        for word, share in _main(e).items():
+        for word, share in _main(e, found.engine.bench.data.arm).items():
             mass[word] += many * share * good
         mass["unknown"] += (1 - many) * good
         mass[_heir(e, ranked, kept, found.engine.bench.noise.stated)] += whole - good
@@ -418,11 +418,14 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
 THREE = 0.8
 
 
-def _main(explanation: Explanation) -> dict[str, float]:
+def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
     """Which effect of an explanation is its main one: each in proportion to its share of the gap,
-    since how large an effect is alone is a matter of what else may take its place."""
+    since how large an effect is alone is a matter of what else may take its place. Without an arm
+    all words speak of one spring, and a second one is mostly more of the first one's law."""
     if not explanation.parts:
         return {"none": 1.0}
+    if not arm:
+        return {explanation.parts[0].word: 1.0}
     square = np.array(explanation.sizes) ** 2
     square[0] = max(float(square[0]), 1e-300)
     share = square / square.sum()
