@@ -399,7 +399,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     for e in ranked:
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         good *= kept.get(e.words, 1.0)
-        many = THREE if len(e.parts) > 2 else 1.0
+        many = THREE if len(e.parts) > 2 and e.sizes[2] > TELLING * e.sizes[0] else 1.0
         for word, share in _main(e, found.engine.bench.data.arm).items():
             mass[word] += many * share * good
         mass["unknown"] += (1 - many) * good
@@ -416,6 +416,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
 # explanations on two seeds of the blind check with and without withheld words, 12 were of a known
 # gap, 28 stood in for a word that was taken away; but what is known must not be split into losing.
 THREE = 0.8
+TELLING = 0.1  # of the largest: a smaller one is no trouble beside it
 
 
 def _main(explanation: Explanation, arm: bool) -> dict[str, float]:

@@ -231,8 +231,8 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
     variants = library(bench, ["joint_creep", "joint_hysteresis"])
     found = search(small_engine_of(bench), variants)
     three = tuple(part(w, [0]) for w in ("joint_yield", "thermal_drift", "force_drift"))
-    for parts, share in ((three, 1 - THREE), (three[:2], 0.0)):
-        sizes = tuple(1e-5 / (i + 1) for i in range(len(parts)))
+    for parts, least, share in ((three, 0.3, 1 - THREE), (three, 0.05, 0.0), (three[:2], 1, 0.0)):
+        sizes = (1e-5, 0.5e-5, 1e-5 * least)[: len(parts)]
         one = replace(found, explanations=(said(parts, sizes, 0.0),), unknown=-800.0, alone={})
         assert weighed(one, {}).probabilities["unknown"] == pytest.approx(share)
 
