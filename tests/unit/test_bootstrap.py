@@ -25,7 +25,10 @@ except KeyboardInterrupt:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_ctrl_c_lets_the_command_end_in_its_own_way() -> None:
-    code = f"import sys, bootstrap\nsys.exit(bootstrap._call([sys.executable, '-c', {COMMAND!r}]))"
+    # a shell that starts the tests in the background has them ignore Ctrl-C; a terminal does not
+    code = f"""import signal, sys, bootstrap
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(bootstrap._call([sys.executable, '-c', {COMMAND!r}]))"""
     started = subprocess.Popen(
         [sys.executable, "-c", code], cwd=HOME, text=True, start_new_session=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,

@@ -23,6 +23,7 @@ from identification.gap.variants import Variant, variant
 WORD = "time_lag"
 LAGS = (0.3, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 4.0, 7.0, 12.0)  # of the time between two samples
 
+_USUAL = 2.5  # samples: a reading so late would have been noticed, the later the sooner
 _OF_STROKE = 0.5  # of the time that one pass of the load takes
 
 
@@ -33,7 +34,7 @@ def variants(bench: Bench) -> list[Variant]:
     sample = 2 * half_sample(bench.rows) if not bench.rows.continuous else _typical_step(bench)
     out = []
     for multiple in LAGS:
-        lag = multiple * sample
+        lag, likely = multiple * sample, min(1.0, _USUAL / multiple)
         if bench.rows.continuous and lag > _OF_STROKE * bench.stroke_s:
             break  # the load would have come before anybody turned a screw
         for channel in ("displacement", "force"):
@@ -45,11 +46,11 @@ def variants(bench: Bench) -> list[Variant]:
                 pair.append(bench.add(change))
                 info: dict[str, Any] = {"lag_s": lag, "kind": kind, "channel": channel}
                 out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", pair[-1:], (0.5, 1.0),
-                                   **info))  # fmt: skip
+                                   prior=likely, **info))  # fmt: skip
             if len(pair) > 1:
                 info = {"lag_s": lag, "kind": "window", "channel": channel}
-                out.append(variant(WORD, f"{channel} window {lag:.3g} s", pair, (0.5,), prior=0.5,
-                                   **info))  # fmt: skip
+                out.append(variant(WORD, f"{channel} window {lag:.3g} s", pair, (0.5,),
+                                   prior=0.5 * likely, **info))  # fmt: skip
     return out
 
 
