@@ -66,6 +66,13 @@ def test_creep_of_a_hold_is_no_burst_and_bursts_are() -> None:
     assert bursts(bench_data(given.pop("force"), given.pop("displacement"), **given))
 
 
+def test_a_line_read_at_odd_times_is_no_burst() -> None:
+    steps = np.where(np.arange(200) % 20 == 7, 30.0, 1.0)
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    given = one_hold(t, 5e-6 * t)
+    assert not bursts(bench_data(given.pop("force"), given.pop("displacement"), **given))
+
+
 def test_creep_times_of_a_bench_reach_from_a_sample_to_beyond_the_session() -> None:
     t, u = creeping()
     given = one_hold(t, u)

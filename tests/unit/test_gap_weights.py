@@ -117,6 +117,8 @@ def test_thresholds_on_the_net_torque_are_others_between_poses_and_senses() -> N
     assert not under(along)
     assert under(hanging(UP, gravity=30.0, poses=(1.0, 1.3)))
     assert under(hanging(np.concatenate([UP, -UP]), gravity=30.0))
+    relieved = hanging(UP, gravity=-300.0, poses=(1.0, 1.3))  # every push takes load off
+    assert not under(relieved)
 
 
 def test_a_threshold_is_the_net_torque_and_knows_no_more_of_it_than_of_the_tool() -> None:
