@@ -13,10 +13,12 @@ from identification.gap.effects import library
 from identification.gap.effects.joint_backlash import TOOLS_KG
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond
 from identification.gap.history import bristles, flowing_play, play
-from identification.gap.interval import TWO_SIDED
+from identification.gap.interval import TWO_SIDED, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.rows import reduce_rows
+from rig.gap_data import arm_setup
+from rig.model import load_robot
 from tests.unit.test_gap_operators import bench_data, fresh
 
 PATH = np.array([0.0, 4.0, 9.0, 15.0, 8.0, 0.0, -6.0, 3.0])
@@ -155,3 +157,33 @@ def test_thresholds_answer_to_the_load_without_the_drift_of_its_reading() -> Non
     expected = np.array([levels[s] for s in rows.step])
     assert bench.true_torque[:, 0] == pytest.approx(expected, abs=0.15)
     assert np.abs(bench.torque[:, 0] - expected).max() > 2.0
+
+
+def test_a_tool_pulls_at_the_point_of_load() -> None:
+    """Against an arm that carries it as its payload there."""
+    arm = load_robot("ur10e")
+    q, tcp = np.array([0.2, -1.66, -1.78, -1.27, 1.57, -1.34]), np.array([0.0, 0.0, 0.07])
+    setup = arm_setup(arm, "P1", q, tcp, "x", np.array([1.0, 0, 0]))
+    laden = replace(arm, payload=1.0, payload_centre=tcp)
+    more = arm.gravity_torques(q) - laden.gravity_torques(q)
+    assert setup.tool_gravity == pytest.approx(more, abs=1e-9)
+    assert np.abs(more).max() > 5.0
+
+
+def test_a_factor_of_a_spring_knows_the_spring_no_better_than_stated() -> None:
+    bench = hanging(UP)
+    wrong = next(v for v in library(bench, ["joint_stiffness_error"]))
+    softer = Softer({0: 0.1}, {0: 0.0}, {0: np.zeros(1)})
+    found = parameters(bench, Part(wrong, 1.0), np.array([0.5]), np.zeros((1, 1)), softer)
+    factor = found["factor_joint1"]
+    assert factor.value == pytest.approx(1 / 1.6)
+    stated = float(bench.data.compliance_relative_sd[0])
+    assert np.log(factor.high / factor.low) == pytest.approx(2 * TWO_SIDED * stated)
+
+
+def test_creep_with_the_square_counts_as_its_straight_line() -> None:
+    bench = hanging(UP)
+    bent = next(v for v in library(bench, ["joint_creep"]) if v.info.get("bent"))
+    k = len(bent.columns)
+    found = parameters(bench, Part(bent, 1.0), np.full(k, 0.1), np.zeros((k, k)))
+    assert found["creep_fraction"].value == pytest.approx(0.75 * 0.1 * k)

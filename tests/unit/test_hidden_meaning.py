@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rig.worlds.hidden import memory
 from rig.worlds.hidden.effect import Unsuited, draw_joint
-from rig.worlds.hidden.joint_laws import _knee_law, _reached
+from rig.worlds.hidden.joint_laws import _knee_law, _reached, onset
 from rig.worlds.hidden.meaning import equal_work_threshold, run_seconds, straight_factor
-from rig.worlds.hidden.scene import Scene, observe, observe_path
-from tests.unit.hidden_scenes import contribution, effect_of, middle, scene_of
+from rig.worlds.hidden.scene import Scene, make_scene, observe, observe_path
+from tests.unit.hidden_scenes import contribution, effect_of, middle, plan_of, scene_of
 
 
 @pytest.fixture(scope="module")
@@ -132,3 +134,27 @@ def test_depth_of_a_seat_is_reached_by_the_largest_load(scene: Scene) -> None:
 def test_a_bent_gain_is_the_best_straight_one() -> None:
     assert straight_factor(lambda x: 1.1 * x) == pytest.approx(1.1)
     assert straight_factor(lambda x: x**2) == pytest.approx(0.75, rel=1e-3)
+
+
+def test_a_tool_hangs_on_the_joints_and_its_weight_counts_at_the_onset() -> None:
+    plan = plan_of("rich")
+    light, heavy = (
+        make_scene(replace(plan, tool_kg=kg), np.random.default_rng(3)) for kg in (0.0, 2.0)
+    )
+    assert np.abs(heavy.weight - light.weight)[:, 2].max() > 5.0
+    weight = heavy.weight[:, 1]
+    for s, setup in enumerate(heavy.plan.setups):
+        arm = float(heavy.levers[s, 1] @ heavy.unit[s])
+        limit = abs(weight[s] + arm * 0.9 * setup.top_N)
+        if np.sign(weight[s] + arm * setup.top_N) != np.sign(arm) or limit < abs(weight).max():
+            continue
+        found = onset(heavy, 1, limit)
+        assert found[setup.direction] <= 0.9 * setup.top_N * (1 + 1e-9)
+        net = [
+            abs(weight[i] + float(heavy.levers[i, 1] @ heavy.unit[i]) * found[setup.direction])
+            for i, other in enumerate(heavy.plan.setups)
+            if other.direction == setup.direction
+        ]
+        assert min(abs(n - limit) for n in net) < 1e-9 * limit
+        return
+    pytest.fail("no push goes beyond the weight")
