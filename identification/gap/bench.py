@@ -43,6 +43,7 @@ _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
 _HELD = 2  # samples
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
+_BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
 _FELT = 0.03  # of the range of the load's torque
 _DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
 
@@ -359,6 +360,18 @@ class Bench:
         """(n,) Nm: what the weights of arm and tool do to a joint."""
         each = [s.gravity + tool_kg * s.tool_gravity for s in self.data.setups]
         return np.asarray(np.stack(each)[self.rows.setup, joint])
+
+    def weight_per_kg(self, joint: int) -> Array:
+        """(n,) Nm/kg: what a tool does to a joint."""
+        return self.weight(joint, 1.0) - self.weight(joint, 0.0)
+
+    def meets_weight_unlike(self, joint: int) -> bool:
+        """Whether pushes go both with the weights and against them, or weights differ between
+        poses: else a law of the net torque is one of the push, shifted."""
+        push, weight = self.true_torque[:, joint], self.weight(joint)
+        top = float(np.abs(push).max())
+        both = min(float(push.max()), -float(push.min())) > _BOTH * top
+        return both or float(np.ptp(weight)) > _UNLIKE * top
 
     def feels_weight(self, joint: int) -> bool:
         """Whether weights make a difference to a joint, beside the torques of the load."""

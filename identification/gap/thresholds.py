@@ -83,7 +83,7 @@ def _with_weight(bench: Bench, part: Part, found: Parameter) -> dict[str, Parame
     net = load + weight if "weight" in info else load
     sense = float(np.sign(net[int(np.abs(net).argmax())]))
     hangs = float(np.mean(weight[sense * load > 0.5 * (sense * load).max()]))
-    per_kg = float(np.abs(bench.weight(joint, 1.0) - bench.weight(joint, 0.0)).max())
+    per_kg = float(np.abs(bench.weight_per_kg(joint)).max())
     half = TWO_SIDED * TOOL_SD_KG * per_kg
     if "weight" in info:  # both are near: what of the tool is wrong in one is wrong in the other
         push = _moved(found, -sense * hangs, 0.0)

@@ -66,7 +66,7 @@ def variants(bench: Bench) -> list[Variant]:
 
 def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Array, float]]:
     """What may cross zero: name, mass of the tool, torque (n,), prior."""
-    torque, plain, per_kg = bench.true_torque[:, j], bench.weight(j, 0.0), _per_kg(bench, j)
+    torque, plain, per_kg = bench.true_torque[:, j], bench.weight(j, 0.0), bench.weight_per_kg(j)
     masses = TOOLS_KG if np.abs(per_kg).max() * max(TOOLS_KG) > ZONES[0] * span else (TOOL_KG,)
     net = [(kg, torque + plain + kg * per_kg) for kg in masses]
     out = [
@@ -79,10 +79,6 @@ def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Arra
     return out
 
 
-def _per_kg(bench: Bench, j: int) -> Array:
-    return bench.weight(j, 1.0) - bench.weight(j, 0.0)
-
-
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Zones about one that was found; where weights decide about the crossing, at masses of the
     tool in between: the zone is small beside what they do. close: share of the steps."""
@@ -90,7 +86,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     if info["kind"] in PLACED:
         return []
     torque = bench.true_torque[:, j]
-    weighty = info["crossing"] == "weight" and np.any(_per_kg(bench, j))
+    weighty = info["crossing"] == "weight" and np.any(bench.weight_per_kg(j))
     steps = _TOOL_STEPS_KG if weighty else np.zeros(1)
     masses = float(info["tool_kg"]) + close * steps
     zones = float(info["zone_Nm"]) * np.array([0.65, 1.0, 1.5]) ** max(close, 0.75)

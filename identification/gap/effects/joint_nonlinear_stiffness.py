@@ -40,9 +40,7 @@ def variants(bench: Bench) -> list[Variant]:
         if not top > 0:
             continue
         x, c = torque / top, bench.compliance[j] * top
-        columns = [
-            bench.add_joint(j, c * np.sign(x) * np.maximum(np.abs(x) - b, 0)) for b in HINGES
-        ]
+        columns = [bench.add_joint(j, c * hinge(x, b)) for b in HINGES]
         info: dict[str, Any] = {"joint": j, "torque": top, "hinges": HINGES}
         line = bench.add_joint(j, c * x)
         out.append(
@@ -87,8 +85,7 @@ def _net(bench: Bench, j: int, line: int) -> list[Variant]:
                     _root(), positive=False, prior=0.3 / len(TOOLS_KG), kinds=kinds, tool_kg=kg,
                     **info)
         )  # fmt: skip
-    both = min(float(torque.max()), -float(torque.min())) > _BOTH * top
-    if both or float(np.ptp(weight)) > _UNLIKE * top:
+    if bench.meets_weight_unlike(j):
         places = float(net.min()) + float(np.ptp(net)) * np.array(HINGES)
         columns = [bench.add_joint(j, c * above(torque, weight, b)) for b in places]
         kinds = ("line", *(("above", float(b)) for b in places))
@@ -107,17 +104,17 @@ def _root() -> Array:
 
 
 TOOLS_KG = (0.5, 1.5, 2.5)
-_BOTH, _UNLIKE = 0.2, 0.03  # of the joint's largest torque
 
 
 def beyond(torque: Array, weight: Array, bend: float) -> Array:
     """(n,) by how much the size of the net torque is beyond a bend, with its sign, more than under
     the weight (n,) alone."""
     net = torque + weight
-    return np.asarray(_hinge(net, bend) - _hinge(weight, bend))
+    return np.asarray(hinge(net, bend) - hinge(weight, bend))
 
 
-def _hinge(x: Array, bend: float) -> Array:
+def hinge(x: Array, bend: float) -> Array:
+    """(n,) by how much the size of x (n,) is beyond a bend, with its sign."""
     return np.asarray(np.sign(x) * np.maximum(np.abs(x) - bend, 0.0))
 
 
@@ -131,7 +128,7 @@ def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
     x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
     start = float(np.abs(x).min()) if x.min() * x.max() > 0 else 0.0
     places = tuple(round(start + b * (1 - start), 6) for b in FINE)
-    columns = [bench.add_joint(j, c * np.sign(x) * np.maximum(np.abs(x) - b, 0)) for b in places]
+    columns = [bench.add_joint(j, c * hinge(x, b)) for b in places]
     root = np.zeros((len(places) + 1,) * 2)
     root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(places), 0.5)
     return variant(WORD, f"joint {j + 1} fine curve", [line, *columns], FINE_SCALES, root,

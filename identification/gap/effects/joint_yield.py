@@ -63,9 +63,8 @@ def _under_weight(
     then none."""
     weight = bench.weight(joint)
     top, alone = float(np.abs(load).max()), float(np.abs(weight).max())
-    both = min(float(load.max()), -float(load.min())) > _BOTH * top
     most = float(np.abs(load + weight).max())
-    if most - alone < _BOTH * top or not (both or float(np.ptp(weight)) > _UNLIKE * top):
+    if most - alone < _PUSHED * top or not bench.meets_weight_unlike(joint):
         return []
     radius = alone + (most - alone) * np.array(THRESHOLDS)
     info = {"joint": joint, "memory": UNDER_WEIGHT, "flow_s": 0.0, "load": load,
@@ -76,7 +75,7 @@ def _under_weight(
     return _knees(WORD, label, [column(s) for s in states.T], radius, back, info)
 
 
-_BOTH, _UNLIKE = 0.2, 0.03  # of the joint's largest torque
+_PUSHED = 0.2  # of the joint's largest torque: so far beyond its weight some push must go
 
 
 def knee_variants(

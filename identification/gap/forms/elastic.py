@@ -11,7 +11,7 @@ from identification.gap.data import Array
 from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import moments
 from identification.gap.effects.contact_seating import pressed
-from identification.gap.effects.joint_nonlinear_stiffness import above, beyond
+from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import STRAINS
 from identification.gap.forms.law import Law, Term, along, scaled
 from identification.gap.history import rests, retarded
@@ -53,11 +53,11 @@ def curve(bench: Bench, law: Law) -> list[Array]:
     }
     out = []
     for t in law.terms:
-        hinge = np.sign(x) * np.maximum(np.abs(x) - t.shape.get("beyond", 0.0), 0.0)
+        bent = hinge(x, t.shape.get("beyond", 0.0))
         for key, bend in (("net_above", above), ("net_beyond", beyond)):
             if key in t.shape:
-                hinge = bend(x, weight, t.shape[key])
-        out.append(bench.joint_column(joint, shapes.get(t.coefficient, hinge)))
+                bent = bend(x, weight, t.shape[key])
+        out.append(bench.joint_column(joint, shapes.get(t.coefficient, bent)))
     return out
 
 
