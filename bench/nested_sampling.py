@@ -27,7 +27,7 @@ from scipy.linalg import eigh
 from scipy.special import ndtr, ndtri
 
 from identification.gap import evidence
-from identification.gap.base import base_columns, prediction
+from identification.gap.base import HALF, base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import IMPERFECTION, LEAST_IMPERFECTION, log_mean, score
 from identification.gap.data import UNLOADING, GapData
@@ -123,10 +123,11 @@ def dense(bench: Bench, drop: tuple[str, ...] = ()) -> Dense:
         common = np.ix_(mine, mine)
         A[common] += np.outer(bench.noise.hold[mine], bench.noise.hold[mine])
         B[common] += evidence.HOLD_PART**2
-    B[np.arange(n), np.arange(n)] += evidence.ROW_PART**2
+        within = np.eye(len(mine)) - np.full((len(mine), len(mine)), 1 / len(mine))
+        B[common] += evidence.ROW_PART**2 * within
     B[:n, :n] += _repeatable(bench) + _of_runs(bench)
     q = np.arange(bench.layout.q.start, bench.layout.q.stop)
-    B[q, q] += evidence._LEVER_M**-2.0
+    B[q, q] += evidence.LEVER_M**-2.0
     for name, column, sd in nuisances(bench):
         if not name.startswith(drop) or not drop:
             A += sd**2 * np.outer(column, column)
@@ -186,13 +187,28 @@ def nuisances(bench: Bench) -> list[tuple[str, Array, float]]:
         out.append((f"datum {s}", stacked(bench, (rows.setup == s) * 1.0), wide))
     for r in np.unique(rows.run):
         out.append((f"scatter {r}", stacked(bench, (rows.run == r) * 1.0), bench.noise.run))
-    zero = stacked(bench, -slope, -pull)
-    zero[bench.layout.zero_force] = 1.0
-    out.append(("tare", zero, bench.noise.force))
+    for axis in range(3):
+        share = np.array([data.setups[s].unit_vector[axis] for s in rows.setup])
+        zero = stacked(bench, -slope * share, -pull * share[:, None])
+        zero[bench.layout.zero_force] = share[rows.zero]
+        if np.any(share):
+            out.append((f"tare {'xyz'[axis]}", zero, bench.noise.force))
+    out.append(("geometry", stacked(bench, *_turning(bench, pull)), HALF))
     for j in range(m if bench.has_q else 0):
         off = stacked(bench, None, np.tile(np.eye(m)[j], (rows.n, 1)))
         out.append((f"offset {j}", off, ENCODER_OFFSET_RAD))
     return out
+
+
+def _turning(bench: Bench, pull: Array) -> tuple[Array, Array]:
+    """Response and joints when the levers turn with the joints: second order in the force."""
+    rows, data = bench.rows, bench.data
+    response, joints = np.zeros(rows.n), np.zeros((rows.n, data.joints))
+    for i in range(rows.n):
+        turned = data.setups[rows.setup[i]].turned_lever @ pull[i]
+        joints[i] = turned * data.compliance * rows.force[i] ** 2
+        response[i] = 1.5 * rows.force[i] ** 2 * float(pull[i] @ turned)
+    return response, joints
 
 
 def stacked(bench: Bench, response: Array | None, joints: Array | None = None) -> Array:

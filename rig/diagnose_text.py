@@ -51,7 +51,7 @@ def _answer(r: GapResult) -> str:
             f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
             f"the uncertainty; about {r.remainder * MM:.3g} mm rms of structure remain."
         )
-    more = [e.name for e in r.effects[1:]]
+    more = [e.name for e in r.effects if e.name != r.verdict]
     also = f" Beside it: {', '.join(more)}." if more else ""
     return (
         f"{r.verdict} ({p:.0%}): {MEANING[r.verdict]}.{also} With it the gap shrinks from "

@@ -174,7 +174,7 @@ def raw_gram(engine: Engine, variant: Variant) -> Array:
     linear law only the part that counts as imperfect."""
     key = (variant.columns, variant.root.tobytes())
     if key not in engine.cache:
-        u = moved_response(engine, engine.pool[: engine.bench.rows.n, list(variant.columns)])
+        u = moved_response(engine, engine.columns(variant.columns)[: engine.bench.rows.n])
         weight = engine.bench.rows.weight
         part = (u * weight[:, None]).T @ u / weight.sum()
         if variant.word in LINEAR:

@@ -123,6 +123,7 @@ def check_words(words: set[str] | frozenset[str]) -> None:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
 
 
+FAR_WORSE = 12.0  # nats
 WORTH = 3.0  # nats that one effect more has to bring before it is named
 # A third effect that moves less than this of the noise, and a small share of what the largest does,
 # is how far the other two's laws are off, however plainly a channel without noise shows it; but a
@@ -131,10 +132,14 @@ BELOW_NOISE = 0.6
 
 
 def _chosen(found: Found, verdict: str) -> Explanation:
-    """The best explanation with the verdict as its main cause."""
+    """The best explanation with the verdict as its largest effect; where that is far worse than
+    those with a larger one beside it, which then is one of several alike, the best of these."""
     if verdict in ("none", "unknown"):
         return next(e for e in found.explanations if not e.parts)
-    mine = [e for e in found.explanations if e.parts and e.parts[0].word == verdict]
+    mine = [e for e in found.explanations if verdict in e.words]
+    first = [e for e in mine if e.parts[0].word == verdict]
+    if first[0].log_weight > mine[0].log_weight - FAR_WORSE:
+        mine = first
     held = [e for e in mine if _held(found, e)]
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]

@@ -14,7 +14,7 @@ small eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -67,7 +67,6 @@ class Engine:
     def __init__(self, bench: Bench, base: Base, target: Array, etas: Array) -> None:
         """target: stacked observation minus the simulation's prediction."""
         self.bench, self.base, self.target, self.etas = bench, base, target, etas
-        self.pool = np.zeros((bench.layout.size, 0))
         self.sigma = row_noise(bench)
         self.cache: dict[object, Array] = {}
         self.stacks: dict[object, Any] = {}  # of variants that are compared again and again
@@ -88,7 +87,7 @@ class Engine:
         self._first = self._whiten(np.column_stack([target, base.columns]))
         self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
         self._bases = side_by_side(self._integrate, range(len(etas)))
-        self._white = self._whiten(self.pool)
+        self._white = self._whiten(self.columns([]))
         none = np.zeros(0)
         self.levels = [
             Level(self, i, float(eta), none, b.log_base, np.zeros((0, 0)))
@@ -98,15 +97,18 @@ class Engine:
 
     def extend(self) -> None:
         """Takes in the columns that were put into the bench's pool since."""
-        added = self.bench.columns[self.pool.shape[1] :]
+        added = range(len(self._white), len(self.bench.columns))
         if not added:
             return
-        fresh = np.column_stack(added)
-        self.pool = np.column_stack([self.pool, fresh])
-        white = self._whiten(fresh)
+        white = self._whiten(self.columns(added))
         self.levels = side_by_side(lambda level: self._grown(level, white), self.levels)
         self._white = self._white.joined(white)
         self._rows.clear()
+
+    def columns(self, numbers: Iterable[int]) -> Array:
+        """(size, k) stacked columns of the pool."""
+        wanted = [self.bench.columns[i] for i in numbers]
+        return np.array(wanted).reshape(len(wanted), self.bench.layout.size).T
 
     def squares(self, columns: NDArray[np.intp]) -> list[Array]:
         """Per level (v, k, k): parts of the Gram matrix of the columns (v, k) of every variant."""

@@ -50,8 +50,7 @@ class Fit:
     def contribution(self, engine: Engine, index: int) -> Array:
         """(size,) stacked contribution of one part."""
         w, _ = self.of(index)
-        columns = list(self.parts[index].variant.columns)
-        return np.asarray(engine.pool[:, columns] @ w)
+        return np.asarray(engine.columns(self.parts[index].variant.columns) @ w)
 
 
 def fit(
@@ -66,22 +65,20 @@ def fit(
     bench, n = engine.bench, engine.bench.rows.n
     keep = np.ones(bench.layout.size, dtype=bool) if keep is None else keep
     columns = [c for p in explanation.parts for c in p.variant.columns]
-    E = engine.pool[:, columns]
+    E = engine.columns(columns)
     # The imperfection counts as noise here and may not take over what the effects can give.
     roots = [np.diag(engine.base.sd), *[p.root for p in explanation.parts]]
-    X = np.column_stack([engine.base.columns, E])
     root = block(roots)
-    k = len(root)
-    gram, moment = _normal(engine, X @ root, explanation.eta, keep)
-    solved = np.linalg.solve(gram + np.eye(k), root.T)  # H^-1 root'
+    X = np.hstack([engine.base.columns, E]) @ root
+    weighed = _weighed(engine, X, explanation.eta, keep)
+    solved = np.linalg.solve(weighed.T @ X + np.eye(len(root)), root.T)  # H^-1 root'
     covariance = root @ solved
-    beta = solved.T @ moment
+    beta = solved.T @ (weighed.T @ engine.target)
     kb = engine.base.columns.shape[1]
     w = beta[kb:]
     if alike and explanation.eta > 0:
         errs = _misled(engine, explanation.parts, w, explanation.eta)
-        gram, _ = _normal(engine, np.column_stack([X @ root, errs]), explanation.eta, keep)
-        moves = solved.T @ gram[:k, k:]
+        moves = solved.T @ (weighed.T @ errs)
         covariance = covariance + moves @ moves.T
     effect = (E @ w)[:n]
     return Fit(
@@ -106,7 +103,8 @@ def _misled(engine: Engine, parts: tuple[Part, ...], w: Array, eta: float) -> Ar
         begin = [engine.bench.stacked(m.astype(float)) for m in _phases(engine)]
         engine.cache["imperfection"] = np.column_stack([levels, runs, *begin])
     n, weight = engine.bench.rows.n, engine.bench.rows.weight
-    does = (engine.pool[:n, [c for p in parts for c in p.variant.columns]] @ w)[:, None]
+    columns = engine.columns(c for p in parts for c in p.variant.columns)
+    does = (columns[:n] @ w)[:, None]
     moved = moved_response(engine, does)[:, 0]
     size = float(np.sqrt(weight @ moved**2 / weight.sum()))
     own = [engine.bench.stacked(moved * m / size) for m in _phases(engine) if size > 0]
@@ -126,26 +124,25 @@ def _phases(engine: Engine) -> list[Flags]:
     return [m for m in masks if m.any()]
 
 
-def _normal(engine: Engine, X: Array, eta: float, keep: Flags) -> tuple[Array, Array]:
-    """`X' V^-1 X` and `X' V^-1 y` over the rows kept; V: noise of rows, and common to holds."""
+def _weighed(engine: Engine, X: Array, eta: float, keep: Flags) -> Array:
+    """`V^-1 X` (size, k), zero in rows that are not kept; V: noise of rows, and common to holds."""
     key, common = _holds(engine, eta)
     sigma2 = engine.sigma**2
     n = engine.bench.rows.n
     sigma2[:n] += (ROW_PART * eta) ** 2 / np.maximum(engine.bench.rows.weight, 1.0)
     p = np.where(keep, 1 / sigma2, 0.0)
-    y = engine.target
+    out = X * p[:, None]
     held = np.flatnonzero((common > 0) & keep)
     order = held[np.argsort(key[held], kind="stable")]
-    gram, moment = (X * p[:, None]).T @ X, X.T @ (p * y)
     if not order.size:
-        return gram, moment
-    edges = np.flatnonzero(np.concatenate([[True], np.diff(key[order]) != 0]))
-    weight = np.add.reduceat(p[order], edges)
-    sums = np.add.reduceat(X[order] * p[order, None], edges, axis=0)
-    target = np.add.reduceat(p[order] * y[order], edges)
+        return out
+    starts = np.concatenate([[True], np.diff(key[order]) != 0])
+    edges = np.flatnonzero(starts)
     h2 = common[order][edges] ** 2
-    shrink = h2 / (1 + h2 * weight)
-    return gram - (sums * shrink[:, None]).T @ sums, moment - sums.T @ (shrink * target)
+    shrink = h2 / (1 + h2 * np.add.reduceat(p[order], edges))
+    sums = np.add.reduceat(out[order], edges, axis=0) * shrink[:, None]
+    out[order] -= p[order, None] * sums[np.cumsum(starts) - 1]
+    return out
 
 
 def _holds(engine: Engine, eta: float) -> tuple[Array, Array]:

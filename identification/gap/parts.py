@@ -56,7 +56,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
-        moved = moved_response(engine, (engine.pool[:n, c] @ part)[:, None])[:, 0]
+        moved = moved_response(engine, (engine.columns(c)[:n] @ part)[:, None])[:, 0]
         square = float(weight @ moved**2 / weight.sum())
         moves.append(square**0.5)
         if p.word in LINEAR:
@@ -74,12 +74,13 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
 def _beyond_springs(engine: Engine, moved: Array) -> float:
     """rms (m) of a linear effect beyond what the springs give within three standard deviations."""
     base, n = engine.base, engine.bench.rows.n
-    springs = base.index("spring")
     root = np.sqrt(engine.bench.rows.weight / engine.bench.rows.weight.sum())
-    sd = base.sd[springs]
-    A = moved_response(engine, base.columns[:n, springs]) * sd
-    t = np.linalg.lstsq(A * root[:, None], moved * root, rcond=1e-6)[0]
-    left = float(np.sqrt(np.sum(((moved - A @ t) * root) ** 2)))
+    if "springs" not in engine.cache:
+        springs = base.index("spring")
+        A = moved_response(engine, base.columns[:n, springs]) * base.sd[springs] * root[:, None]
+        engine.cache["springs"], engine.cache["to springs"] = A, np.linalg.pinv(A, rcond=1e-6)
+    t = engine.cache["to springs"] @ (moved * root)
+    left = float(np.linalg.norm(moved * root - engine.cache["springs"] @ t))
     most = float(np.abs(t).max()) if t.size else 0.0
     beyond = max(0.0, 1 - 3 / most) if most > 0 else 1.0
     return max(left, beyond * float(np.sqrt(np.sum((moved * root) ** 2))))

@@ -113,7 +113,7 @@ def _by_direction(engine: Engine, part: Part) -> Array:
     """Share of what a part can do, in every direction."""
     names = [s.direction for s in engine.bench.data.setups]
     number = np.array([names.index(n) for n in names])[engine.bench.rows.setup]
-    does = engine.pool[: engine.bench.rows.n, list(part.variant.columns)] @ part.root
+    does = engine.columns(part.variant.columns)[: engine.bench.rows.n] @ part.root
     square = np.sum(moved_response(engine, does) ** 2, axis=1)
     sums = np.bincount(number, weights=square, minlength=len(names))
     return np.asarray(sums / max(float(sums.sum()), 1e-300))

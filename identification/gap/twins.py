@@ -58,7 +58,7 @@ def twin_of(engine: Engine, part: Part, w: Array, eta: float) -> Twin | None:
     if part.word not in ("joint_yield", "base_slip") or not bench.data.arm:
         return None
     law, _ = law_of(bench, part.variant)
-    own = engine.pool[:, list(part.variant.columns)] @ w
+    own = engine.columns(part.variant.columns) @ w
     here = float(np.abs(_lever(bench, law)).max())
     other = "base_slip" if part.word == "joint_yield" else "joint_yield"
     for constants, lever in _places(bench, other):

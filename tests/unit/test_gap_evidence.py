@@ -74,7 +74,7 @@ def test_evidence_is_the_dense_gaussian_marginal() -> None:
     offset = None
     for i, extra in ((0, ()), (0, (0,)), (0, (0, 1))):
         cov = dense_covariance(engine, 0.0)
-        columns = engine.pool[:, list(extra)] * 2.0
+        columns = engine.columns(extra) * 2.0
         cov = cov + columns @ columns.T
         exact = multivariate_normal.logpdf(engine.target, np.zeros(len(cov)), cov)
         level = engine.levels[i]
@@ -101,7 +101,7 @@ def test_score_averages_over_scales_and_asks_for_the_sign() -> None:
     bench = small_bench()
     engine = small_engine(bench)
     # an effect of that shape is really there, at three times the noise
-    engine.target[: bench.rows.n] += 0.3 * engine.pool[: bench.rows.n, 0]
+    engine.target[: bench.rows.n] += 0.3 * bench.columns[0][: bench.rows.n]
     engine = Engine(bench, engine.base, engine.target, np.array([0.0, 3e-6]))
     free = variant("joint_creep", "free", [0], (1.0,), positive=False)
     signed = variant("joint_creep", "signed", [0], (1.0,))

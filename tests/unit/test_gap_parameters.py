@@ -194,7 +194,7 @@ def test_covariance_under_alike_mistakes_is_the_scatter_of_the_estimate() -> Non
     V += same * (np.outer(bench.noise.hold, bench.noise.hold) + (HOLD_PART * eta) ** 2)
     levels = level_covariance(bench)[np.ix_(bench.rows.level, bench.rows.level)]
     K = eta**2 * (levels + 0.6**2 * _hats(bench) + _alike(bench, engine, plain.coefficients))
-    X = np.column_stack([engine.base.columns, engine.pool[:, 0]])
+    X = np.column_stack([engine.base.columns, engine.bench.columns[0]])
     prior = np.diag(1 / np.append(engine.base.sd, 1.0) ** 2)
     weighed = np.linalg.solve(V, X)
     H = np.linalg.inv(X.T @ weighed + prior)
@@ -223,7 +223,7 @@ def _alike(bench: Bench, engine: Engine, w: Array) -> Array:
     place = np.minimum(np.arange(n) - first, 3)
     before = np.maximum(first - 1, 0)
     rises = np.abs(bench.load[first]) >= np.abs(bench.load[before])
-    does = engine.pool[:n, 0] * w[0]
+    does = bench.columns[0][:n] * w[0]
     does = does - np.average(does, weights=rows.weight)
     does /= np.sqrt(np.average(does**2, weights=rows.weight))
     key = place * 2 + rises
@@ -269,7 +269,7 @@ def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> Non
     """Data that exclude all thresholds of a grid but one say no more than where it stands on it."""
     bench = small_bench()
     engine = small_engine(bench)
-    engine.target = engine.target + 4.0 * engine.pool[:, 0]
+    engine.target = engine.target + 4.0 * engine.bench.columns[0]
     family = [
         Variant("joint_yield", f"at {c}", (k,), (1.0,), np.eye(1), prior=prior, info={
             "radius": np.array([c]), "load": bench.load, "flow_s": 0.0, "centre": c, "joint": 0,
