@@ -237,9 +237,8 @@ def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
 def structural_rms(bench: Bench, base: Base, target: Array) -> float:
     """rms (m) of the response that the base alone leaves at its best."""
     n, sigma = bench.rows.n, row_noise(bench)
-    A = np.vstack([base.columns / sigma[:, None], np.diag(1 / base.sd)])
-    b = np.concatenate([target / sigma, np.zeros(len(base.sd))])
-    beta = np.linalg.lstsq(A, b, rcond=None)[0]
+    A = base.columns * base.sd / sigma[:, None]
+    beta = base.sd * np.linalg.solve(A.T @ A + np.eye(len(base.sd)), A.T @ (target / sigma))
     weight = bench.rows.weight
     left = (target - base.columns @ beta)[:n]
     return float(np.sqrt(weight @ left**2 / weight.sum()))

@@ -67,9 +67,9 @@ def fit(
     columns = [c for p in explanation.parts for c in p.variant.columns]
     E = engine.columns(columns)
     # The imperfection counts as noise here and may not take over what the effects can give.
-    roots = [np.diag(engine.base.sd), *[p.root for p in explanation.parts]]
-    root = block(roots)
-    X = np.hstack([engine.base.columns, E]) @ root
+    effects = block([p.root for p in explanation.parts])
+    root = block([np.diag(engine.base.sd), effects])
+    X = np.hstack([engine.base.columns * engine.base.sd, E @ effects])
     weighed = _weighed(engine, X, explanation.eta, keep)
     solved = np.linalg.solve(weighed.T @ X + np.eye(len(root)), root.T)  # H^-1 root'
     covariance = root @ solved

@@ -157,8 +157,8 @@ def flowing_play(
     """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
 
     `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
-    falls below it, wherever it has come to. Ramps between rows in _PARTS parts, then standing.
-    weight (n,): as in `play`.
+    falls below it, wherever it has come to. Ramps between holds in _PARTS parts, then standing;
+    within a hold the load hardly moves, and one part will do. weight (n,): as in `play`.
     """
     out = np.empty((len(load), len(radius)))
     hung = np.zeros(out.shape)
@@ -172,11 +172,13 @@ def flowing_play(
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
     stands = np.minimum(settling_share(rows), ease)
     pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
-    part = ((np.arange(_PARTS) + 0.5) / _PARTS)[:, None]
+    parts = np.where(rows.hold_starts | rest | rows.continuous, _PARTS, 1)
+    share = {m: ((np.arange(m) + 0.5) / m)[:, None] for m in (1, _PARTS)}
     # shares (n, k) of what is beyond that flow off: before the load moves, in every part, after it
-    waits, moves = pause > 0, ease > stands + pause
+    waits, moves, ends = pause > 0, ease > stands + pause, stands > 0
     paused = -np.expm1(-pause[:, None] / times)
-    during = -np.expm1(-np.maximum(ease - stands - pause, 0.0)[:, None] / _PARTS / times)
+    ramp = np.maximum(ease - stands - pause, 0.0) / parts
+    during = -np.expm1(-ramp[:, None] / times)
     stood = -np.expm1(-stands[:, None] / times)
     low, high = load[:, None] + below, load[:, None] + above
 
@@ -191,11 +193,12 @@ def flowing_play(
         if waits[i]:
             state = flown(state, paused[i], before + below[i], before + above[i])
         if moves[i]:
-            at = before + part * (x - before)
+            at = before + share[parts[i]] * (x - before)
             for least, most in zip(at + below[i], at + above[i], strict=True):
                 state = flown(state, during[i], least, most)
-        out[i] = state = flown(state, stood[i], low[i], high[i])
-        before = x
+        if ends[i]:
+            state = flown(state, stood[i], low[i], high[i])
+        out[i], before = state, x
     return out - hung
 
 

@@ -12,12 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.data import Array
 from identification.gap.parallel import side_by_side
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 _AT_ONCE = 1_000_000  # numbers of columns that are gathered at a time
 _FEW = 500  # rows
@@ -81,6 +86,14 @@ def _together(mine: Array, other: Array, weights: Sequence[Array]) -> list[Array
     return np.split(stacked, len(weights))
 
 
+def _scaled(thin: csr_matrix, weights: Array, other: Array) -> Array:
+    """`(thin * weights) @ other.T`"""
+    from scipy.sparse import csr_matrix
+
+    each = csr_matrix((thin.data * weights[thin.indices], thin.indices, thin.indptr), thin.shape)
+    return np.asarray(each @ other.T)
+
+
 @dataclass(frozen=True, eq=False)
 class White:
     """Whitened stacked columns (p): even (p, holds + rest), means of the response per hold and the
@@ -120,16 +133,24 @@ class White:
 
     def sparsely(self, columns: White, w: Weights) -> Array:
         """The same, where most numbers of these columns are zero."""
-        from scipy import sparse
-
-        if np.count_nonzero(self.even) > _SPARSE * self.even.size:
+        if self._thin is None:
             return self.between(columns, [w])[0]
-        out = np.asarray(sparse.csr_matrix(self.even * self._even(w)) @ columns.even.T)
+        even, contrast = self._thin
+        out = _scaled(even, self._even(w), columns.even)
         mine, other = self.contrast, columns.contrast
         if mine.none and other.none:
-            product = np.asarray(sparse.csr_matrix(mine.values * w.contrast) @ other.values.T)
+            product = _scaled(contrast, w.contrast, other.values)
             out += product[np.ix_(mine.at, other.at)]
         return out
+
+    @cached_property
+    def _thin(self) -> tuple[csr_matrix, csr_matrix] | None:
+        """Means and contrasts without their zeros, None where there are few of these."""
+        from scipy.sparse import csr_matrix
+
+        if np.count_nonzero(self.even) > _SPARSE * self.even.size:
+            return None
+        return csr_matrix(self.even), csr_matrix(self.contrast.values)
 
     def picked(self, columns: NDArray[np.intp]) -> White:
         """Some of these columns (k,)."""

@@ -98,11 +98,11 @@ def _misfit(engine: Engine, own: Array, columns: Array, eta: float) -> float:
     root = 1 / np.sqrt(variance)
     size = np.linalg.norm(columns * root[:, None], axis=0)
     free = (columns * root[:, None])[:, size > 0] / size[size > 0]
-    base = engine.base.columns * engine.base.sd
-    A = np.vstack([
-        np.hstack([base * root[:, None], free]),
-        np.hstack([np.eye(base.shape[1]), np.zeros((base.shape[1], free.shape[1]))]),
-    ])  # fmt: skip
-    b = np.append(own * root, np.zeros(base.shape[1]))
-    t = np.linalg.lstsq(A, b, rcond=1e-10)[0]
-    return 0.5 * float(np.sum((b - A @ t) ** 2))
+    base = engine.base.columns * (engine.base.sd * root[:, None])
+    # the base adapts under its prior, the columns freely: left of both is what the base leaves
+    whole = np.column_stack([free, own * root])
+    inner = np.eye(base.shape[1]) + base.T @ base
+    shared = base.T @ whole
+    gram = whole.T @ whole - shared.T @ np.linalg.solve(inner, shared)
+    k = free.shape[1]
+    return 0.5 * float(gram[k, k] - gram[k, :k] @ np.linalg.pinv(gram[:k, :k], 1e-10) @ gram[:k, k])
