@@ -29,11 +29,14 @@ from scipy.special import ndtr, ndtri
 from identification.gap import evidence
 from identification.gap.base import HALF, base_columns, prediction
 from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import IMPERFECTION, LEAST_IMPERFECTION, log_mean, score
+from identification.gap.compare import Scored, log_mean, score
 from identification.gap.data import UNLOADING, GapData
 from identification.gap.effects import library
 from identification.gap.evidence import Engine, eta_levels
+from identification.gap.finer import gained
+from identification.gap.imperfection import IMPERFECTION, LEAST_IMPERFECTION
 from identification.gap.noise import ENCODER_OFFSET_RAD
+from identification.gap.parts import Part, part_sizes
 from identification.gap.search import search
 from identification.gap.variants import Variant
 from rig.gap_data import gap_data
@@ -294,7 +297,7 @@ class Prior:
         for s in v.scales:
             w = s * draws @ v.root.T
             kept = np.ones(len(w), dtype=bool) if v.positive is None else w @ v.positive > v.least
-            kept &= np.all(w > 0, axis=1) if v.each else True
+            kept &= np.all(w[:, np.array(v.each)] > 0, axis=1) if any(v.each) else True
             self.log_share.append(float(np.log(kept.mean())))
 
     def coefficients(self, u: Array, scale: int) -> tuple[Array, float]:
@@ -303,7 +306,7 @@ class Prior:
         T = v.scales[scale] * v.root
         if v.positive is None:
             return np.asarray(T @ ndtri(u)), 0.0
-        if v.each:
+        if any(v.each):
             return self._orthant(u, T, scale)
         along = T.T @ v.positive
         length = float(np.linalg.norm(along))
@@ -460,14 +463,22 @@ def compare(
             scored = [s for s, yes in zip(scored, near, strict=True) if yes]
             each = [s.log_evidence - float(np.log(s.variant.prior)) for s in scored]
             ours = log_mean(each, [s.variant.prior for s in scored])
+            ours += gained(engine, *_best_part(engine, scored))
             value, error = sampled_evidence(model, found, live)
         seconds = time.perf_counter() - start
         out.append(Line(name, word, ours + offset, value, error, seconds))
     return out, ours_s
 
 
+def _best_part(engine: Engine, scored: list[Scored]) -> tuple[tuple[Part], float]:
+    """The likeliest form, with its mean square (m^2)."""
+    best = max(scored, key=lambda s: s.log_evidence)
+    parts = (Part(best.variant, best.scale),)
+    return parts, part_sizes(engine, parts, best.level).energy
+
+
 def _free(v: Variant) -> Variant:
-    return replace(v, positive=None, each=False, least=0.0)
+    return replace(v, positive=None, each=(False,) * len(v.columns), least=0.0)
 
 
 def main() -> None:

@@ -6,27 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
+from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR, log_level
 from identification.gap.parallel import side_by_side
+from identification.gap.signs import Signs, log_odds
 from identification.gap.variants import Variant
-
-IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a real mechanism
-# Elasticity, gains and leverage are laws, not families: exact to half a percent of their size.
-LAW_IMPERFECTION = 0.005
-LINEAR = frozenset(
-    [
-        "link_flexibility",
-        "base_compliance",
-        "load_misalignment",
-        "force_scale",
-        "displacement_scale",
-        "pose_error",
-        "joint_stiffness_error",
-    ]
-)
-LEAST_IMPERFECTION = 0.01
-_SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +58,15 @@ def _score_batch(
         gain = 1 + s2 * values[:, None, :]
         mean = s2 * beta[:, None, :] / gain
         fit = 0.5 * np.sum(mean * beta[:, None, :], axis=2) - 0.5 * np.log(gain).sum(axis=2)
-        fit += _sign(signs, root, vectors, mean, s2 / gain, s2)
+        fit += _kept(signs, root, vectors, mean, s2 / gain, s2)
         turned = mean @ np.swapaxes(vectors, 1, 2)
         energy = np.sum((turned @ plain) * turned, axis=2)
-        return np.asarray(level.log_base + fit + _log_level(engine.etas, i, energy + already))
+        return np.asarray(level.log_base + fit + log_level(engine.etas, i, energy + already))
 
     logs = np.stack(side_by_side(of_level, range(len(levels))))
     flat = logs.transpose(1, 0, 2).reshape(len(batch), -1)
     best = flat.argmax(axis=1)
-    total = _logsumexp(flat) - np.log(scales.shape[1])
+    total = logsumexp(flat) - np.log(scales.shape[1])
     number = scales.shape[1]
     return [
         Scored(v, float(t) + float(np.log(v.prior)), v.scales[b % number], int(b // number))
@@ -89,18 +74,7 @@ def _score_batch(
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class _Signs:
-    """Of a batch: sums (v, k) that are wanted above least (v,), which want one, which want each
-    coefficient so; None of all: any sign will do."""
-
-    sums: Array
-    least: Array
-    wanted: Flags
-    each: Flags
-
-
-_Stacks = tuple[Array, Array, Array, Array, "_Signs | None", list[Array]]
+_Stacks = tuple[Array, Array, Array, Array, Signs | None, list[Array]]
 
 
 def _stacks(engine: Engine, batch: list[Variant]) -> _Stacks:
@@ -112,9 +86,9 @@ def _stacks(engine: Engine, batch: list[Variant]) -> _Stacks:
         k = len(batch[0].columns)
         wanted = np.array([v.positive is not None for v in batch])
         sums = [v.positive if v.positive is not None else np.zeros(k) for v in batch]
-        signs = _Signs(
+        signs = Signs(
             np.stack(sums), np.array([v.least for v in batch]), wanted,
-            np.array([v.each for v in batch]) & (k > 1),
+            np.array([v.each for v in batch]),
         )  # fmt: skip
         columns = np.array([v.columns for v in batch])
         engine.stacks[key] = (
@@ -138,35 +112,19 @@ def _rotate(level: Level, part: Array, columns: Array, root: Array) -> Array:
     return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
 
 
-def _sign(
-    signs: _Signs | None, root: Array, vectors: Array, mean: Array, variance: Array, s2: Array
+def _kept(
+    signs: Signs | None, root: Array, vectors: Array, mean: Array, variance: Array, s2: Array
 ) -> Array:
     """What the signs that physics wants add to the log evidence, (v, s); 0 where they are free.
 
     mean, variance, s2 (v, s, k or 1): of the coefficients in the eigenvectors, and their prior's.
     """
-    from scipy.special import log_ndtr
-
     if signs is None:
         return np.zeros(mean.shape[:2])
-    spread = root @ vectors  # of each coefficient, from the eigenvectors
-    turned = (signs.sums[:, None, :] @ spread)[:, 0]
-    centre = (mean @ turned[:, :, None])[:, :, 0]
-    after = np.sqrt((variance @ (turned**2)[:, :, None])[:, :, 0]) + 1e-300
-    before = np.sqrt(s2[:, :, 0] * np.sum(turned**2, axis=1)[:, None]) + 1e-300
-    least = signs.least[:, None]
-    total = log_ndtr((centre - least) / after) - log_ndtr(-least / before)
-    out = np.where(signs.wanted[:, None], total, 0.0)
-    each = signs.each
-    if each.any():
-        across = np.swapaxes(spread[each], 1, 2)
-        sds = np.sqrt(variance[each] @ across**2) + 1e-300
-        z = (mean[each] @ across) / sds
-        wrong = np.flatnonzero(z.ravel() < 0)  # the right sign costs nothing
-        alone = np.zeros(z.size)
-        alone[wrong] = log_ndtr(z.ravel()[wrong]) - np.log(0.5)
-        out[each] += alone.reshape(z.shape).sum(axis=2)
-    return np.asarray(out)
+    spread = np.swapaxes(root @ vectors, 1, 2)  # from the eigenvectors to the coefficients
+    before = np.linalg.norm((signs.sums[:, None, :] @ root)[:, 0], axis=1)[:, None]
+    roots = np.sqrt(variance)[..., None] * spread[:, None]
+    return log_odds(signs, before * np.sqrt(s2[:, :, 0]), mean @ spread, roots)
 
 
 def raw_gram(engine: Engine, variant: Variant) -> Array:
@@ -194,33 +152,6 @@ def moved_response(engine: Engine, response: Array) -> Array:
     return np.asarray(response - (engine.cache["setups"].T @ response)[rows.setup])
 
 
-def level_prior(engine: Engine, i: int, energy: float) -> float:
-    """log prior of level i for an explanation of that mean square (m^2)."""
-    return float(_log_level(engine.etas, i, np.array(energy)))
-
-
-def _log_level(etas: Array, i: int, energy: Array) -> Array:
-    """log prior of level i for effects of that energy: log-normal about IMPERFECTION x size.
-
-    Levels are bins of log eta; the lowest takes all below.
-    """
-    from scipy.special import ndtr
-
-    centre = 0.5 * np.log(IMPERFECTION**2 * np.maximum(energy, 0.0) + 1e-300)
-    with np.errstate(divide="ignore"):
-        upper = np.inf if i == len(etas) - 1 else np.log(_edge(etas, i))
-        lower = -np.inf if i == 0 else np.log(_edge(etas, i - 1))
-    p = ndtr((upper - centre) / _SPREAD) - ndtr((lower - centre) / _SPREAD)
-    # no mechanism of a real rig follows a formula closer than that
-    floor = LEAST_IMPERFECTION / IMPERFECTION * np.exp(centre)
-    short = np.log(np.maximum(floor, 1e-300)) - (np.log(_edge(etas, i)) if upper < np.inf else 1e9)
-    return np.asarray(np.log(np.maximum(p, 1e-12)) - 300.0 * np.maximum(short, 0.0))
-
-
-def _edge(etas: Array, i: int) -> float:
-    return float(np.sqrt(max(etas[i], etas[i + 1] / 2.5) * etas[i + 1]))
-
-
 def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float) -> Level:
     """The level with an effect of fixed scale integrated out as well."""
     c = np.array(columns)
@@ -239,7 +170,8 @@ def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float)
     )
 
 
-def _logsumexp(values: Array) -> Array:
+def logsumexp(values: Array) -> Array:
+    """log of the sum of exp(values) along the last axis."""
     top = values.max(axis=-1, keepdims=True)
     return np.asarray(top[..., 0] + np.log(np.exp(values - top).sum(axis=-1)))
 

@@ -15,6 +15,7 @@ from identification.gap.earned import FREE, earned, noise_of, sample_rms
 from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.fit import Fit, fit
+from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.interval import Parameter
 from identification.gap.leftover import looked_up
@@ -86,7 +87,7 @@ def diagnose_gap(
     out, forced = set(withhold), frozenset(add)
     check_words(out | forced)
     tell("preparing", 0.0)
-    bench = make_bench(data)
+    bench = make_bench(without_glitches(data))
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])

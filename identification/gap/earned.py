@@ -10,11 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.compare import LINEAR, moved_response
+from identification.gap.compare import moved_response
 from identification.gap.data import Array, Ints
 from identification.gap.evidence import Engine
 from identification.gap.fit import fit
 from identification.gap.heldout import folds, held_out
+from identification.gap.imperfection import LINEAR
 from identification.gap.search import Explanation, Found, weighed
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen

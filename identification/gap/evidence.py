@@ -86,7 +86,8 @@ class Engine:
         self._weights = [self._left(float(eta)) for eta in etas]
         self._first = self._whiten(np.column_stack([target, base.columns]))
         self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
-        self._bases = side_by_side(self._integrate, range(len(etas)))
+        self._bases = side_by_side(self._integrate, etas, self._weights)
+        self._finer: dict[float, tuple[Weights, _Integrated]] = {}
         self._white = self._whiten(self.columns([]))
         none = np.zeros(0)
         self.levels = [
@@ -135,6 +136,21 @@ class Engine:
             self._rows[columns] = made
         return self._rows[columns]
 
+    def between(self, eta: float, columns: Sequence[int]) -> tuple[Array, Array, float]:
+        """For an imperfection that is none of the levels: Gram matrix (k, k) and moment (k,) of
+        columns of the pool, and the evidence of the base alone."""
+        if eta not in self._finer:
+            w = self._left(eta)
+            self._finer[eta] = w, self._integrate(eta, w)
+        w, base = self._finer[eta]
+        if not columns:
+            return np.zeros((0, 0)), np.zeros(0), base.log_base
+        white = self._white.picked(np.array(columns, dtype=np.intp))
+        beside = self._common(white, w)
+        shared = _forward(base.factor, base.root.T @ beside[1 : 1 + base.root.shape[0]])
+        square = white.between(white, [w])[0] - shared.T @ shared
+        return square, beside[0] - shared.T @ base.left, base.log_base
+
     def _whiten(self, columns: Array) -> White:
         bench, n, q = self.bench, self.bench.rows.n, self.bench.layout.q
         white = columns / self.sigma[:, None]
@@ -170,9 +186,8 @@ class Engine:
         """(c, p) products with target, base and repeatable imperfection."""
         return np.vstack([self._first.between(white, [w])[0], self._second.sparsely(white, w)])
 
-    def _integrate(self, number: int) -> _Integrated:
+    def _integrate(self, eta: float, w: Weights) -> _Integrated:
         """Base and repeatable imperfection, integrated out of target and, later, of the pool."""
-        eta, w = float(self.etas[number]), self._weights[number]
         gram = np.hstack([self._common(self._first, w), self._common(self._second, w)])
         kb = self.base.columns.shape[1]
         covariance = level_covariance(self.bench)

@@ -21,6 +21,9 @@ from identification.gap.search import LAW_REMAINDER, REMAINDER, SOFT, Explanatio
 
 # An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.
 SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none of noise
+# What is stated of a bench's instruments is known to a factor of two (GUM G.4.2: a type B estimate
+# is worth few degrees of freedom): what is left below twice that is no structure.
+_UNSURE = 3**0.5  # of it, beyond it in quadrature
 IN_SPELLS = 0.1  # share that is kept by laws of load and time where readings scatter in spells
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
 
@@ -54,7 +57,7 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     most = max(
         REMAINDER * engine.structural,
         LAW_REMAINDER * max(explanation.sizes),
-        0.6 * bench.noise.stated,
+        _UNSURE * bench.noise.stated,
     )
     share = 1 / (1 + (np.sqrt(max(square, 0.0)) / most) ** SOFT)
     if explanation.words & CURVES and _falls(engine):

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.compare import LINEAR, moved_response
+from identification.gap.compare import moved_response
 from identification.gap.data import BRANCH_NAMES, Array, Flags, Ints
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit
+from identification.gap.imperfection import LINEAR
 
 _SHOWS = 0.15  # an effect shows where it reaches this share of its largest part
 _INSTRUMENT = frozenset(

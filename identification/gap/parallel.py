@@ -7,16 +7,15 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
-_In = TypeVar("_In")
 _Out = TypeVar("_Out")
 _MOST = 4
 
 
-def side_by_side(function: Callable[[_In], _Out], items: Iterable[_In]) -> list[_Out]:
-    """`[function(i) for i in items]`, in threads; the order is kept."""
-    return list(_pool(os.getpid()).map(function, items))
+def side_by_side(function: Callable[..., _Out], *items: Iterable[Any]) -> list[_Out]:
+    """`list(map(function, *items))`, in threads; the order is kept."""
+    return list(_pool(os.getpid()).map(function, *items))
 
 
 @cache

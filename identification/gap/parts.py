@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import log
 
 import numpy as np
 
-from identification.gap.compare import IMPERFECTION, LAW_IMPERFECTION, LINEAR, moved_response
+from identification.gap.compare import moved_response
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
+from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
+from identification.gap.signs import Signs, log_odds
 from identification.gap.variants import Variant
 
 
@@ -88,37 +89,42 @@ def _beyond_springs(engine: Engine, moved: Array) -> float:
 
 def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
     """log of the odds that every part keeps the sign physics wants, all fitted together."""
-    from scipy.special import log_ndtr
-
     columns = [c for p in parts for c in p.variant.columns]
     root = block([p.root for p in parts])
     precision = np.eye(len(columns)) + root.T @ level.square(columns) @ root
-    covariance = root @ np.linalg.solve(precision, root.T)
-    w = root @ np.linalg.solve(precision, root.T @ level.moment[columns])
+    factor = np.linalg.cholesky(precision)
+    roots = np.linalg.solve(factor, root.T)  # of the covariance
+    w = roots.T @ np.linalg.solve(factor, root.T @ level.moment[columns])
     out, start = 0.0, 0
     for p in parts:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
         v = p.variant
         if v.positive is not None:
-            spread = float(np.sqrt(v.positive @ covariance[s, s] @ v.positive)) + 1e-300
-            before = float(np.linalg.norm(v.positive @ p.root)) + 1e-300
-            odds = log_ndtr((v.positive @ w[s] - v.least) / spread) - log_ndtr(-v.least / before)
-            out += min(0.0, float(odds))
-        if v.each:
-            sds = np.sqrt(np.diag(covariance[s, s])) + 1e-300
-            out += float(np.minimum(log_ndtr(w[s] / sds) - log(0.5), 0.0).sum())
+            signs = Signs(v.positive[None], np.array([v.least]), np.ones(1, dtype=bool),
+                          np.array([v.each]))  # fmt: skip
+            before = np.array([[np.linalg.norm(v.positive @ p.root)]])
+            odds = log_odds(signs, before, w[None, None, s], roots[None, None, :, s])
+            out += min(0.0, float(odds[0, 0]))
     return out
 
 
 def log_joint(level: Level, parts: tuple[Part, ...]) -> float:
     """log evidence of all parts together with fixed scales at one level."""
     columns = [c for p in parts for c in p.variant.columns]
+    return _together(parts, level.square(columns), level.moment[columns], level.log_base)
+
+
+def log_joint_between(engine: Engine, parts: tuple[Part, ...], eta: float) -> float:
+    """The same for a size of imperfection (m) that is none of the levels."""
+    return _together(parts, *engine.between(eta, [c for p in parts for c in p.variant.columns]))
+
+
+def _together(parts: tuple[Part, ...], gram: Array, moment: Array, log_base: float) -> float:
     root = block([p.root for p in parts])
-    inner = np.eye(len(columns)) + root.T @ level.square(columns) @ root
-    factor = np.linalg.cholesky(inner)
-    left = np.linalg.solve(factor, root.T @ level.moment[columns])
-    return level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum())
+    factor = np.linalg.cholesky(np.eye(len(gram)) + root.T @ gram @ root)
+    left = np.linalg.solve(factor, root.T @ moment)
+    return log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum())
 
 
 def block(roots: list[Array]) -> Array:

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.compare import LINEAR, moved_response
+from identification.gap.compare import moved_response
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
+from identification.gap.imperfection import LINEAR
 from identification.gap.parts import Part, Sizes
 
 # A second effect smaller than this share of the first can't be told from the first one's law.

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.compare import IMPERFECTION, LINEAR, level_prior, score
+from identification.gap.compare import score
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit, fit
+from identification.gap.imperfection import IMPERFECTION, LINEAR, level_prior
 from identification.gap.interval import TWO_SIDED, Parameter, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
@@ -127,7 +128,7 @@ def _levels(engine: Engine, explanation: Explanation, prior: float) -> _Weighed:
     out = []
     for i, level in enumerate(engine.levels):
         energy = part_sizes(engine, explanation.parts, i).energy
-        weight = prior + log_joint(level, explanation.parts) + level_prior(engine, i, energy)
+        weight = prior + log_joint(level, explanation.parts) + level_prior(engine.etas, i, energy)
         weight += signs_kept(level, explanation.parts)
         out.append((replace(explanation, eta=_size(engine, i, energy)), float(weight)))
     return out

@@ -9,16 +9,12 @@ from math import log
 
 import numpy as np
 
-from identification.gap.compare import (
-    Scored,
-    condition,
-    level_prior,
-    log_mean,
-    score,
-)
+from identification.gap.compare import Scored, condition, log_mean, score
 from identification.gap.data import Array
 from identification.gap.effects import WORDS
 from identification.gap.evidence import Engine, Level
+from identification.gap.finer import gained
+from identification.gap.imperfection import level_prior
 from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
 from identification.gap.penalties import cancelling, pettiness, trifle
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN, prior_of
@@ -98,7 +94,7 @@ def search(engine: Engine, variants: list[Variant]) -> Found:
         front = _deepen(engine, variants, pool, front, depth)
         if not front:
             break
-    ranked = sorted(pool.values(), key=lambda e: -e.log_weight)
+    ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
     strange = [lv for lv in engine.levels if lv.eta > 0.6 * engine.bench.noise.stated]
     found = Found(
         engine=engine,
@@ -332,6 +328,18 @@ def conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], f
     return levels, part_sizes(engine, parts, int(weights.argmax())).energy
 
 
+def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
+    """With the evidence of those that matter between the levels of imperfection, best first."""
+    least, out = ranked[0].log_weight - _WINDOW, []
+    for i, e in enumerate(ranked):
+        more = 0.0
+        if i < _LEADING and e.parts and e.log_weight > least:
+            level = int(np.argmin(np.abs(engine.etas - e.eta)))
+            more = gained(engine, e.parts, part_sizes(engine, e.parts, level).energy)
+        out.append(replace(e, log_weight=e.log_weight + more, log_good=e.log_good + more))
+    return sorted(out, key=lambda e: -e.log_weight)
+
+
 def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:
     """The explanation with its prior; too small a part is charged as what it is: freedom of the
     larger one's law."""
@@ -339,7 +347,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     bases = np.array([log_joint(lv, parts) for lv in levels])
     sizes = part_sizes(engine, parts, int(bases.argmax()))
     each, energy = sizes.gap, sizes.energy
-    logs = bases + [level_prior(engine, i, energy) for i in range(len(levels))]
+    logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
     least = max(
         0.6 * engine.bench.noise.stated,

@@ -17,8 +17,8 @@ UNDER_WEIGHT = " under weight"  # a memory that begins with the weight coming on
 class Variant:
     """columns: k indices of the pool. root (k, k): prior covariance of the coefficients is
     `s^2 root root^T` for s out of `scales`, all equally likely. positive (k,): weights of a sum of
-    coefficients that physics wants above `least` (None: either sign). each: none of the
-    coefficients may be negative either. info: what the parameters are reported from.
+    coefficients that physics wants above `least` (None: either sign). each (k,): coefficients that
+    may not be negative either. info: what the parameters are reported from.
     """
 
     word: str
@@ -28,7 +28,7 @@ class Variant:
     root: Array
     positive: Array | None = None
     least: float = 0.0
-    each: bool = False
+    each: tuple[bool, ...] = ()
     info: Mapping[str, Any] = field(default_factory=dict)
     prior: float = 1.0
 
@@ -42,10 +42,11 @@ def variant(
     positive: bool | Array = True,
     prior: float = 1.0,
     least: float = 0.0,
-    each: bool = False,
+    each: bool | tuple[bool, ...] = False,
     **info: Any,
 ) -> Variant:
-    """A variant with independent unit priors unless `root` says otherwise."""
+    """A variant with independent unit priors unless `root` says otherwise. each: all coefficients,
+    or the first ones that are named, the others free."""
     k = len(columns)
     return Variant(
         word,
@@ -55,10 +56,16 @@ def variant(
         np.eye(k) if root is None else root,
         positive if isinstance(positive, np.ndarray) else (np.ones(k) if positive else None),
         least,
-        each,
+        _all(each, k),
         info,
         prior,
     )
+
+
+def _all(each: bool | tuple[bool, ...], k: int) -> tuple[bool, ...]:
+    if isinstance(each, bool):
+        return (each and k > 1,) * k
+    return (*each, *(False,) * (k - len(each)))
 
 
 def smooth_root(k: int, alike: float = 0.7, common: float = 0.0) -> Array:

@@ -115,7 +115,8 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
     root = np.diag([1.0, FRICTION, 1.0])
     return [
         variant(WORD, f"joint {j + 1} {flanks.kind}{name}", columns[:k], scales, root[:k, :k],
-                _less_rub(k) if flanks.kind == "held" else np.eye(k)[0], _PLACED_PRIOR, **info)
+                _less_rub(k) if flanks.kind == "held" else np.eye(k)[0], _PLACED_PRIOR,
+                each=(True, True), **info)
         for k, name in ((2, ""), (3, ", other springs"))
     ]  # fmt: skip
 
@@ -135,7 +136,7 @@ def _zone(
         root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
         out.append(
             variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
-                    _less_rub(len(columns)), prior, **(info | {"kind": kind}))
+                    _less_rub(len(columns)), prior, each=(True, True), **(info | {"kind": kind}))
         )  # fmt: skip
     return out
 

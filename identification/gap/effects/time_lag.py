@@ -29,7 +29,7 @@ _OF_STROKE = 0.5  # of the time that one pass of the load takes
 
 def variants(bench: Bench) -> list[Variant]:
     """Lags of laser or force, as delays and as filters; coefficient 1 is the lag itself."""
-    if bench.timeless:
+    if bench.timeless or _like_a_soft_start(bench):
         return []
     sample = 2 * half_sample(bench.rows) if not bench.rows.continuous else _typical_step(bench)
     out = []
@@ -54,6 +54,16 @@ def variants(bench: Bench) -> list[Variant]:
     return out
 
 
+def _like_a_soft_start(bench: Bench) -> bool:
+    """One reading a step, and every run goes one way: a lag would be but a step's worth of datum,
+    and what the first reading lacks."""
+    rows = bench.rows
+    if rows.continuous or not rows.hold_starts.all():
+        return False
+    way = np.diff(bench.load)[~rows.starts[1:]]
+    return bool(np.all(way >= 0) or np.all(way <= 0))
+
+
 def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
     """(size,) what a lag of a channel does: the one that answers shows the response to earlier
     loads; the one that is driven was in truth ahead of what was read."""
@@ -72,11 +82,13 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
 
 
 _SIDE = 4  # rows to either side
+_NOISE = 4.0  # standard deviations, by second differences
 
 
 def _smooth(bench: Bench, values: Array) -> Array:
     """Means (n,) of a running recording over the rows about each: noise of what is driven is in the
-    response as well, and must not stand in the column that is to explain it."""
+    response as well, and must not stand in the column that is to explain it. Where means are far
+    from what was read, as about a step, it was no noise, and stays."""
     if not bench.rows.continuous:
         return values
     out, edges = values.copy(), np.append(np.flatnonzero(bench.rows.starts), bench.rows.n)
@@ -84,7 +96,10 @@ def _smooth(bench: Bench, values: Array) -> Array:
     for a, b in pairwise(edges):
         if b - a > 4 * _SIDE:
             inner = np.convolve(values[a:b], kernel / kernel.sum(), mode="valid")
-            out[a + _SIDE : b - _SIDE] = inner
+            read = values[a + _SIDE : b - _SIDE]
+            noise = float(np.median(np.abs(np.diff(values[a:b], 2)))) / 0.6745 / 6**0.5
+            near = np.abs(inner - read) <= _NOISE * noise
+            out[a + _SIDE : b - _SIDE] = np.where(near, inner, read)
     return out
 
 

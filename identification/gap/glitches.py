@@ -1,0 +1,89 @@
+"""Single readings of a running recording that jump off and come back: set aside, and said.
+
+Converters drop a bit, a clamp knocks at a turning point. A handful of such readings, far off beside
+hundreds that follow a law, is no effect of the rig; but where they are most of what a straight line
+leaves, they are the gap, and stay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from identification.gap.data import Array, Flags, GapData
+from identification.gap.rows import hold_ids, is_continuous
+
+_WINDOW = 25  # readings, in which a typical change is
+_NOISE, _STEPS, _RANGE = 6.0, 3.0, 0.02  # a glitch is off by more than each: standard deviations,
+# typical changes from one reading to the next, share of the range
+_LONGEST = 3  # readings in a row
+_MOST = 0.05  # of all readings: more of them are how this rig behaves
+_MINOR = 0.8  # of the rms that a straight line leaves without them
+_FEWEST = 40
+
+
+def without_glitches(data: GapData) -> GapData:
+    """The data without them, and a note that says how many; as they are where there are none."""
+    if data.arm or len(data.force) < _FEWEST or not is_continuous(data, hold_ids(data)):
+        return data
+    off = _off(data.force, data.run) | _off(data.displacement, data.run)
+    if not off.any() or off.mean() > _MOST or not _minor(data, off):
+        return data
+    count = int(off.sum())
+    note = (
+        f"{count} of {len(off)} readings jump off and come back at once: set aside as glitches "
+        f"(the first at {data.time[off][0]:.4g} s). See to cables, converter and clamps."
+    )
+    return replace(_picked(data, ~off), notes=(*data.notes, note))
+
+
+def _off(values: Array, run: Array) -> Flags:
+    """(n,) readings that are off, in every run."""
+    out = np.zeros(len(values), dtype=bool)
+    for r in np.unique(run):
+        mine = np.flatnonzero(run == r)
+        if len(mine) >= _FEWEST:
+            out[mine] = _off_in_one(values[mine])
+    return out
+
+
+def _off_in_one(x: Array) -> Flags:
+    """Readings, up to _LONGEST in a row, that are all off the line between the ones about them."""
+    from scipy.ndimage import median_filter
+
+    noise = float(np.median(np.abs(np.diff(x, 2)))) / 0.6745 / 6**0.5
+    step = median_filter(np.abs(np.diff(x, append=x[-1])), _WINDOW, mode="nearest")
+    limit = np.maximum(_STEPS * step, max(_NOISE * noise, _RANGE * float(np.ptp(x))))
+    off = np.zeros(len(x), dtype=bool)
+    for long in range(1, _LONGEST + 1):
+        at = np.arange(1, len(x) - long)  # first of the block
+        share = np.arange(1, long + 1)[:, None] / (long + 1)
+        block = at + np.arange(long)[:, None]
+        away = x[block] - (1 - share) * x[at - 1] - share * x[at + long]
+        jumps = np.all(np.abs(away) > limit[at], axis=0) & (np.ptp(np.sign(away), axis=0) == 0)
+        jumps &= np.abs(x[at + long] - x[at - 1]) < np.abs(away).min(axis=0)  # else it is a step
+        off[block[:, jumps]] = True
+    return off
+
+
+def _minor(data: GapData, off: Flags) -> bool:
+    """Whether they are the lesser part of what a straight line leaves."""
+    line = np.column_stack([data.force, np.ones(len(off))])
+    w = np.linalg.lstsq(line[~off], data.displacement[~off], rcond=None)[0]
+    left = data.displacement - line @ w
+    at = np.arange(len(off))
+    jump = left - np.interp(at, at[~off], left[~off])
+    return bool(np.sum(jump**2) < _MINOR**2 * np.sum(left[~off] ** 2))
+
+
+def _picked(data: GapData, kept: Flags) -> GapData:
+    n, out = len(kept), {}
+    for f in fields(data):
+        value = getattr(data, f.name)
+        if isinstance(value, np.ndarray) and len(value) == n and f.name not in _NOT_ROWS:
+            out[f.name] = value[kept]
+    return replace(data, **out)
+
+
+_NOT_ROWS = frozenset({"compliance", "compliance_relative_sd"})

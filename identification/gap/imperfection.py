@@ -1,0 +1,73 @@
+"""How well laws meet real mechanisms: the prior of the size of an explanation's imperfection.
+
+A family of shapes meets a mechanism to a few percent of its size (`IMPERFECTION`, log-normal, by a
+factor of 2.5 from case to case), none closer than a hundredth. In the evidence the size eta is on a
+grid of levels (`identification.gap.evidence.eta_levels`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.data import Array
+
+IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a real mechanism
+# Elasticity, gains and leverage are laws, not families: exact to half a percent of their size.
+LAW_IMPERFECTION = 0.005
+LINEAR = frozenset(
+    [
+        "link_flexibility",
+        "base_compliance",
+        "load_misalignment",
+        "force_scale",
+        "displacement_scale",
+        "pose_error",
+        "joint_stiffness_error",
+    ]
+)
+LEAST_IMPERFECTION = 0.01
+_SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
+
+
+def level_prior(etas: Array, i: int, energy: float) -> float:
+    """log prior of level i for an explanation of that mean square (m^2)."""
+    return float(log_level(etas, i, np.array(energy)))
+
+
+def log_level(etas: Array, i: int, energy: Array) -> Array:
+    """The same for many. Levels are bins of log eta; the lowest takes all below."""
+    from scipy.special import ndtr
+
+    centre = _centre(energy)
+    with np.errstate(divide="ignore"):
+        upper = np.inf if i == len(etas) - 1 else np.log(_edge(etas, i))
+        lower = -np.inf if i == 0 else np.log(_edge(etas, i - 1))
+    p = ndtr((upper - centre) / _SPREAD) - ndtr((lower - centre) / _SPREAD)
+    # no mechanism of a real rig follows a formula closer than that
+    short = _floor(centre) - (np.log(_edge(etas, i)) if upper < np.inf else 1e9)
+    return np.asarray(np.log(np.maximum(p, _LEAST_SHARE)) - 300.0 * np.maximum(short, 0.0))
+
+
+def log_share(edges: Array, energy: float) -> Array:
+    """log prior (n,) of sizes between neighbouring edges (n + 1,) of log eta, for an explanation of
+    that mean square (m^2)."""
+    from scipy.special import ndtr
+
+    centre = _centre(np.array(energy))
+    p = np.diff(ndtr((np.maximum(edges, _floor(centre)) - centre) / _SPREAD))
+    return np.asarray(np.log(np.maximum(p, np.where(edges[1:] > _floor(centre), 1e-15, 1e-300))))
+
+
+def _centre(energy: Array) -> Array:
+    return np.asarray(0.5 * np.log(IMPERFECTION**2 * np.maximum(energy, 0.0) + 1e-300))
+
+
+def _floor(centre: Array) -> Array:
+    return np.asarray(centre + np.log(LEAST_IMPERFECTION / IMPERFECTION))
+
+
+_LEAST_SHARE = 1e-12
+
+
+def _edge(etas: Array, i: int) -> float:
+    return float(np.sqrt(max(etas[i], etas[i + 1] / 2.5) * etas[i + 1]))
