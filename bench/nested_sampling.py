@@ -478,7 +478,7 @@ def _best_part(engine: Engine, scored: list[Scored]) -> tuple[tuple[Part], float
 
 
 def _free(v: Variant) -> Variant:
-    return replace(v, positive=None, each=(False,) * len(v.columns), least=0.0)
+    return replace(v, positive=None, each=(False,) * len(v.columns), within=v.within[:0], least=0.0)
 
 
 def main() -> None:

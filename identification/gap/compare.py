@@ -10,7 +10,7 @@ from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR, log_level
 from identification.gap.parallel import side_by_side
-from identification.gap.signs import Signs, log_odds
+from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 
 
@@ -45,7 +45,7 @@ def score(
 def _score_batch(
     engine: Engine, levels: list[Level], batch: list[Variant], already: float
 ) -> list[Scored]:
-    columns, root, scales, plain, signs, squares = _stacks(engine, batch)
+    columns, root, scales, plain, limits, squares = _stacks(engine, batch)
 
     def of_level(i: int) -> Array:
         level = levels[i]
@@ -58,7 +58,7 @@ def _score_batch(
         gain = 1 + s2 * values[:, None, :]
         mean = s2 * beta[:, None, :] / gain
         fit = 0.5 * np.sum(mean * beta[:, None, :], axis=2) - 0.5 * np.log(gain).sum(axis=2)
-        fit += _kept(signs, root, vectors, mean, s2 / gain, s2)
+        fit += _kept(limits, root, vectors, mean, s2 / gain, s2)
         turned = mean @ np.swapaxes(vectors, 1, 2)
         energy = np.sum((turned @ plain) * turned, axis=2)
         return np.asarray(level.log_base + fit + log_level(engine.etas, i, energy + already))
@@ -74,29 +74,22 @@ def _score_batch(
     ]
 
 
-_Stacks = tuple[Array, Array, Array, Array, Signs | None, list[Array]]
+_Stacks = tuple[Array, Array, Array, Array, Limits | None, list[Array]]
 
 
 def _stacks(engine: Engine, batch: list[Variant]) -> _Stacks:
-    """Columns (v, k), roots (v, k, k), scales (v, s), mean squares (v, k, k) and signs of a batch,
+    """Columns (v, k), roots (v, k, k), scales (v, s), mean squares (v, k, k) and limits of a batch,
     and per level its products (v, k, k), made once: batches come again with every effect that is
     added."""
     key = ("batch", tuple(map(id, batch)))
     if key not in engine.stacks:
-        k = len(batch[0].columns)
-        wanted = np.array([v.positive is not None for v in batch])
-        sums = [v.positive if v.positive is not None else np.zeros(k) for v in batch]
-        signs = Signs(
-            np.stack(sums), np.array([v.least for v in batch]), wanted,
-            np.array([v.each for v in batch]),
-        )  # fmt: skip
         columns = np.array([v.columns for v in batch])
         engine.stacks[key] = (
             columns,
             np.stack([v.root for v in batch]),
             np.array([v.scales for v in batch]),
             np.stack([raw_gram(engine, v) for v in batch]),
-            signs if wanted.any() else None,
+            Limits.of(batch),
             engine.squares(columns),
         )
     found: _Stacks = engine.stacks[key]
@@ -113,18 +106,18 @@ def _rotate(level: Level, part: Array, columns: Array, root: Array) -> Array:
 
 
 def _kept(
-    signs: Signs | None, root: Array, vectors: Array, mean: Array, variance: Array, s2: Array
+    limits: Limits | None, root: Array, vectors: Array, mean: Array, variance: Array, s2: Array
 ) -> Array:
-    """What the signs that physics wants add to the log evidence, (v, s); 0 where they are free.
+    """What the limits that physics sets add to the log evidence, (v, s); 0 where they are free.
 
     mean, variance, s2 (v, s, k or 1): of the coefficients in the eigenvectors, and their prior's.
     """
-    if signs is None:
+    if limits is None:
         return np.zeros(mean.shape[:2])
     spread = np.swapaxes(root @ vectors, 1, 2)  # from the eigenvectors to the coefficients
-    before = np.linalg.norm((signs.sums[:, None, :] @ root)[:, 0], axis=1)[:, None]
+    before = np.linalg.norm((limits.rows[:, :1] @ root)[:, 0], axis=1)[:, None]
     roots = np.sqrt(variance)[..., None] * spread[:, None]
-    return log_odds(signs, before * np.sqrt(s2[:, :, 0]), mean @ spread, roots)
+    return log_odds(limits, before * np.sqrt(s2[:, :, 0]), mean @ spread, roots)
 
 
 def raw_gram(engine: Engine, variant: Variant) -> Array:

@@ -8,10 +8,11 @@ leaves, they are the gap, and stay.
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, GapData
+from identification.gap.data import Array, Flags, GapData, Ints
 from identification.gap.rows import hold_ids, is_continuous
 
 _WINDOW = 25  # readings, in which a typical change is
@@ -38,7 +39,7 @@ def without_glitches(data: GapData) -> GapData:
     return replace(_picked(data, ~off), notes=(*data.notes, note))
 
 
-def _off(values: Array, run: Array) -> Flags:
+def _off(values: Array, run: Ints) -> Flags:
     """(n,) readings that are off, in every run."""
     out = np.zeros(len(values), dtype=bool)
     for r in np.unique(run):
@@ -78,7 +79,7 @@ def _minor(data: GapData, off: Flags) -> bool:
 
 
 def _picked(data: GapData, kept: Flags) -> GapData:
-    n, out = len(kept), {}
+    n, out = len(kept), dict[str, Any]()
     for f in fields(data):
         value = getattr(data, f.name)
         if isinstance(value, np.ndarray) and len(value) == n and f.name not in _NOT_ROWS:

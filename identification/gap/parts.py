@@ -10,7 +10,7 @@ from identification.gap.compare import moved_response
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
-from identification.gap.signs import Signs, log_odds
+from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 
 
@@ -100,11 +100,10 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
         v = p.variant
-        if v.positive is not None:
-            signs = Signs(v.positive[None], np.array([v.least]), np.ones(1, dtype=bool),
-                          np.array([v.each]))  # fmt: skip
-            before = np.array([[np.linalg.norm(v.positive @ p.root)]])
-            odds = log_odds(signs, before, w[None, None, s], roots[None, None, :, s])
+        limits = Limits.of([v])
+        if limits is not None:
+            before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)[:, None]
+            odds = log_odds(limits, before, w[None, None, s], roots[None, None, :, s])
             out += min(0.0, float(odds[0, 0]))
     return out
 

@@ -1,71 +1,90 @@
-"""What it costs that coefficients keep the signs physics wants: log of the share of the posterior
+"""What it costs that coefficients keep the limits physics sets: log of the share of the posterior
 that does, over that of the prior.
 
-A sum of coefficients is wanted above a limit, some coefficients each above zero. Sum and
-coefficients alone have exact shares of the normal distribution; together they count as independent,
-but never for more than the half-space nearest to the mean that holds the quadrant of the sum and
-one coefficient (a convex set at Mahalanobis distance d has at most the share Phi(-d)): where only
-the sum of two is known, one may not turn negative to pay for the other.
+The first limit, on a sum of coefficients, has its exact share of the normal distribution. Further
+ones (single coefficients above zero, a place within its play) count as independent, but together
+with the first never for more than the half-space nearest to the mean that holds both: a convex set
+at Mahalanobis distance d has at most the share Phi(-d). Where only the sum of two is known, one may
+not turn negative to pay for the other.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from identification.gap.data import Array, Flags
+from identification.gap.variants import Variant
 
 _TINY = 1e-300
+_NEAR = 1 - 1e-9  # as correlated as two may be
 
 
 @dataclass(frozen=True, eq=False)
-class Signs:
-    """Of v variants with k coefficients: sums (v, k), weights of the sum that is wanted above least
-    (v,) where wanted (v,); each (v, k): coefficients that are wanted above zero."""
+class Limits:
+    """Of v variants with k coefficients w: rows (v, m, k), `rows w > 0` where asked (v, m), but for
+    the first, `rows[0] w > least` (v,)."""
 
-    sums: Array
+    rows: Array
     least: Array
-    wanted: Flags
-    each: Flags
+    asked: Flags
+
+    @classmethod
+    def of(cls, variants: Sequence[Variant]) -> Limits | None:
+        """None where none of them has any."""
+        k = len(variants[0].columns)
+        each = [_rows(v) for v in variants]
+        most = max(len(r) for r in each)
+        if not any(v.positive is not None for v in variants):
+            return None
+        rows, asked = np.zeros((len(variants), most, k)), np.zeros((len(variants), most), bool)
+        for i, (v, r) in enumerate(zip(variants, each, strict=True)):
+            rows[i, : len(r)] = r
+            asked[i, : len(r)] = v.positive is not None
+        return cls(rows, np.array([v.least for v in variants]), asked)
 
 
-def log_odds(signs: Signs, before: Array, mean: Array, roots: Array) -> Array:
+def _rows(v: Variant) -> Array:
+    first = np.zeros(len(v.columns)) if v.positive is None else v.positive
+    unit = np.eye(len(v.columns))[np.array(v.each, dtype=bool)]
+    return np.vstack([first[None], unit, *v.within])
+
+
+def log_odds(limits: Limits, before: Array, mean: Array, roots: Array) -> Array:
     """(v, s) for coefficients of mean (v, s, k) and covariance `roots' roots`, roots (v, s, r, k);
-    before (v, s): standard deviation of the sum in the prior."""
+    before (v, s): standard deviation of the first limit's sum in the prior."""
     from scipy.special import log_ndtr
 
-    along = (roots @ signs.sums[:, None, :, None])[..., 0]  # (v, s, r)
-    total = (mean @ signs.sums[:, :, None])[..., 0] - signs.least[:, None]
-    after = np.sqrt(np.sum(along**2, axis=2)) + _TINY
-    share = log_ndtr(-signs.least[:, None] / (before + _TINY))
-    out = np.where(signs.wanted[:, None], log_ndtr(total / after) - share, 0.0)
-    some = signs.each.any(axis=1) & signs.wanted
-    if some.any():
-        each = np.broadcast_to(signs.each[some][:, None, :], mean[some].shape)
-        z, away = _apart(mean[some], roots[some], total[some], along[some])
-        alone = np.zeros(z.shape)
-        wrong = each & (z < 0)  # the right sign costs nothing
-        alone[wrong] = log_ndtr(z[wrong]) - np.log(0.5)
-        nearest = np.max(away, axis=2, where=each, initial=0.0)
-        bound = np.where(nearest > 0, log_ndtr(-nearest) - share[some], np.inf)
-        out[some] = np.minimum(out[some] + alone.sum(axis=2), bound)
-    return np.asarray(out)
+    across = np.swapaxes(limits.rows, 1, 2)[:, None]  # (v, 1, k, m)
+    along = roots @ across  # (v, s, r, m)
+    centre = (mean[:, :, None] @ across)[:, :, 0]  # (v, s, m)
+    centre[..., 0] -= limits.least[:, None]
+    variance = np.where(limits.asked[:, None], np.sum(along**2, axis=2) + _TINY, 1.0)
+    z = centre / np.sqrt(variance)
+    share = log_ndtr(-limits.least[:, None] / (before + _TINY))
+    out = np.where(limits.asked[:, None, 0], log_ndtr(z[..., 0]) - share, 0.0)
+    if z.shape[2] == 1:
+        return np.asarray(out)
+    asked = limits.asked[:, None, 1:]
+    wrong = (z[..., 1:] < 0) & asked  # the right side of a limit costs nothing
+    alone = np.zeros(wrong.shape)
+    alone[wrong] = log_ndtr(z[..., 1:][wrong]) - np.log(0.5)
+    common = np.sum(along[..., :1] * along[..., 1:], axis=2)
+    first, more = (centre[..., :1], variance[..., :1]), (centre[..., 1:], variance[..., 1:])
+    nearest = np.max(np.where(asked, _distance(*more, *first, common), 0.0), axis=2)
+    bound = np.where(nearest > 0, log_ndtr(-nearest) - share, np.inf)
+    return np.asarray(np.minimum(out + alone.sum(axis=2), bound))
 
 
-def _apart(mean: Array, roots: Array, total: Array, along: Array) -> tuple[Array, Array]:
-    """(v, s, k) of every coefficient: mean over standard deviation, and the Mahalanobis distance of
-    it and the sum from where both are positive."""
-    a, b = mean, total[..., None]
-    aa = np.sum(roots**2, axis=2) + _TINY
-    bb = np.sum(along**2, axis=2)[..., None] + _TINY
-    ab = np.minimum(np.maximum((along[..., None, :] @ roots)[..., 0, :], -_NEAR * np.sqrt(aa * bb)),
-                    _NEAR * np.sqrt(aa * bb))  # fmt: skip
+def _distance(a: Array, aa: Array, b: Array, bb: Array, ab: Array) -> Array:
+    """Mahalanobis distance of means a, b with variances aa, bb and covariance ab from where both
+    are positive."""
+    most = _NEAR * np.sqrt(aa * bb)
+    ab = np.clip(ab, -most, most)
     corner = (a**2 * bb - 2 * a * b * ab + b**2 * aa) / (aa * bb - ab**2)
     square = np.where((a < 0) & (b - ab / aa * a >= 0), a**2 / aa, corner)
     square = np.where((b < 0) & (a - ab / bb * b >= 0), b**2 / bb, square)
     square = np.where((a >= 0) & (b >= 0), 0.0, square)
-    return a / np.sqrt(aa), np.sqrt(np.maximum(square, 0.0))
-
-
-_NEAR = 1 - 1e-9  # as correlated as two may be
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))

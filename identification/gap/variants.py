@@ -18,7 +18,8 @@ class Variant:
     """columns: k indices of the pool. root (k, k): prior covariance of the coefficients is
     `s^2 root root^T` for s out of `scales`, all equally likely. positive (k,): weights of a sum of
     coefficients that physics wants above `least` (None: either sign). each (k,): coefficients that
-    may not be negative either. info: what the parameters are reported from.
+    may not be negative either. within (m, k): weights of further sums above zero. info: what the
+    parameters are reported from.
     """
 
     word: str
@@ -29,6 +30,7 @@ class Variant:
     positive: Array | None = None
     least: float = 0.0
     each: tuple[bool, ...] = ()
+    within: Array = field(default_factory=lambda: np.zeros((0, 0)))
     info: Mapping[str, Any] = field(default_factory=dict)
     prior: float = 1.0
 
@@ -43,6 +45,7 @@ def variant(
     prior: float = 1.0,
     least: float = 0.0,
     each: bool | tuple[bool, ...] = False,
+    within: Array | None = None,
     **info: Any,
 ) -> Variant:
     """A variant with independent unit priors unless `root` says otherwise. each: all coefficients,
@@ -57,6 +60,7 @@ def variant(
         positive if isinstance(positive, np.ndarray) else (np.ones(k) if positive else None),
         least,
         _all(each, k),
+        np.zeros((0, k)) if within is None else within,
         info,
         prior,
     )

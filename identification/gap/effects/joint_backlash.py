@@ -136,7 +136,8 @@ def _zone(
         root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
         out.append(
             variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
-                    _less_rub(len(columns)), prior, each=(True, True), **(info | {"kind": kind}))
+                    _less_rub(len(columns)), prior, each=(True, True),
+                    within=_inside(len(columns)), **(info | {"kind": kind}))
         )  # fmt: skip
     return out
 
@@ -147,6 +148,13 @@ def _less_rub(k: int) -> Array:
     out = np.zeros(k)
     out[:2] = 1.0, -1.0 / MOST_RUB
     return out
+
+
+def _inside(k: int) -> Array:
+    """(m, k) of the coefficients: free places, from the third on, are no further off than half of
+    the play, to either side."""
+    rows = [np.eye(k)[0] + side * np.eye(k)[i] for i in range(2, k) for side in (2.0, -2.0)]
+    return np.array(rows).reshape(len(rows), k)
 
 
 def _crosses(net: Array, torque: Array) -> bool:
