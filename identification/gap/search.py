@@ -111,7 +111,12 @@ def search(engine: Engine, variants: list[Variant]) -> Found:
 def refine(engine: Engine, variants: list[Variant]) -> list[Variant]:
     """Finer shapes of the words that stand out and that a grid meets badly: thresholds and zones
     make the evidence piecewise smooth, offsets act by their squares."""
-    from identification.gap.effects import joint_backlash, joint_yield, pose_error
+    from identification.gap.effects import (
+        joint_backlash,
+        joint_nonlinear_stiffness,
+        joint_yield,
+        pose_error,
+    )
 
     by_word = _by_word(score(engine, engine.levels, variants))
     least = engine.levels[0].log_base + _WINDOW
@@ -134,6 +139,10 @@ def refine(engine: Engine, variants: list[Variant]) -> list[Variant]:
                 best = max(_scored_beside(engine, by_word, ranked, finer), key=_evidence)
                 finer += joint_backlash.refined(engine.bench, best.variant, _CLOSE)
             out += finer
+        elif word == "joint_nonlinear_stiffness":
+            odd = [s for s in found if "line" in s.variant.info]
+            for s in odd[:1]:
+                out += joint_nonlinear_stiffness.refined(engine.bench, s.variant)
         elif word == "pose_error":
             kinds = {str(s.variant.info["kind"]): s for s in reversed(found)}
             for s in kinds.values():

@@ -90,6 +90,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     steps = _TOOL_STEPS_KG if weighty else np.zeros(1)
     masses = float(info["tool_kg"]) + close * steps
     zones = float(info["zone_Nm"]) * np.array([0.65, 1.0, 1.5]) ** max(close, 0.75)
+    # what changes over more of the range is a curved spring
+    zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
     kinds, out = tuple(dict.fromkeys([info["kind"], "soft"])), []
     share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}

@@ -21,7 +21,9 @@ from identification.gap.data import Array
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
-HINGES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+# Closer at the start: contacts are soft where they begin to bear, as `|tau|^(2/3)` (Hertz 1882).
+HINGES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+PLACES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the range of the net torque
 SCALES = (0.05, 0.15, 0.4, 1.0)
 # Of a rig without an arm, where rubber locks and foam buckles and is squeezed flat: close together
 # at both ends of the range, and up to a hundred times stiffer.
@@ -74,32 +76,46 @@ def _net(bench: Bench, j: int, line: int) -> list[Variant]:
     torque, weight, c = bench.true_torque[:, j], bench.weight(j), bench.compliance[j]
     top, net = float(np.abs(torque).max()), torque + weight
     info: dict[str, Any] = {"joint": j, "torque": top}
-    out = []
-    for kg in TOOLS_KG:
-        hung = bench.weight(j, kg)
-        most = float(np.abs(torque + hung).max())
-        columns = [bench.add_joint(j, c * beyond(torque, hung, b * most)) for b in HINGES]
-        kinds = ("line", *(("beyond", b * most) for b in HINGES))
-        out.append(
-            variant(WORD, f"joint {j + 1} odd curve, tool {kg:g} kg", [line, *columns], SCALES,
-                    _root(), positive=False, prior=0.3 / len(TOOLS_KG), kinds=kinds, tool_kg=kg,
-                    **info)
-        )  # fmt: skip
+    out = [_odd(bench, j, line, kg, 0.3 / len(TOOLS_KG)) for kg in TOOLS_KG]
     if bench.meets_weight_unlike(j):
-        places = float(net.min()) + float(np.ptp(net)) * np.array(HINGES)
+        places = float(net.min()) + float(np.ptp(net)) * np.array(PLACES)
         columns = [bench.add_joint(j, c * above(torque, weight, b)) for b in places]
         kinds = ("line", *(("above", float(b)) for b in places))
         out.append(
             variant(WORD, f"joint {j + 1} curve of the net torque", [line, *columns], SCALES,
-                    _root(), positive=False, prior=0.4, kinds=kinds, tool_kg=TOOL_KG, **info)
+                    _root(len(places)), positive=False, prior=0.4, kinds=kinds, tool_kg=TOOL_KG,
+                    **info)
         )  # fmt: skip
     return out
 
 
-def _root() -> Array:
-    """Prior of a line and HINGES."""
-    root = np.zeros((len(HINGES) + 1,) * 2)
-    root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(HINGES), 0.5)
+def _odd(bench: Bench, j: int, line: int, kg: float, prior: float) -> Variant:
+    torque, hung, c = bench.true_torque[:, j], bench.weight(j, kg), bench.compliance[j]
+    most = float(np.abs(torque + hung).max())
+    columns = [bench.add_joint(j, c * beyond(torque, hung, b * most)) for b in HINGES]
+    kinds = ("line", *(("beyond", b * most) for b in HINGES))
+    return variant(WORD, f"joint {j + 1} odd curve, tool {kg:.3g} kg", [line, *columns], SCALES,
+                   _root(), positive=False, prior=prior, kinds=kinds, tool_kg=kg, joint=j,
+                   torque=float(np.abs(torque).max()), line=line)  # fmt: skip
+
+
+def refined(bench: Bench, found: Variant) -> list[Variant]:
+    """Curves alike in both senses, about one that was found, for masses of the tool in between:
+    where they are soft about no torque, it matters where that is."""
+    if "line" not in found.info or not np.any(bench.weight_per_kg(found.info["joint"])):
+        return []
+    masses = float(found.info["tool_kg"]) + _TOOL_STEPS_KG
+    share = 0.3 / len(masses)
+    return [_odd(bench, found.info["joint"], found.info["line"], kg, share) for kg in masses]
+
+
+_TOOL_STEPS_KG = np.array([-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4])
+
+
+def _root(hinges: int = len(HINGES)) -> Array:
+    """Prior of a line and hinges."""
+    root = np.zeros((hinges + 1,) * 2)
+    root[0, 0], root[1:, 1:] = 1.0, smooth_root(hinges, 0.5)
     return root
 
 
@@ -129,8 +145,6 @@ def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
     start = float(np.abs(x).min()) if x.min() * x.max() > 0 else 0.0
     places = tuple(round(start + b * (1 - start), 6) for b in FINE)
     columns = [bench.add_joint(j, c * hinge(x, b)) for b in places]
-    root = np.zeros((len(places) + 1,) * 2)
-    root[0, 0], root[1:, 1:] = 1.0, smooth_root(len(places), 0.5)
-    return variant(WORD, f"joint {j + 1} fine curve", [line, *columns], FINE_SCALES, root,
-                   positive=False, prior=0.5, kinds=("line", *places), joint=j, torque=top,
-                   hinges=places)  # fmt: skip
+    return variant(WORD, f"joint {j + 1} fine curve", [line, *columns], FINE_SCALES,
+                   _root(len(places)), positive=False, prior=0.5, kinds=("line", *places),
+                   joint=j, torque=top, hinges=places)  # fmt: skip
