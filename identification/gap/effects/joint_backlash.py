@@ -2,11 +2,11 @@
 
 Net torque = load and, in an upright arm, its own weight. The joint lies at one side of its play w
 or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where it was pushed until
-the torque has turned: a play of radius `zone` on the torque, cut at the ends of the play, or of
-0.7 zones with soft ends. Gears with play rub too: a stop operator of the zone's strength rides
-along. Without torque the joint lies anywhere in its play, a free place per setup at its first zero
-load and at later ones, or where the rubbing left it. The tool's mass is not known: the torque at
-which the weights are balanced is sought among masses of 0 to 3 kg.
+the torque has turned: a play of radius `zone`, or half of it, on the torque, cut at the ends of
+the play, or of 0.7 zones with soft ends. Gears with play rub too: a stop operator of the zone's
+strength rides along. Without torque the joint lies anywhere in its play, a free place per setup at
+its first zero load and at later ones, or where the rubbing left it. The tool's mass is not known:
+the torque at which the weights are balanced is sought among masses of 0 to 3 kg.
 Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
 force: such plays are placed by the data (flanks.py), with the springs that they bring.
 
@@ -27,7 +27,7 @@ from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
-KINDS = ("free", "friction", "friction 3", "soft", "rubbing")
+KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "rubbing")
 PLACED = ("gap", "held")
 HELD = ("rubbing",)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
@@ -138,7 +138,7 @@ def _zone(
         root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
         out.append(
             variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
-                    _less_rub(len(columns)), prior, each=(True, True),
+                    _less_rub(len(columns)), prior, each=(True,),
                     within=_inside(len(columns)), **(info | {"kind": kind}))
         )  # fmt: skip
     return out
@@ -153,10 +153,11 @@ def _less_rub(k: int) -> Array:
 
 
 def _inside(k: int) -> Array:
-    """(m, k) of the coefficients: free places, from the third on, are no further off than half of
-    the play, to either side."""
-    rows = [np.eye(k)[0] + side * np.eye(k)[i] for i in range(2, k) for side in (2.0, -2.0)]
-    return np.array(rows).reshape(len(rows), k)
+    """(m, k) of the coefficients: a play of that zone rubs as much too much at most as too little;
+    free places, from the third on, are no further off than half of the play, to either side."""
+    rows = [np.eye(k)[0] + np.eye(k)[1] / MOST_RUB]
+    rows += [np.eye(k)[0] + side * np.eye(k)[i] for i in range(2, k) for side in (2.0, -2.0)]
+    return np.array(rows)
 
 
 def _crosses(net: Array, torque: Array) -> bool:
@@ -167,11 +168,12 @@ def _crosses(net: Array, torque: Array) -> bool:
 
 def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
     """Per kind: the play itself, and the friction beside it."""
-    state = bench.plays(x, zone * np.array([1.0, 3.0, 0.7]))
+    state = bench.plays(x, zone * np.array([1.0, 3.0, 0.7, 0.5]))
     rub = -(x - state[:, 0]) / (2 * zone)
     return {
         "free": [np.tanh(x / zone) / 2, rub],
         "friction": [np.clip(state[:, 0] / zone, -1, 1) / 2, rub],
+        "friction 1/2": [np.clip(state[:, 3] / zone, -1, 1) / 2, rub],
         "friction 3": [np.tanh(state[:, 1] / zone) / 2, rub],
         "soft": [-np.sign(x) * np.expm1(-np.abs(x) / zone) / 2, rub],
         "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
