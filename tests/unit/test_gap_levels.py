@@ -3,16 +3,17 @@ plateaus of a driven displacement; and what several effects of one explanation o
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from identification.gap.bench import displacement_imposed, make_bench
+from identification.gap.bench import Bench, displacement_imposed, make_bench
 from identification.gap.compare import log_mean
 from identification.gap.data import Array
-from identification.gap.diagnose import _held
+from identification.gap.diagnose import _chosen, _held
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
@@ -21,7 +22,15 @@ from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import _apart, _on_its_own
 from identification.gap.products import White
 from identification.gap.rows import reduce_rows
-from identification.gap.search import THREE, Explanation, _heir, _main, search, weighed
+from identification.gap.search import (
+    EXPLAINED,
+    THREE,
+    Explanation,
+    _heir,
+    _main,
+    search,
+    weighed,
+)
 from identification.gap.variants import Variant, variant
 from rig.dataset import load
 from rig.gap_data import gap_data
@@ -255,3 +264,40 @@ def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
     )
     found = replace(found, kept={two.words: 0.1, frozenset({"joint_creep"}): 0.9})
     assert [_held(found, e) for e in (two, three, other)] == [False, False, True]
+
+
+def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    law, noise = (part("joint_creep", [0]),), bench.noise.stated
+    share = np.exp(-EXPLAINED) / (1 + np.exp(-EXPLAINED))
+    for eta, arm, unknown in ((noise, False, share), (3 * noise, False, 1.0), (noise, True, 1.0)):
+        data = replace(bench.data, arm=arm)
+        engine = replace_bench(found.engine, replace(bench, data=data))
+        one = said(law, (1e-5,), -20.0, eta)
+        whole = replace(found, engine=engine, explanations=(one,), unknown=0.0, alone={})
+        assert weighed(whole, {}).probabilities["unknown"] == pytest.approx(unknown, abs=1e-6)
+    failed = {frozenset({"joint_creep"}): 0.1}
+    whole = replace(found, explanations=(said(law, (1e-5,), -20.0, noise),), unknown=0.0, alone={})
+    assert weighed(whole, failed).probabilities["unknown"] == pytest.approx(1.0, abs=1e-6)
+
+
+def replace_bench(engine: Engine, bench: Bench) -> Engine:
+    """The engine as it is, of another bench."""
+    other = copy(engine)
+    other.bench = bench
+    return other
+
+
+def test_a_verdict_that_is_nowhere_the_largest_effect_is_shown_where_it_is_likely() -> None:
+    """One of two alike stands beside it in each; which of them it is nobody can tell."""
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    creep, gain, link = (part(w, [0]) for w in ("joint_creep", "force_scale", "link_flexibility"))
+    beside = [said((large, creep), (2e-5, 1e-5), 0.0) for large in (gain, link)]
+    for weight, shown in ((-40.0, beside[0]), (-5.0, None)):
+        alone = said((creep,), (1e-5,), weight)
+        whole = replace(found, explanations=(*beside, alone), kept={})
+        assert _chosen(whole, "joint_creep") is (shown or alone)

@@ -395,3 +395,22 @@ def test_turning_points_of_a_crank_are_no_holds() -> None:
     for cycles in (2, 3, 5, 8):
         force = 100 * np.sin(2 * np.pi * cycles * np.arange(900) / 900)
         assert make_bench(running(force, force / SPRING, imposed="force")).always_moves, cycles
+
+
+def test_steps_of_what_is_driven_are_no_noise_and_stay_sharp_in_a_lag() -> None:
+    force = np.repeat([0.0, 50.0, 0.0, -50.0, 0.0], 40)
+    bench = make_bench(running(force, force / SPRING, imposed="force"))
+    behind = late(bench, "displacement", "delay", 3.0)[: len(force)]
+    moved = np.flatnonzero(np.abs(behind) > 1e-9)
+    assert set(moved) <= {k * 40 + i for k in range(1, 5) for i in range(4)}
+    assert behind[41] == pytest.approx(-50.0 / SPRING)
+
+
+def test_one_reading_a_step_on_one_way_shows_no_lag() -> None:
+    up = np.arange(12.0)
+    for load, shows in ((up, False), (np.append(up, up[::-1]), True)):
+        bench = make_bench(bench_data(load, load * 1e-5))
+        assert bool(words_with(bench, "time_lag")) is shows
+    held = np.repeat(up, 3)
+    bench = make_bench(bench_data(held, held * 1e-5, step=np.repeat(np.arange(12), 3)))
+    assert words_with(bench, "time_lag")

@@ -9,7 +9,7 @@ import pytest
 
 from identification.gap.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
 from identification.gap.data import Array, Setup
-from identification.gap.effects import library
+from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness, library
 from identification.gap.effects.joint_backlash import TOOLS_KG
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond
 from identification.gap.history import bristles, flowing_play, play
@@ -187,3 +187,22 @@ def test_creep_with_the_square_counts_as_its_straight_line() -> None:
     k = len(bent.columns)
     found = parameters(bench, Part(bent, 1.0), np.full(k, 0.1), np.zeros((k, k)))
     assert found["creep_fraction"].value == pytest.approx(0.75 * 0.1 * k)
+
+
+def test_curves_and_plays_are_refined_for_tools_in_between_and_no_wider_than_a_play() -> None:
+    bench = hanging(UP)
+    odd = next(v for v in library(bench, ["joint_nonlinear_stiffness"]) if "odd" in v.label)
+    finer = joint_nonlinear_stiffness.refined(bench, odd)
+    masses = [v.info["tool_kg"] - odd.info["tool_kg"] for v in finer]
+    assert max(np.abs(masses)) == pytest.approx(0.4)
+    assert min(np.abs(masses)) == pytest.approx(0.1)
+    assert sum(v.prior for v in finer) == pytest.approx(0.3)
+    bent = [bench.columns[v.columns[1]][: bench.rows.n] for v in (odd, finer[0])]
+    assert not np.allclose(*bent)
+    weightless = [replace(s, tool_gravity=np.zeros(1)) for s in bench.data.setups]
+    assert not joint_nonlinear_stiffness.refined(
+        make_bench(replace(bench.data, setups=tuple(weightless))), odd
+    )
+    wide = [v for v in library(bench, ["joint_backlash"]) if v.info["crossing"] == "weight"][-1]
+    widest = max(v.info["zone_Nm"] for v in joint_backlash.refined(bench, wide))
+    assert widest == pytest.approx(joint_backlash.ZONES[-1] * bench.reach_of(bench.load))

@@ -1,0 +1,59 @@
+"""Glitches of running recordings are set aside; steps, peaks and gaps of glitches alone are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.data import Array, GapData
+from identification.gap.glitches import without_glitches
+from tests.unit.test_gap_operators import bench_data
+
+N = 300
+
+
+def recording(u: Array, force: Array | None = None) -> GapData:
+    """A running recording: force N from a curved spring unless it is given."""
+    n = len(u)
+    f = 100.0 * (u + 0.3 * u**2) if force is None else force
+    return bench_data(f, u * 1e-3, step=np.full(n, -1), time=0.1 * np.arange(n))
+
+
+def triangle() -> Array:
+    return np.asarray(1 - np.abs(np.linspace(-1, 3, N) % 2 - 1))
+
+
+def test_single_readings_that_jump_off_are_set_aside_and_said() -> None:
+    data = recording(triangle())
+    force = data.force.copy()
+    force[[60, 61, 200]] += 12.0
+    kept = without_glitches(recording(triangle(), force))
+    assert len(kept.force) == N - 3
+    assert kept.time[60] == pytest.approx(6.2)
+    (note,) = kept.notes
+    assert note.startswith("3 of 300 readings jump off and come back at once: set aside")
+    assert "6 s" in note
+    assert len(kept.compliance) == len(data.compliance)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_turning_points_and_steps_are_no_glitches(noise: float) -> None:
+    draw = np.random.default_rng(4)
+    for u in (triangle(), np.repeat([0.0, 1.0, 0.4, 1.2, 0.1], N // 5)):
+        force = 100 * u + 5 * u**2 + noise * draw.standard_normal(len(u))
+        assert not without_glitches(recording(u, force)).notes
+
+
+def test_a_clean_spring_with_jumping_readings_keeps_them() -> None:
+    """They are the gap then."""
+    force = 100 * triangle()
+    force[[60, 120, 200]] += 20.0
+    kept = without_glitches(recording(triangle(), force))
+    assert len(kept.force) == N
+    assert not kept.notes
+
+
+def test_many_of_them_are_how_the_rig_behaves() -> None:
+    force = 100 * (triangle() + 0.3 * triangle() ** 2)
+    force[10::15] += 20.0
+    assert not without_glitches(recording(triangle(), force)).notes

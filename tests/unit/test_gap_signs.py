@@ -1,0 +1,150 @@
+"""Limits of coefficients, evidence between the levels, and the prior of the imperfection."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import log_ndtr
+
+from bench.nested_sampling import case_data, dense
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import make_bench
+from identification.gap.compare import score
+from identification.gap.data import Array
+from identification.gap.evidence import Engine
+from identification.gap.finer import gained
+from identification.gap.imperfection import LEAST_IMPERFECTION, log_share
+from identification.gap.parts import Part, log_joint, log_joint_between, signs_kept
+from identification.gap.signs import Limits, log_odds
+from identification.gap.variants import variant
+from tests.unit.test_gap_evidence import small_bench, small_engine
+
+
+def odds(mean: Array, covariance: Array, prior: Array, **limits: object) -> float:
+    v = variant("joint_yield", "v", list(range(len(mean))), (1.0,), **limits)  # type: ignore[arg-type]
+    found = Limits.of([v])
+    assert found is not None
+    first = found.rows[0, 0]
+    before = np.sqrt(first @ prior @ first).reshape(1, 1)
+    roots = np.linalg.cholesky(covariance).T
+    return float(log_odds(found, before, mean[None, None], roots[None, None])[0, 0])
+
+
+def sampled(mean: Array, covariance: Array, prior: Array, rows: Array, least: float) -> float:
+    """log of the share that keeps `rows w > (least, 0, 0 ...)`, over that of the prior."""
+    draw = np.random.default_rng(2)
+    limit = np.append(least, np.zeros(len(rows) - 1))
+    share = [
+        np.mean(np.all(draw.multivariate_normal(m, c, 2_000_000) @ rows.T > limit, axis=1))
+        for m, c in ((mean, covariance), (np.zeros(len(mean)), prior))
+    ]
+    return float(np.log(share[0] / share[1]))
+
+
+ALONE = np.array([[1.0]])
+
+
+def test_one_coefficient_and_its_sign_are_exact() -> None:
+    for mean in (-3.0, -0.4, 0.0, 2.0):
+        found = odds(np.array([mean]), 0.25 * ALONE, ALONE, least=0.3)
+        assert found == pytest.approx(log_ndtr((mean - 0.3) / 0.5) - log_ndtr(-0.3))
+
+
+def test_no_limit_costs_nothing() -> None:
+    assert Limits.of([variant("joint_yield", "v", [0, 1], (1.0,), positive=False)]) is None
+
+
+def test_one_coefficient_may_not_pay_for_another_with_the_wrong_sign() -> None:
+    """Data see `2 w0 + w1 = 0` only; `w0 + w1` is wanted above a limit, and neither below zero."""
+    along, across = np.array([2.0, 1.0]) / 5**0.5, np.array([-1.0, 2.0]) / 5**0.5
+    covariance = 1e-4 * np.outer(along, along) + np.outer(across, across)
+    prior = np.eye(2)
+    found = odds(np.zeros(2), covariance, prior, least=0.15, each=True)
+    free = odds(np.zeros(2), covariance, prior, least=0.15)
+    assert free > -1.0  # the sum alone is easily met
+    assert found < -15.0  # but not with both above zero: 0.15 / 5**0.5 is 6.7 standard deviations
+
+
+def test_limits_that_the_data_keep_cost_little() -> None:
+    mean, covariance = np.array([0.6, 0.8]), np.array([[0.04, -0.03], [-0.03, 0.04]])
+    exact = sampled(mean, covariance, np.eye(2), np.array([[1.0, 1.0], [1, 0], [0, 1]]), 0.15)
+    found = odds(mean, covariance, np.eye(2), least=0.15, each=True)
+    # signs that are kept earn nothing here; truly each is worth up to log 2
+    assert exact - 2 * np.log(2) - 0.2 < found < exact + 0.2
+
+
+def test_a_place_lies_within_its_play() -> None:
+    """w1 beyond half of w0, to either side, by ten standard deviations of it."""
+    covariance = np.diag([0.01, 1e-4])
+    rows = np.array([[0.5, 1.0], [0.5, -1.0]])
+    for side in (1.0, -1.0):
+        inside = odds(np.array([1.0, side * 0.4]), covariance, np.eye(2), within=rows)
+        outside = odds(np.array([1.0, side * 1.0]), covariance, np.eye(2), within=rows)
+        assert inside > 0.0
+        assert outside < -25.0
+
+
+def test_what_two_parts_keep_together_is_asked_part_by_part() -> None:
+    engine = small_engine(small_bench())
+    engine.target[: engine.bench.rows.n] -= 3.0 * engine.bench.columns[0][: engine.bench.rows.n]
+    engine = Engine(engine.bench, engine.base, engine.target, engine.etas)
+    kept = Part(variant("joint_creep", "free", [1], (1.0,), positive=False), 1.0)
+    wrong = Part(variant("joint_creep", "signed", [0], (1.0,)), 1.0)
+    right = Part(variant("joint_creep", "minus", [0], (1.0,), positive=-np.ones(1)), 1.0)
+    assert signs_kept(engine.levels[0], (kept, wrong)) < -5.0
+    assert signs_kept(engine.levels[0], (kept, right)) == 0.0
+
+
+# --- between the levels --------------------------------------------------------------------------
+
+
+def test_evidence_at_every_size_of_imperfection_is_that_of_one_dense_covariance() -> None:
+    """Nuisances and imperfection built anew by `bench/nested_sampling.py`, as one matrix."""
+    bench = make_bench(case_data("yield"))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    engine = Engine(bench, base, target, np.array([0.0, 1e-6, 2e-5, 1e-4]))
+    model = dense(bench)
+    offset = -float(np.sum(np.log(engine.sigma))) - 0.5 * bench.layout.size * np.log(2 * np.pi)
+    nothing = np.zeros(len(model.target))
+    for level in engine.levels:
+        exact = model.log_density(nothing, level.eta)
+        assert level.log_base + offset == pytest.approx(exact, rel=1e-8)
+    between = log_joint_between(engine, (), 5e-5) + offset
+    assert between == pytest.approx(model.log_density(nothing, 5e-5), rel=1e-8)
+
+
+def test_between_two_levels_is_what_a_level_there_would_give() -> None:
+    bench = small_bench()
+    engine = small_engine(bench, (0.0, 3e-6, 7.5e-6))
+    finer = Engine(bench, engine.base, engine.target, np.array([0.0, 3e-6, 4.7e-6, 7.5e-6]))
+    parts = (Part(variant("joint_creep", "a", [0, 1], (0.5,)), 0.5),)
+    found = log_joint_between(engine, parts, 4.7e-6)
+    assert found == pytest.approx(log_joint(finer.levels[2], parts), rel=1e-12)
+
+
+def test_steps_between_levels_lose_nothing_that_finer_ones_show() -> None:
+    """An effect met to 4 %: levels by 2.5 beside levels by 1.1 of the same range."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    shape = bench.columns[0][: bench.rows.n]
+    bent = shape * (1 + 0.1 * np.sin(40 * bench.load / np.ptp(bench.load)))
+    target = engine.target.copy()
+    target[: bench.rows.n] += 400.0 * bent
+    steps = 5e-7 * 2.5 ** np.arange(8)
+    fine = np.geomspace(steps[0], steps[-1], 1 + round(np.log(steps[-1] / steps[0]) / np.log(1.1)))
+    v = variant("joint_creep", "a", [0], (400.0,))
+    total, energy = [], float(np.mean((400.0 * (shape - shape.mean())) ** 2))
+    for etas in (steps, fine):
+        e = Engine(bench, engine.base, target, np.concatenate([[0.0], etas]))
+        total.append(score(e, e.levels, [v])[0].log_evidence)
+        if etas is steps:
+            total[0] += gained(e, (Part(v, 400.0),), energy)
+    assert total[0] == pytest.approx(total[1], abs=0.3)
+
+
+def test_no_law_is_met_more_closely_than_its_least_imperfection() -> None:
+    energy, edges = 1e-8, np.log(np.geomspace(1e-8, 1e-3, 400))
+    share = log_share(edges, energy)
+    least = LEAST_IMPERFECTION * energy**0.5
+    assert np.all(share[np.exp(edges[1:]) < least] < -600)
+    assert np.exp(share).sum() == pytest.approx(1 - 0.065, abs=0.01)  # what is below has no room
