@@ -94,9 +94,9 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
 
 def _on_its_own(parts: tuple[Part, ...], found: Sizes, i: int, k: int) -> bool:
     """One of them is wrong springs that move the arm far more than the mechanism beside them: no
-    linear part of its law."""
+    linear part of its law. A curved spring has a line of its own, of any size."""
     for a, b in ((i, k), (k, i)):
-        if parts[a].word == "joint_stiffness_error" and parts[b].word not in LINEAR:
+        if parts[a].word == "joint_stiffness_error" and parts[b].word not in LINEAR | CURVES:
             return bool(found.moved[a] > _FAR_MORE * found.moved[b])
     return False
 

@@ -126,13 +126,13 @@ def refine(engine: Engine, variants: list[Variant]) -> list[Variant]:
     for word in ranked:
         if _marginal(by_word[word]) < least:
             continue
-        found = sorted(beside.get(word, by_word[word]), key=lambda s: -s.log_evidence)
+        found = sorted(by_word[word], key=lambda s: -s.log_evidence)
+        second = sorted(beside.get(word, []), key=lambda s: -s.log_evidence)
         if word in ("joint_yield", "base_slip"):
-            sharp = [s for s in found if s.variant.info["knee"] == "sharp"]
-            for s in _places(sharp):
+            for s in _places(found, second, "sharp"):
                 out += joint_yield.refined(engine.bench, s.variant)
         elif word == "joint_backlash":
-            finer = [v for s in _places(found)
+            finer = [v for s in _places(found, second)
                      for v in joint_backlash.refined(engine.bench, s.variant)]  # fmt: skip
             engine.extend()
             if finer:
@@ -192,12 +192,18 @@ def _estimate(engine: Engine, variant: Variant) -> tuple[Array, Array]:
     return fitted.coefficients, softer
 
 
-def _places(found: list[Scored]) -> list[Scored]:
-    """The best of the _REFINED best joints, or axes."""
+def _places(alone: list[Scored], beside: list[Scored], knee: str | None = None) -> list[Scored]:
+    """The best of the _REFINED best joints, or axes, beside the leading word, and the best alone:
+    of two words that explain the same neither has a place beside the other. knee: of that kind."""
+
+    def able(scored: list[Scored]) -> list[Scored]:
+        return [s for s in scored if knee is None or s.variant.info["knee"] == knee]
+
     places: dict[object, Scored] = {}
-    for s in found:
+    for s in able(beside or alone):
         places.setdefault((s.variant.info.get("joint"), s.variant.info.get("axis")), s)
-    return list(places.values())[:_REFINED]
+    found = [*able(alone)[:1], *list(places.values())[:_REFINED]]
+    return [s for i, s in enumerate(found) if s.variant not in [f.variant for f in found[:i]]]
 
 
 def force(

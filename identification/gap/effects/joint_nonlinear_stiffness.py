@@ -23,7 +23,7 @@ from identification.gap.variants import Variant, smooth_root, variant
 WORD = "joint_nonlinear_stiffness"
 # Closer at the start: contacts are soft where they begin to bear, as `|tau|^(2/3)` (Hertz 1882).
 HINGES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-PLACES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the range of the net torque
+PLACES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of corners; of all of the net torque
 SCALES = (0.05, 0.15, 0.4, 1.0)
 # Of a rig without an arm, where rubber locks and foam buckles and is squeezed flat: close together
 # at both ends of the range, and up to a hundred times stiffer.
@@ -55,11 +55,13 @@ def variants(bench: Bench) -> list[Variant]:
                 variant(WORD, f"joint {j + 1} {name}", [column], SCALES, positive=False,
                         prior=0.1, kinds=(name,), **info)
             )  # fmt: skip
-        for k in range(len(HINGES) - 1):
+        for k in range(
+            HINGES.index(PLACES[0]), len(HINGES) - 1
+        ):  # nearer to none it is lost motion
             out.append(
                 variant(WORD, f"joint {j + 1} bend {HINGES[k]}", [line, *columns[k : k + 2]],
                         SCALES,
-                        positive=False, prior=0.2 / (len(HINGES) - 1),
+                        positive=False, prior=0.2 / (len(PLACES) - 1),
                         kinds=("line", *HINGES[k : k + 2]), **info)
             )  # fmt: skip
         if not bench.data.arm and bench.rows.continuous and bench.unloads:
