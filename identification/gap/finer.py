@@ -13,9 +13,10 @@ from identification.gap.compare import logsumexp
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.imperfection import level_prior, log_share
+from identification.gap.parallel import side_by_side
 from identification.gap.parts import Part, log_joint, log_joint_between
 
-_PARTS = 4  # of a step between levels
+_PARTS = 3  # of a step between levels
 _POINTS = 25  # of the integral, per part of a step
 _STEP = np.log(2.5)
 
@@ -32,10 +33,10 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
     parts_between = round((np.log(etas[last]) - lowest) / _STEP * _PARTS)
     x = np.linspace(lowest, np.log(etas[last]), parts_between + 1)
     known = {round(float(v), 6): j for v, j in zip(np.log(etas[1:]), joint[1:], strict=True)}
-    y = np.array([
-        known.get(round(float(v), 6)) or log_joint_between(engine, parts, float(np.exp(v)))
-        for v in x
-    ])  # fmt: skip
+    missing = [v for v in x.tolist() if round(v, 6) not in known]
+    found = side_by_side(lambda v: log_joint_between(engine, parts, float(np.exp(v))), missing)
+    known |= {round(v, 6): j for v, j in zip(missing, found, strict=True)}
+    y = np.array([known[round(v, 6)] for v in x.tolist()])
     total = [_integral(x, y, energy), *coarse[last + 1 :]]
     if best <= 1:
         total.append(joint[0] + float(log_share(np.array([-np.inf, lowest]), energy)[0]))

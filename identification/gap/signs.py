@@ -71,11 +71,17 @@ def log_odds(limits: Limits, before: Array, mean: Array, roots: Array) -> Array:
     wrong = (z[..., 1:] < 0) & asked  # the right side of a limit costs nothing
     alone = np.zeros(wrong.shape)
     alone[wrong] = log_ndtr(z[..., 1:][wrong]) - np.log(0.5)
-    common = np.sum(along[..., :1] * along[..., 1:], axis=2)
-    first, more = (centre[..., :1], variance[..., :1]), (centre[..., 1:], variance[..., 1:])
-    nearest = np.max(np.where(asked, _distance(*more, *first, common), 0.0), axis=2)
-    bound = np.where(nearest > 0, log_ndtr(-nearest) - share, np.inf)
-    return np.asarray(np.minimum(out + alone.sum(axis=2), bound))
+    out = out + alone.sum(axis=2)
+    far = (z[..., 0] < 0) | wrong.any(axis=2)
+    if far.any():
+        a, b, aa, bb = centre[far, 1:], centre[far, :1], variance[far, 1:], variance[far, :1]
+        common = np.sum(along[far][..., :1] * along[far][..., 1:], axis=1)
+        apart = np.where(
+            np.broadcast_to(asked, wrong.shape)[far], _distance(a, aa, b, bb, common), 0
+        )
+        bound = log_ndtr(-apart.max(axis=1)) - np.broadcast_to(share, out.shape)[far]
+        out[far] = np.minimum(out[far], bound)
+    return np.asarray(out)
 
 
 def _distance(a: Array, aa: Array, b: Array, bb: Array, ab: Array) -> Array:
