@@ -8,9 +8,9 @@ import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -80,17 +80,33 @@ def without_name(message: str, path: Path) -> str:
     return text[:1].upper() + text[1:]
 
 
+def load_drawing() -> None:
+    """What `draw` needs in a new process."""
+    import matplotlib.backends.backend_svg
+    import matplotlib.figure  # noqa: F401
+
+    import rig.report.gap_pictures  # noqa: F401
+
+
 class Crew:
-    """The processes that diagnose, and what they are at."""
+    """The processes that diagnose, and one that draws half of the figures of what they find."""
 
-    def __init__(self, pool: ProcessPoolExecutor, jobs: Sequence[Job]) -> None:
+    def __init__(self, pool: ProcessPoolExecutor, artist: ProcessPoolExecutor) -> None:
         self.pool = pool
-        self.begun = [pool.submit(run, job) for job in jobs]
+        self.artist = artist
+        self.begun: list[Future[Found]] = []
 
-    @property
-    def idle(self) -> bool:
-        """Whether every diagnosis is done."""
-        return all(future.done() for future in self.begun)
+    def begin(self, jobs: Sequence[Job]) -> None:
+        """Begins every diagnosis for which there is a process; the others follow."""
+        with _ctrl_c_ignored():  # which the children inherit, from their first moment on
+            self.begun = [self.pool.submit(run, job) for job in jobs]
+
+    def wait_for(self, number: int) -> Found:
+        """What a diagnosis found. The artist starts only now: while this process waits, nobody
+        else wants its core."""
+        with _ctrl_c_ignored(), suppress(BrokenProcessPool):  # `_drawn` does without it
+            self.artist.submit(load_drawing)
+        return self.begun[number].result(DEADLINE_S)
 
 
 class Waiting:
@@ -112,7 +128,7 @@ class Waiting:
         if self._crew is None:
             return run(self._job)
         try:
-            return self._crew.begun[self._number].result(DEADLINE_S)
+            return self._crew.wait_for(self._number)
         except TimeoutError:
             return Found(
                 None, reason=f"The diagnosis took longer than {DEADLINE_S:g} s and was given up."
@@ -121,13 +137,13 @@ class Waiting:
             return Found(None, reason="The diagnosis was ended from outside, or ran out of memory.")
 
     def _drawn(self, view: GapView) -> tuple[Figure, ...]:
-        """Half of the figures here, the others in the process that has nothing to do any more."""
-        if self._crew is None or not self._crew.idle:
+        """Every other figure here, the rest beside: both take about as long."""
+        if self._crew is None:
             return draw(view, FIGURES)
-        here, there = FIGURES[:2], FIGURES[2:]
         try:
-            others = self._crew.pool.submit(draw, view, there)
-            return (*draw(view, here), *others.result(DEADLINE_S))
+            others = self._crew.artist.submit(draw, view, FIGURES[1::2])
+            pairs = zip(draw(view, FIGURES[::2]), others.result(DEADLINE_S), strict=True)
+            return tuple(figure for pair in pairs for figure in pair)
         except (TimeoutError, BrokenProcessPool):
             return draw(view, FIGURES)
 
@@ -149,17 +165,20 @@ def diagnosing(jobs: Sequence[Job], processes: int) -> Iterator[list[Waiting]]:
         yield [Waiting(job) for job in jobs]
         return
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(
-        min(processes, len(jobs)), multiprocessing.get_context("spawn"), _deaf_to_ctrl_c
-    )
+    crew = Crew(_pool(min(processes, len(jobs))), _pool(1))
     try:
-        with _ctrl_c_ignored():  # which the children inherit, from their first moment on
-            crew = Crew(pool, jobs)
+        crew.begin(jobs)
         yield [Waiting(job, crew, number) for number, job in enumerate(jobs)]
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        for pool in (crew.pool, crew.artist):
+            pool.shutdown(wait=False, cancel_futures=True)
         for child in set(multiprocessing.active_children()) - others:
             child.terminate()
+
+
+def _pool(processes: int) -> ProcessPoolExecutor:
+    """Starts them when there is work."""
+    return ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _deaf_to_ctrl_c)
 
 
 @contextmanager

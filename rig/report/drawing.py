@@ -52,8 +52,12 @@ def draw(
 
 def svg_of(figure: Plot, name: str) -> str:
     """SVG text, one element; its ids begin with `name`, so that figures of a page don't mix."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    # `savefig` draws everything twice, first for the layout alone, and what comes out is the same
+    canvas = FigureCanvasSVG(figure)
+    canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]
     return alone(buffer.getvalue(), name)
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import re
 import sys
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure as Plot
 
 from rig.dataset import load
 from rig.errors import InputError
@@ -27,6 +29,7 @@ from rig.report.document import (
     Word,
     figures,
 )
+from rig.report.drawing import alone, style, svg_of
 from rig.report.gather import gather
 from rig.report.html import escape, render
 from rig.report.pdf import pdf
@@ -260,6 +263,25 @@ def test_a_rehearsed_figure_is_not_drawn_again(
     assert drawn == [f.name for f in figures(once.sections)]
     assert len(drawn) == len(set(drawn)) > 2
     assert all(name.startswith(names[0]) for name in drawn)
+
+
+def test_a_figure_is_drawn_once_and_as_matplotlib_would(monkeypatch: pytest.MonkeyPatch) -> None:
+    def plot() -> Plot:
+        figure = Plot(figsize=(4, 3), layout="constrained")
+        axes = figure.subplots(1, 2, sharey=True)[0]
+        axes.plot([1.0, 2000.0], [0.1, 2.5], label="x")
+        axes.set_aspect("equal")
+        figure.legend(loc="outside lower center")
+        return figure
+
+    with style():
+        saved = io.StringIO()
+        plot().savefig(saved, format="svg", metadata={"Date": None, "Creator": None})
+        drawn: list[Plot] = []
+        once = Plot.draw
+        monkeypatch.setattr(Plot, "draw", lambda f, to: drawn.append(f) or once(f, to))
+        assert svg_of(plot(), "a") == alone(saved.getvalue(), "a")
+    assert len(drawn) == 1
 
 
 def test_figures_with_many_panels_stay_legible_on_paper() -> None:
