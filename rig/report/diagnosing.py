@@ -81,11 +81,15 @@ def without_name(message: str, path: Path) -> str:
 
 
 def load_drawing() -> None:
-    """What `draw` needs in a new process."""
-    import matplotlib.backends.backend_svg
-    import matplotlib.figure  # noqa: F401
-
+    """What `draw` needs in a new process: a first figure takes twice as long as the next one."""
     import rig.report.gap_pictures  # noqa: F401
+    from rig.gap_layout import blank
+    from rig.report.drawing import style, svg_of
+
+    with style():
+        figure = blank(2.0, 2.0)
+        figure.add_subplot().set_xlabel("x")
+        svg_of(figure, "first")
 
 
 class Crew:
