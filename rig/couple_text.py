@@ -44,7 +44,7 @@ def _stiffness(result: CouplingResult) -> str:
         f"Stiffness in N/mm (standard uncertainty). Single: base axes. Coupled: {axes}, "
         f"beta = {np.rad2deg(result.spec.beta):g} deg; the model's coupling: "
         f"{result.spec.described}.",
-        f"  {'':<10} {'x':>18} {'y':>18} {'z':>18}",
+        f"  {'':<14} {'x':>18} {'y':>18} {'z':>18}",
     ]
     rows = {"single": (result.single, result.u_single)}
     rows |= {name: (result.pair[name], result.u_pair[name]) for name in result.pair}
@@ -52,10 +52,10 @@ def _stiffness(result: CouplingResult) -> str:
         cells = "".join(
             f" {f'{v / 1e3:.1f} ({s / 1e3:.1f})':>18}" for v, s in zip(values, u, strict=True)
         )
-        lines.append(f"  {name:<10}{cells}")
+        lines.append(f"  {name:<14}{cells}")
     for name, values in result.pair.items():
         cells = "".join(f" {f'{g:.2f} times':>18}" for g in values / result.single)
-        lines.append(f"  gain {name:<5.5}{cells}")
+        lines.append(f"  {f'gain {name}':<14}{cells}")
     return "\n".join(lines)
 
 

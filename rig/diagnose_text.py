@@ -104,7 +104,7 @@ def _value(p: Parameter) -> str:
 def _gap(r: GapResult) -> str:
     lines = [
         "How far (rms, mm)",
-        "                    before      after  after/noise  shrinks by",
+        "                        before      after  after/noise  shrinks by",
         _row("fitted", r.before, r.after, r.noise),
     ]
     for h in r.held_out:
@@ -121,7 +121,7 @@ def _gap(r: GapResult) -> str:
 def _row(name: str, before: float, after: float, noise: float) -> str:
     shrink = before / after if after > 0 else 1.0
     ratio = after / noise if noise > 0 else 1.0
-    return f"  {name:18s}{before * MM:10.4g} {after * MM:10.4g} {ratio:10.2f}  {shrink:10.3g}"
+    return f"  {name:22s}{before * MM:10.4g} {after * MM:10.4g} {ratio:10.2f}  {shrink:10.3g}"
 
 
 def _next(r: GapResult) -> str:

@@ -85,7 +85,8 @@ class Plan:
         steps = sum(run.steps for run in self.runs)
         lines = [f"Plan: {self.title} (robot {self.robot}{station})", "", *_table(self.runs), ""]
         lines += [
-            f"Together: {len(self.runs)} runs of {steps} steps, {self.repetitions} times; "
+            f"Together: {_count(len(self.runs), 'run')} of {_count(steps, 'step')}, "
+            f"{_count(self.repetitions, 'time')}; "
             f"at least {self.samples} samples",
             f"Duration: about {_time(self.duration_s)}"
             + (f"; at {self.speed:g} times real time {_time(self.duration_s / self.speed)}"
@@ -302,6 +303,10 @@ def _name(run: PlannedRun) -> str:
     return f"pose {run.pose}, direction {run.direction}"
 
 
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
 def _time(seconds: float) -> str:
     minutes = seconds / 60
     if minutes < 2:
@@ -313,7 +318,7 @@ def _assumptions(
     protocol: MeasurementProtocol, arm: Arm, mounts: int, emulated: bool
 ) -> Iterator[str]:
     if not emulated:
-        yield f"{MOUNT_S / 60:g} min to set up a pose or direction ({mounts} times)"
+        yield f"{MOUNT_S / 60:g} min to set up a pose or direction ({_count(mounts, 'time')})"
     settle = protocol.settle
     yield (
         f"{SCREW_S:g} s of turning and {settle.window_s:g} s of settling (no longer than its "

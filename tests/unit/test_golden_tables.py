@@ -1,0 +1,66 @@
+"""Every table that the terminal prints, word for word, from results with fixed numbers.
+
+After a deliberate change: write the text to the golden file, and read it. Tables of `rig analyze`,
+`rig list` and of a plan have theirs beside their other tests.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from rig import cli
+from rig.blind import text
+from rig.blind.score import report
+from tests.unit import shown_results as shown
+from tests.unit.test_blind_judge import campaign
+
+GOLDEN = Path(__file__).parents[1] / "golden"
+TABLES: dict[str, Callable[[], Sequence[str]]] = {
+    "identify": lambda: [shown.identified().to_text()],
+    "diagnose": lambda: [
+        d.to_text() for d in (shown.explained(), shown.without_gap(), shown.unexplained())
+    ],
+    "couple": lambda: [shown.coupled().to_text(), shown.placed().to_text()],
+    "simulate": lambda: [shown.predicted().to_text()],
+    "check": lambda: [shown.checked().to_text()],
+    "blind": lambda: [text.terminal(report(campaign()))],
+}
+
+
+@pytest.mark.parametrize("command", TABLES)
+def test_the_text_word_for_word(command: str) -> None:
+    found = "\n\n\n".join(TABLES[command]()) + "\n"
+    assert found == (GOLDEN / f"{command}_text.txt").read_text("utf-8")
+
+
+IMPORTED = """session_s,time_s,repetition,branch,step,force_N,displacement_mm,temprature1_C
+0,0,1,zero,0,0.0,0.0,7
+1,1,1,loading,1,20.0,0.25,7
+2,2,1,loading,2,40.0,0.5,7
+0.5,0.5,2,zero,0,0.0,0.0,7
+1.5,1.5,2,loading,1,20.0,0.251,7
+2.5,2.5,2,loading,2,40.0,0.502,7
+"""
+META = """robot: none
+directions: {x: [1, 0, 0]}
+instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
+"""
+
+
+def test_what_import_says_word_for_word(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "run.csv").write_text(IMPORTED, "utf-8")
+    (tmp_path / "meta.yaml").write_text(META, "utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["rig", "import", "run.csv", "meta.yaml", "-o", "run.h5"])
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # `main` sets its own
+    with pytest.raises(SystemExit) as ending:
+        cli.main()
+    assert not ending.value.code
+    out, said = capsys.readouterr()
+    assert (out, said) == ("", (GOLDEN / "import_text.txt").read_text("utf-8"))
