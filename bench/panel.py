@@ -21,6 +21,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -123,10 +124,13 @@ def run(folder: Path, samples: int, speed: float, *, page: bool) -> Watched:
         assert links[1] is not None
         audience = Audience(links[0][0], links[1][0])
     memory: dict[str, list[float]] = {}
-    threading.Thread(target=_drain, args=(process.stderr,), daemon=True).start()
+    said: deque[str] = deque(maxlen=3)  # read throughout, so that the measurement never waits
+    threading.Thread(target=said.extend, args=(process.stderr,), daemon=True).start()
     while process.poll() is None:
         _note_memory(process.pid, memory)
         time.sleep(1.0)
+    if process.returncode:
+        sys.exit(f"rig measure ended with {process.returncode}:\n{''.join(said)}")
     columns = load(folder / "bench.h5").columns
     nothing = np.array([])
     return Watched(
@@ -136,11 +140,6 @@ def run(folder: Path, samples: int, speed: float, *, page: bool) -> Watched:
         audience.gaps_s() if audience else nothing,
         memory,
     )
-
-
-def _drain(lines: object) -> None:
-    for _ in lines:  # type: ignore[attr-defined]
-        pass
 
 
 def _note_memory(pid: int, memory: dict[str, list[float]]) -> None:
