@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from identification.gap.diagnose import Effect, GapResult
-from identification.gap.discriminate import ENOUGH
-from identification.gap.interval import Parameter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from identification.gap.diagnose import Effect, GapResult
+    from identification.gap.interval import Parameter
 
 MM = 1e3
 
@@ -127,6 +129,8 @@ def _row(name: str, before: float, after: float, noise: float) -> str:
 def _next(r: GapResult) -> str:
     if r.next_measurement is None:
         return ""
+    from identification.gap.discriminate import ENOUGH  # the report takes only words from here
+
     first, second = r.next_measurement.separates
     lines = [f"Next, to tell {first} from {second}:", f"  {r.next_measurement.text}"]
     others = [o for o in r.next_measurement.alternatives if o.expected_nats >= ENOUGH]

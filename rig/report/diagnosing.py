@@ -110,6 +110,7 @@ class Crew:
         else wants its core."""
         with _ctrl_c_ignored(), suppress(BrokenProcessPool):  # `_drawn` does without it
             self.artist.submit(load_drawing)
+        load_drawing()  # half of the figures are drawn here
         return self.begun[number].result(DEADLINE_S)
 
 

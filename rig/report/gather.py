@@ -6,10 +6,9 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rig.analyze import Analysis, analyze
-from rig.couple import CouplingResult
 from rig.dataset import Dataset, load
 from rig.errors import InputError
 from rig.identify import IdentifyResult, identify
@@ -21,6 +20,9 @@ from rig.report.quality import Quality, assess
 from rig.report.wishes import Named, Wishes
 from rig.software import software_version
 from rig.terminal import Progress, silent
+
+if TYPE_CHECKING:
+    from rig.couple import CouplingResult
 
 SCHEMA = "rig.report/1"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
@@ -57,13 +59,31 @@ def found_with(artist: Beside, outcome: Found | Exception) -> Waiting:
     return Waiting(Job(Path("a.h5"), "a", png=False), crew, 0)
 
 
-def test_the_figures_are_drawn_in_two_processes(drawn: list[tuple[str, ...]]) -> None:
-    artist = Beside()
+def test_the_figures_are_drawn_in_two_processes(
+    drawn: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    artist, loaded = Beside(), list[str]()
+
+    def load_drawing() -> None:
+        loaded.append("drawing")
+
+    monkeypatch.setattr(diagnosing, "load_drawing", load_drawing)
     diagnosed = found_with(artist, Found({"verdict": "none"}, VIEW)).result()
     assert tuple(f.name for f in diagnosed.figures) == FIGURES
     assert sorted(sum(drawn, ())) == sorted(FIGURES)  # each of them once
     assert len(drawn) == 2
     assert artist.done == ["load_drawing", "draw"]  # it has loaded before there is work
+    assert loaded == ["drawing", "drawing"]  # and so has this process
+
+
+def test_what_is_done_meanwhile_loads_no_diagnosis() -> None:
+    code = (
+        "import sys, rig.report.compose, rig.report.gather, rig.report.pictures\n"
+        "print([m for m in sys.modules if m.startswith('identification.gap')])"
+    )
+    command = [sys.executable, "-c", code]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert said.strip() == "[]"
 
 
 def test_without_the_process_that_draws_all_is_drawn_here(drawn: list[tuple[str, ...]]) -> None:
