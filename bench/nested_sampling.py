@@ -34,7 +34,7 @@ from identification.gap.data import UNLOADING, GapData
 from identification.gap.effects import library
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.finer import gained
-from identification.gap.imperfection import IMPERFECTION, LEAST_IMPERFECTION
+from identification.gap.imperfection import IMPERFECTION, least_size
 from identification.gap.noise import ENCODER_OFFSET_RAD
 from identification.gap.parts import Part, part_sizes
 from identification.gap.search import search
@@ -335,13 +335,15 @@ def _across(axis: Array) -> Array:
     return np.asarray(np.linalg.svd(axis[None, :])[2][1:].T)
 
 
-def sampled_evidence(model: Dense, found: list[Form], live: int) -> tuple[float, float]:
+def sampled_evidence(
+    model: Dense, found: list[Form], etas: Array, live: int
+) -> tuple[float, float]:
     """log evidence and its error: coefficients and imperfection sampled, form by form and scale by
     scale (a sampler that has to find the form as well misses narrow ones)."""
     values, errors, weights = [], [], []
     for f in found:
         for s in range(len(f.variant.scales)):
-            value, error = _sampled_form(model, f, s, live)
+            value, error = _sampled_form(model, f, s, etas, live)
             values.append(value)
             errors.append(error)
             weights.append(f.variant.prior / len(f.variant.scales))
@@ -350,18 +352,21 @@ def sampled_evidence(model: Dense, found: list[Form], live: int) -> tuple[float,
     return log_mean(values, weights), float(np.sqrt(np.sum((share * np.array(errors)) ** 2)))
 
 
-def _sampled_form(model: Dense, form: Form, scale: int, live: int) -> tuple[float, float]:
+def _sampled_form(
+    model: Dense, form: Form, scale: int, etas: Array, live: int
+) -> tuple[float, float]:
     bench, rows = model.bench, model.bench.rows
     turned, prior = model.turn.T @ form.columns, Prior(form.variant)
     moved = _less_datum(bench, form.columns[: rows.n])
     share = rows.weight / rows.weight.sum()
-    low = float(ndtr(np.log(LEAST_IMPERFECTION / IMPERFECTION) / _SPREAD))
 
     def log_likelihood(u: Array) -> float:
         w, weight = prior.coefficients(u[1:], scale)
         if weight <= _IMPOSSIBLE:
             return _IMPOSSIBLE
         size = float(np.sqrt(share @ (moved @ w) ** 2))
+        least = least_size(etas, size**2) - np.log(IMPERFECTION * size)
+        low = float(ndtr(least / _SPREAD))
         factor = float(np.exp(_SPREAD * ndtri(low + u[0] * (1 - low))))
         return model.log_density(turned @ w, IMPERFECTION * size * factor) + weight
 
@@ -464,7 +469,7 @@ def compare(
             each = [s.log_evidence - float(np.log(s.variant.prior)) for s in scored]
             ours = log_mean(each, [s.variant.prior for s in scored])
             ours += gained(engine, *_best_part(engine, scored))
-            value, error = sampled_evidence(model, found, live)
+            value, error = sampled_evidence(model, found, etas, live)
         seconds = time.perf_counter() - start
         out.append(Line(name, word, ours + offset, value, error, seconds))
     return out, ours_s

@@ -37,18 +37,18 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
     found = side_by_side(lambda v: log_joint_between(engine, parts, float(np.exp(v))), missing)
     known |= {round(v, 6): j for v, j in zip(missing, found, strict=True)}
     y = np.array([known[round(v, 6)] for v in x.tolist()])
-    total = [_integral(x, y, energy), *coarse[last + 1 :]]
+    total = [_integral(etas, x, y, energy), *coarse[last + 1 :]]
     if best <= 1:
-        total.append(joint[0] + float(log_share(np.array([-np.inf, lowest]), energy)[0]))
+        total.append(joint[0] + float(log_share(etas, np.array([-np.inf, lowest]), energy)[0]))
     else:
         total += list(coarse[: best - 1])
     return float(logsumexp(np.array(total)) - logsumexp(coarse))
 
 
-def _integral(x: Array, y: Array, energy: float) -> float:
+def _integral(etas: Array, x: Array, y: Array, energy: float) -> float:
     """log of the integral of `exp(y(x))` under the prior of log sizes x."""
     from scipy.interpolate import CubicSpline
 
     edges = np.linspace(x[0], x[-1], (len(x) - 1) * _POINTS + 1)
     middle = (edges[1:] + edges[:-1]) / 2
-    return float(logsumexp(CubicSpline(x, y)(middle) + log_share(edges, energy)))
+    return float(logsumexp(CubicSpline(x, y)(middle) + log_share(etas, edges, energy)))

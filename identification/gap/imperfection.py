@@ -40,35 +40,40 @@ def log_level(etas: Array, i: int, energy: Array) -> Array:
     from scipy.special import ndtr
 
     centre = _centre(energy)
-    with np.errstate(divide="ignore"):
-        upper = np.inf if i == len(etas) - 1 else np.log(_edge(etas, i))
-        lower = -np.inf if i == 0 else np.log(_edge(etas, i - 1))
+    lower, upper = _edge(etas, i - 1), _edge(etas, i)
     p = ndtr((upper - centre) / _SPREAD) - ndtr((lower - centre) / _SPREAD)
     # no mechanism of a real rig follows a formula closer than that
-    short = _floor(centre) - (np.log(_edge(etas, i)) if upper < np.inf else 1e9)
+    short = centre + _FLOOR - (upper if upper < np.inf else 1e9)
     return np.asarray(np.log(np.maximum(p, _LEAST_SHARE)) - 300.0 * np.maximum(short, 0.0))
 
 
-def log_share(edges: Array, energy: float) -> Array:
+def log_share(etas: Array, edges: Array, energy: float) -> Array:
     """log prior (n,) of sizes between neighbouring edges (n + 1,) of log eta, for an explanation of
     that mean square (m^2)."""
     from scipy.special import ndtr
 
-    centre = _centre(np.array(energy))
-    p = np.diff(ndtr((np.maximum(edges, _floor(centre)) - centre) / _SPREAD))
-    return np.asarray(np.log(np.maximum(p, np.where(edges[1:] > _floor(centre), 1e-15, 1e-300))))
+    centre, least = _centre(np.array(energy)), least_size(etas, energy)
+    p = np.diff(ndtr((np.maximum(edges, least) - centre) / _SPREAD))
+    return np.asarray(np.log(np.maximum(p, np.where(edges[1:] > least, 1e-15, 1e-300))))
+
+
+def least_size(etas: Array, energy: float) -> float:
+    """log of the least size that counts: the lower edge of the level that has the least
+    imperfection in it. Explanations of about the same size are held to the same."""
+    floor = float(_centre(np.array(energy))) + _FLOOR
+    return next(_edge(etas, i - 1) for i in range(len(etas)) if floor <= _edge(etas, i))
 
 
 def _centre(energy: Array) -> Array:
     return np.asarray(0.5 * np.log(IMPERFECTION**2 * np.maximum(energy, 0.0) + 1e-300))
 
 
-def _floor(centre: Array) -> Array:
-    return np.asarray(centre + np.log(LEAST_IMPERFECTION / IMPERFECTION))
-
-
 _LEAST_SHARE = 1e-12
+_FLOOR = float(np.log(LEAST_IMPERFECTION / IMPERFECTION))
 
 
 def _edge(etas: Array, i: int) -> float:
-    return float(np.sqrt(max(etas[i], etas[i + 1] / 2.5) * etas[i + 1]))
+    """log of the edge between level i and the next."""
+    if i < 0 or i >= len(etas) - 1:
+        return -np.inf if i < 0 else np.inf
+    return float(0.5 * np.log(max(etas[i], etas[i + 1] / 2.5) * etas[i + 1]))

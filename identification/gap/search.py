@@ -30,6 +30,7 @@ LAW_REMAINDER = 0.03
 TEMPER = 0.12
 _REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 6  # words that are refined
+_SHARPENED = 8  # explanations at the most
 _PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
@@ -345,14 +346,18 @@ def conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], f
 
 def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
     """With the evidence of those that matter between the levels of imperfection, best first."""
-    least, out = ranked[0].log_weight - _WINDOW, []
-    for i, e in enumerate(ranked):
-        more = 0.0
-        if i < _LEADING and e.parts and e.log_weight > least:
-            level = int(np.argmin(np.abs(engine.etas - e.eta)))
-            more = gained(engine, e.parts, part_sizes(engine, e.parts, level).energy)
-        out.append(replace(e, log_weight=e.log_weight + more, log_good=e.log_good + more))
-    return sorted(out, key=lambda e: -e.log_weight)
+    done: dict[frozenset[str], Explanation] = {}
+    for _ in range(_SHARPENED):
+        ranked = sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)
+        near = [e for e in ranked if e.log_weight > ranked[0].log_weight - _WINDOW / 2]
+        todo = [e for e in near if e.parts and e.words not in done]
+        if not todo:
+            break
+        e = todo[0]
+        level = int(np.argmin(np.abs(engine.etas - e.eta)))
+        more = gained(engine, e.parts, part_sizes(engine, e.parts, level).energy)
+        done[e.words] = replace(e, log_weight=e.log_weight + more, log_good=e.log_good + more)
+    return sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)
 
 
 def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:

@@ -13,7 +13,7 @@ from identification.gap.compare import score
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.finer import gained
-from identification.gap.imperfection import LEAST_IMPERFECTION, log_share
+from identification.gap.imperfection import least_size, log_share
 from identification.gap.parts import Part, log_joint, log_joint_between, signs_kept
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import variant
@@ -143,8 +143,12 @@ def test_steps_between_levels_lose_nothing_that_finer_ones_show() -> None:
 
 
 def test_no_law_is_met_more_closely_than_its_least_imperfection() -> None:
+    """To the edge of the level that it falls into, so that the grid gives all the same room."""
     energy, edges = 1e-8, np.log(np.geomspace(1e-8, 1e-3, 400))
-    share = log_share(edges, energy)
-    least = LEAST_IMPERFECTION * energy**0.5
+    etas = np.concatenate([[0.0], 4e-7 * 2.5 ** np.arange(6)])  # 1e-6, 1 % of it, is the second
+    share = log_share(etas, edges, energy)
+    least = np.exp(least_size(etas, energy))
+    assert 4e-7 * 2.5**0.5 == pytest.approx(least)
     assert np.all(share[np.exp(edges[1:]) < least] < -600)
-    assert np.exp(share).sum() == pytest.approx(1 - 0.065, abs=0.01)  # what is below has no room
+    assert np.all(share[np.exp(edges[:-1]) > 1.1 * least] > -40)
+    assert least_size(etas, 1e-14) == -np.inf  # so small that any will do

@@ -42,12 +42,14 @@ def variants(bench: Bench) -> list[Variant]:
         if not top > 0:
             continue
         x, c = torque / top, bench.compliance[j] * top
-        columns = [bench.add_joint(j, c * hinge(x, b)) for b in HINGES]
-        info: dict[str, Any] = {"joint": j, "torque": top, "hinges": HINGES}
+        # a specimen that settles in its clamps has no contact inside
+        hinges = HINGES if bench.data.arm else PLACES
+        columns = [bench.add_joint(j, c * hinge(x, b)) for b in hinges]
+        info: dict[str, Any] = {"joint": j, "torque": top, "hinges": hinges}
         line = bench.add_joint(j, c * x)
         out.append(
-            variant(WORD, f"joint {j + 1} curve", [line, *columns], SCALES, _root(),
-                    positive=False, prior=0.5, kinds=("line", *HINGES), **info)
+            variant(WORD, f"joint {j + 1} curve", [line, *columns], SCALES, _root(len(hinges)),
+                    positive=False, prior=0.5, kinds=("line", *hinges), **info)
         )  # fmt: skip
         for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
             column = bench.add_joint(j, c * shape)
@@ -55,14 +57,12 @@ def variants(bench: Bench) -> list[Variant]:
                 variant(WORD, f"joint {j + 1} {name}", [column], SCALES, positive=False,
                         prior=0.1, kinds=(name,), **info)
             )  # fmt: skip
-        for k in range(
-            HINGES.index(PLACES[0]), len(HINGES) - 1
-        ):  # nearer to none it is lost motion
+        for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
             out.append(
-                variant(WORD, f"joint {j + 1} bend {HINGES[k]}", [line, *columns[k : k + 2]],
+                variant(WORD, f"joint {j + 1} bend {hinges[k]}", [line, *columns[k : k + 2]],
                         SCALES,
                         positive=False, prior=0.2 / (len(PLACES) - 1),
-                        kinds=("line", *HINGES[k : k + 2]), **info)
+                        kinds=("line", *hinges[k : k + 2]), **info)
             )  # fmt: skip
         if not bench.data.arm and bench.rows.continuous and bench.unloads:
             out.append(_fine(bench, j, line, top))
