@@ -148,7 +148,7 @@ def test_no_law_is_met_more_closely_than_its_least_imperfection() -> None:
     etas = np.concatenate([[0.0], 4e-7 * 2.5 ** np.arange(6)])  # 1e-6, 1 % of it, is the second
     share = log_share(etas, edges, energy)
     least = np.exp(least_size(etas, energy))
-    assert 4e-7 * 2.5**0.5 == pytest.approx(least)
+    assert pytest.approx(least) == 4e-7 * 2.5**0.5
     assert np.all(share[np.exp(edges[1:]) < least] < -600)
     assert np.all(share[np.exp(edges[:-1]) > 1.1 * least] > -40)
     assert least_size(etas, 1e-14) == -np.inf  # so small that any will do
