@@ -47,7 +47,7 @@ def _score_batch(
 ) -> list[Scored]:
     columns, root, scales, plain, limits, squares = _stacks(engine, batch)
 
-    def of_level(i: int) -> Array:
+    def of_level(i: int) -> tuple[Array, Array, Array, Array]:
         level = levels[i]
         gram = _rotate(level, squares[i], columns, root)
         moment = np.einsum("vji,vj->vi", root, level.moment[columns])
@@ -58,12 +58,15 @@ def _score_batch(
         gain = 1 + s2 * values[:, None, :]
         mean = s2 * beta[:, None, :] / gain
         fit = 0.5 * np.sum(mean * beta[:, None, :], axis=2) - 0.5 * np.log(gain).sum(axis=2)
-        fit += _kept(limits, root, vectors, mean, s2 / gain, s2)
         turned = mean @ np.swapaxes(vectors, 1, 2)
         energy = np.sum((turned @ plain) * turned, axis=2)
-        return np.asarray(level.log_base + fit + log_level(engine.etas, i, energy + already))
+        log = level.log_base + fit + log_level(engine.etas, i, energy + already)
+        return log, vectors, mean, s2 / gain
 
-    logs = np.stack(side_by_side(of_level, range(len(levels))))
+    made = side_by_side(of_level, range(len(levels)))
+    logs = np.stack([m[0] for m in made])
+    if limits is not None:
+        _limit(logs, limits, [v.word for v in batch], root, scales, [m[1:] for m in made])
     flat = logs.transpose(1, 0, 2).reshape(len(batch), -1)
     best = flat.argmax(axis=1)
     total = logsumexp(flat) - np.log(scales.shape[1])
@@ -72,6 +75,40 @@ def _score_batch(
         Scored(v, float(t) + float(np.log(v.prior)), v.scales[b % number], int(b // number))
         for v, t, b in zip(batch, total, best, strict=True)
     ]
+
+
+def _limit(
+    logs: Array, limits: Limits, words: list[str], root: Array, scales: Array,
+    fits: list[tuple[Array, Array, Array]],
+) -> None:  # fmt: skip
+    """Takes from the log evidence (l, v, s) what the limits cost that physics sets, where it counts
+    among the shapes of its word. fits: per level, eigenvectors (v, k, k), mean and variance
+    (v, s, k) of the coefficients along them."""
+    word = np.unique(words, return_inverse=True)[1]
+    before = np.linalg.norm((limits.rows[:, :1] @ root)[:, 0], axis=1)
+    todo, done = np.zeros(logs.shape, dtype=bool), np.zeros(logs.shape, dtype=bool)
+
+    def of_level(i: int) -> None:
+        which, scale = np.nonzero(todo[i])
+        vectors, mean, variance = fits[i]
+        spread = np.swapaxes(root[which] @ vectors[which], 1, 2)  # to the coefficients
+        at = which, scale
+        sd = before[which] * scales[at]
+        centre = (mean[at][:, None] @ spread)[:, 0]
+        roots = np.sqrt(variance[at])[:, :, None] * spread
+        logs[i][at] += log_odds(limits, which, sd, centre, roots)
+
+    while True:
+        top = np.full(word.max() + 1, -np.inf)
+        np.maximum.at(top, word, logs.max(axis=(0, 2)))
+        todo = (logs > top[word][:, None] - _COUNTS) & ~done
+        if not todo.any():
+            return
+        side_by_side(of_level, np.flatnonzero(todo.any(axis=(1, 2))))
+        done |= todo
+
+
+_COUNTS = 40.0  # nats below the best of its word: what lies further down adds nothing
 
 
 _Stacks = tuple[Array, Array, Array, Array, Limits | None, list[Array]]
@@ -103,21 +140,6 @@ def _rotate(level: Level, part: Array, columns: Array, root: Array) -> Array:
     if np.array_equal(root, np.broadcast_to(np.eye(root.shape[1]), root.shape)):
         return np.asarray(part)
     return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
-
-
-def _kept(
-    limits: Limits | None, root: Array, vectors: Array, mean: Array, variance: Array, s2: Array
-) -> Array:
-    """What the limits that physics sets add to the log evidence, (v, s); 0 where they are free.
-
-    mean, variance, s2 (v, s, k or 1): of the coefficients in the eigenvectors, and their prior's.
-    """
-    if limits is None:
-        return np.zeros(mean.shape[:2])
-    spread = np.swapaxes(root @ vectors, 1, 2)  # from the eigenvectors to the coefficients
-    before = np.linalg.norm((limits.rows[:, :1] @ root)[:, 0], axis=1)[:, None]
-    roots = np.sqrt(variance)[..., None] * spread[:, None]
-    return log_odds(limits, before * np.sqrt(s2[:, :, 0]), mean @ spread, roots)
 
 
 def raw_gram(engine: Engine, variant: Variant) -> Array:

@@ -102,10 +102,13 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
         v = p.variant
         limits = Limits.of([v])
         if limits is not None:
-            before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)[:, None]
-            odds = log_odds(limits, before, w[None, None, s], roots[None, None, :, s])
-            out += min(0.0, float(odds[0, 0]))
+            before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)
+            odds = log_odds(limits, _ONE, before, w[None, s], roots[None, :, s])
+            out += min(0.0, float(odds[0]))
     return out
+
+
+_ONE = np.zeros(1, dtype=np.intp)
 
 
 def log_joint(level: Level, parts: tuple[Part, ...]) -> float:

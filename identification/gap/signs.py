@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.gap.data import Array, Flags, Ints
 from identification.gap.variants import Variant
 
 _TINY = 1e-300
@@ -52,34 +52,29 @@ def _rows(v: Variant) -> Array:
     return np.vstack([first[None], unit, *v.within])
 
 
-def log_odds(limits: Limits, before: Array, mean: Array, roots: Array) -> Array:
-    """(v, s) for coefficients of mean (v, s, k) and covariance `roots' roots`, roots (v, s, r, k);
-    before (v, s): standard deviation of the first limit's sum in the prior."""
+def log_odds(limits: Limits, which: Ints, before: Array, mean: Array, roots: Array) -> Array:
+    """(n,) for variants which (n,), with coefficients of mean (n, k) and covariance `roots' roots`,
+    roots (n, r, k); before (n,): standard deviation of the first limit's sum in the prior."""
     from scipy.special import log_ndtr
 
-    across = np.swapaxes(limits.rows, 1, 2)[:, None]  # (v, 1, k, m)
-    along = roots @ across  # (v, s, r, m)
-    centre = (mean[:, :, None] @ across)[:, :, 0]  # (v, s, m)
-    centre[..., 0] -= limits.least[:, None]
-    variance = np.where(limits.asked[:, None], np.sum(along**2, axis=2) + _TINY, 1.0)
+    across, asked = np.swapaxes(limits.rows[which], 1, 2), limits.asked[which]
+    along = roots @ across  # (n, r, m)
+    centre = (mean[:, None] @ across)[:, 0]  # (n, m)
+    centre[:, 0] -= limits.least[which]
+    variance = np.where(asked, np.sum(along**2, axis=1) + _TINY, 1.0)
     z = centre / np.sqrt(variance)
-    share = log_ndtr(-limits.least[:, None] / (before + _TINY))
-    out = np.where(limits.asked[:, None, 0], log_ndtr(z[..., 0]) - share, 0.0)
-    if z.shape[2] == 1:
-        return np.asarray(out)
-    asked = limits.asked[:, None, 1:]
-    wrong = (z[..., 1:] < 0) & asked  # the right side of a limit costs nothing
+    share = log_ndtr(-limits.least[which] / (before + _TINY))
+    out = np.where(asked[:, 0], log_ndtr(z[:, 0]) - share, 0.0)
+    wrong = (z[:, 1:] < 0) & asked[:, 1:]  # the right side of a limit costs nothing
     alone = np.zeros(wrong.shape)
-    alone[wrong] = log_ndtr(z[..., 1:][wrong]) - np.log(0.5)
-    out = out + alone.sum(axis=2)
-    far = (z[..., 0] < 0) | wrong.any(axis=2)
-    if far.any():
-        a, b, aa, bb = centre[far, 1:], centre[far, :1], variance[far, 1:], variance[far, :1]
-        common = np.sum(along[far][..., :1] * along[far][..., 1:], axis=1)
-        apart = np.where(
-            np.broadcast_to(asked, wrong.shape)[far], _distance(a, aa, b, bb, common), 0
-        )
-        bound = log_ndtr(-apart.max(axis=1)) - np.broadcast_to(share, out.shape)[far]
+    alone[wrong] = log_ndtr(z[:, 1:][wrong]) - np.log(0.5)
+    out += alone.sum(axis=1)
+    far = np.flatnonzero((wrong.any(axis=1) | (z[:, 0] < 0)) & asked[:, 0])
+    if far.size and wrong.shape[1]:
+        first, more = (centre[far, :1], variance[far, :1]), (centre[far, 1:], variance[far, 1:])
+        common = np.sum(along[far][:, :, :1] * along[far][:, :, 1:], axis=1)
+        apart = np.where(asked[far, 1:], _distance(*more, *first, common), 0.0).max(axis=1)
+        bound = np.where(apart > 0, log_ndtr(-apart) - share[far], np.inf)
         out[far] = np.minimum(out[far], bound)
     return np.asarray(out)
 

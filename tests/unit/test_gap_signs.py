@@ -25,9 +25,9 @@ def odds(mean: Array, covariance: Array, prior: Array, **limits: object) -> floa
     found = Limits.of([v])
     assert found is not None
     first = found.rows[0, 0]
-    before = np.sqrt(first @ prior @ first).reshape(1, 1)
+    before = np.array([np.sqrt(first @ prior @ first)])
     roots = np.linalg.cholesky(covariance).T
-    return float(log_odds(found, before, mean[None, None], roots[None, None])[0, 0])
+    return float(log_odds(found, np.zeros(1, int), before, mean[None], roots[None])[0])
 
 
 def sampled(mean: Array, covariance: Array, prior: Array, rows: Array, least: float) -> float:
