@@ -43,7 +43,7 @@ RADII = (
 REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # Without unloading no loop is seen: what then bends all at once, at a large load, is a knee; what
-# bends ever more from the first load on is a spectrum of strengths.
+# bends ever more from the first load on is a spectrum of strengths. Specimens yield.
 _SMALL = 5
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 
@@ -90,7 +90,7 @@ def _spectrum(
 ) -> list[Variant]:  # fmt: skip
     """The whole spectrum of strengths, and each strength with its neighbour."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
-    radius = span * np.array(RADII)
+    radius = span * np.array(RADII if bench.unloads or bench.data.arm else RADII[:_SMALL])
     radius = bench.radii(torque, radius) if bench.unloads else radius
     radius = np.append(radius, NEVER * span)
     if path is None:
@@ -106,7 +106,9 @@ def _spectrum(
     out = [variant(WORD, f"{name} spectrum", columns, SCALES, root, prior=0.25, each=True,
                    joint=joint, radius=radius, law="Iwan")]  # fmt: skip
     # friction acts from the first load on: one strength alone is a small one
-    alone = len(columns) - 2 if bench.imposed else (_SMALL + 1 if bench.unloads else _SMALL)
+    alone = min(_SMALL + bench.unloads, len(columns) - 2)
+    if bench.imposed:
+        alone = len(columns) - 2
     for k in range(alone):
         out.append(
             variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES,
