@@ -94,9 +94,10 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
 
 def _on_its_own(parts: tuple[Part, ...], found: Sizes, i: int, k: int) -> bool:
     """One of them is wrong springs that move the arm far more than the mechanism beside them: no
-    linear part of its law. A curved spring has a line of its own, of any size."""
+    linear part of its law. A curve that has a line of its own has one of any size."""
     for a, b in ((i, k), (k, i)):
-        if parts[a].word == "joint_stiffness_error" and parts[b].word not in LINEAR | CURVES:
+        line = "line" in parts[b].variant.info.get("kinds", ())
+        if parts[a].word == "joint_stiffness_error" and parts[b].word not in LINEAR and not line:
             return bool(found.moved[a] > _FAR_MORE * found.moved[b])
     return False
 

@@ -222,7 +222,8 @@ def test_springs_far_off_stand_on_their_own_beside_a_mechanism() -> None:
     assert _on_its_own((springs, rubs), far, 0, 1)
     assert not _on_its_own((springs, rubs), near, 0, 1)
     assert not _on_its_own((part("joint_yield", [0]), rubs), far, 0, 1)
-    assert not _on_its_own((springs, part("joint_nonlinear_stiffness", [1])), far, 0, 1)
+    curves = [part("joint_nonlinear_stiffness", [1], kinds=k) for k in (("line", 0.5), ("even",))]
+    assert [_on_its_own((springs, curve), far, 0, 1) for curve in curves] == [False, True]
 
 
 def test_creep_that_grows_with_the_square_is_among_the_shapes_of_an_arm() -> None:
