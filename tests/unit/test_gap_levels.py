@@ -10,19 +10,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, displacement_imposed, make_bench
 from identification.gap.compare import log_mean
 from identification.gap.data import Array
 from identification.gap.diagnose import _chosen, _held
-from identification.gap.effects import library
+from identification.gap.effects import joint_yield, library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
+from identification.gap.leftover import looked_up
 from identification.gap.noise import bursts
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import _apart, _on_its_own
 from identification.gap.products import White
 from identification.gap.rows import reduce_rows
 from identification.gap.search import (
+    BENCH_DOUBT,
+    DOUBT,
     EXPLAINED,
     THREE,
     Explanation,
@@ -115,6 +119,8 @@ def test_a_table_without_a_clock_says_nothing_of_lags_and_creep(
     assert data.timed is clock
     bench = make_bench(data)
     assert bench.timeless is not clock
+    knee = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")
+    assert any(" flow " in v.label for v in joint_yield.refined(bench, knee)) is clock
     words = {v.word for v in library(bench, ["joint_creep", "time_lag", "joint_hysteresis"])}
     assert ({"joint_creep", "time_lag"} <= words) is clock
     assert "joint_hysteresis" in words
@@ -303,3 +309,38 @@ def test_a_verdict_that_is_nowhere_the_largest_effect_is_shown_where_it_is_likel
         alone = said((creep,), (1e-5,), weight)
         whole = replace(found, explanations=(*beside, alone), kept={})
         assert _chosen(whole, "joint_creep") is (shown or alone)
+
+
+@pytest.mark.parametrize(("arm", "most"), [(True, DOUBT), (False, BENCH_DOUBT)])
+def test_a_sure_verdict_gives_a_little_away_on_a_bench_twice_as_much(
+    arm: bool, most: float
+) -> None:
+    assert BENCH_DOUBT == 2 * DOUBT
+    bench = small_bench()
+    variants = library(bench, ["joint_creep", "joint_hysteresis"])
+    found = search(small_engine_of(bench), variants)
+    engine = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=arm)))
+    sure = said((part("joint_creep", [0]),), (1e-5,), 0.0)
+    alone = {"joint_creep": 0.0, "joint_hysteresis": 0.0}
+    one = replace(found, engine=engine, explanations=(sure,), unknown=-800.0, alone=alone)
+    given = weighed(one, {}).probabilities
+    assert given["joint_creep"] == pytest.approx(1 - most + 0.25 * most)
+    assert given["unknown"] == pytest.approx(0.5 * most)
+
+
+def test_what_levels_without_an_arm_really_leave_is_looked_up() -> None:
+    """The grid of imperfections says that too much is left; the rows say that nothing is."""
+    bench = small_bench()
+    bench.add(bench.stacked(1e-4 * (bench.load / np.ptp(bench.load)) ** 2))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    engine = Engine(bench, base, target + bench.columns[0], np.array([0.0, 3e-6]))
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    poor = replace(said((part("joint_creep", [0]),), (3e-5,)), log_good=-30.0)
+    other = replace(said((part("joint_creep", [0]),), (3e-5,), -50.0), log_good=-80.0)
+    one = replace(found, engine=engine, explanations=(poor, other), unknown=-800.0)
+    first, second = looked_up(one).explanations
+    assert first.log_good > -0.1
+    assert second is other  # so far down nobody looks
+    arm = replace_bench(engine, replace(bench, data=replace(bench.data, arm=True)))
+    assert looked_up(replace(one, engine=arm)).explanations[0] is poor
