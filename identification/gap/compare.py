@@ -9,7 +9,6 @@ import numpy as np
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR, log_level
-from identification.gap.parallel import side_by_side
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 
@@ -63,7 +62,7 @@ def _score_batch(
         log = level.log_base + fit + log_level(engine.etas, i, energy + already)
         return log, vectors, mean, s2 / gain
 
-    made = side_by_side(of_level, range(len(levels)))
+    made = [of_level(i) for i in range(len(levels))]
     logs = np.stack([m[0] for m in made])
     if limits is not None:
         _limit(logs, limits, [v.word for v in batch], root, scales, [m[1:] for m in made])
@@ -88,7 +87,7 @@ def _limit(
     before = np.linalg.norm((limits.rows[:, :1] @ root)[:, 0], axis=1)
     todo, done = np.zeros(logs.shape, dtype=bool), np.zeros(logs.shape, dtype=bool)
 
-    def of_level(i: int) -> None:
+    def take(i: int) -> None:
         which, scale = np.nonzero(todo[i])
         vectors, mean, variance = fits[i]
         spread = np.swapaxes(root[which] @ vectors[which], 1, 2)  # to the coefficients
@@ -104,7 +103,8 @@ def _limit(
         todo = (logs > top[word][:, None] - _COUNTS) & ~done
         if not todo.any():
             return
-        side_by_side(of_level, np.flatnonzero(todo.any(axis=(1, 2))))
+        for i in np.flatnonzero(todo.any(axis=(1, 2))):
+            take(int(i))
         done |= todo
 
 

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING, Array
-from identification.gap.parallel import side_by_side
 from identification.gap.products import Some, Weights, White
 from identification.gap.rows import rises
 
@@ -86,7 +85,7 @@ class Engine:
         self._weights = [self._left(float(eta)) for eta in etas]
         self._first = self._whiten(np.column_stack([target, base.columns]))
         self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
-        self._bases = side_by_side(self._integrate, etas, self._weights)
+        self._bases = [self._integrate(e, w) for e, w in zip(etas, self._weights, strict=True)]
         self._finer: dict[float, tuple[Weights, _Integrated]] = {}
         self._white = self._whiten(self.columns([]))
         none = np.zeros(0)
@@ -102,7 +101,7 @@ class Engine:
         if not added:
             return
         white = self._whiten(self.columns(added))
-        self.levels = side_by_side(lambda level: self._grown(level, white), self.levels)
+        self.levels = [self._grown(level, white) for level in self.levels]
         self._white = self._white.joined(white)
         self._rows.clear()
 

@@ -13,7 +13,6 @@ from identification.gap.compare import logsumexp
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.imperfection import level_prior, log_share
-from identification.gap.parallel import side_by_side
 from identification.gap.parts import Part, log_joint, log_joint_between
 
 _PARTS = 3  # of a step between levels
@@ -34,8 +33,7 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
     x = np.linspace(lowest, np.log(etas[last]), parts_between + 1)
     known = {round(float(v), 6): j for v, j in zip(np.log(etas[1:]), joint[1:], strict=True)}
     missing = [v for v in x.tolist() if round(v, 6) not in known]
-    found = side_by_side(lambda v: log_joint_between(engine, parts, float(np.exp(v))), missing)
-    known |= {round(v, 6): j for v, j in zip(missing, found, strict=True)}
+    known |= {round(v, 6): log_joint_between(engine, parts, float(np.exp(v))) for v in missing}
     y = np.array([known[round(v, 6)] for v in x.tolist()])
     total = [_integral(etas, x, y, energy), *coarse[last + 1 :]]
     if best <= 1:

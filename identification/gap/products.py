@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.data import Array
-from identification.gap.parallel import side_by_side
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -162,7 +161,7 @@ class White:
         v, k = columns.shape
         step = max(1, _AT_ONCE // max(k * self.even.shape[1], 1))
         chunks = [columns[i : i + step] for i in range(0, v, step)]
-        made = side_by_side(lambda c: self._squares(c, weights), chunks)
+        made = [self._squares(c, weights) for c in chunks]
         return [np.concatenate([m[i] for m in made]) for i in range(len(weights))]
 
     def _squares(self, columns: NDArray[np.intp], weights: list[Weights]) -> list[Array]:
