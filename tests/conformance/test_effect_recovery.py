@@ -22,6 +22,7 @@ from identification.gap.interval import Parameter
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.search import Explanation
+from identification.gap.signs import Limits
 from identification.gap.variants import Variant
 from tests.conformance.effect_benches import (
     PAIRS,
@@ -66,15 +67,16 @@ def first_of_rows(count: NDArray[np.int_]) -> NDArray[np.bool_]:
 
 
 def strength(bench: Bench, v: Variant, columns: Array, times: float) -> Array:
-    """Coefficients of the prior's main direction (of a knee, the knee), rms of the response beyond
-    the datum `times` the noise."""
+    """Coefficients of the prior's main direction (of a knee, the knee) that keep all limits,
+    rms of the response beyond the datum `times` the noise."""
     unit = np.ones(len(v.columns))
     if "centre" in v.info:
         unit[: len(v.info["radius"])] = np.equal(v.info["radius"], v.info["centre"])
         unit[len(v.info["radius"]) :] = 0.0
-    w = v.root @ unit
-    if v.positive is not None and v.positive @ w < 0:
-        w = -w
+    w, limits = v.root @ unit, Limits.of([v])
+    if limits is not None and np.any(limits.rows[0] @ w < 0):
+        w = v.root @ np.eye(len(unit))[0]  # the first alone: together they break a limit
+        assert np.all(limits.rows[0] @ w >= 0)
     moved = columns[:, list(v.columns)] @ w
     u = moved[: bench.rows.n]
     size = np.sqrt(np.mean((u - u.mean()) ** 2)) or np.sqrt(np.mean(u**2))
