@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -92,9 +94,35 @@ def _effects(r: GapResult) -> str:
 
 def _one_effect(e: Effect) -> list[str]:
     lines = [f"  {e.name}: present with {e.probability:.0%}, {e.share_of_gap:.0%} of the gap"]
-    lines += [f"    {name} = {_value(p)}" for name, p in e.parameters.items()]
+    lines += _parameters(e.parameters)
     if e.indistinguishable_from:
         lines.append(f"    can't be told apart from {', '.join(e.indistinguishable_from)} here")
+    return lines
+
+
+_OF_RUN = re.compile(r"(.+)_run\d+$")
+_EACH = 2  # runs that are listed one by one
+
+
+def _parameters(found: Mapping[str, Parameter]) -> list[str]:
+    """A line each; what many runs have each to themselves is one line, its range."""
+    families: dict[str, dict[str, Parameter]] = {}
+    for name, p in found.items():
+        of_run = _OF_RUN.match(name)
+        families.setdefault(of_run[1] if of_run else name, {})[name] = p
+    lines = []
+    for family, members in families.items():
+        if len(members) <= _EACH:
+            lines += [f"    {name} = {_value(p)}" for name, p in members.items()]
+            continue
+        each = list(members.values())
+        low, high = min(p.value for p in each), max(p.value for p in each)
+        wide = max(max(p.high - p.value, p.value - p.low) for p in each)
+        unit = "" if each[0].unit == "1" else f" {each[0].unit}"
+        lines.append(
+            f"    {family} = {low:.4g} to {high:.4g}{unit} in {len(each)} runs"
+            f" (95 %: each +- {wide:.2g}{unit} at most; one by one in the JSON)"
+        )
     return lines
 
 

@@ -32,6 +32,7 @@ from identification.gap.search import (
     Explanation,
     _heir,
     _main,
+    _sharpened,
     search,
     weighed,
 )
@@ -344,3 +345,21 @@ def test_what_levels_without_an_arm_really_leave_is_looked_up() -> None:
     assert second is other  # so far down nobody looks
     arm = replace_bench(engine, replace(bench, data=replace(bench.data, arm=True)))
     assert looked_up(replace(one, engine=arm)).explanations[0] is poor
+
+
+def test_explanations_that_matter_are_taken_between_the_levels(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    engine, asked = small_engine(small_bench()), []
+
+    def gains(_: Engine, parts: tuple[Part, ...], __: float) -> float:
+        asked.append(parts[0].word)
+        return {"joint_creep": -10.0, "joint_yield": 1.0}[parts[0].word]
+
+    monkeypatch.setattr("identification.gap.search.gained", gains)
+    words = ("joint_creep", "joint_yield", "joint_hysteresis")
+    ranked = [said((part(w, [0]),), (1e-6,), g) for w, g in zip(words, (0, -4, -50), strict=True)]
+    found = _sharpened(engine, [*ranked, said((), (), -60.0)])
+    assert [e.log_weight for e in found] == [-3.0, -10.0, -50.0, -60.0]
+    assert [e.log_good for e in found] == [-3.0, -10.0, -50.0, -60.0]
+    assert asked == ["joint_creep", "joint_yield"]  # what is hopeless is left as it is

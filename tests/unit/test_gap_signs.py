@@ -73,6 +73,14 @@ def test_limits_that_the_data_keep_cost_little() -> None:
     assert exact - 2 * np.log(2) - 0.2 < found < exact + 0.2
 
 
+def test_every_coefficient_with_the_wrong_sign_is_charged() -> None:
+    """Three of them, each two standard deviations off, under a sum that is kept."""
+    mean, covariance = np.array([9.0, -2.0, -2.0, -2.0]), np.eye(4)
+    found = odds(mean, covariance, 9 * np.eye(4), each=True)
+    one = log_ndtr(-2.0) - np.log(0.5)
+    assert found == pytest.approx(3 * one + np.log(2), abs=0.15)  # log 2: the sum is kept
+
+
 def test_a_place_lies_within_its_play() -> None:
     """w1 beyond half of w0, to either side, by ten standard deviations of it."""
     covariance = np.diag([0.01, 1e-4])

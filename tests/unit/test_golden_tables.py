@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from rig import cli
+from identification.gap.interval import Parameter
+from rig import cli, diagnose_text
 from rig.blind import text
 from rig.blind.score import report
 from tests.unit import shown_results as shown
@@ -64,3 +65,16 @@ def test_what_import_says_word_for_word(
     assert not ending.value.code
     out, said = capsys.readouterr()
     assert (out, said) == ("", (GOLDEN / "import_text.txt").read_text("utf-8"))
+
+
+def test_what_each_of_many_runs_has_to_itself_is_one_line_with_its_range() -> None:
+    found = {f"drift_x_run{i}": Parameter(i - 3.0, i - 3.1, i - 2.8, "N") for i in (1, 2, 3)}
+    assert diagnose_text._parameters(found) == [
+        "    drift_x = -2 to 0 N in 3 runs (95 %: each +- 0.2 N at most; one by one in the JSON)"
+    ]
+    two = {name: found[name] for name in list(found)[:2]}
+    assert diagnose_text._parameters(two | {"lag": Parameter(1.0, 0.9, 1.1, "s")}) == [
+        "    drift_x_run1 = -2 N (95 %: -2.1 to -1.8 N)",
+        "    drift_x_run2 = -1 N (95 %: -1.1 to -0.8 N)",
+        "    lag = 1 s (95 %: 0.9 to 1.1 s)",
+    ]
