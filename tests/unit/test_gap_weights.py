@@ -7,16 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.base import base_columns, prediction
 from identification.gap.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
+from identification.gap.compare import Scored
 from identification.gap.data import Array, Setup
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness, library
 from identification.gap.effects.joint_backlash import TOOLS_KG
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond
+from identification.gap.evidence import Engine
 from identification.gap.history import bristles, flowing_play, play
 from identification.gap.interval import TWO_SIDED, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.rows import reduce_rows
+from identification.gap.search import _places, refine
+from identification.gap.variants import variant
 from rig.gap_data import arm_setup
 from rig.model import load_robot
 from tests.unit.test_gap_operators import bench_data, fresh
@@ -206,3 +211,24 @@ def test_curves_and_plays_are_refined_for_tools_in_between_and_no_wider_than_a_p
     wide = [v for v in library(bench, ["joint_backlash"]) if v.info["crossing"] == "weight"][-1]
     widest = max(v.info["zone_Nm"] for v in joint_backlash.refined(bench, wide))
     assert widest == pytest.approx(joint_backlash.ZONES[-1] * bench.reach_of(bench.load))
+
+
+def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> None:
+    bench = hanging(np.concatenate([UP, -UP]))
+    variants = library(bench, ["joint_nonlinear_stiffness", "joint_creep"])
+    odd = next(v for v in variants if "odd curve, tool 1.5 kg" in v.label)
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    bent = bench.columns[odd.columns[1]] + bench.columns[odd.columns[4]]
+    engine = Engine(bench, base, target + 0.3 * bent, np.array([0.0, 2e-6, 5e-6]))
+    finer = refine(engine, variants)
+    assert any("odd curve" in v.label and v.info["tool_kg"] == 1.6 for v in finer)
+
+    def scored(joint: int, knee: str) -> Scored:
+        return Scored(variant("joint_yield", f"{joint} {knee}", [0], (1.0,), joint=joint,
+                              axis=None, knee=knee), 0.0, 1.0, 0)  # fmt: skip
+
+    alone = [scored(1, "round"), scored(1, "sharp"), scored(2, "sharp")]
+    beside = [scored(3, "sharp"), scored(3, "sharp"), scored(4, "sharp"), scored(5, "sharp")]
+    found = _places(alone, beside, "sharp")
+    assert [s.variant.info["joint"] for s in found] == [1, 3, 4]
+    assert _places(alone, [], "sharp") == alone[1:]
