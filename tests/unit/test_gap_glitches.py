@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identification.gap.data import Array, GapData
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.glitches import without_glitches
 from tests.unit.test_gap_operators import bench_data
 
@@ -57,3 +58,11 @@ def test_many_of_them_are_how_the_rig_behaves() -> None:
     force = 100 * (triangle() + 0.3 * triangle() ** 2)
     force[10::15] += 20.0
     assert not without_glitches(recording(triangle(), force)).notes
+
+
+def test_the_diagnosis_sets_them_aside_and_says_so() -> None:
+    force = 100 * (triangle() + 0.3 * triangle() ** 2)
+    force[[60, 61, 200]] += 12.0
+    found = diagnose_gap(recording(triangle(), force))
+    assert found.bench.rows.n == N - 3
+    assert any(note.startswith("3 of 300 readings jump off") for note in found.notes)

@@ -232,3 +232,16 @@ def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> 
     found = _places(alone, beside, "sharp")
     assert [s.variant.info["joint"] for s in found] == [1, 3, 4]
     assert _places(alone, [], "sharp") == alone[1:]
+
+
+def test_a_joint_shows_strong_friction_in_a_single_loading_a_specimen_none() -> None:
+    """One strength alone stays small: what bends all at once is a knee."""
+    bench = hanging(UP[:5], gravity=0.0)
+    assert bench.once
+    found = library(bench, ["joint_hysteresis"])
+    whole = next(v for v in found if v.label.endswith("spectrum"))
+    span = bench.reach_of(bench.true_torque[:, 0])
+    assert whole.info["radius"][-2] == pytest.approx(span)
+    assert max(v.info["radius"][0] for v in found if " r " in v.label) <= 0.15 * span
+    specimen = make_bench(replace(bench.data, arm=False))
+    assert not library(specimen, ["joint_hysteresis"])
