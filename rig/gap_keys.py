@@ -65,6 +65,7 @@ CONSTANTS: dict[str, Key] = {
 }
 SHAPES: dict[str, Key] = {
     "threshold": Key("threshold_Nm", "positive"),
+    "grows_beyond": Key("grows_beyond_Nm", "positive"),
     "returns_beyond": Key("returns_beyond_Nm", "positive"),
     "ratchets_beyond": Key("ratchets_beyond_Nm", "positive"),
     "after": Key("after_Nm", "positive"),
@@ -79,7 +80,7 @@ SHAPES: dict[str, Key] = {
     "strain": Key("strain", "text", options=("bending", "twist")),
     "run": Key("run", "count"),
     "axis": Key("axis", "text", options=_SIDES),
-    "law": Key("law", "text", options=("exponential", "hyperbolic")),
+    "law": Key("law", "text", options=("exponential", "hyperbolic", "slack")),
     "force_scale": Key("force_scale_N", "positive"),
     "along": Key("along", "vector"),
     "across": Key("across", "vector"),
@@ -98,6 +99,7 @@ _COEFFICIENTS: dict[str, Key] = {
     "compliance_quadratic": Key("compliance_rad_per_Nm2"),
     "compliance_even": Key("even_compliance_rad_per_Nm2"),
     "compliance_cubic": Key("compliance_rad_per_Nm3"),
+    "compliance_xy": Key("compliance_xy_rad_per_Nm"),
     "width": Key("width_rad"),
     "rub": Key("rub_rad"),
     "place": Key("place_rad"),
@@ -132,6 +134,7 @@ class Grammar:
 
 _PLAYS = (
     ("compliance", ("threshold",)),
+    ("compliance", ("grows_beyond",)),
     ("compliance", ("returns_beyond", "after")),
     ("compliance", ("ratchets_beyond", "after")),
 )
@@ -173,7 +176,7 @@ GRAMMAR: dict[str, Grammar] = {
     ),
     "joint_stiffness_error": Grammar((), (("compliance", ("joint",)),)),
     "link_flexibility": Grammar((), (("over_nominal", ("segment", "strain")),)),
-    "base_compliance": Grammar(("depth",), (("compliance", ("axis",)),)),
+    "base_compliance": Grammar(("depth",), (("compliance", ("axis",)), ("compliance_xy", ()))),
     "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
     "load_misalignment": Grammar(
         ("about",),

@@ -197,6 +197,7 @@ def _effects(found: Found, variants: list[Variant], chosen: Explanation) -> tupl
     total = float(share.sum())
     squares = np.array(chosen.sizes) ** 2 if chosen.sizes else np.zeros(0)
     power = float(squares.sum())
+    read = parameters_of(found.engine, variants, chosen, found.explanations)
     out = []
     for i, part in enumerate(chosen.parts):
         present = sum(
@@ -207,7 +208,7 @@ def _effects(found: Found, variants: list[Variant], chosen: Explanation) -> tupl
                 name=part.word,
                 label=part.variant.label,
                 probability=min(1.0, present / total),
-                parameters=parameters_of(found.engine, variants, chosen, i),
+                parameters=read[i],
                 indistinguishable_from=_alike(found, chosen, part.word),
                 share_of_gap=float(squares[i] / power) if power > 0 else 1.0 / len(squares),
                 size=float(chosen.sizes[i]),

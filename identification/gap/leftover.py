@@ -1,8 +1,8 @@
-"""What explanations leave of a recording without an arm, looked at row by row.
+"""What explanations leave, looked at row by row.
 
-The levels of imperfection are a coarse grid, and one that fits stretches of fifty rows: they rank
-explanations, but they don't say how much of the gap is left. For those that matter that is looked
-up in the data.
+The levels of imperfection are a coarse grid, of what may repeat from run to run as of what a row
+has to itself: they rank explanations, but they don't say how much of the gap is left. For those
+that matter that is looked up in the data.
 """
 
 from __future__ import annotations
@@ -29,37 +29,51 @@ _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that ar
 
 
 def looked_up(found: Found) -> Found:
-    """The posterior with what the best explanations of a recording without an arm really leave; of
-    levels that rest, after a look for readings that scatter in spells, as nothing here makes them.
-    """
-    data = found.engine.bench.data
-    if bursts(data):
+    """The posterior with what the best explanations really leave; of levels that rest, after a look
+    for readings that scatter in spells, as nothing here makes them."""
+    engine = found.engine
+    if bursts(engine.bench.data):
         doubted = [replace(e, log_good=e.log_good + log(IN_SPELLS)) for e in found.explanations]
         return weighed(replace(found, explanations=tuple(doubted)), found.kept)
-    if data.arm:
-        return found
+    judge = _still_good if engine.bench.data.arm else _judged
     best = found.explanations[0].log_weight
-    out = [
-        _judged(found.engine, e)
-        if e.parts and i < _LOOKED_AT and e.log_weight > best - _WITHIN
-        else e
-        for i, e in enumerate(found.explanations)
-    ]
-    return weighed(replace(found, explanations=tuple(out)), found.kept)
+    first = [e for e in found.explanations[:_LOOKED_AT] if e.log_weight > best - _WITHIN]
+    done = {e.words: judge(engine, e) for e in first if e.parts}
+    if engine.bench.data.arm:  # what these lose goes to those with fewer of their effects
+        lost = [e.words for e in done.values() if not e.good]
+        heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
+        done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
+    out = tuple(done.get(e.words, e) for e in found.explanations)
+    return weighed(replace(found, explanations=out), found.kept)
+
+
+def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
+    """Of an arm: with no more of its weight than what it leaves allows it."""
+    bench = engine.bench
+    share = _share(_left(engine, explanation), engine, explanation, bench.noise.stated)
+    least = explanation.log_weight + float(np.log(max(share, 1e-300)))
+    return replace(explanation, log_good=min(explanation.log_good, least))
+
+
+def _left(engine: Engine, explanation: Explanation) -> float:
+    """rms (m) of rows beyond their noise."""
+    bench, n = engine.bench, engine.bench.rows.n
+    weight, noise = bench.rows.weight / bench.rows.weight.sum(), bench.noise
+    left = engine.target[:n] - fit(engine, explanation).response
+    square = weight @ (left**2 - noise.response**2 - noise.hold**2 - noise.run**2)
+    return float(np.sqrt(max(float(square), 0.0)))
+
+
+def _share(left: float, engine: Engine, explanation: Explanation, unseen: float) -> float:
+    """Of the weight that is kept by what is left (m). unseen: what noise hides of it."""
+    most = max(REMAINDER * engine.structural, LAW_REMAINDER * max(explanation.sizes), unseen)
+    return float(1 / (1 + (left / most) ** SOFT))
 
 
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
-    bench, n = engine.bench, engine.bench.rows.n
-    weight = bench.rows.weight / bench.rows.weight.sum()
-    left = engine.target[:n] - fit(engine, explanation).response
-    square = float(weight @ left**2) - float(weight @ bench.noise.response**2)
-    most = max(
-        REMAINDER * engine.structural,
-        LAW_REMAINDER * max(explanation.sizes),
-        _UNSURE * bench.noise.stated,
-    )
-    share = 1 / (1 + (np.sqrt(max(square, 0.0)) / most) ** SOFT)
+    left = _left(engine, explanation)
+    share = _share(left, engine, explanation, _UNSURE * engine.bench.noise.stated)
     if explanation.words & CURVES and _falls(engine):
         share *= SNAPS
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -19,47 +20,112 @@ from identification.gap.penalties import SAME_JOINT
 from identification.gap.search import Explanation, conditioned
 from identification.gap.variants import Variant
 
+Parameters = dict[str, Parameter]
 _MOST, _LEAST_SHARE = 10, 0.01  # shapes that count, and their least share of the posterior
 
 
 def parameters_of(
-    engine: Engine, variants: list[Variant], chosen: Explanation, index: int
-) -> dict[str, Parameter]:
-    """Parameters of effect `index` of the explanation: 95 % interval of the mixture of its
-    likeliest shapes, wherever they sit, under every size of imperfection, the other effects as they
-    are; value: of those that sit where the explanation says. What names its joint or axis is mixed
-    over the shapes that have it."""
-    found, weights, here = [], [], []
-    place = _place(chosen.parts[index].variant)
-    every = _open(engine, variants, chosen, index)
-    least = max(weight for _, weight in every) + np.log(_LEAST_SHARE)
-    open_ = [e for i, e in enumerate(every) if e[1] > least or i == 0]
-    for explanation, weight in open_:
-        found.append(_read(engine, explanation, index))
-        weights.append(weight)
-        here.append(_place(explanation.parts[index].variant) == place)
-    beside = _beside(every, open_, index)
-    step = _read(engine, beside, index) if beside is not None else {}
-    share = np.exp(np.array(weights) - max(weights))
-    out = {}
-    for name in found[0]:
-        has = np.array([name in f for f in found])
-        mine = has & np.array(here)
-        mixed = _mixture([f[name] for f in found if name in f], share[has])
-        value = _mixture(
-            [f[name] for f, m in zip(found, mine, strict=True) if m], share[mine]
-        ).value
-        grid = abs(step[name].value - value) / 12**0.5 if name in step else 0.0
-        meant = 0.0 if chosen.parts[index].word in LINEAR else DEFINED * abs(value)
-        more = TWO_SIDED * float(np.hypot(grid, meant)) if mixed.low < mixed.high else 0.0
-        low, high = min(mixed.low - value, 0.0), max(mixed.high - value, 0.0)
-        out[name] = replace(
-            mixed,
-            value=value,
-            low=value - float(np.hypot(low, more)),
-            high=value + float(np.hypot(high, more)),
-        )
+    engine: Engine,
+    variants: list[Variant],
+    chosen: Explanation,
+    rivals: Iterable[Explanation] = (),
+) -> list[Parameters]:
+    """Parameters of every effect of the explanation: 95 % intervals of the mixture of its likeliest
+    shapes, wherever they sit, under every size of imperfection; value: of those that sit where the
+    explanation says. What names its joint or axis is mixed over the shapes that have it. By how
+    much a value moves with the shapes of the effects beside it, and with which effects these are
+    (rivals: other explanations, by their weights), adds to its variance."""
+    each = [_Shapes(engine, variants, chosen, i) for i in range(len(chosen.parts))]
+    likely = _likely(rivals, chosen)
+    others = [(_by_word(e, _read(engine, e)), weight) for e, weight in likely]
+    out = []
+    for i, shapes in enumerate(each):
+        word, own = chosen.parts[i].word, shapes.own()
+        beside = [e for e in each if e.index != i]
+        of_rivals = [(r[word], w) for r, w in others if word in r]
+        out.append({n: _wider(p, _moves(n, p.value, i, beside, of_rivals)) for n, p in own.items()})
     return out
+
+
+class _Shapes:
+    """An effect of an explanation in all shapes that the data leave open, the others as they are;
+    every[0] is the explanation itself, read: parameters of all effects in those that count."""
+
+    def __init__(
+        self, engine: Engine, variants: list[Variant], chosen: Explanation, index: int
+    ) -> None:
+        self.engine, self.chosen, self.index = engine, chosen, index
+        self.every = _open(engine, variants, chosen, index)
+        least = max(weight for _, weight in self.every) + np.log(_LEAST_SHARE)
+        self.open = [e for i, e in enumerate(self.every) if e[1] > least or i == 0]
+        self.read = [_read(engine, explanation) for explanation, _ in self.open]
+        weights = np.array([weight for _, weight in self.open])
+        self.share = np.exp(weights - weights.max())
+
+    def own(self) -> Parameters:
+        """Parameters of the effect, the others as they are."""
+        found, index, word = [r[self.index] for r in self.read], self.index, self._part.word
+        place = _place(self._part.variant)
+        here = np.array([_place(e.parts[index].variant) == place for e, _ in self.open])
+        beside = _beside(self.every, self.open, index)
+        step = _read(self.engine, beside)[index] if beside is not None else {}
+        out = {}
+        for name in found[0]:
+            has = np.array([name in f for f in found])
+            mine = has & here
+            mixed = _mixture([f[name] for f in found if name in f], self.share[has])
+            value = _mixture(
+                [f[name] for f, m in zip(found, mine, strict=True) if m], self.share[mine]
+            ).value
+            grid = abs(step[name].value - value) / 12**0.5 if name in step else 0.0
+            meant = 0.0 if word in LINEAR else DEFINED * abs(value)
+            out[name] = _wider(replace(mixed, value=value), grid**2 + meant**2)
+        return out
+
+    @property
+    def _part(self) -> Part:
+        return self.chosen.parts[self.index]
+
+
+def _moves(
+    name: str,
+    value: float,
+    index: int,
+    beside: list[_Shapes],
+    rivals: list[tuple[Parameters, float]],
+) -> float:
+    """Mean square by which a parameter of an effect moves with what stands beside it."""
+    total = 0.0
+    for other in beside:
+        values = np.array([r[index][name].value for r in other.read])
+        total += float(other.share @ (values - values[0]) ** 2) / float(other.share.sum())
+    have = [(r[name].value - value, weight) for r, weight in rivals if name in r]
+    whole = 1.0 + sum(weight for _, weight in have)
+    return total + sum(weight * off**2 for off, weight in have) / whole
+
+
+def _likely(rivals: Iterable[Explanation], chosen: Explanation) -> _Weighed:
+    """Explanations by other words that count beside the chosen one, with their weights over its."""
+    out = []
+    for e in rivals:
+        weight = float(np.exp(min(e.log_weight - chosen.log_weight, 0.0)))
+        if e.words != chosen.words and e.words & chosen.words and weight > _LEAST_SHARE:
+            out.append((e, weight))
+    return out
+
+
+def _by_word(explanation: Explanation, read: list[Parameters]) -> dict[str, Parameters]:
+    return dict(zip((p.word for p in explanation.parts), read, strict=True))
+
+
+def _wider(p: Parameter, variance: float) -> Parameter:
+    """With so much more variance, where it has an interval at all."""
+    if not p.low < p.high:
+        return p
+    more = TWO_SIDED * variance**0.5
+    low, high = min(p.low - p.value, 0.0), max(p.high - p.value, 0.0)
+    low, high = p.value - float(np.hypot(low, more)), p.value + float(np.hypot(high, more))
+    return replace(p, low=low, high=high)
 
 
 # Standard uncertainty of what a mechanism's parameter means, as its share (VIM 2.27): where a knee
@@ -67,11 +133,13 @@ def parameters_of(
 DEFINED = 0.01
 
 
-def _read(engine: Engine, explanation: Explanation, index: int) -> dict[str, Parameter]:
-    """Parameters of one effect of an explanation as it is."""
+def _read(engine: Engine, explanation: Explanation) -> list[Parameters]:
+    """Parameters of the effects of an explanation as it is."""
     fitted = fit(engine, explanation, alike=True)
-    softer = _softer(engine, fitted, index)
-    return parameters(engine.bench, explanation.parts[index], *fitted.of(index), softer)
+    return [
+        parameters(engine.bench, part, *fitted.of(i), _softer(engine, fitted, i))
+        for i, part in enumerate(explanation.parts)
+    ]
 
 
 _Weighed = list[tuple[Explanation, float]]

@@ -21,7 +21,7 @@ from identification.gap.twins import twin_of
 from tests.unit.test_gap_operators import bench_data
 
 
-def arm_data(seed: int = 0, stretch: float = 1.0) -> GapData:
+def arm_data(seed: int = 0, stretch: float = 1.0, directions: str = "xy") -> GapData:
     """Two poses, x and y, twice loaded and unloaded; readings, force across, temperatures.
     stretch: all loads and times that much larger."""
     from rig.gap_data import arm_setup
@@ -31,9 +31,10 @@ def arm_data(seed: int = 0, stretch: float = 1.0) -> GapData:
     poses = {"P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],
              "P2": [0.554, -1.480, -1.948, -1.284, 1.371, -1.036]}  # fmt: skip
     setups = tuple(
-        arm_setup(arm, name, np.array(q), np.array([0, 0, 0.1]), d, np.array(n))
+        arm_setup(arm, name, np.array(q), np.array([0, 0, 0.1]), d, n)
         for name, q in poses.items()
-        for d, n in (("x", [1.0, 0, 0]), ("y", [0, 1.0, 0]))
+        for d, n in zip("xyz", np.eye(3), strict=True)
+        if d in directions
     )
     rows, clock = [], 0.0
     for s in range(len(setups)):

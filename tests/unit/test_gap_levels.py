@@ -338,13 +338,33 @@ def test_what_levels_without_an_arm_really_leave_is_looked_up() -> None:
     variants = library(bench, ["joint_creep"])
     found = search(small_engine_of(bench), variants)
     poor = replace(said((part("joint_creep", [0]),), (3e-5,)), log_good=-30.0)
-    other = replace(said((part("joint_creep", [0]),), (3e-5,), -50.0), log_good=-80.0)
+    other = replace(said((part("zero_shift", [0]),), (3e-5,), -50.0), log_good=-80.0)
     one = replace(found, engine=engine, explanations=(poor, other), unknown=-800.0)
     first, second = looked_up(one).explanations
     assert first.log_good > -0.1
     assert second is other  # so far down nobody looks
-    arm = replace_bench(engine, replace(bench, data=replace(bench.data, arm=True)))
-    assert looked_up(replace(one, engine=arm)).explanations[0] is poor
+
+
+def test_an_arm_s_explanation_that_leaves_much_of_the_gap_in_the_rows_is_none() -> None:
+    """Whatever the levels say; nor are those with fewer of its effects, however far down."""
+    bench = small_bench()
+    bench.add(bench.stacked(1e-4 * (bench.load / np.ptp(bench.load)) ** 2))
+    bench = replace(bench, data=replace(bench.data, arm=True))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    bumps = bench.stacked(1e-4 * np.sin(bench.load / 4.0))
+    column, one = bench.columns[0], part("joint_creep", [0])
+    two = said((one, part("contact_seating", [0])), (3e-5, 1e-5))
+    few, other = said((one,), (3e-5,), -60.0), said((part("zero_shift", [0]),), (3e-5,), -60.0)
+    poor = replace(two, log_good=-30.0)
+    variants = library(bench, ["joint_creep"])
+    searched = search(small_engine_of(bench), variants)
+    for left, kept in ((0.0, True), (1.0, False)):
+        engine = Engine(bench, base, target + column + left * bumps, np.array([0.0, 3e-6]))
+        found = replace(searched, engine=engine, unknown=-800.0)
+        out = looked_up(replace(found, explanations=(two, few, other))).explanations
+        assert [e.good for e in out] == [kept, kept, True]
+        assert out[2] is other  # so far down nobody looks
+        assert looked_up(replace(found, explanations=(poor,))).explanations[0].log_good <= -30.0
 
 
 def test_explanations_that_matter_are_taken_between_the_levels(

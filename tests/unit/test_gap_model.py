@@ -24,7 +24,7 @@ from rig.gap_path import planned_data
 from rig.model import MODELS, load_model
 from rig.protocol import load_protocol
 from rig.simulate import Simulation, simulate
-from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_forms import arm_data, pulled
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 F1 = (MODELS / "F1.yaml").read_text()
@@ -36,7 +36,7 @@ YIELD: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def bench() -> Bench:
-    return make_bench(arm_data())
+    return make_bench(arm_data(directions="xyz"))
 
 
 def model(tmp: Path, *effects: dict[str, Any]) -> Path:
@@ -59,9 +59,19 @@ def procedure(tmp: Path, text: str = "loading-unloading", **changes: str) -> Pat
 
 @pytest.mark.parametrize("word", WORDS)
 def test_every_shape_of_the_library_survives_the_file(bench: Bench, word: str) -> None:
+    assert_survives(bench, word)
+
+
+def test_shapes_of_a_bench_that_is_pulled_survive_the_file() -> None:
+    for word in ("contact_seating", "joint_yield", "joint_creep"):
+        assert_survives(pulled("displacement"), word)
+
+
+def assert_survives(bench: Bench, word: str) -> None:
     fresh = replace(bench, columns=[])
     variants = library(fresh, (word,))
-    kinds = {v.label.split()[-1]: v for v in variants}  # one of every kind
+    # one of every kind
+    kinds = {end: v for v in variants for end in (v.label.split()[0], v.label.split()[-1])}
     for v in kinds.values():
         w = 0.01 * np.arange(1.0, len(v.columns) + 1)
         form = describe(fresh, Part(v, 1.0), w, np.diag(w**2))

@@ -259,7 +259,7 @@ def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
         for c, j in ((30.0, 0), (60.0, 1))
     )  # fmt: skip
     chosen = Explanation((Part(low, 1.0),), 0.0, 0.0, (0.0,), 0.0)
-    found = parameters_of(engine, [low, high], chosen, 0)["threshold"]
+    found = parameters_of(engine, [low, high], chosen)[0]["threshold"]
     assert found.value == pytest.approx(30.0, rel=0.01)  # where the explanation says
     assert found.low < 30.0
     assert found.high > 60.0
@@ -277,8 +277,50 @@ def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> Non
         for k, c, prior in ((0, 30.0, 1.0), (1, 36.0, 1e-12))
     ]  # fmt: skip
     chosen = Explanation((Part(family[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
-    alone = parameters_of(engine, family[:1], chosen, 0)["threshold"]
-    found = parameters_of(engine, family, chosen, 0)["threshold"]
+    alone = parameters_of(engine, family[:1], chosen)[0]["threshold"]
+    found = parameters_of(engine, family, chosen)[0]["threshold"]
     assert found.value == pytest.approx(30.0, rel=0.01)
     assert sd(found) == pytest.approx(np.hypot(sd(alone), 6.0 / 12**0.5), rel=0.01)
     assert found.high - 30.0 == pytest.approx(30.0 - found.low)
+
+
+def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
+    """Beside it, two shapes of another word that the data leave alike take more or less from it."""
+    engine = small_engine(small_bench())
+    bench = engine.bench
+    mine = Variant("joint_stiffness_error", "joint 1", (0,), (10.0,), np.eye(1),
+                   info={"joints": [0], "joint": 0})  # fmt: skip
+    rival = Variant("joint_creep", "T 3", (1,), (1.0,), np.eye(1),
+                    info={"joint": 0, "times_s": [3.0]})  # fmt: skip
+    bench.columns.append(bench.columns[1] + 0.2 * bench.columns[0])
+    twice = replace(rival, label="T 4", columns=(len(bench.columns) - 1,))
+    engine.target = engine.target + 4.0 * bench.columns[0] + 2.0 * bench.columns[1]
+    engine = Engine(bench, engine.base, engine.target, engine.etas)
+    chosen = Explanation((Part(mine, 10.0), Part(rival, 1.0)), 0.0, 0.0, (1.0, 0.5), 0.0)
+    alone = parameters_of(engine, [mine, rival], chosen)[0]["factor_joint1"]
+    both = parameters_of(engine, [mine, rival, twice], chosen)[0]["factor_joint1"]
+    assert both.value == pytest.approx(alone.value)
+    assert both.high - both.low > 1.02 * (alone.high - alone.low)
+
+
+def test_explanations_by_other_words_move_parameters_as_far_as_they_are_likely() -> None:
+    engine = small_engine(small_bench())
+    bench = engine.bench
+    engine.target = engine.target + 4.0 * bench.columns[0]
+    engine = Engine(bench, engine.base, engine.target, engine.etas)
+    mine, other = (
+        Variant(word, word, (k,), (10.0,), np.eye(1), info=info)
+        for word, k, info in (
+            ("joint_stiffness_error", 0, {"joints": [0], "joint": 0}),
+            ("joint_creep", 1, {"joint": 0, "times_s": [3.0]}),
+        )
+    )
+    chosen = Explanation((Part(mine, 10.0),), 0.0, 0.0, (1.0,), 0.0)
+
+    def width(rival_weight: float) -> float:
+        rival = Explanation((Part(mine, 0.3), Part(other, 1.0)), rival_weight, 0.0, (1.0, 0.5), 0.0)
+        found = parameters_of(engine, [mine, other], chosen, [chosen, rival])[0]["factor_joint1"]
+        return found.high - found.low
+
+    assert width(0.0) > width(-2.0) > width(-9.0)
+    assert width(-9.0) == width(-20.0)  # what hardly counts does not

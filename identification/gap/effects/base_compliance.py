@@ -4,7 +4,8 @@ A moment about axis a gives a rotation `c_a M_a`, and the target moves by the sa
 direction `c_a (r x n)_a^2` per newton. Unseen by encoders. 5e5 to 2e6 Nm/rad.
 
 Size: 5e-7 to 2e-6 rad/Nm; tables and stands up to ten times softer.
-Prior: compliances positive in sum, sd out of SCALES, equally likely; single axes at 0.3.
+Prior: compliances positive, sd out of SCALES, equally likely; turned axes at 0.5, single ones at
+0.3.
 Source: stiffness of bolted mountings of arms, 5e5 to 2e6 Nm/rad.
 """
 
@@ -28,6 +29,7 @@ DEPTHS_M = (
     0.8,
     1.0,
 )  # of tilt axes below the base: flange, table, floor
+COUPLED = 0.6  # sd of what couples two axes, against that of their own compliances
 SCALES = (3e-7, 1e-6, 3e-6)  # rad/Nm
 
 
@@ -41,17 +43,22 @@ def moments(bench: Bench, depth: float) -> Array:
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Per depth of the axes: all three, and each alone (yaw knows no depth)."""
+    """Per depth of the axes: all three, along the base's or turned, and each alone (yaw knows no
+    depth)."""
     out = []
     for depth in DEPTHS_M:
         m = moments(bench, depth)
         columns = [bench.add(bench.outside_column(m[:, a] ** 2 * bench.load)) for a in range(3)]
-        info: dict[str, Any] = {"depth_m": depth}
+        both = 2 * m[:, 0] * m[:, 1]  # of loads that turn it about both
+        info: dict[str, Any] = {"depth_m": depth, "turned": False}
         seen = [a for a in range(3) if np.abs(m[:, a]).max() > 1e-3]
         out.append(
-            variant(WORD, f"axes {depth:g} m below", [columns[a] for a in seen], SCALES, axes=seen,
-                    **info)
+            variant(WORD, f"axes {depth:g} m below", [columns[a] for a in seen], SCALES, each=True,
+                    axes=seen, **info)
         )  # fmt: skip
+        if np.abs(both).max() > 1e-3:
+            coupling = bench.add(bench.outside_column(both * bench.load))
+            out.append(_turned(depth, [*(columns[a] for a in seen), coupling], seen))
         for a in seen:
             if a < 2 or depth == 0:
                 out.append(
@@ -59,3 +66,15 @@ def variants(bench: Bench) -> list[Variant]:
                             prior=0.3, axes=[a], **info)
                 )  # fmt: skip
     return out
+
+
+def _turned(depth: float, columns: list[int], axes: list[int]) -> Variant:
+    """Of a stand whose soft axes lie between x and y, the moment about one turns it about the other
+    too. An axis half between them, either way, has a positive compliance as well."""
+    root = np.diag([*np.ones(len(axes)), COUPLED])
+    total = np.append(np.ones(len(axes)), 0.0)
+    between = np.zeros((2, len(columns)))
+    between[:, :2], between[:, -1] = 1.0, (2.0, -2.0)
+    return variant(WORD, f"turned axes {depth:g} m below", columns, SCALES, root, total,
+                   prior=0.5, each=(True,) * len(axes), within=between, axes=axes, depth_m=depth,
+                   turned=True)  # fmt: skip

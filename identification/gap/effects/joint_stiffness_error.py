@@ -11,17 +11,21 @@ Source: scatter between gears of one size, and simulators set up from catalogues
 
 from __future__ import annotations
 
+from itertools import combinations
+from math import comb
+
 from identification.gap.bench import Bench
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_stiffness_error"
 SCALES = (1.0, 3.0)
 BENCH_SCALES = (3.0, 9.0)
+PAIRS = 2.0  # prior weight of any two joints, against one certain joint alone
 STIFFEST = -0.9  # relative change of what the spring gives (compliance; force, if that answers)
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Each joint alone, all of them, and all but one, which may have a trouble of its own."""
+    """Each joint alone, any two, all of them, and all but one, which may have its own trouble."""
     relative = bench.data.compliance_relative_sd
     out, columns = [], []
     for j in bench.moving_joints():
@@ -40,6 +44,12 @@ def variants(bench: Bench) -> list[Variant]:
         out.append(
             variant(WORD, "all joints", columns, scales, positive=False,
                     joints=bench.moving_joints())
+        )  # fmt: skip
+    for a, b in combinations(range(len(columns)), 2) if len(columns) > 2 else ():
+        pair = [bench.moving_joints()[i] for i in (a, b)]
+        out.append(
+            variant(WORD, f"joints {pair[0] + 1} and {pair[1] + 1}", [columns[a], columns[b]],
+                    scales, positive=False, prior=PAIRS / comb(len(columns), 2), joints=pair)
         )  # fmt: skip
     for k, j in enumerate(bench.moving_joints() if len(columns) > 2 else ()):
         rest = [i for i in bench.moving_joints() if i != j]

@@ -4,7 +4,7 @@ Compliance along the direction of each nominal tube (model file of the robot), s
 coefficient: 1 is the nominal aluminium tube, 50 to 870 um at 100 N; castings are 0.2 to 3 times it.
 
 Size: 0.2 to 3 times the nominal tubes: 50 to 870 um at 100 N.
-Prior: factors positive in sum, sd out of SCALES, equally likely.
+Prior: factors positive, sd out of SCALES, equally likely.
 Source: beam theory for the segments in the robot's model file.
 """
 
@@ -34,10 +34,19 @@ def variants(bench: Bench) -> list[Variant]:
     ]
     root = np.array([[1.0, 0.0], [ALIKE, np.sqrt(1 - ALIKE**2)]])
     out = [
-        variant(WORD, f"segment {k + 1}", columns[2 * k : 2 * k + 2], SCALES, root, segments=[k])
+        variant(
+            WORD,
+            f"segment {k + 1}",
+            columns[2 * k : 2 * k + 2],
+            SCALES,
+            root,
+            each=True,
+            segments=[k],
+        )
         for k in range(count)
     ]
     if count > 1:
         both = np.kron(np.eye(count), root).astype(float)
-        out.append(variant(WORD, "both arms", columns, SCALES, both, segments=list(range(count))))
+        out.append(variant(WORD, "both arms", columns, SCALES, both, each=True,
+                           segments=list(range(count))))  # fmt: skip
     return out

@@ -122,16 +122,17 @@ def links(bench: Bench, law: Law) -> list[Array]:
 
 
 def describe_base(_: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: axes through a point `depth` below the base."""
-    terms = tuple(Term("compliance", {"axis": "xyz"[a]}) for a in v.info["axes"])
-    return Law({"depth": float(v.info["depth_m"])}, terms), np.ones(len(terms))
+    """Terms: axes through a point `depth` below the base, and what couples two that lie turned."""
+    terms = [Term("compliance", {"axis": "xyz"[a]}) for a in v.info["axes"]]
+    terms += [Term("compliance_xy")] if v.info["turned"] else []
+    return Law({"depth": float(v.info["depth_m"])}, tuple(terms)), np.ones(len(terms))
 
 
 def base(bench: Bench, law: Law) -> list[Array]:
-    """`(r x n)_a^2` times the load."""
+    """`(r x n)_a^2` times the load, of a coupling `2 (r x n)_x (r x n)_y`."""
     m = moments(bench, law.constants["depth"])
-    axes = ["xyz".index(t.shape["axis"]) for t in law.terms]
-    return [bench.outside_column(m[:, a] ** 2 * bench.load) for a in axes]
+    lever = {"x": m[:, 0] ** 2, "y": m[:, 1] ** 2, "z": m[:, 2] ** 2, "xy": 2 * m[:, 0] * m[:, 1]}
+    return [bench.outside_column(lever[t.shape.get("axis", "xy")] * bench.load) for t in law.terms]
 
 
 def describe_seating(_: Bench, v: Variant) -> tuple[Law, Array]:

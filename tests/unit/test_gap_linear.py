@@ -1,0 +1,72 @@
+"""Springs, links and mountings: what they may be, and which of their numbers stand together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import Bench, make_bench
+from identification.gap.effects import library
+from identification.gap.effects.base_compliance import moments
+from identification.gap.signs import Limits, log_odds
+from identification.gap.variants import Variant
+from tests.unit.test_gap_forms import arm_data
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return make_bench(arm_data(directions="xyz"))
+
+
+def of(bench: Bench, word: str) -> tuple[Bench, dict[str, Variant]]:
+    fresh = replace(bench, columns=[])
+    return fresh, {v.label: v for v in library(fresh, (word,))}
+
+
+def charged(v: Variant, w: list[float], sd: float = 0.01) -> float:
+    """nats that coefficients known to sd cost against the limits."""
+    limits = Limits.of([v])
+    assert limits is not None
+    k = len(w)
+    before = np.array([np.linalg.norm(limits.rows[0, 0])])
+    roots = sd * np.eye(k)[None]
+    return float(log_odds(limits, np.zeros(1, int), before, np.array([w]), roots)[0])
+
+
+@pytest.mark.parametrize(("word", "label", "good", "bad"), [
+    ("base_compliance", "axes 0.3 m below", [1.0, 0.2, 0.5], [1.0, -0.2, 0.5]),
+    ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, 0.7], [1, 0.5, -0.2, 0.7]),
+    ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, 0.7], [1, 0.5, 0.2, 0.9]),
+    ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, -0.7], [1, 0.5, 0.2, -0.9]),
+    ("link_flexibility", "segment 1", [1.0, 0.3], [1.0, -0.3]),
+    ("link_flexibility", "both arms", [1.0, 0.3, 0.5, 0.1], [1.0, 0.3, -0.5, 0.1]),
+])  # fmt: skip
+def test_what_bends_gives_way_under_load_in_every_part(
+    bench: Bench, word: str, label: str, good: list[float], bad: list[float]
+) -> None:
+    v = of(bench, word)[1][label]
+    assert charged(v, good) > 0.0
+    assert charged(v, bad) < -25.0
+
+
+def test_a_stand_that_tilts_about_an_oblique_edge_has_turned_axes(bench: Bench) -> None:
+    fresh, variants = of(bench, "base_compliance")
+    edge = np.array([np.cos(0.6), np.sin(0.6), 0.0])
+    gives = fresh.outside_column((moments(fresh, 0.3) @ edge) ** 2 * fresh.load)
+    pool = np.column_stack(fresh.columns)
+    left = {}
+    for label in ("axes 0.3 m below", "turned axes 0.3 m below"):
+        columns = pool[:, list(variants[label].columns)]
+        w = np.linalg.lstsq(columns / np.abs(columns).max(), gives, rcond=None)[0]
+        left[label] = np.linalg.norm(gives - columns @ w / np.abs(columns).max())
+    assert left["turned axes 0.3 m below"] < 1e-9 * np.linalg.norm(gives)
+    assert left["axes 0.3 m below"] > 0.02 * np.linalg.norm(gives)
+
+
+def test_any_two_springs_may_be_wrong_together(bench: Bench) -> None:
+    fresh, variants = of(bench, "joint_stiffness_error")
+    pairs = {tuple(v.info["joints"]) for v in variants.values() if len(v.info["joints"]) == 2}
+    assert pairs == set(combinations(fresh.moving_joints(), 2))
