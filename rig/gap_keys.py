@@ -42,6 +42,7 @@ CONSTANTS: dict[str, Key] = {
     "joint": Key("joint", "count"),
     "memory": _MEMORY,
     "flow_time": Key("flow_time_s", "size"),
+    "flow_exponent": Key("flow_exponent", "positive"),
     "axis": Key("axis", "text", options=_SIDES),
     "depth": Key("axis_below_base_mm", factor=1e3),
     "law": Key("law", "text", options=("Iwan", "Dahl", "Bouc-Wen")),
@@ -120,7 +121,7 @@ for _name, _unit in _DRIFTS.items():
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
 
 
-MAY_BE_MISSING = ("measured_to", "about", "tool")
+MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent")
 
 
 @dataclass(frozen=True)
@@ -146,8 +147,8 @@ _PATHS = (
     ("drift_per_kelvin", ("sensor",)),
 )
 GRAMMAR: dict[str, Grammar] = {
-    "joint_yield": Grammar(("joint", "memory", "flow_time"), _PLAYS),
-    "base_slip": Grammar(("axis", "depth", "memory", "flow_time"), _PLAYS),
+    "joint_yield": Grammar(("joint", "memory", "flow_time", "flow_exponent"), _PLAYS),
+    "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "joint_hysteresis": Grammar(
         ("joint", "law", "memory"), (("compliance", ("strength",)), ("compliance", ("reach",)))
     ),

@@ -144,10 +144,15 @@ class Bench:
     def passes(self) -> int:
         """How often the load comes from zero or goes back there: one for a single pull, two for a
         cycle; runs that start anew count at least one each; many where it only trembles."""
-        if not np.ptp(self.load) > 0 or self.stands:
+        if self.rests:
             return _MANY
         runs = np.unique(self.rows.run)
         return sum(passes(self.load[self.rows.run == r]) for r in runs)
+
+    @property
+    def rests(self) -> bool:
+        """The load does not change: the same all the time, or none at all."""
+        return not np.ptp(self.load) > 0 or self.stands
 
     @cached_property
     def stands(self) -> bool:

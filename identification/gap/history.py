@@ -152,13 +152,16 @@ def _prefix(keep: Array, gain: Array) -> Array:
 
 
 def flowing_play(
-    load: Array, radius: Array, times: Array, rows: Rows, fresh: Flags, weight: Array | None = None
-) -> Array:
+    load: Array, radius: Array, times: Array, rows: Rows, fresh: Flags, weight: Array | None = None,
+    square: Flags | bool = False,
+) -> Array:  # fmt: skip
     """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
 
     `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
-    falls below it, wherever it has come to. Ramps between holds in _PARTS parts, then standing;
-    within a hold the load hardly moves, and one part will do. weight (n,): as in `play`.
+    falls below it, wherever it has come to. square (k,): it flows with the square of the
+    overstress, `T p' = o |o| / r`, and slows down as it comes near. Ramps between holds in _PARTS
+    parts, then standing; within a hold the load hardly moves, and one part will do. weight (n,): as
+    in `play`.
     """
     out = np.empty((len(load), len(radius)))
     hung = np.zeros(out.shape)
@@ -174,16 +177,24 @@ def flowing_play(
     pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
     parts = np.where(rows.hold_starts | rest | rows.continuous, _PARTS, 1)
     share = {m: ((np.arange(m) + 0.5) / m)[:, None] for m in (1, _PARTS)}
-    # shares (n, k) of what is beyond that flow off: before the load moves, in every part, after it
+    # shares (n, k) of what is beyond that flow off: before the load moves, in every part, after it;
+    # of what flows with the square, times over its time constant
     waits, moves, ends = pause > 0, ease > stands + pause, stands > 0
-    paused = -np.expm1(-pause[:, None] / times)
     ramp = np.maximum(ease - stands - pause, 0.0) / parts
-    during = -np.expm1(-ramp[:, None] / times)
-    stood = -np.expm1(-stands[:, None] / times)
+
+    def much(seconds: Array) -> Array:
+        over = seconds[:, None] / times
+        return np.where(square, over, -np.expm1(-over))
+
+    paused, during, stood = much(pause), much(ramp), much(stands)
     low, high = load[:, None] + below, load[:, None] + above
 
     def flown(state: Array, share: Array, least: Array, most: Array) -> Array:
-        return state + share * (np.minimum(np.maximum(state, least), most) - state)
+        over = np.minimum(np.maximum(state, least), most) - state
+        if not np.any(square):
+            return state + share * over
+        way = share * np.abs(over) / radius
+        return state + np.where(square, way / (1 + way), share) * over
 
     for i, x in enumerate(load):
         if fresh[i]:

@@ -78,11 +78,19 @@ def _slides(force: _Channel, moved: _Channel) -> bool:
     driven would hold such a plateau in one sense only, as under a weight, or run through it."""
     went, time = np.diff(moved.values), np.diff(force.time)
     flat = np.abs(np.diff(force.values)) < _FLAT * np.abs(went)
-    for way in (went > 0, went < 0):
+    sense = _senses(moved)  # of its legs: what noise does back and forth is no way
+    for way in (sense > 0, sense < 0):
         path, spent = np.abs(went) * way, time * way
         if flat @ spent < _SPENT * time.sum() or flat @ path < _MOST * path.sum():
             return False
     return True
+
+
+def _senses(channel: _Channel) -> Array:
+    """(n - 1,) sense of the leg that every step from point to point belongs to."""
+    y = channel.values
+    edges = np.minimum(_zigzag(y, max(_TURNS[-1], 6 * channel.noise)), len(y) - 1)
+    return np.repeat(np.sign(np.diff(y[edges])), np.diff(edges))
 
 
 def _still(values: Array, sd: float) -> bool:

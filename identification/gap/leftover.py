@@ -82,9 +82,11 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
 
 
 def _falls(engine: Engine) -> bool:
-    """Whether the response goes back in a single pull whose load goes on."""
+    """Whether the response goes back in a single pull whose load goes on; one reading that jumps
+    off does not."""
     bench = engine.bench
     if not bench.once or not bench.always_moves:
         return False
-    fall = way_back(np.abs(bench.response - bench.response[0]))
+    size = np.abs(bench.response - bench.response[0])
+    fall = way_back(np.median([size[:-2], size[1:-1], size[2:]], axis=0))
     return bool(fall > _FALL * np.ptp(bench.response))

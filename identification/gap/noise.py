@@ -127,7 +127,8 @@ _LEAST_SAMPLES = 300
 
 def white_noise(values: Array) -> float:
     """Standard deviation of the white part of a signal that is sampled densely; 0 where second
-    differences show how it moves rather than its noise."""
+    differences show how it moves rather than its noise. Of turning points alone, up and down by
+    turns, every second one tells."""
     if len(values) < _LEAST_SAMPLES:
         return 0.0
 
@@ -136,7 +137,7 @@ def white_noise(values: Array) -> float:
         return float(np.median(np.abs(second))) / 0.6745 / 6**0.5
 
     one, two = middle(1), middle(2)
-    return one if 0 < two < _WHITE**0.5 * one else 0.0
+    return min(one, two) if two < _WHITE**0.5 * one else 0.0
 
 
 def tangent(rows: Rows, force_sd: float) -> Array:

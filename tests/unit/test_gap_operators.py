@@ -119,16 +119,21 @@ def test_retardation_follows_a_staircase_of_thinned_holds() -> None:
     assert found[alone] == pytest.approx(np.interp(rows.time, grid, z)[alone], abs=0.01)
 
 
-def test_slow_flow_follows_a_staircase_of_thinned_holds() -> None:
+@pytest.mark.parametrize("square", [False, True])
+def test_slow_flow_follows_a_staircase_of_thinned_holds(square: bool) -> None:
     rows, grid, load = staircase()
     y, state = np.zeros_like(grid), 0.0
     for i in range(1, len(grid)):
         beyond = np.clip(state, load[i] - 8.0, load[i] + 8.0) - state
-        state += beyond * -np.expm1(-1e-3 / 4.0)
+        state += beyond * 1e-3 / 4.0 * (abs(beyond) / 8.0 if square else 1.0)
         y[i] = state
-    one = np.array([4.0])
-    found = flowing_play(rows.force, np.array([8.0]), one, rows, fresh(rows.n))[:, 0]
-    assert found == pytest.approx(np.interp(rows.time, grid, y), abs=0.15)  # ramps in four parts
+    both = flowing_play(
+        rows.force, np.array([8.0, 8.0]), np.array([4.0, 4.0]), rows, fresh(rows.n),
+        square=np.array([square, False]),
+    )  # fmt: skip
+    assert both[:, 0] == pytest.approx(np.interp(rows.time, grid, y), abs=0.15)  # four parts a ramp
+    alone = flowing_play(rows.force, np.array([8.0]), np.array([4.0]), rows, fresh(rows.n))
+    assert both[:, 1] == pytest.approx(alone[:, 0], abs=1e-12)  # whatever flows beside it
 
 
 def test_a_delay_of_thinned_holds_is_that_of_the_load() -> None:

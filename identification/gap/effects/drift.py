@@ -10,7 +10,7 @@ from identification.gap.data import Array
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
 # Pieces of a free smooth path: slower than a run, as slow as an air conditioner's swing. In a
 # recording that runs on and on three passes of the load tell what comes again, and every further
-# one bears three pieces.
+# one bears three pieces; where nothing is loaded, nothing tells a quick path from other events.
 PIECES = {"free path": 10, "winding path": 20}
 LONG_PIECES, LEAST_PIECES = 40, 4
 
@@ -73,7 +73,8 @@ def free_paths(bench: Bench) -> dict[str, int]:
         return {}
     if not bench.rows.continuous:
         return PIECES
-    pieces = min(3 * (bench.passes - 3), LONG_PIECES)
+    most = PIECES["free path"] if bench.rests else LONG_PIECES
+    pieces = min(3 * (bench.passes - 3), most)
     return {"free path": pieces} if pieces >= LEAST_PIECES else {}
 
 

@@ -2,9 +2,10 @@
 
 Beyond the elastic deflection it moves by `w P_r(tau)`, P play of radius r = threshold (kinematic
 hardening, Prandtl 1928): stiff below, knee, the rest stays after unloading. Rounded knees are
-several radii from the threshold on; slow flow is the same state reached with a lag; a controller
-that takes the joint back resets it between runs. w in units of the joint's elastic compliance:
-1/w is the ratio of hardening to spring, so 0.3 (little) to 30 (clamp that hardly holds).
+several radii from the threshold on; slow flow is the same state reached with a lag, in proportion
+to the overstress or with its square; a controller that takes the joint back resets it between
+runs. w in units of the joint's elastic compliance: 1/w is the ratio of hardening to spring, so 0.3
+(little) to 30 (clamp that hardly holds).
 
 Size: slope beyond the knee 0.3 to 30 times the joint's compliance; thresholds anywhere in the range
 of load.
@@ -182,7 +183,8 @@ def _with_back(
 
 LEAST = 0.15  # of the elastic compliance: what bends less does not give way
 FINE = 13  # radii about a threshold that was found on the grid, from 0.84 to 1.2 of it
-FLOWS_S = (1.2, 2.5, 5.0, 10.0, 25.0)
+FLOWS_S = (1.2, 2.5, 5.0, 10.0, 25.0)  # in proportion to the overstress,
+SQUARE_S = (2.5, 6.0, 15.0)  # or with its square
 BACK = (0.1, 0.2, 0.3, 0.42, 0.56)  # radii of what flows back after a reversal, of the range
 RATCHET_FROM = 0.6  # of the range
 RATCHETS = 0.3  # of a cycle's path beyond that: creeps on so much slower than it flows
@@ -197,12 +199,13 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
     radius = alone + (float(info["centre"]) - alone) * np.linspace(0.84, 1.2, FINE)
     fresh = _memories(bench).get(info["memory"], bench.moved)
     name, out = found.label.split(" at ")[0].split(" flow")[0], []
-    for flow, states in _flowing(bench, info["load"], radius, fresh, weight).items():
+    for (flow, square), states in _flowing(bench, info["load"], radius, fresh, weight).items():
         columns = [info["column"](s) for s in states.T]
-        share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S))
+        share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S) + len(SQUARE_S))
+        how = f" flow {flow:g} s{' squared' if square else ''}" if flow else ""
         for k in range(FINE):
-            exact = {**info, "centre": radius[k], "flow_s": flow}
-            label = f"{name}{f' flow {flow:g} s' if flow else ''} at {radius[k]:.4g} fine"
+            exact = {**info, "centre": radius[k], "flow_s": flow, "square": square}
+            label = f"{name}{how} at {radius[k]:.4g} fine"
             kinds = {"": slice(k, k + 1), " rounded": slice(max(k - 2, 0), k + 3)}
             for kind, place in kinds.items():
                 exact["radius"] = radius[place]
@@ -256,29 +259,30 @@ def _memories(bench: Bench) -> dict[str, Flags]:
 
 def states(
     bench: Bench, load: Array, radius: Array, flow: float, fresh: Flags,
-    weight: Array | None = None,
+    weight: Array | None = None, square: bool = False,
 ) -> Array:  # fmt: skip
     """Play states (n, k) of radii (k,): reached at once, or by viscoplastic flow in `flow` s."""
     if flow == 0:
         return bench.plays(load, radius, fresh, weight)
-    given = (load, radius, flow, fresh, 0.0 if weight is None else weight)
+    given = (load, radius, flow, fresh, 0.0 if weight is None else weight, square)
     key = b"".join(np.asarray(v).tobytes() for v in given)
     if key not in bench.flows:
         times = np.full(len(radius), flow)
-        bench.flows[key] = flowing_play(load, radius, times, bench.rows, fresh, weight)
+        bench.flows[key] = flowing_play(load, radius, times, bench.rows, fresh, weight, square)
     return bench.flows[key]
 
 
 def _flowing(
     bench: Bench, load: Array, radius: Array, fresh: Flags, weight: Array | None
-) -> dict[float, Array]:
-    """Flow time s -> play states (n, k), for no flow and all flow times in one go."""
-    out = {0.0: bench.plays(load, radius, fresh, weight)}
+) -> dict[tuple[float, bool], Array]:
+    """(flow time s, whether squared) -> play states (n, k), for no flow and all in one go."""
+    out = {(0.0, False): bench.plays(load, radius, fresh, weight)}
     if bench.rows.continuous or bench.timeless:
         return out
-    every = flowing_play(load, np.tile(radius, len(FLOWS_S)),
-                         np.repeat(FLOWS_S, len(radius)), bench.rows, fresh, weight)  # fmt: skip
-    return out | dict(zip(FLOWS_S, np.split(every, len(FLOWS_S), axis=1), strict=True))
+    ways = [*((t, False) for t in FLOWS_S), *((t, True) for t in SQUARE_S)]
+    times, square = (np.repeat(v, len(radius)) for v in zip(*ways, strict=True))
+    every = flowing_play(load, np.tile(radius, len(ways)), times, bench.rows, fresh, weight, square)
+    return out | dict(zip(ways, np.split(every, len(ways), axis=1), strict=True))
 
 
 def ratchet(load: Array, threshold: float, fresh: Flags) -> Array:

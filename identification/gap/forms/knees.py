@@ -13,12 +13,15 @@ from identification.gap.variants import UNDER_WEIGHT, Variant
 
 _MEMORY = {"": KEPT, " lasting": ACROSS, " taken back": LOST, joint_yield.HARDENED: KEPT,
            UNDER_WEIGHT: HUNG}  # fmt: skip
+_SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: plays (threshold), and what flows back once the threshold `after` was passed."""
     info = v.info
     constants = {"memory": _MEMORY[info["memory"]], "flow_time": float(info["flow_s"])}
+    if info.get("square"):
+        constants["flow_exponent"] = _SQUARE
     if v.word == base_slip.WORD:
         constants |= {"axis": "xyz"[info["axis"]], "depth": float(info["depth_m"])}
         unit = base_slip._NATURAL
@@ -68,7 +71,8 @@ def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     weight = None
     if law.constants["memory"] == HUNG and "joint" in law.constants:  # its twin may sit elsewhere
         weight = bench.weight(law.constants["joint"])
-    out = list(joint_yield.states(bench, load, radius, law.constants["flow_time"], fresh, weight).T)
+    flow, square = law.constants["flow_time"], law.constants.get("flow_exponent") == _SQUARE
+    out = list(joint_yield.states(bench, load, radius, flow, fresh, weight, square).T)
     beyond = np.array([t.shape["grows_beyond"] for t in law.terms if "grows_beyond" in t.shape])
     out += list(joint_yield.grown(load, beyond, fresh).T)
     for term in law.terms:
