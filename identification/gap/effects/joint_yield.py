@@ -279,7 +279,9 @@ def _flowing(
     out = {(0.0, False): bench.plays(load, radius, fresh, weight)}
     if bench.rows.continuous or bench.timeless:
         return out
-    ways = [*((t, False) for t in FLOWS_S), *((t, True) for t in SQUARE_S)]
+    # what slows down so under a load that stands, a single spring can't tell from creep
+    squared = SQUARE_S if bench.data.arm else ()
+    ways = [*((t, False) for t in FLOWS_S), *((t, True) for t in squared)]
     times, square = (np.repeat(v, len(radius)) for v in zip(*ways, strict=True))
     every = flowing_play(load, np.tile(radius, len(ways)), times, bench.rows, fresh, weight, square)
     return out | dict(zip(ways, np.split(every, len(ways), axis=1), strict=True))
