@@ -43,8 +43,24 @@ def parameters_of(
         word, own = chosen.parts[i].word, shapes.own()
         beside = [e for e in each if e.index != i]
         of_rivals = [(r[word], w) for r, w in others if word in r]
-        out.append({n: _wider(p, _moves(n, p.value, i, beside, of_rivals)) for n, p in own.items()})
+        wide = {n: _wider(p, _moves(n, p.value, i, beside, of_rivals)) for n, p in own.items()}
+        out.append({n: _stretched(p) for n, p in wide.items()} if beside else wide)
     return out
+
+
+# Of 78 parameters in blind mixtures 78 % lay within what should have been 90 % intervals, of 94
+# alone 89 %: what one law leaves of the gap its neighbours take, and the posterior does not know
+# that the laws are only families. The same rule as with probabilities (`search.trusted`).
+SHARING = 1.25
+
+
+def _stretched(p: Parameter) -> Parameter:
+    """Its interval so much wider; what is above zero stays there."""
+    if p.low > 0:
+        low, high = (p.value * (v / p.value) ** SHARING for v in (p.low, p.high))
+    else:
+        low, high = (p.value + SHARING * (v - p.value) for v in (p.low, p.high))
+    return replace(p, low=low, high=high)
 
 
 class _Shapes:

@@ -21,7 +21,7 @@ from identification.gap.fit import fit
 from identification.gap.interval import Parameter, Softer
 from identification.gap.parameters import parameters, run_seconds
 from identification.gap.parts import Part
-from identification.gap.posterior import _mixture, parameters_of
+from identification.gap.posterior import SHARING, _mixture, _stretched, parameters_of
 from identification.gap.search import Explanation
 from identification.gap.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
@@ -301,6 +301,13 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
     both = parameters_of(engine, [mine, rival, twice], chosen)[0]["factor_joint1"]
     assert both.value == pytest.approx(alone.value)
     assert both.high - both.low > 1.02 * (alone.high - alone.low)
+
+
+def test_intervals_of_effects_that_share_a_gap_are_wider() -> None:
+    above, across = Parameter(2.0, 1.0, 3.0, "1"), Parameter(1.0, -1.0, 3.0, "1")
+    assert _stretched(above).low == pytest.approx(2 * 0.5**SHARING)
+    assert _stretched(above).high == pytest.approx(2 * 1.5**SHARING)
+    assert (_stretched(across).low, _stretched(across).high) == (1 - 2 * SHARING, 1 + 2 * SHARING)
 
 
 def test_explanations_by_other_words_move_parameters_as_far_as_they_are_likely() -> None:
