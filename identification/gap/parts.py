@@ -73,7 +73,8 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
 
 
 def _beyond_springs(engine: Engine, moved: Array) -> float:
-    """rms (m) of a linear effect beyond what the springs give within three standard deviations."""
+    """rms (m) of a linear effect beyond what the springs give within three standard deviations;
+    beside an effect that hardly shows, some of what it moves counts whatever they give."""
     base, n = engine.base, engine.bench.rows.n
     root = np.sqrt(engine.bench.rows.weight / engine.bench.rows.weight.sum())
     if "springs" not in engine.cache:
@@ -84,7 +85,10 @@ def _beyond_springs(engine: Engine, moved: Array) -> float:
     left = float(np.linalg.norm(moved * root - engine.cache["springs"] @ t))
     most = float(np.abs(t).max()) if t.size else 0.0
     beyond = max(0.0, 1 - 3 / most) if most > 0 else 1.0
-    return max(left, beyond * float(np.sqrt(np.sum((moved * root) ** 2))))
+    return max(left, max(beyond, _COUNTS) * float(np.sqrt(np.sum((moved * root) ** 2))))
+
+
+_COUNTS = 0.03
 
 
 def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:

@@ -83,8 +83,11 @@ def test_a_run_lasts_from_its_first_sample_to_its_last(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("form", ["two_rates", "wander", "linear"])
-def test_drift_over_the_session_is_what_the_force_shows_at_its_end(form: str) -> None:
-    scene = scene_of("medium")
+@pytest.mark.parametrize(("design", "which"), [("medium", 3), ("rich", 0)])  # rich: x reversed
+def test_drift_over_the_session_is_what_the_force_shows_at_its_end(
+    form: str, design: str, which: int
+) -> None:
+    scene = scene_of(design, which)
     for seed in range(4):
         drawn = effect_of(scene, "force_drift", form, seed)
         added = observe(scene, [drawn.change(2.0)]).force_N - observe(scene).force_N

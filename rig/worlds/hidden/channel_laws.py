@@ -45,7 +45,8 @@ def drifting_force(law: str) -> Callable[[Scene, Generator], Drawn]:
     def draw(scene: Scene, random: Generator) -> Drawn:
         each = law == "each_channel"
         path, extra = drift_path(scene, "warm_up" if each else law, random)
-        channels = random.choice([-1.0, 1.0]) * np.ones(3)
+        along = float(random.choice([-1.0, 1.0]))  # every direction
+        channels = along * np.ones(3)
         if each:
             channels = random.choice([-1.0, 1.0], 3) * random.uniform(0.3, 1.0, 3)
         else:  # alike along every direction that has no opposite
@@ -57,7 +58,7 @@ def drifting_force(law: str) -> Callable[[Scene, Generator], Drawn]:
 
         def parameters(size: float) -> dict[str, Any]:
             end = size * float(path[-1])  # a path that turns back ends elsewhere than at its most
-            drift = end * channels if each else end * float(channels[0])
+            drift = end * channels if each else end * along
             return {"drift_over_session_N": drift, "session_s": float(scene.history.time[-1]),
                     **extra}  # fmt: skip
 
