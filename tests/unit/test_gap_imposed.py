@@ -218,3 +218,14 @@ def test_creep_under_a_weight_is_no_sliding() -> None:
     data = bench_data(8.0 * force, 2**-10 * moved, time=t, session=t, step=np.full(400, -1))
     known = replace(data.instruments, force=8e-4, displacement=1e-7)
     assert not displacement_simpler(replace(data, instruments=known))
+
+
+def test_what_toggles_between_two_steps_of_its_scale_does_not_slide_to_and_fro() -> None:
+    """A speed, counted coarsely, behind a step of the voltage, which stands."""
+    t = np.arange(60) * 0.02
+    force = np.where(t > 0.2, 9.0, 0.0)
+    speed = 11 * (1 - np.exp(-np.maximum(t - 0.2, 0) / 0.12))
+    toggles = np.where(np.arange(60) % 2, 0.3, -0.3) * (t > 0.5)
+    data = bench_data(force, 1e-3 * np.round((speed + toggles) / 0.73) * 0.73, time=t, session=t,
+                      step=np.full(60, -1))  # fmt: skip
+    assert not displacement_simpler(data)

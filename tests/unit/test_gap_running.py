@@ -45,6 +45,12 @@ def test_white_noise_of_a_dense_recording_is_found_and_motion_is_not_taken_for_i
     assert white_noise(rng.normal(0, 1.0, 50)) == 0.0  # too short to tell
 
 
+def test_noise_of_turning_points_alone_is_told_by_every_second_one() -> None:
+    rng = np.random.default_rng(3)
+    peaks = np.where(np.arange(400) % 2, 1.0, -1.0)
+    assert white_noise(peaks + rng.normal(0, 1e-3, 400)) == pytest.approx(1e-3, rel=0.2)
+
+
 def test_an_understated_uncertainty_is_raised_to_what_the_samples_show() -> None:
     rng = np.random.default_rng(2)
     force = 100 * triangle(3000, 3)
@@ -114,6 +120,7 @@ def test_cycles_and_an_unloaded_rig_show_drifts_of_any_path(word: str) -> None:
     rest = make_bench(running(still, moving, imposed="force"))
     assert rest.stands
     assert "free path" in words_with(rest, word)
+    assert free_paths(rest) == {"free path": 10}  # a quicker one could be anything
 
 
 def test_under_a_load_that_stands_what_runs_is_creep_and_no_free_drift() -> None:
@@ -188,6 +195,37 @@ def test_a_pull_whose_force_falls_is_not_said_to_be_elastic(falls: bool) -> None
                    compliance=np.array([1e-3 / force[10] * x[10]]))  # fmt: skip
     found = diagnose_gap(data)
     assert found.verdict == ("unknown" if falls else "joint_nonlinear_stiffness")
+
+
+def test_one_reading_that_jumps_is_no_fall_of_the_force() -> None:
+    """A specimen that locks, with a glitch of a quarter of the range."""
+    u = np.linspace(0, 1e-3, 80)
+    force = 40 * (u / 1e-3) ** 3 + 20 * u / 1e-3
+    force[30] += 15.0
+    said = diagnose_gap(running(force, u, imposed="displacement"))
+    assert said.verdict == "joint_nonlinear_stiffness"
+
+
+def test_a_curve_off_its_zero_that_comes_again_is_elastic() -> None:
+    """A pin that bears at one side before it does at the other, moved to and fro."""
+    t = np.arange(400.0)
+    u = 1e-3 * np.sin(t / 20)
+    force = 2e5 * (np.maximum(u - 1e-4, 0) - np.maximum(-6e-4 - u, 0)) + 2e4 * u
+    force += np.random.default_rng(5).normal(0, 0.1, 400)
+    said = diagnose_gap(running(force, u, imposed="displacement"))
+    assert said.verdict in ("joint_nonlinear_stiffness", "joint_backlash")
+    assert said.after < 0.1 * said.before
+    labels = [v.label for v in library(make_bench(running(force, u, imposed="displacement")))]
+    assert any("uneven" in label for label in labels)
+    half = [v.label for v in library(make_bench(running(force[:90], u[:90])))]
+    assert not any("uneven" in label for label in half)
+
+
+@pytest.mark.parametrize(("both", "seats"), [(False, True), (True, False)])
+def test_what_bears_both_ways_is_no_seat(both: bool, seats: bool) -> None:
+    load = 100 * np.sin(np.arange(300) / 15)
+    force = load if both else np.abs(load)
+    assert bool(library(make_bench(running(force, force / SPRING)), ["contact_seating"])) == seats
 
 
 def test_one_factor_is_shared_as_calibrations_are_stated() -> None:

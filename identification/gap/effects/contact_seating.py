@@ -26,9 +26,10 @@ SHARES = (0.003, 0.01, 0.03, 0.1)  # of the deflection
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Per force scale and law, and a mixture of scales."""
+    """Per force scale and law, and a mixture of scales. What bears both ways is no seat: what is
+    slack there is a play."""
     top = float(np.abs(bench.load).max())
-    if not top > 0:
+    if not top > 0 or not (bench.data.arm or bench.one_sided):
         return []
     scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else BENCH_SHARES))
     size, sign = pressed(bench)

@@ -30,11 +30,13 @@ SCALES = (0.05, 0.15, 0.4, 1.0)
 FINE = (0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.86, 0.91,
         0.95, 0.98)  # fmt: skip
 FINE_SCALES = (0.15, 1.0, 6.0, 40.0)
+ALONG = tuple(k / 24 for k in range(1, 24))  # of all of the range, where it goes both ways
 
 
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: a smooth curve of several hinges, one quadratic, one cubic, one corner; where a
-    rig without an arm came back along its curve, a finer one."""
+    rig without an arm came back along its curve, a finer one, and one uneven where it was loaded
+    both ways."""
     out = []
     for j in bench.moving_joints():
         torque = bench.true_torque[:, j]
@@ -66,6 +68,8 @@ def variants(bench: Bench) -> list[Variant]:
             )  # fmt: skip
         if not bench.data.arm and bench.rows.continuous and bench.unloads:
             out.append(_fine(bench, j, line, top))
+            if not bench.one_sided and bench.passes > 2:  # in half a loop it could be anything
+                out.append(_uneven(bench, j, line, top))
         if bench.feels_weight(j):
             out += _net(bench, j, line)
     return out
@@ -139,6 +143,17 @@ def hinge(x: Array, bend: float) -> Array:
 def above(torque: Array, weight: Array, bend: float) -> Array:
     """(n,) by how much the net torque is above a bend more than under the weight (n,) alone."""
     return np.asarray(np.maximum(torque + weight - bend, 0.0) - np.maximum(weight - bend, 0.0))
+
+
+def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
+    """A curve that pull and push have each its own, or that lies off the zero of either."""
+    x, c = bench.true_torque[:, j], bench.compliance[j]
+    places = float(x.min()) + float(np.ptp(x)) * np.array(ALONG)
+    columns = [bench.add_joint(j, c * above(x, bench.weight(j), b)) for b in places]
+    kinds = ("line", *(("above", float(b)) for b in places))
+    return variant(WORD, f"joint {j + 1} uneven curve", [line, *columns], FINE_SCALES,
+                   _root(len(places)), positive=False, prior=0.4, kinds=kinds, tool_kg=TOOL_KG,
+                   joint=j, torque=top)  # fmt: skip
 
 
 def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
