@@ -108,6 +108,15 @@ def test_every_shape_of_the_library_is_its_law_on_an_arm(bench: Bench, word: str
     assert assert_same(replace(bench, columns=[]), (word,)) > 0
 
 
+def test_slow_flow_with_the_square_of_the_overstress_is_for_arms(bench: Bench) -> None:
+    """A single spring under a load that stands creeps so."""
+    loose = replace(bench_data(30 * np.repeat(np.arange(9.0), 4), np.zeros(36)), timed=True)
+    for there, squared in ((replace(bench, columns=[]), True), (make_bench(loose), False)):
+        knee = next(v for v in library(there, ["joint_yield"]) if v.label.endswith("sharp"))
+        assert any("flow" in v.label for v in refined(there, knee))
+        assert any("squared" in v.label for v in refined(there, knee)) == squared
+
+
 @pytest.mark.parametrize("imposed", [None, "displacement"])
 def test_every_shape_of_the_library_is_its_law_on_a_bench(imposed: str | None) -> None:
     assert assert_same(bench_without_arm(imposed), WORDS) > 100

@@ -10,7 +10,7 @@ import pytest
 
 from identification.gap.bench import displacement_imposed
 from identification.gap.data import Array, GapData
-from identification.gap.imposed import displacement_simpler
+from identification.gap.imposed import _Channel, _slides, displacement_simpler
 from tests.unit.test_gap_operators import bench_data
 
 NOISE = 3e-4  # of the range
@@ -222,10 +222,12 @@ def test_creep_under_a_weight_is_no_sliding() -> None:
 
 def test_what_toggles_between_two_steps_of_its_scale_does_not_slide_to_and_fro() -> None:
     """A speed, counted coarsely, behind a step of the voltage, which stands."""
-    t = np.arange(60) * 0.02
-    force = np.where(t > 0.2, 9.0, 0.0)
-    speed = 11 * (1 - np.exp(-np.maximum(t - 0.2, 0) / 0.12))
-    toggles = np.where(np.arange(60) % 2, 0.3, -0.3) * (t > 0.5)
-    data = bench_data(force, 1e-3 * np.round((speed + toggles) / 0.73) * 0.73, time=t, session=t,
-                      step=np.full(60, -1))  # fmt: skip
-    assert not displacement_simpler(data)
+    t = np.arange(120) * 0.01
+    force = np.where(t > 0.2, 1.0, 0.0)
+    speed = np.round((1 - np.exp(-np.maximum(t - 0.2, 0) / 0.12)) * 15) / 15
+    toggles = np.where(np.arange(120) % 2, 1 / 15, 0.0) * (t > 0.5)
+    still, moved = _Channel(t, force, 0.0), _Channel(t, speed + toggles, 0.03)
+    assert not _slides(still, moved)
+    there = _Channel(t, np.where(t < 0.6, t, 1.2 - t) / 0.6, 0.03)
+    rubs = _Channel(t, np.where(t < 0.6, 1.0, -1.0), 0.0)
+    assert _slides(rubs, there)

@@ -8,9 +8,13 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
+from identification.gap.compare import moved_response
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
+from identification.gap.evidence import Engine
+from identification.gap.parts import _beyond_springs
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
@@ -70,3 +74,15 @@ def test_any_two_springs_may_be_wrong_together(bench: Bench) -> None:
     fresh, variants = of(bench, "joint_stiffness_error")
     pairs = {tuple(v.info["joints"]) for v in variants.values() if len(v.info["joints"]) == 2}
     assert pairs == set(combinations(fresh.moving_joints(), 2))
+
+
+def test_of_what_the_springs_hide_a_little_counts(bench: Bench) -> None:
+    """Wrong springs are all that springs can give; beside another effect they are not nothing."""
+    target = bench.observed - prediction(bench)
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
+    spring = engine.base.index("spring")[:1]
+    column = engine.base.columns[: bench.rows.n, spring] * engine.base.sd[spring]
+    moved = 0.5 * moved_response(engine, column)[:, 0]  # half a standard deviation
+    size = np.sqrt(bench.rows.weight @ moved**2 / bench.rows.weight.sum())
+    assert _beyond_springs(engine, moved) == pytest.approx(0.03 * size)
+    assert _beyond_springs(engine, 100 * moved) > 0.9 * 100 * size

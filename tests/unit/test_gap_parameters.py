@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap import posterior
 from identification.gap.bench import Bench, make_bench
 from identification.gap.effects import library
 from identification.gap.effects.time_lag import late
@@ -282,6 +283,27 @@ def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> Non
     assert found.value == pytest.approx(30.0, rel=0.01)
     assert sd(found) == pytest.approx(np.hypot(sd(alone), 6.0 / 12**0.5), rel=0.01)
     assert found.high - 30.0 == pytest.approx(30.0 - found.low)
+
+
+def test_beside_another_effect_intervals_are_wider(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = small_engine(small_bench())
+    family = [
+        Variant(word, word, (k,), (1.0,), np.eye(1), info=info)
+        for word, k, info in (
+            ("joint_stiffness_error", 0, {"joints": [0], "joint": 0}),
+            ("force_scale", 1, {}),
+        )
+    ]
+    parts = tuple(Part(v, 1.0) for v in family)
+    both = Explanation(parts, 0.0, 0.0, (1.0, 0.5), 0.0)
+    wide = parameters_of(engine, family, both)[1]["factor"]
+    alone = parameters_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,)))
+    monkeypatch.setattr(posterior, "SHARING", 1.0)
+    narrow = parameters_of(engine, family, both)[1]["factor"]
+    assert np.log(wide.high / wide.value) == pytest.approx(
+        SHARING * np.log(narrow.high / narrow.value)
+    )
+    assert parameters_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,))) == alone
 
 
 def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
