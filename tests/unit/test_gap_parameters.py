@@ -300,6 +300,7 @@ def test_beside_another_effect_intervals_are_wider(monkeypatch: pytest.MonkeyPat
     alone = parameters_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,)))
     monkeypatch.setattr(posterior, "SHARING", 1.0)
     narrow = parameters_of(engine, family, both)[1]["factor"]
+    assert SHARING > 1.2
     assert np.log(wide.high / wide.value) == pytest.approx(
         SHARING * np.log(narrow.high / narrow.value)
     )
