@@ -226,6 +226,15 @@ def test_a_curve_off_its_zero_that_comes_again_is_elastic() -> None:
     assert not any("uneven" in label for label in half)
 
 
+def test_a_specimen_that_is_only_let_go_does_not_flow_back() -> None:
+    load = 100 * np.sin(np.arange(300) / 15)
+    for force, back in ((load, True), (np.abs(load), False)):
+        labels = [
+            v.label for v in library(make_bench(running(force, force / SPRING)), ["joint_yield"])
+        ]
+        assert any("flows back" in label for label in labels) == back
+
+
 @pytest.mark.parametrize(("both", "seats"), [(False, True), (True, False)])
 def test_what_bears_both_ways_is_no_seat(both: bool, seats: bool) -> None:
     load = 100 * np.sin(np.arange(300) / 15)

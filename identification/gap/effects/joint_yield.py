@@ -221,10 +221,11 @@ _REVERSED = 0.05  # of the largest load: so far back it is a reversal
 def after_yield(bench: Bench, load: Array, top: float, fresh: Flags) -> list[Array]:
     """States (n,) of what yielding leaves behind: smaller plays from the first reversal on, zero
     before (the first loading has a knee as sharp as it likes), and a ratchet; empty where nothing
-    is reversed. top: range of the load."""
+    is reversed. A specimen that is only let go takes back what is elastic: where more comes back,
+    a curve or friction does that. top: range of the load."""
     peak_of = peaks(load, BACK_FROM * top, fresh)
     after = peak_of >= 0
-    if not after.any():
+    if not after.any() or (not bench.data.arm and bench.one_sided):
         return []
     states = bench.plays(load, top * np.array(BACK), fresh)
     back = [np.where(after, s - s[peak_of], 0.0) for s in states.T]
