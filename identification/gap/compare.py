@@ -118,7 +118,7 @@ def _stacks(engine: Engine, batch: list[Variant]) -> _Stacks:
     """Columns (v, k), roots (v, k, k), scales (v, s), mean squares (v, k, k) and limits of a batch,
     and per level its products (v, k, k), made once: batches come again with every effect that is
     added."""
-    key = ("batch", tuple(map(id, batch)))
+    key = tuple(batch)  # the variants themselves: the id of one that is gone may come again
     if key not in engine.stacks:
         columns = np.array([v.columns for v in batch])
         engine.stacks[key] = (
