@@ -8,8 +8,9 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
-from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR, log_level
-from identification.gap.signs import Limits, log_odds
+from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
+from identification.gap.signs import Limits
+from identification.gap.table import Stack, Table
 from identification.gap.variants import Variant
 
 
@@ -31,9 +32,9 @@ def score(
     already: mean square (m^2) of that effect: it brings imperfection of its own.
     """
     out: list[Scored | None] = [None] * len(variants)
-    by_size: dict[tuple[int, int], list[int]] = {}
+    by_size: dict[tuple[str, int, int], list[int]] = {}
     for i, v in enumerate(variants):
-        by_size.setdefault((len(v.columns), len(v.scales)), []).append(i)
+        by_size.setdefault((v.word, len(v.columns), len(v.scales)), []).append(i)
     for members in by_size.values():
         batch = [variants[i] for i in members]
         for i, s in zip(members, _score_batch(engine, levels, batch, already), strict=True):
@@ -44,102 +45,31 @@ def score(
 def _score_batch(
     engine: Engine, levels: list[Level], batch: list[Variant], already: float
 ) -> list[Scored]:
-    columns, root, scales, plain, limits, squares = _stacks(engine, batch)
-
-    def of_level(i: int) -> tuple[Array, Array, Array, Array]:
-        level = levels[i]
-        gram = _rotate(level, squares[i], columns, root)
-        moment = np.einsum("vji,vj->vi", root, level.moment[columns])
-        values, vectors = np.linalg.eigh(gram)
-        values = np.maximum(values, 0.0)
-        beta = np.einsum("vji,vj->vi", vectors, moment)
-        s2 = scales[:, :, None] ** 2  # (v, s, 1)
-        gain = 1 + s2 * values[:, None, :]
-        mean = s2 * beta[:, None, :] / gain
-        fit = 0.5 * np.sum(mean * beta[:, None, :], axis=2) - 0.5 * np.log(gain).sum(axis=2)
-        turned = mean @ np.swapaxes(vectors, 1, 2)
-        energy = np.sum((turned @ plain) * turned, axis=2)
-        log = level.log_base + fit + log_level(engine.etas, i, energy + already)
-        return log, vectors, mean, s2 / gain
-
-    made = [of_level(i) for i in range(len(levels))]
-    logs = np.stack([m[0] for m in made])
-    if limits is not None:
-        _limit(logs, limits, [v.word for v in batch], root, scales, [m[1:] for m in made])
-    flat = logs.transpose(1, 0, 2).reshape(len(batch), -1)
+    """Of variants of one word, with as many coefficients and scales each."""
+    key = tuple(batch)  # batches come again with every effect that is added
+    if key not in engine.stacks:
+        engine.stacks[key] = _stack(engine, batch)
+    table = Table(engine, levels, engine.stacks[key], already)
+    table.look()
+    table.limit()
+    flat = table.logs.transpose(1, 0, 2).reshape(len(batch), -1)
     best = flat.argmax(axis=1)
-    total = logsumexp(flat) - np.log(scales.shape[1])
-    number = scales.shape[1]
+    number = len(batch[0].scales)
+    total = logsumexp(flat) - np.log(number)
     return [
         Scored(v, float(t) + float(np.log(v.prior)), v.scales[b % number], int(b // number))
         for v, t, b in zip(batch, total, best, strict=True)
     ]
 
 
-def _limit(
-    logs: Array, limits: Limits, words: list[str], root: Array, scales: Array,
-    fits: list[tuple[Array, Array, Array]],
-) -> None:  # fmt: skip
-    """Takes from the log evidence (l, v, s) what the limits cost that physics sets, where it counts
-    among the shapes of its word. fits: per level, eigenvectors (v, k, k), mean and variance
-    (v, s, k) of the coefficients along them."""
-    word = np.unique(words, return_inverse=True)[1]
-    before = np.linalg.norm((limits.rows[:, :1] @ root)[:, 0], axis=1)
-    todo, done = np.zeros(logs.shape, dtype=bool), np.zeros(logs.shape, dtype=bool)
-
-    def take(i: int) -> None:
-        which, scale = np.nonzero(todo[i])
-        vectors, mean, variance = fits[i]
-        spread = np.swapaxes(root[which] @ vectors[which], 1, 2)  # to the coefficients
-        at = which, scale
-        sd = before[which] * scales[at]
-        centre = (mean[at][:, None] @ spread)[:, 0]
-        roots = np.sqrt(variance[at])[:, :, None] * spread
-        logs[i][at] += log_odds(limits, which, sd, centre, roots)
-
-    while True:
-        top = np.full(word.max() + 1, -np.inf)
-        np.maximum.at(top, word, logs.max(axis=(0, 2)))
-        todo = (logs > top[word][:, None] - _COUNTS) & ~done
-        if not todo.any():
-            return
-        for i in np.flatnonzero(todo.any(axis=(1, 2))):
-            take(int(i))
-        done |= todo
-
-
-_COUNTS = 40.0  # nats below the best of its word: what lies further down adds nothing
-
-
-_Stacks = tuple[Array, Array, Array, Array, Limits | None, list[Array]]
-
-
-def _stacks(engine: Engine, batch: list[Variant]) -> _Stacks:
-    """Columns (v, k), roots (v, k, k), scales (v, s), mean squares (v, k, k) and limits of a batch,
-    and per level its products (v, k, k), made once: batches come again with every effect that is
-    added."""
-    key = tuple(batch)  # the variants themselves: the id of one that is gone may come again
-    if key not in engine.stacks:
-        columns = np.array([v.columns for v in batch])
-        engine.stacks[key] = (
-            columns,
-            np.stack([v.root for v in batch]),
-            np.array([v.scales for v in batch]),
-            np.stack([raw_gram(engine, v) for v in batch]),
-            Limits.of(batch),
-            engine.squares(columns),
-        )
-    found: _Stacks = engine.stacks[key]
-    return found
-
-
-def _rotate(level: Level, part: Array, columns: Array, root: Array) -> Array:
-    if len(level.taken):
-        gone = level.taken[:, columns].transpose(1, 0, 2)  # (v, r, k)
-        part = part - np.swapaxes(gone, 1, 2) @ gone
-    if np.array_equal(root, np.broadcast_to(np.eye(root.shape[1]), root.shape)):
-        return np.asarray(part)
-    return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
+def _stack(engine: Engine, batch: list[Variant]) -> Stack:
+    return Stack(
+        np.array([v.columns for v in batch]),
+        np.stack([v.root for v in batch]),
+        np.array([v.scales for v in batch]),
+        np.stack([raw_gram(engine, v) for v in batch]),
+        Limits.of(batch),
+    )
 
 
 def raw_gram(engine: Engine, variant: Variant) -> Array:
@@ -181,6 +111,7 @@ def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float)
         level,
         moment=level.moment - cross.T @ left,
         log_base=level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum()),
+        misfit=level.misfit - float(left @ left),
         taken=np.vstack([level.taken, cross]),
     )
 

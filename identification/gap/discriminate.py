@@ -244,7 +244,8 @@ def _discrimination(bench: Bench, design: Design, rivals: tuple[_Rival, _Rival])
 def _told(level: Level, place: int) -> Level:
     """The level of a bench on which nothing was observed, had the pool's column been observed."""
     moment = level.beside([place])[0]
-    return replace(level, moment=moment, log_base=level.log_base - 0.5 * float(moment[place]))
+    misfit = float(moment[place])
+    return replace(level, moment=moment, misfit=misfit, log_base=level.log_base - 0.5 * misfit)
 
 
 def _simulated(

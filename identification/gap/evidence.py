@@ -39,9 +39,9 @@ class Level:
     """Pool and data with the base integrated out, for one size of imperfection eta (m), the
     `number`th of its engine.
 
-    moment (p,): of the pool; log_base: evidence of the base alone, nats. taken (r, p): what effects
-    that were integrated out as well take from the Gram matrix, `gram - taken' taken`; no full
-    matrix is ever made.
+    moment (p,): of the pool; log_base: evidence of the base alone, nats; misfit: square of what is
+    left of the target, in units of the noise. taken (r, p): what effects that were integrated out
+    as well take from the Gram matrix, `gram - taken' taken`; no full matrix is ever made.
     """
 
     engine: Engine
@@ -49,6 +49,7 @@ class Level:
     eta: float
     moment: Array
     log_base: float
+    misfit: float
     taken: Array
 
     def square(self, columns: Sequence[int]) -> Array:
@@ -90,7 +91,7 @@ class Engine:
         self._white = self._whiten(self.columns([]))
         none = np.zeros(0)
         self.levels = [
-            Level(self, i, float(eta), none, b.log_base, np.zeros((0, 0)))
+            Level(self, i, float(eta), none, b.log_base, b.misfit, np.zeros((0, 0)))
             for i, (eta, b) in enumerate(zip(etas, self._bases, strict=True))
         ]
         self.extend()
@@ -110,19 +111,17 @@ class Engine:
         wanted = [self.bench.columns[i] for i in numbers]
         return np.array(wanted).reshape(len(wanted), self.bench.layout.size).T
 
-    def squares(self, columns: NDArray[np.intp]) -> list[Array]:
-        """Per level (v, k, k): parts of the Gram matrix of the columns (v, k) of every variant."""
-        made = self._white.squares(columns, self._weights)
-        for base, square in zip(self._bases, made, strict=True):
-            shared = base.pool[columns]
-            np.subtract(square, shared @ np.swapaxes(shared, 1, 2), out=square)
-        return made
+    def squares(self, columns: NDArray[np.intp], number: int) -> Array:
+        """(v, k, k): parts of a level's Gram matrix of the columns (v, k) of every variant."""
+        shared = self._bases[number].pool[columns]
+        made = self._white.squares(columns, self._weights[number])
+        return np.asarray(made - shared @ np.swapaxes(shared, 1, 2))
 
     def square(self, columns: tuple[int, ...]) -> list[Array]:
         """Per level (k, k): the part of the Gram matrix of some columns, kept for the next time."""
         if columns not in self._squares:
-            made = self.squares(np.array([columns], dtype=np.intp))
-            self._squares[columns] = [m[0] for m in made]
+            at = np.array([columns], dtype=np.intp)
+            self._squares[columns] = [self.squares(at, i)[0] for i in range(len(self.etas))]
         return self._squares[columns]
 
     def beside(self, columns: tuple[int, ...]) -> list[Array]:
@@ -203,9 +202,10 @@ class Engine:
         share = self._freedom / max(len(w.contrast), 1)
         log_noise = -0.5 * (np.log(w.hold).sum() + np.log(w.q).sum())
         log_noise -= 0.5 * share * np.log(w.contrast).sum()
-        log_base = -0.5 * (gram[0, 0] - left @ left) - np.log(np.diag(factor)).sum() - log_noise
+        misfit = float(gram[0, 0] - left @ left)
+        log_base = float(-0.5 * misfit - np.log(np.diag(factor)).sum() - log_noise)
         none = np.zeros((0, kb + count))
-        return _Integrated(root, factor.astype(float), left.astype(float), float(log_base), none)
+        return _Integrated(root, factor.astype(float), left.astype(float), log_base, misfit, none)
 
     def _grown(self, level: Level, white: White) -> Level:
         """A level with further columns."""
@@ -230,12 +230,14 @@ def _forward(factor: Array, values: Array) -> Array:
 @dataclass(frozen=True, eq=False)
 class _Integrated:
     """Prior root (k, k) of base and imperfection, Cholesky factor (k, k) of their precision, what
-    the target (k,) and the pool (p, k) share with them, evidence of the base alone."""
+    the target (k,) and the pool (p, k) share with them, evidence of the base alone, and its misfit
+    (as of a `Level`)."""
 
     root: Array
     factor: Array
     left: Array
     log_base: float
+    misfit: float
     pool: Array
 
 

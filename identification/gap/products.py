@@ -156,29 +156,22 @@ class White:
         q = tuple(s.picked(columns) for s in self.q)
         return White(self.even[columns], q, self.contrast.picked(columns), self.holds)
 
-    def squares(self, columns: NDArray[np.intp], weights: list[Weights]) -> list[Array]:
-        """(v, k, k) per set of weights: products of the columns (v, k) of every variant."""
+    def squares(self, columns: NDArray[np.intp], w: Weights) -> Array:
+        """(v, k, k): products of the columns (v, k) of every variant."""
         v, k = columns.shape
         step = max(1, _AT_ONCE // max(k * self.even.shape[1], 1))
-        chunks = [columns[i : i + step] for i in range(0, v, step)]
-        made = [self._squares(c, weights) for c in chunks]
-        return [np.concatenate([m[i] for m in made]) for i in range(len(weights))]
+        return np.concatenate([self._squares(columns[i : i + step], w) for i in range(0, v, step)])
 
-    def _squares(self, columns: NDArray[np.intp], weights: list[Weights]) -> list[Array]:
+    def _squares(self, columns: NDArray[np.intp], w: Weights) -> Array:
         even = self.even[columns]
-        across = np.swapaxes(even, 1, 2)
-        out = [(even * self._even(w)) @ across for w in weights]
-        for j, some in enumerate((*self.q, self.contrast)):
+        out = (even * self._even(w)) @ np.swapaxes(even, 1, 2)
+        for some, weight in zip((*self.q, self.contrast), (*self._q(w), w.contrast), strict=True):
             at = some.at[columns]
             mine = np.flatnonzero((at != some.none).any(axis=1))
-            if not mine.size:
-                continue
-            part = some.values[at[mine]]
-            across = np.swapaxes(part, 1, 2)
-            for square, w in zip(out, weights, strict=True):
-                weight = w.contrast if j == len(self.q) else self._q(w)[j]
-                square[mine] += (part * weight) @ across
-        return out
+            if mine.size:
+                part = some.values[at[mine]]
+                out[mine] += (part * weight) @ np.swapaxes(part, 1, 2)
+        return np.asarray(out)
 
     def _even(self, w: Weights) -> Array:
         return np.concatenate([w.hold, np.ones(self.even.shape[1] - self.holds)])
