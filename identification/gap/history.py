@@ -91,25 +91,25 @@ def bristles(
     `dz = (s - z) s dx / r` with s the sense of motion (Dahl); elastic: while z opposes the motion
     it falls linearly, `dz = dx / r` (Bouc-Wen with beta = gamma). Exact between rows.
     """
-    out = np.empty((len(load), len(reach)))
-    hung = np.zeros(out.shape)
+    hung = np.zeros((len(load), len(reach)))
     if weight is not None:
         hung = -np.sign(weight)[:, None] * np.expm1(-np.abs(weight)[:, None] / reach)
-    z = hung[0]
-    before = 0.0
-    for i, x in enumerate(load):
-        if fresh[i]:
-            z, before = hung[i], 0.0
-        way = np.abs(x - before) / reach
-        s = np.sign(x - before)
-        if elastic:
-            back = np.minimum(np.maximum(-s * z, 0.0), way)
-            z, way = z + s * back, way - back
-        if s != 0:
-            z = s - (s - z) * np.exp(-way)
-        before = x
-        out[i] = z
-    return out - hung
+    begins = fresh | (np.arange(len(load)) == 0)
+    step = load - np.where(begins, 0.0, np.concatenate([[0.0], load[:-1]]))
+    sense, way = np.sign(step)[:, None], np.abs(step)[:, None] / reach
+    if not elastic:
+        from_before = np.where(begins[:, None], hung, 0.0)
+        still = np.exp(-way)
+        gain = still * from_before - sense * np.expm1(-way)
+        return np.asarray(_prefix(np.where(begins[:, None], 0.0, still), gain) - hung)
+    changes = begins | (step != 0)
+    states, z = [], hung[0]
+    for i in np.flatnonzero(changes):
+        z = hung[i] if begins[i] else z
+        back = np.minimum(np.maximum(-sense[i] * z, 0.0), way[i])
+        z = sense[i] - (sense[i] * (1 - back) - z) * np.exp(back - way[i])
+        states.append(z)
+    return np.asarray(np.array(states)[np.cumsum(changes) - 1] - hung)
 
 
 def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
@@ -240,7 +240,8 @@ def half_sample(rows: Rows) -> float:
 
 
 def delayed(values: Array, delay: float, rows: Rows) -> Array:
-    """`values(t - delay)` (n,), within every run, the path between rows being straight ramps."""
+    """`values(t - delay)` of values (n,) or (n, k), within every run, the path between rows being
+    straight ramps."""
     out = np.empty_like(values)
     half = half_sample(rows)
     edges = np.append(np.flatnonzero(rows.starts), rows.n)
@@ -253,5 +254,8 @@ def delayed(values: Array, delay: float, rows: Rows) -> Array:
             v = np.concatenate([v, v[new], v[:-1][new[1:]]])
             order = np.argsort(t, kind="stable")
             t, v = t[order], v[order]
-        out[a:b] = np.interp(rows.time[a:b] - delay, t, v)
+        place = np.interp(rows.time[a:b] - delay, t, np.arange(len(t), dtype=float))
+        low = place.astype(np.intp)
+        share = (place - low).reshape(-1, *[1] * (v.ndim - 1))
+        out[a:b] = v[low] + share * (v[np.minimum(low + 1, len(v) - 1)] - v[low])
     return out

@@ -106,7 +106,7 @@ def _smooth(bench: Bench, values: Array) -> Array:
 def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
     """Values (n, k) as a channel shows them that lags."""
     if kind == "delay":
-        return np.column_stack([delayed(v, lag, bench.rows) for v in values.T])
+        return delayed(values, lag, bench.rows)
     times = np.full(values.shape[1], lag)
     return retarded(values, times, bench.rows, rests(bench.rows))
 
@@ -134,13 +134,13 @@ def _true_force(bench: Bench, kind: str, lag: float) -> Array:
     shown, out = _behind(bench, holds, kind, lag), bench.load.copy()
     for run in np.unique(rows.run):
         mine = rows.run == run
-        used = np.unique(within[mine])
+        used, number = np.unique(within[mine], return_inverse=True)
         A, root = shown[mine][:, used], np.sqrt(rows.weight[mine])
-        mean = np.array([out[mine][within[mine] == h].mean() for h in used])
+        mean = np.bincount(number, weights=bench.load[mine]) / np.bincount(number)
         left = bench.load[mine] - A @ mean
         weighted = np.vstack([A * root[:, None], _HOLDS_BACK * np.eye(len(used))])
         change = np.linalg.lstsq(weighted, np.append(left * root, np.zeros(len(used))), rcond=None)
-        out[mine] = holds[mine][:, used] @ (mean + change[0])
+        out[mine] = (mean + change[0])[number]
     return out
 
 
