@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.gap.data import Array, Ints
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
+from identification.gap.products import squares_of
 from identification.gap.signs import Limits
 from identification.gap.table import Stack, Table
 from identification.gap.variants import Variant
@@ -31,59 +32,59 @@ def score(
 
     already: mean square (m^2) of that effect: it brings imperfection of its own.
     """
-    out: list[Scored | None] = [None] * len(variants)
-    by_size: dict[tuple[str, int, int], list[int]] = {}
-    for i, v in enumerate(variants):
-        by_size.setdefault((v.word, len(v.columns), len(v.scales)), []).append(i)
-    for members in by_size.values():
-        batch = [variants[i] for i in members]
-        for i, s in zip(members, _score_batch(engine, levels, batch, already), strict=True):
-            out[i] = s
-    return [s for s in out if s is not None]
+    out: dict[Variant, Scored] = {}
+    by_size: dict[tuple[int, int], dict[str, list[Variant]]] = {}
+    for v in variants:
+        words = by_size.setdefault((len(v.columns), len(v.scales)), {})
+        words.setdefault(v.word, []).append(v)
+    for words in by_size.values():
+        out |= _score_batch(engine, levels, list(words.values()), already)
+    return [out[v] for v in variants]
 
 
 def _score_batch(
-    engine: Engine, levels: list[Level], batch: list[Variant], already: float
-) -> list[Scored]:
-    """Of variants of one word, with as many coefficients and scales each."""
-    key = tuple(batch)  # batches come again with every effect that is added
-    if key not in engine.stacks:
-        engine.stacks[key] = _stack(engine, batch)
-    table = Table(engine, levels, engine.stacks[key], already)
+    engine: Engine, levels: list[Level], families: list[list[Variant]], already: float
+) -> dict[Variant, Scored]:
+    """Of variants with as many coefficients and scales each, word by word."""
+    table = Table(engine, levels, [_stack(engine, tuple(f)) for f in families], already)
     table.look()
     table.limit()
+    batch = [v for family in families for v in family]
     flat = table.logs.transpose(1, 0, 2).reshape(len(batch), -1)
     best = flat.argmax(axis=1)
     number = len(batch[0].scales)
     total = logsumexp(flat) - np.log(number)
-    return [
-        Scored(v, float(t) + float(np.log(v.prior)), v.scales[b % number], int(b // number))
+    return {
+        v: Scored(v, float(t) + float(np.log(v.prior)), v.scales[b % number], int(b // number))
         for v, t, b in zip(batch, total, best, strict=True)
-    ]
+    }
 
 
-def _stack(engine: Engine, batch: list[Variant]) -> Stack:
-    return Stack(
-        np.array([v.columns for v in batch]),
-        np.stack([v.root for v in batch]),
-        np.array([v.scales for v in batch]),
-        np.stack([raw_gram(engine, v) for v in batch]),
-        Limits.of(batch),
-    )
+def _stack(engine: Engine, family: tuple[Variant, ...]) -> Stack:
+    """Made once: families come again with every effect that is added."""
+    if family not in engine.stacks:
+        columns = np.array([v.columns for v in family])
+        root = np.stack([v.root for v in family])
+        engine.stacks[family] = Stack(
+            columns,
+            root,
+            np.array([v.scales for v in family]),
+            np.swapaxes(root, 1, 2) @ mean_squares(engine, columns, family[0].word) @ root,
+            Limits.of(family),
+        )
+    found: Stack = engine.stacks[family]
+    return found
 
 
-def raw_gram(engine: Engine, variant: Variant) -> Array:
-    """(k, k): mean square response (m^2) of coefficients, without the datum of each setup; of a
-    linear law only the part that counts as imperfect."""
-    key = (variant.columns, variant.root.tobytes())
-    if key not in engine.cache:
-        u = moved_response(engine, engine.columns(variant.columns)[: engine.bench.rows.n])
-        weight = engine.bench.rows.weight
-        part = (u * weight[:, None]).T @ u / weight.sum()
-        if variant.word in LINEAR:
-            part = part * (LAW_IMPERFECTION / IMPERFECTION) ** 2
-        engine.cache[key] = variant.root.T @ part @ variant.root
-    return engine.cache[key]
+def mean_squares(engine: Engine, columns: Ints, word: str) -> Array:
+    """(v, k, k): mean square response (m^2) of coefficients of columns (v, k), without the datum of
+    each setup; of a linear law only the part that counts as imperfect."""
+    weight = engine.bench.rows.weight
+    used, place = np.unique(columns, return_inverse=True)
+    moved = moved_response(engine, engine.columns(used)[: engine.bench.rows.n])
+    moved *= np.sqrt(weight / weight.sum())[:, None]
+    out = squares_of(moved.T, place.reshape(columns.shape))
+    return out * (LAW_IMPERFECTION / IMPERFECTION) ** 2 if word in LINEAR else out
 
 
 def moved_response(engine: Engine, response: Array) -> Array:

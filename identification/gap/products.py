@@ -158,23 +158,26 @@ class White:
 
     def squares(self, columns: NDArray[np.intp], w: Weights) -> Array:
         """(v, k, k): products of the columns (v, k) of every variant."""
-        v, k = columns.shape
-        step = max(1, _AT_ONCE // max(k * self.even.shape[1], 1))
-        return np.concatenate([self._squares(columns[i : i + step], w) for i in range(0, v, step)])
-
-    def _squares(self, columns: NDArray[np.intp], w: Weights) -> Array:
-        even = self.even[columns]
-        out = (even * self._even(w)) @ np.swapaxes(even, 1, 2)
+        out = squares_of(self.even, columns, self._even(w))
         for some, weight in zip((*self.q, self.contrast), (*self._q(w), w.contrast), strict=True):
             at = some.at[columns]
             mine = np.flatnonzero((at != some.none).any(axis=1))
-            if mine.size:
-                part = some.values[at[mine]]
-                out[mine] += (part * weight) @ np.swapaxes(part, 1, 2)
-        return np.asarray(out)
+            out[mine] += squares_of(some.values, at[mine], weight)
+        return out
 
     def _even(self, w: Weights) -> Array:
         return np.concatenate([w.hold, np.ones(self.even.shape[1] - self.holds)])
 
     def _q(self, w: Weights) -> list[Array]:
         return np.split(w.q, len(self.q)) if self.q else []
+
+
+def squares_of(values: Array, columns: NDArray[np.intp], weight: Array | float = 1.0) -> Array:
+    """(v, k, k): weighted products of the columns (v, k) of every variant, each a row of values."""
+    v, k = columns.shape
+    out = np.empty((v, k, k))
+    step = max(1, _AT_ONCE // max(k * values.shape[1], 1))
+    for i in range(0, v, step):
+        mine = values[columns[i : i + step]]
+        out[i : i + step] = (mine * weight) @ np.swapaxes(mine, 1, 2)
+    return out

@@ -10,10 +10,11 @@ that of the levels below, and, by the ratio of eta^2, that of those above.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import Array, Ints
+from identification.gap.data import Array, Flags, Ints
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import log_level
 from identification.gap.signs import Limits, log_odds
@@ -33,15 +34,29 @@ class Stack:
     limits: Limits | None
     squares: dict[int, Array] = field(default_factory=dict)
 
+    def at(self, level: Level) -> Array:
+        """Products (v, k, k) of the columns at a level, but for what effects take there."""
+        if level.number not in self.squares:
+            self.squares[level.number] = level.engine.squares(self.columns, level.number)
+        return self.squares[level.number]
+
 
 class Table:
     """logs (l, v, s): log evidence by level, variant and scale, -inf where it can't count."""
 
-    def __init__(self, engine: Engine, levels: list[Level], stack: Stack, already: float) -> None:
-        """already: mean square (m^2) of the effects that the levels contain."""
-        self._engine, self._levels, self._stack, self._already = engine, levels, stack, already
-        v, k = stack.columns.shape
-        size = len(levels), v, stack.scales.shape[1]
+    def __init__(
+        self, engine: Engine, levels: list[Level], stacks: list[Stack], already: float
+    ) -> None:
+        """stacks: of several words, one after the other. already: mean square (m^2) of the effects
+        that the levels contain."""
+        self._engine, self._levels, self._stacks, self._already = engine, levels, stacks, already
+        self._columns = np.concatenate([s.columns for s in stacks])
+        self._root = np.concatenate([s.root for s in stacks])
+        self._scales = np.concatenate([s.scales for s in stacks])
+        self._plain = np.concatenate([s.plain for s in stacks])
+        self._edges = np.cumsum([0, *(len(s.columns) for s in stacks)]).tolist()
+        v, k = self._columns.shape
+        size = len(levels), v, self._scales.shape[1]
         self.logs = np.full(size, -np.inf)
         self._seen = np.zeros(size[:2], dtype=bool)
         self._ceiling = np.array([lv.log_base + 0.5 * lv.misfit for lv in levels])
@@ -60,31 +75,39 @@ class Table:
                 self._make(i, which)
 
     def limit(self) -> None:
-        """Takes away what the limits cost that physics sets, where it counts among all shapes."""
+        """Takes away what the limits cost that physics sets, where it counts among the shapes of
+        the word."""
         done = np.zeros(self.logs.shape, dtype=bool)
-        while self._stack.limits is not None:
-            todo = (self.logs > self.logs.max() - _COUNTS) & ~done
-            if not todo.any():
-                return
-            for i in np.flatnonzero(todo.any(axis=(1, 2))):
-                which, scale = np.nonzero(todo[i])
-                self.logs[i, which, scale] += self._odds(self._stack.limits, int(i), which, scale)
-            done |= todo
+        while sum(self._limited(k, done) for k in range(len(self._stacks))):
             self.look()
 
+    def _limited(self, k: int, done: Flags) -> bool:
+        """Whether there was anything to take away in one stack that was not done (l, v, s)."""
+        limits, start = self._stacks[k].limits, self._edges[k]
+        mine = slice(start, self._edges[k + 1])
+        if limits is None:
+            return False
+        logs = self.logs[:, mine]
+        todo = (logs > logs.max() - _COUNTS) & ~done[:, mine]
+        for i in np.flatnonzero(todo.any(axis=(1, 2))).tolist():
+            which, scale = np.nonzero(todo[i])
+            logs[i, which, scale] += self._odds(limits, i, start, which, scale)
+        done[:, mine] |= todo
+        return bool(todo.any())
+
     def _make(self, i: int, which: Ints) -> None:
-        level, root = self._levels[i], self._stack.root[which]
-        moment = np.einsum("vji,vj->vi", root, level.moment[self._stack.columns[which]])
+        level, root = self._levels[i], self._root[which]
+        moment = np.einsum("vji,vj->vi", root, level.moment[self._columns[which]])
         values, vectors = np.linalg.eigh(self._gram(level, which, root))
         values = np.maximum(values, 0.0)
         beta = np.einsum("vji,vj->vi", vectors, moment)
-        s2 = self._stack.scales[which][:, :, None] ** 2  # (w, s, 1)
+        s2 = self._scales[which][:, :, None] ** 2  # (w, s, 1)
         gain = 1 + s2 * values[:, None, :]
         mean = s2 * beta[:, None, :] / gain
         taken = np.sum(mean * beta[:, None, :], axis=2)
         fit = 0.5 * taken - 0.5 * np.log(gain).sum(axis=2)
         turned = mean @ np.swapaxes(vectors, 1, 2)
-        energy = np.sum((turned @ self._stack.plain[which]) * turned, axis=2) + self._already
+        energy = np.sum((turned @ self._plain[which]) * turned, axis=2) + self._already
         self.logs[i, which] = level.log_base + fit + log_level(self._engine.etas, i, energy)
         self._vectors[i, which], self._mean[i, which] = vectors, mean
         self._variance[i, which] = s2 / gain
@@ -93,12 +116,14 @@ class Table:
 
     def _gram(self, level: Level, which: Ints, root: Array) -> Array:
         """Products (w, k, k) of unit coefficients of some variants."""
-        squares, columns = self._stack.squares, self._stack.columns
-        if level.number not in squares:
-            squares[level.number] = self._engine.squares(columns, level.number)
-        part = squares[level.number][which]
+        ends = pairwise(np.searchsorted(which, self._edges))
+        part = np.concatenate([
+            stack.at(level)[which[a:b] - start]
+            for stack, start, (a, b) in zip(self._stacks, self._edges[:-1], ends, strict=True)
+            if a < b
+        ])  # fmt: skip
         if len(level.taken):
-            gone = level.taken[:, columns[which]].transpose(1, 0, 2)  # (w, r, k)
+            gone = level.taken[:, self._columns[which]].transpose(1, 0, 2)  # (w, r, k)
             part -= np.swapaxes(gone, 1, 2) @ gone
         return np.asarray(np.swapaxes(root, 1, 2) @ part @ root)
 
@@ -109,16 +134,16 @@ class Table:
         below = self._ceiling[:i, None] - 0.5 * self._levels[i].misfit + fit
         share = (etas[i] / etas[i + 1 : len(self._levels)]) ** 2
         above = self._ceiling[i + 1 :, None] - 0.5 * share[:, None] * left
-        others = np.arange(len(self._levels)) != i
-        most = np.concatenate([below, above])
-        self._most[np.ix_(others, which)] = np.minimum(self._most[np.ix_(others, which)], most)
+        self._most[:i, which] = np.minimum(self._most[:i, which], below)
+        self._most[i + 1 :, which] = np.minimum(self._most[i + 1 :, which], above)
 
-    def _odds(self, limits: Limits, i: int, which: Ints, scale: Ints) -> Array:
-        """log odds (w,) that coefficients of variants `which` at their scales keep the limits."""
-        root = self._stack.root[which]
+    def _odds(self, limits: Limits, i: int, start: int, which: Ints, scale: Ints) -> Array:
+        """log odds (w,) that coefficients of variants `which`, counted from `start`, at their
+        scales keep the limits."""
+        at = start + which
+        root = self._root[at]
         before = np.linalg.norm((limits.rows[which, :1] @ root)[:, 0], axis=1)
-        spread = np.swapaxes(root @ self._vectors[i, which], 1, 2)  # to the coefficients
-        centre = (self._mean[i, which, scale][:, None] @ spread)[:, 0]
-        roots = np.sqrt(self._variance[i, which, scale])[:, :, None] * spread
-        sd = before * self._stack.scales[which, scale]
-        return log_odds(limits, which, sd, centre, roots)
+        spread = np.swapaxes(root @ self._vectors[i, at], 1, 2)  # to the coefficients
+        centre = (self._mean[i, at, scale][:, None] @ spread)[:, 0]
+        roots = np.sqrt(self._variance[i, at, scale])[:, :, None] * spread
+        return log_odds(limits, which, before * self._scales[at, scale], centre, roots)
