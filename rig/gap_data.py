@@ -195,14 +195,10 @@ def _tangents(n: Array) -> Array:
 
 
 def _turned(arm: Arm, q: Array, tool: Array, n: Array) -> Array:
-    """(6, 6): change of lever i per radian of joint j."""
-    out = np.empty((6, 6))
-    for j in range(6):
-        step = np.zeros(6)
-        step[j] = _STEP_RAD
-        above, below = arm.jacobian(q + step, tool)[:3], arm.jacobian(q - step, tool)[:3]
-        out[:, j] = (above - below).T @ n / (2 * _STEP_RAD)
-    return out
+    """(..., 6, 6): change of lever i per radian of joint j, for q (..., 6)."""
+    steps = q[..., None, :] + _STEP_RAD * np.eye(6), q[..., None, :] - _STEP_RAD * np.eye(6)
+    above, below = (n @ arm.jacobian(at, tool)[..., :3, :] for at in steps)
+    return np.asarray(np.swapaxes(above - below, -1, -2) / (2 * _STEP_RAD))
 
 
 def _turned_offset(axes: Array, n: Array) -> Array:
@@ -216,13 +212,10 @@ def _turned_offset(axes: Array, n: Array) -> Array:
 
 def _bent(arm: Arm, q: Array, tool: Array, n: Array) -> Array:
     """(6, 6, 6): change of `_turned` per radian of joint k, the last index."""
-    out = np.empty((6, 6, 6))
-    for k in range(6):
-        step = np.zeros(6)
-        step[k] = _WIDE_STEP_RAD
-        change = _turned(arm, q + step, tool, n) - _turned(arm, q - step, tool, n)
-        out[:, :, k] = change / (2 * _WIDE_STEP_RAD)
-    return out
+    above, below = (
+        _turned(arm, q + w * np.eye(6), tool, n) for w in (_WIDE_STEP_RAD, -_WIDE_STEP_RAD)
+    )
+    return np.asarray(np.moveaxis(above - below, 0, -1) / (2 * _WIDE_STEP_RAD))
 
 
 def _link(arm: Arm, link: Beam, q: Array, tool: Array, n: Array) -> tuple[float, float]:
