@@ -150,23 +150,22 @@ class Engine:
         return square, beside[0] - shared.T @ base.left, base.log_base
 
     def _whiten(self, columns: Array) -> White:
-        bench, n, q = self.bench, self.bench.rows.n, self.bench.layout.q
-        white = columns / self.sigma[:, None]
-        response, inverse = white[:n], self._inverse
-        means = np.add.reduceat(response * inverse[:, None], self._edges, axis=0)
-        means /= self._length_u[:, None]
+        n, q = self.bench.rows.n, self.bench.layout.q
+        white = np.ascontiguousarray(columns.T) / self.sigma
+        response, inverse = white[:, :n], self._inverse
+        means = np.add.reduceat(response * inverse, self._edges, axis=1) / self._length_u
         direction = inverse / self._length_u[self._hold]
-        contrast = (response - direction[:, None] * means[self._hold])[~self._alone]
+        contrast = (response - direction * means[:, self._hold])[:, ~self._alone]
         # most columns stand still within a hold
-        size = np.abs(contrast).max(axis=0) if len(contrast) else np.zeros(contrast.shape[1])
-        top = np.abs(response).max(axis=0) if bench.rows.n else size
-        contrast[:, size <= 1e-9 * (1 + top)] = 0.0
+        size = np.abs(contrast).max(axis=1, initial=0.0)
+        top = np.abs(response).max(axis=1, initial=0.0)
+        contrast[size <= 1e-9 * (1 + top)] = 0.0
         holds = len(self._edges)
         readings = tuple(
-            Some.of(white[start : start + holds]) for start in range(q.start, q.stop, holds)
+            Some.of(white[:, start : start + holds]) for start in range(q.start, q.stop, holds)
         )
-        even = np.vstack([means, white[q.stop :]]).T
-        return White(np.ascontiguousarray(even), readings, Some.of(contrast), holds)
+        even = np.hstack([means, white[:, q.stop :]])
+        return White(even, readings, Some.of(contrast), holds)
 
     def _left(self, eta: float) -> Weights:
         """What an imperfection leaves of the precision."""

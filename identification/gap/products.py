@@ -48,11 +48,11 @@ class Some:
 
     @classmethod
     def of(cls, columns: Array) -> Some:
-        """Of columns (rows, p), those that are not all zero."""
-        kept = np.flatnonzero(np.any(columns != 0, axis=0))
-        at = np.full(columns.shape[1], len(kept), dtype=np.intp)
+        """Of columns (p, rows), those that are not all zero."""
+        kept = np.flatnonzero(np.any(columns != 0, axis=1))
+        at = np.full(len(columns), len(kept), dtype=np.intp)
         at[kept] = np.arange(len(kept))
-        return cls(at, np.vstack([columns[:, kept].T, np.zeros((1, len(columns)))]))
+        return cls(at, np.vstack([columns[kept], np.zeros((1, columns.shape[1]))]))
 
     def joined(self, other: Some) -> Some:
         """With the columns of another after them."""
