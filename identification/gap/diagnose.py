@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
+from identification.gap.compare import score
 from identification.gap.data import GapData, Ints
 from identification.gap.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.earned import FREE, earned, noise_of, sample_rms
@@ -94,11 +95,13 @@ def diagnose_gap(
     tell("comparing effects", 0.2)
     etas = eta_levels(bench, base, target)
     engine = Engine(bench, base, target, etas)
-    finer = refine(engine, variants)
+    singles = score(engine, engine.levels, variants)
+    finer = refine(engine, singles)
     if finer:
         variants += finer
         engine.extend()
-    found = search(engine, variants)
+        singles += score(engine, engine.levels, finer)
+    found = search(engine, variants, singles)
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])

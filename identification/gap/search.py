@@ -74,13 +74,13 @@ class Found:
     kept: Mapping[frozenset[str], float] = field(default_factory=dict)
 
 
-def search(engine: Engine, variants: list[Variant]) -> Found:
+def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None = None) -> Found:
     """All single effects, then sets around the best ones, each re-fitted jointly. Where no levels
-    repeat from run to run, a third effect is but freedom of the other two's laws."""
+    repeat from run to run, a third effect is but freedom of the other two's laws. singles: scores
+    of the variants one by one, where they are known."""
     deepest = 2 if engine.bench.rows.continuous else 3
     levels = engine.levels
-    singles = score(engine, levels, variants)
-    by_word = _by_word(singles)
+    by_word = _by_word(singles or score(engine, levels, variants))
     alone = {w: _marginal(s) for w, s in by_word.items()}
     pool: dict[frozenset[str], Explanation] = {}
     for word, scored in by_word.items():
@@ -109,9 +109,9 @@ def search(engine: Engine, variants: list[Variant]) -> Found:
     return weighed(found, {})
 
 
-def refine(engine: Engine, variants: list[Variant]) -> list[Variant]:
-    """Finer shapes of the words that stand out and that a grid meets badly: thresholds and zones
-    make the evidence piecewise smooth, offsets act by their squares."""
+def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
+    """Finer shapes of the words that stand out among single effects and that a grid meets badly:
+    thresholds and zones make the evidence piecewise smooth, offsets act by their squares."""
     from identification.gap.effects import (
         joint_backlash,
         joint_nonlinear_stiffness,
@@ -119,7 +119,7 @@ def refine(engine: Engine, variants: list[Variant]) -> list[Variant]:
         pose_error,
     )
 
-    by_word = _by_word(score(engine, engine.levels, variants))
+    by_word = _by_word(singles)
     least = engine.levels[0].log_base + _WINDOW
     ranked = sorted(by_word, key=lambda w: -_marginal(by_word[w]))[:_LEADING]
     beside = _beside_first(engine, by_word, ranked)

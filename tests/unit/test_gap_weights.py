@@ -9,7 +9,7 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
-from identification.gap.compare import Scored
+from identification.gap.compare import Scored, score
 from identification.gap.data import Array, Setup
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness, library
 from identification.gap.effects.joint_backlash import TOOLS_KG
@@ -220,7 +220,7 @@ def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> 
     base, target = base_columns(bench), bench.observed - prediction(bench)
     bent = bench.columns[odd.columns[1]] + bench.columns[odd.columns[4]]
     engine = Engine(bench, base, target + 0.3 * bent, np.array([0.0, 2e-6, 5e-6]))
-    finer = refine(engine, variants)
+    finer = refine(engine, score(engine, engine.levels, variants))
     assert any("odd curve" in v.label and v.info["tool_kg"] == 1.6 for v in finer)
 
     def scored(joint: int, knee: str) -> Scored:
