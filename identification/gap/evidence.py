@@ -31,6 +31,7 @@ RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
 CONTINUOUS_ROW_PART = 0.3  # neighbouring rows of a running recording err alike
 _NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
+_AT_ONCE = 500_000  # numbers: what they take stays near the processor
 LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
 
@@ -101,9 +102,11 @@ class Engine:
         added = range(len(self._white), len(self.bench.columns))
         if not added:
             return
-        white = self._whiten(self.columns(added))
-        self.levels = [self._grown(level, white) for level in self.levels]
-        self._white = self._white.joined(white)
+        step = max(1, _AT_ONCE // self.bench.layout.size)
+        blocks = [added[i : i + step] for i in range(0, len(added), step)]
+        parts = [self._whiten(self.columns(block)) for block in blocks]
+        self.levels = [self._grown(level, parts) for level in self.levels]
+        self._white = White.joined([self._white, *parts])
         self._rows.clear()
 
     def columns(self, numbers: Iterable[int]) -> Array:
@@ -206,11 +209,11 @@ class Engine:
         none = np.zeros((0, kb + count))
         return _Integrated(root, factor.astype(float), left.astype(float), log_base, misfit, none)
 
-    def _grown(self, level: Level, white: White) -> Level:
+    def _grown(self, level: Level, parts: list[White]) -> Level:
         """A level with further columns."""
         i = level.number
         base = self._bases[i]
-        beside = self._common(white, self._weights[i])
+        beside = np.hstack([self._common(white, self._weights[i]) for white in parts])
         b = slice(1, 1 + base.root.shape[0])
         fresh = _forward(base.factor, base.root.T @ beside[b])
         moment = beside[0] - fresh.T @ base.left

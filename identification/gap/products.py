@@ -23,7 +23,7 @@ from identification.gap.data import Array
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-_AT_ONCE = 1_000_000  # numbers of columns that are gathered at a time
+_AT_ONCE = 100_000  # numbers of columns that are gathered at a time
 _FEW = 500  # rows
 _SPARSE = 0.2  # share of numbers that are not zero, below which zeros are left out
 
@@ -54,14 +54,14 @@ class Some:
         at[kept] = np.arange(len(kept))
         return cls(at, np.vstack([columns[kept], np.zeros((1, columns.shape[1]))]))
 
-    def joined(self, other: Some) -> Some:
-        """With the columns of another after them."""
-        mine, last = len(self.values) - 1, len(self.values) + len(other.values) - 2
-        at = np.concatenate([
-            np.where(self.at == mine, last, self.at),
-            np.where(other.at == len(other.values) - 1, last, other.at + mine),
-        ])  # fmt: skip
-        return Some(at, np.vstack([self.values[:-1], other.values]))
+    @classmethod
+    def joined(cls, parts: Sequence[Some]) -> Some:
+        """The columns of all parts, one after the other."""
+        starts = np.cumsum([0, *(part.none for part in parts)])
+        at = [np.where(p.at == p.none, starts[-1], p.at + start)
+              for p, start in zip(parts, starts[:-1], strict=True)]  # fmt: skip
+        values = [*(part.values[:-1] for part in parts), parts[0].values[-1:]]
+        return cls(np.concatenate(at), np.vstack(values))
 
     def picked(self, columns: NDArray[np.intp]) -> Some:
         """Some of all columns (k,)."""
@@ -107,13 +107,14 @@ class White:
     def __len__(self) -> int:
         return len(self.even)
 
-    def joined(self, other: White) -> White:
-        """With the columns of another after them."""
-        return White(
-            np.vstack([self.even, other.even]),
-            tuple(a.joined(b) for a, b in zip(self.q, other.q, strict=True)),
-            self.contrast.joined(other.contrast),
-            self.holds,
+    @classmethod
+    def joined(cls, parts: Sequence[White]) -> White:
+        """The columns of all parts, one after the other."""
+        return cls(
+            np.vstack([part.even for part in parts]),
+            tuple(Some.joined(each) for each in zip(*(part.q for part in parts), strict=True)),
+            Some.joined([part.contrast for part in parts]),
+            parts[0].holds,
         )
 
     def between(self, columns: White, weights: list[Weights]) -> list[Array]:
