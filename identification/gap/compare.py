@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 
@@ -51,12 +52,11 @@ def _score_batch(
     table.limit()
     batch = [v for family in families for v in family]
     flat = table.logs.transpose(1, 0, 2).reshape(len(batch), -1)
-    best = flat.argmax(axis=1)
     number = len(batch[0].scales)
-    total = logsumexp(flat) - np.log(number)
+    total = (logsumexp(flat) - log(number)).tolist()
     return {
-        v: Scored(v, float(t) + float(np.log(v.prior)), v.scales[b % number], int(b // number))
-        for v, t, b in zip(batch, total, best, strict=True)
+        v: Scored(v, t + log(v.prior), v.scales[b % number], b // number)
+        for v, t, b in zip(batch, total, flat.argmax(axis=1).tolist(), strict=True)
     }
 
 

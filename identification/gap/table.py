@@ -68,11 +68,12 @@ class Table:
         """Makes what may count beside the best level and scale of its own variant: from the level
         that fits the base best down, then up."""
         start = int(np.argmax([lv.log_base for lv in self._levels]))
+        best = self.logs.max(axis=(0, 2))
         for i in (*range(start, -1, -1), *range(start + 1, len(self._levels))):
-            best = self.logs.max(axis=(0, 2))
             which = np.flatnonzero(~self._seen[i] & (self._most[i] > best - _COUNTS))
             if which.size:
                 self._make(i, which)
+                best[which] = np.maximum(best[which], self.logs[i, which].max(axis=1))
 
     def limit(self) -> None:
         """Takes away what the limits cost that physics sets, where it counts among the shapes of
