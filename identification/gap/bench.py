@@ -316,12 +316,16 @@ class Bench:
     def joint_column(self, joint: int, deflection: Array) -> Array:
         """What a deflection (n,) rad of one joint does to the laser and to that joint's reading;
         where the displacement is imposed it is negative for a joint that gives way (`sense`)."""
-        q = np.zeros((self.rows.n, self.data.joints))
-        response = self.lever[:, joint] * deflection
+        response, turned = self.lever[:, joint] * deflection, self.sense * deflection
         if self.imposed:  # what one joint gives way, force and all other joints lose
             q = self._follow(response)
-        q[:, joint] += self.sense * deflection
-        return self.stacked(response, q)
+            q[:, joint] += turned
+            return self.stacked(response, q)
+        out = self.stacked(response)
+        if self.has_q:
+            readings = out[self.layout.q].reshape(self.data.joints, -1)
+            readings[joint] = hold_means(self.rows, turned[:, None])[:, 0]
+        return out
 
     def outside_column(self, motion: Array) -> Array:
         """What a motion (n,) m of the target does that does not come from the joints: the laser
