@@ -163,7 +163,8 @@ class White:
         for some, weight in zip((*self.q, self.contrast), (*self._q(w), w.contrast), strict=True):
             at = some.at[columns]
             mine = np.flatnonzero((at != some.none).any(axis=1))
-            out[mine] += squares_of(some.values, at[mine], weight)
+            if mine.size:
+                out[mine] += squares_of(some.values, at[mine], weight)
         return out
 
     def _even(self, w: Weights) -> Array:

@@ -34,22 +34,20 @@ class Limits:
     @classmethod
     def of(cls, variants: Sequence[Variant]) -> Limits | None:
         """None where none of them has any."""
-        k = len(variants[0].columns)
-        each = [_rows(v) for v in variants]
-        most = max(len(r) for r in each)
         if not any(v.positive is not None for v in variants):
             return None
-        rows, asked = np.zeros((len(variants), most, k)), np.zeros((len(variants), most), bool)
-        for i, (v, r) in enumerate(zip(variants, each, strict=True)):
-            rows[i, : len(r)] = r
-            asked[i, : len(r)] = v.positive is not None
+        most = max(1 + sum(v.each) + len(v.within) for v in variants)
+        rows = np.zeros((len(variants), most, len(variants[0].columns)))
+        asked = np.zeros((len(variants), most), dtype=bool)
+        for i, v in enumerate(variants):
+            if v.positive is not None:
+                alone = np.flatnonzero(v.each)
+                count = 1 + len(alone)
+                rows[i, 0] = v.positive
+                rows[i, np.arange(1, count), alone] = 1.0
+                rows[i, count : count + len(v.within)] = v.within
+                asked[i, : count + len(v.within)] = True
         return cls(rows, np.array([v.least for v in variants]), asked)
-
-
-def _rows(v: Variant) -> Array:
-    first = np.zeros(len(v.columns)) if v.positive is None else v.positive
-    unit = np.eye(len(v.columns))[np.array(v.each, dtype=bool)]
-    return np.vstack([first[None], unit, *v.within])
 
 
 def log_odds(limits: Limits, which: Ints, before: Array, mean: Array, roots: Array) -> Array:

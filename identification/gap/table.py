@@ -90,11 +90,10 @@ class Table:
             return False
         logs = self.logs[:, mine]
         todo = (logs > logs.max() - _COUNTS) & ~done[:, mine]
-        for i in np.flatnonzero(todo.any(axis=(1, 2))).tolist():
-            which, scale = np.nonzero(todo[i])
-            logs[i, which, scale] += self._odds(limits, i, start, which, scale)
+        level, which, scale = np.nonzero(todo)
+        logs[todo] += self._odds(limits, level, start, which, scale)
         done[:, mine] |= todo
-        return bool(todo.any())
+        return bool(len(which))
 
     def _make(self, i: int, which: Ints) -> None:
         level, root = self._levels[i], self._root[which]
@@ -138,13 +137,13 @@ class Table:
         self._most[:i, which] = np.minimum(self._most[:i, which], below)
         self._most[i + 1 :, which] = np.minimum(self._most[i + 1 :, which], above)
 
-    def _odds(self, limits: Limits, i: int, start: int, which: Ints, scale: Ints) -> Array:
+    def _odds(self, limits: Limits, level: Ints, start: int, which: Ints, scale: Ints) -> Array:
         """log odds (w,) that coefficients of variants `which`, counted from `start`, at their
-        scales keep the limits."""
+        levels and scales keep the limits."""
         at = start + which
         root = self._root[at]
         before = np.linalg.norm((limits.rows[which, :1] @ root)[:, 0], axis=1)
-        spread = np.swapaxes(root @ self._vectors[i, at], 1, 2)  # to the coefficients
-        centre = (self._mean[i, at, scale][:, None] @ spread)[:, 0]
-        roots = np.sqrt(self._variance[i, at, scale])[:, :, None] * spread
+        spread = np.swapaxes(root @ self._vectors[level, at], 1, 2)  # to the coefficients
+        centre = (self._mean[level, at, scale][:, None] @ spread)[:, 0]
+        roots = np.sqrt(self._variance[level, at, scale])[:, :, None] * spread
         return log_odds(limits, which, before * self._scales[at, scale], centre, roots)
