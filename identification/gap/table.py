@@ -19,7 +19,9 @@ from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import log_level
 from identification.gap.signs import Limits, log_odds
 
-_COUNTS = 40.0  # nats below the best: what lies further down adds nothing
+# Nats below the best: what lies further down adds nothing. Limits that do not ask a sum for more
+# than zero add one at the most.
+_COUNTS = 40.0
 
 
 @dataclass(frozen=True, eq=False)

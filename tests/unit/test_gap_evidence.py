@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from identification.gap import evidence
+from identification.gap import evidence, table
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import condition, score
@@ -23,6 +23,7 @@ from identification.gap.evidence import (
 )
 from identification.gap.priors import prior_of
 from identification.gap.search import search
+from identification.gap.table import Table
 from identification.gap.variants import variant
 from tests.unit.test_gap_operators import bench_data
 
@@ -95,6 +96,31 @@ def test_levels_of_imperfection_are_exact_too(monkeypatch: pytest.MonkeyPatch) -
         exact.append(multivariate_normal.logpdf(engine.target, zeros, covariance))
     found = [level.log_base for level in engine.levels]
     assert found[1] - found[0] == pytest.approx(exact[1] - exact[0], abs=1e-5)
+
+
+def test_levels_that_are_not_looked_at_add_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = small_bench()
+    small_engine(bench)
+    base, n = base_columns(bench), bench.rows.n
+    target = bench.observed - prediction(bench)
+    target[:n] += 30 * bench.columns[0][:n]
+    engine = Engine(bench, base, target, np.array([0.0, *(1e-6 * 2.5 ** np.arange(9))]))
+    shapes = [
+        variant(word, word, columns, (3.0, 30.0), positive=positive)
+        for word, columns, positive in (
+            ("joint_creep", [0], True), ("joint_yield", [1], True), ("base_slip", [0, 1], False),
+            ("time_lag", [0], -np.ones(1)), ("contact_seating", [0, 1], np.array([1.0, -1.0])),
+        )
+    ]  # fmt: skip
+    looked, look = [], Table.look
+    monkeypatch.setattr(Table, "look", lambda self: (look(self), looked.append(self.logs))[0])
+    few = [s.log_evidence for s in score(engine, engine.levels, shapes)]
+    assert any(np.isneginf(logs).any() for logs in looked)
+    looked.clear()
+    monkeypatch.setattr(table, "_COUNTS", np.inf)
+    every = [s.log_evidence for s in score(engine, engine.levels, shapes)]
+    assert not any(np.isneginf(logs).any() for logs in looked)
+    assert few == pytest.approx(every, rel=1e-12)
 
 
 def test_score_averages_over_scales_and_asks_for_the_sign() -> None:
