@@ -19,9 +19,7 @@ from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import log_level
 from identification.gap.signs import Limits, log_odds
 
-# Nats below the best: what lies further down adds nothing. Limits that do not ask a sum for more
-# than zero add one at the most.
-_COUNTS = 40.0
+_COUNTS = 40.0  # nats below the best: what lies further down adds nothing; limits add four at most
 
 
 @dataclass(frozen=True, eq=False)
