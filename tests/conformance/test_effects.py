@@ -14,7 +14,7 @@ import pytest
 
 from identification.gap import effects
 from identification.gap.data import GapData
-from identification.gap.effects import NEED_ARM, WORDS
+from identification.gap.effects import WORDS
 from identification.gap.fit import fit
 from identification.gap.parts import Part
 from identification.gap.search import Explanation
@@ -22,6 +22,7 @@ from tests.conformance.effect_benches import (
     IN_JOINTS,
     OUTSIDE,
     PAIRS,
+    WITHOUT_ARM,
     built,
     module,
     of,
@@ -209,8 +210,7 @@ def test_another_unit_of_force_changes_nothing_but_units(word: str, design: str)
         )  # fmt: skip
 
 
-@pytest.mark.parametrize("design", ["bench", "bench imposed"])
-@pytest.mark.parametrize("word", [w for w in WORDS if w not in NEED_ARM])
+@pytest.mark.parametrize(("word", "design"), WITHOUT_ARM)
 def test_another_unit_of_length_changes_nothing_but_units(word: str, design: str) -> None:
     """A bench has no absolute length: prior columns grow with the unit."""
     b, data = 1 / 128.0, linear(design)
