@@ -11,7 +11,7 @@ from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import STANDING, library
-from identification.gap.effects.drift import free_paths
+from identification.gap.effects.drift import free_paths, shares
 from identification.gap.effects.joint_yield import grown
 from identification.gap.effects.time_lag import late
 from identification.gap.evidence import Engine
@@ -124,6 +124,8 @@ def test_cycles_and_an_unloaded_rig_show_drifts_of_any_path(word: str) -> None:
     assert rest.stands
     assert "free path" in words_with(rest, word)
     assert free_paths(rest) == {"free path": 10}  # a quicker one could be anything
+    assert max(shares(rest, (0.1, 0.3))) == 3.0
+    assert max(shares(make_bench(running(force, force / SPRING)), (0.1, 0.3))) == 0.3
 
 
 def test_under_a_load_that_stands_what_runs_is_creep_and_no_free_drift() -> None:

@@ -44,12 +44,12 @@ def paths(bench: Bench) -> dict[str, Array]:
 
 def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
     """Sizes of a drift, of the deflection or the largest force: the usual ones; up to all that is
-    seen, and steeper, in a recording that runs on and on; small ones where it is but a curve."""
+    seen, and steeper, in a recording without load; small ones where it is but a curve."""
     if not own_clock(bench):
         return usual[:SMALL]
     if not bench.rows.continuous:
         return usual
-    return (*(s for s in usual if s < 0.3), 0.3, 1.0, 3.0)
+    return (*(s for s in usual if s < 0.3), 0.3, *((1.0, 3.0) if bench.rests else ()))
 
 
 _LOADED = 0.3  # of the largest force
