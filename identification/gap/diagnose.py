@@ -24,7 +24,7 @@ from identification.gap.locate import Where, locate
 from identification.gap.noise import bursts
 from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
-from identification.gap.search import Explanation, Found, force, refine, search
+from identification.gap.search import NOISY, Explanation, Found, force, refine, search
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
 
@@ -300,6 +300,11 @@ def _notes(bench: Bench) -> tuple[str, ...]:
         out.append(
             "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "
             "glitches, which no effect explains. See to the laser's mounting and to the cables."
+        )
+    if bench.noise.raised > NOISY:
+        out.append(
+            f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "
+            "uncertainty that was judged too small. They were taken as uncertain as they are."
         )
     if bench.imposed:
         out.append("The displacement is imposed: force is predicted from it.")

@@ -22,7 +22,7 @@ _ENOUGH = 30  # second differences: then their scatter is known to about an eigh
 class Noise:
     """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
     already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
-    one sample."""
+    one sample. raised: how many times what is stated a running recording scatters, at least 1."""
 
     response: Array
     q: Array
@@ -30,6 +30,7 @@ class Noise:
     hold: Array
     run: float
     stated: float
+    raised: float = 1.0
 
 
 def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Noise:
@@ -54,7 +55,15 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     return Noise(
         response=per_sample / np.sqrt(weight), q=q, force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
+        raised=_raised(data) if rows.continuous else 1.0,
     )  # fmt: skip
+
+
+def _raised(data: GapData) -> float:
+    """The larger ratio of what a channel scatters to what is stated of it, at least 1."""
+    meter = data.instruments
+    force = white_noise(data.force) / meter.force
+    return max(1.0, force, white_noise(data.displacement) / meter.displacement)
 
 
 def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:

@@ -428,6 +428,8 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     for e in ranked:
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         good *= kept.get(e.words, 1.0)
+        if not e.parts and found.engine.bench.noise.raised > NOISY:
+            good *= STATED
         many = THREE if len(e.parts) > 2 and e.sizes[2] > TELLING * e.sizes[0] else 1.0
         for word, share in _main(e, found.engine.bench.data.arm).items():
             mass[word] += many * share * good
@@ -456,6 +458,9 @@ def _of_the_strange(found: Found, kept: Mapping[frozenset[str], float]) -> float
 
 
 EXPLAINED = 1.0  # nats
+# Readings that scatter so many times more than stated are not explained by what was stated: so much
+# is left of `none`.
+NOISY, STATED = 3.0, 0.1
 
 # What is left of three troubles at once: one that the library lacks may be likelier. Of 40 such
 # explanations on two seeds of the blind check with and without withheld words, 12 were of a known

@@ -61,6 +61,16 @@ def test_an_understated_uncertainty_is_raised_to_what_the_samples_show() -> None
     assert make_bench(data).noise.stated == pytest.approx(5e-6, rel=0.25)  # 1e-6 was stated
 
 
+@pytest.mark.parametrize(("times", "verdict"), [(1.0, "none"), (10.0, "unknown")])
+def test_a_spring_that_shakes_more_than_stated_is_not_explained(times: float, verdict: str) -> None:
+    rng = np.random.default_rng(4)
+    force = 100 * triangle(1200, 3)
+    data = running(force, force / SPRING + rng.normal(0, 1e-6 * times, 1200), imposed="force")
+    found = diagnose_gap(data)
+    assert found.verdict == verdict
+    assert any("10 times as much as stated" in n for n in found.notes) == (verdict == "unknown")
+
+
 def test_on_a_plateau_an_imposed_displacement_adds_no_noise() -> None:
     """5 mm of plateau: 1 um of uncertainty is 0.1 N on the flank and nothing on the plateau."""
     u = 5e-3 * triangle(2000, 1)
