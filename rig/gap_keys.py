@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from identification.gap.effects import joint_backlash
-from identification.gap.forms.law import ACROSS, HUNG, KEPT, LOST, WORKED
+from identification.gap.forms.law import ACROSS, ANEW, HUNG, KEPT, LOST, WORKED
 
 # What an entry says besides its law; kept, not interpreted.
 ABOUT = (
@@ -36,7 +36,7 @@ class Key:
     options: tuple[str, ...] = ()
 
 
-_MEMORY = Key("memory", "text", options=(KEPT, ACROSS, LOST, WORKED, HUNG))
+_MEMORY = Key("memory", "text", options=(KEPT, ACROSS, LOST, WORKED, HUNG, ANEW))
 _SIDES = ("x", "y", "z")
 CONSTANTS: dict[str, Key] = {
     "joint": Key("joint", "count"),

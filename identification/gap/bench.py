@@ -397,6 +397,11 @@ class Bench:
         """(n,) first rows after the arm went to another pose."""
         return moves(self.rows, [s.pose for s in self.data.setups])
 
+    @property
+    def rebuilt(self) -> Flags:
+        """(n,) first rows after the arm went to another pose, or the rig to another direction."""
+        return moves(self.rows, [f"{i}" for i in range(len(self.data.setups))])
+
     def moving_joints(self) -> list[int]:
         """Joints whose compliance carries at least a hundredth of the deflection in some setup."""
         part = np.abs(self.lever * self.elastic)

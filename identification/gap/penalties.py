@@ -60,6 +60,22 @@ def cancelling(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
     return 60.0 * max(0.0, float(np.log(share / CANCELLING)))
 
 
+def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
+    """Penalty in nats, a steep wall, for curves of an arm's joint that hardly bend: a spring is
+    off there, and the arm's turning bends its line a little."""
+    if not engine.bench.data.arm:
+        return 0.0
+    penalty = 0.0
+    for p, gap, moved in zip(parts, found.gap, found.moved, strict=True):
+        if "line" in p.variant.info.get("kinds", ()) and moved > 0:
+            share = max(float(gap / moved), 1e-6)
+            penalty += 60.0 * max(0.0, float(np.log(BENDS / share)))
+    return penalty
+
+
+BENDS = 0.04  # of what a curve moves: so much the springs can't give at least
+
+
 def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats for effects below the noise of a single sample of a running recording:
     thousands of samples would show them, but for what noise of low frequency does to them."""

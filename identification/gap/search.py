@@ -16,7 +16,7 @@ from identification.gap.evidence import Engine, Level
 from identification.gap.finer import gained
 from identification.gap.imperfection import level_prior
 from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
-from identification.gap.penalties import cancelling, pettiness, trifle
+from identification.gap.penalties import cancelling, pettiness, straight, trifle
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN, prior_of
 from identification.gap.variants import Variant
 
@@ -379,7 +379,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     fraction = float(share @ good / share.sum())
     order = np.argsort(-each, kind="stable")
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
-    weight -= trifle(engine, parts, sizes)
+    weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
     if len(parts) > 1:
         weight -= pettiness(engine, parts, sizes) + cancelling(engine, parts, each)
         weight += signs_kept(levels[best], parts)

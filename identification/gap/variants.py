@@ -11,6 +11,7 @@ import numpy as np
 from identification.gap.data import Array
 
 UNDER_WEIGHT = " under weight"  # a memory that begins with the weight coming on
+SET_UP_ANEW = " set up anew"  # one that is lost when the rig is turned to another direction
 
 
 @dataclass(frozen=True, eq=False)

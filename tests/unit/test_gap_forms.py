@@ -108,6 +108,17 @@ def test_every_shape_of_the_library_is_its_law_on_an_arm(bench: Bench, word: str
     assert assert_same(replace(bench, columns=[]), (word,)) > 0
 
 
+def test_memory_may_end_where_the_rig_is_turned_to_another_direction(bench: Bench) -> None:
+    """Two directions in each of two poses: four setups, of which two are in a new pose."""
+    assert (bench.moved.sum(), bench.rebuilt.sum()) == (2, 4)
+    for word in ("joint_yield", "base_slip", "joint_hysteresis"):
+        there = replace(bench, columns=[])
+        labels = [v.label for v in library(there, [word])]
+        assert any("set up anew" in label for label in labels), word
+    one = make_bench(arm_data(directions="x"))
+    assert not any("set up anew" in v.label for v in library(one, ["joint_yield"]))
+
+
 def test_slow_flow_with_the_square_of_the_overstress_is_for_arms(bench: Bench) -> None:
     """A single spring under a load that stands creeps so."""
     loose = replace(bench_data(30 * np.repeat(np.arange(9.0), 4), np.zeros(36)), timed=True)

@@ -14,7 +14,8 @@ from identification.gap.compare import moved_response
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence import Engine
-from identification.gap.parts import _beyond_springs
+from identification.gap.parts import Part, Sizes, _beyond_springs
+from identification.gap.penalties import straight
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
@@ -86,3 +87,18 @@ def test_of_what_the_springs_hide_a_little_counts(bench: Bench) -> None:
     size = np.sqrt(bench.rows.weight @ moved**2 / bench.rows.weight.sum())
     assert _beyond_springs(engine, moved) == pytest.approx(0.03 * size)
     assert _beyond_springs(engine, 100 * moved) > 0.9 * 100 * size
+
+
+def test_a_curve_that_hardly_bends_is_a_wrong_spring(bench: Bench) -> None:
+    fresh, variants = of(bench, "joint_nonlinear_stiffness")
+    engine = Engine(fresh, base_columns(fresh), fresh.observed, np.array([0.0, 3e-6]))
+    curve = next(v for name, v in variants.items() if "curve" in name)
+    one = (Part(curve, 1.0),)
+
+    def charge(gap: float) -> float:
+        return straight(engine, one, Sizes(np.array([gap]), np.array([1e-4]), 0.0))
+
+    assert charge(1e-5) == 0.0
+    assert charge(1e-6) == pytest.approx(60 * np.log(4))
+    spring = (Part(of(bench, "joint_stiffness_error")[1]["joint 1"], 1.0),)
+    assert straight(engine, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0

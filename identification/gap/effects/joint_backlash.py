@@ -167,8 +167,9 @@ def _crosses(net: Array, torque: Array) -> bool:
 
 
 def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
-    """Per kind: the play itself, and the friction beside it."""
-    state = bench.plays(x, zone * np.array([1.0, 3.0, 0.7, 0.5]))
+    """Per kind: the play itself, and the friction beside it; anew in every setup, as the free
+    places are."""
+    state = bench.plays(x, zone * np.array([1.0, 3.0, 0.7, 0.5]), bench.rebuilt)
     rub = -(x - state[:, 0]) / (2 * zone)
     return {
         "free": [np.tanh(x / zone) / 2, rub],

@@ -24,7 +24,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
 from identification.gap.history import Path, bristles, play, worked_in
-from identification.gap.variants import UNDER_WEIGHT, Variant, smooth_root, variant
+from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, smooth_root, variant
 
 WORD = "joint_hysteresis"
 RADII = (
@@ -50,13 +50,15 @@ SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 
 def variants(bench: Bench) -> list[Variant]:
     """Per joint and memory: kept while the arm stands, from no load or from the weight that came
-    on first; lost in the rest between runs; there from the beginning, of loads like those measured
-    (rigs are cycled before they are measured)."""
+    on first; lost when the rig is turned to another direction, or in the rest between runs; there
+    from the beginning, of loads like those measured (rigs are cycled before they are measured)."""
     if bench.once and not bench.data.arm:  # one pull shows a curve, and no loop
         return []
     memories = {"": (bench.moved, False)}
     if not bench.once:
         memories[" worked in"] = (bench.moved, True)
+    if np.sum(bench.rebuilt) > np.sum(bench.moved):
+        memories[SET_UP_ANEW] = (bench.rebuilt, False)
     if np.sum(bench.rest) > np.sum(bench.moved):
         memories[" rested"] = (bench.moved | bench.rest, False)
     out = []

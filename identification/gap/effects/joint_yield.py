@@ -25,12 +25,12 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.history import flowing_play
-from identification.gap.variants import UNDER_WEIGHT, Variant, variant
+from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, variant
 
 WORD = "joint_yield"
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 # A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
-_LIKELY = {"": 1.0, " lasting": 0.5, " taken back": 0.3, UNDER_WEIGHT: 1.0}
+_LIKELY = {"": 1.0, " lasting": 0.5, SET_UP_ANEW: 0.5, " taken back": 0.3, UNDER_WEIGHT: 1.0}
 _HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 _FIRST = 2  # lower ones only round off the knees above them
 # Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
@@ -248,11 +248,14 @@ def peaks(load: Array, threshold: float, fresh: Flags) -> Ints:
 
 
 def _memories(bench: Bench) -> dict[str, Flags]:
-    """When the joint gets back to where it was: never, when the arm moves, before every run."""
+    """When the joint gets back to where it was: never, when the arm moves, when the rig is turned
+    to another direction (the arm may be sent away meanwhile), before every run."""
     moved, first = bench.moved, np.zeros(bench.rows.n, dtype=bool)
     out = {"": moved}
     if np.sum(moved) > 1:
         out[" lasting"] = first
+    if np.sum(bench.rebuilt) > np.sum(moved):
+        out[SET_UP_ANEW] = bench.rebuilt
     if np.sum(bench.rest) > np.sum(moved):
         out[" taken back"] = moved | bench.rest
     return out

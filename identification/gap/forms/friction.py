@@ -8,11 +8,12 @@ from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effects import joint_backlash
 from identification.gap.flanks import Flanks, shapes
-from identification.gap.forms.law import HUNG, KEPT, LOST, WORKED, Law, Term, fresh_after
+from identification.gap.forms.law import ANEW, HUNG, KEPT, LOST, WORKED, Law, Term, fresh_after
 from identification.gap.history import bristles, play, worked_in
-from identification.gap.variants import UNDER_WEIGHT, Variant
+from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant
 
-_MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG}
+_MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
+           SET_UP_ANEW.strip(): ANEW}  # fmt: skip
 
 
 def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:

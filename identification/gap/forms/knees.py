@@ -8,11 +8,11 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects import base_slip, joint_yield
 from identification.gap.effects.base_compliance import moments
-from identification.gap.forms.law import ACROSS, HUNG, KEPT, LOST, Law, Term, fresh_after
-from identification.gap.variants import UNDER_WEIGHT, Variant
+from identification.gap.forms.law import ACROSS, ANEW, HUNG, KEPT, LOST, Law, Term, fresh_after
+from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant
 
 _MEMORY = {"": KEPT, " lasting": ACROSS, " taken back": LOST, joint_yield.HARDENED: KEPT,
-           UNDER_WEIGHT: HUNG}  # fmt: skip
+           UNDER_WEIGHT: HUNG, SET_UP_ANEW: ANEW}  # fmt: skip
 _SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
 

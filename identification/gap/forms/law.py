@@ -37,13 +37,15 @@ Columns = Callable[[Bench, Law], list[Array]]
 """A law on any bench -> one stacked column per term, for a coefficient of one SI unit."""
 
 KEPT, ACROSS, LOST, WORKED = "kept", "kept across poses", "lost between runs", "worked in"
-HUNG = "under weight"
+HUNG, ANEW = "under weight", "lost between setups"
 
 
 def fresh_after(bench: Bench, memory: str) -> Flags:
     """(n,) rows before which the mechanism forgets, for one of the kinds of memory."""
     if memory == ACROSS:
         return np.zeros(bench.rows.n, dtype=bool)
+    if memory == ANEW:
+        return bench.rebuilt
     if memory == LOST:
         return np.asarray(bench.moved | bench.rest)
     return bench.moved
