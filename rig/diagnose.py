@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.data import BRANCH_NAMES, GapData
-from identification.gap.diagnose import Effect, GapResult, check_words, diagnose_gap
+from identification.gap.diagnose import Effect, GapResult, check_words, diagnose_gap, explain_gap
 from identification.gap.forms.known import less_known
 from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
@@ -107,6 +107,16 @@ def diagnose(
         progress=progress,
     )
     return Diagnosis(dataset.uuid, result, dataset.banners(), known)
+
+
+def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
+    """The diagnosis but for what to measure next, and what makes it whole. InputError as there."""
+    result, whole = explain_gap(gap_data(dataset), others=lambda: elsewhere(dataset))
+
+    def said(found: GapResult) -> Diagnosis:
+        return Diagnosis(dataset.uuid, found, dataset.banners())
+
+    return said(result), lambda: said(whole())
 
 
 def _believing(dataset: Dataset, model: Path) -> tuple[GapData, tuple[dict[str, Any], ...]]:

@@ -84,6 +84,20 @@ def diagnose_gap(
     """The diagnosis of a data set. withhold: words taken out of the library; add: words that the
     explanation must contain; others: setups that the rig could take up next. Raises ValueError for
     unknown words."""
+    _, whole = explain_gap(data, withhold=withhold, add=add, others=others, progress=progress)
+    return whole()
+
+
+def explain_gap(
+    data: GapData,
+    *,
+    withhold: Iterable[str] = (),
+    add: Iterable[str] = (),
+    others: Others | None = None,
+    progress: Progress | None = None,
+) -> tuple[GapResult, Callable[[], GapResult]]:
+    """The diagnosis but for what to measure next, for who need not wait for that, and what makes it
+    whole; otherwise as `diagnose_gap`."""
     tell = progress or _silent
     out, forced = set(withhold), frozenset(add)
     check_words(out | forced)
@@ -110,10 +124,14 @@ def diagnose_gap(
     else:
         chosen = _chosen(found, verdict)
     result = _with_twins(_result(found, variants, verdict, chosen), chosen, out)
-    tell("what to measure next", 0.9)
-    result = replace(result, next_measurement=_next(found, variants, chosen, result, others))
-    tell("done", 1.0)
-    return result
+
+    def whole() -> GapResult:
+        tell("what to measure next", 0.9)
+        following = _next(found, variants, chosen, result, others)
+        tell("done", 1.0)
+        return replace(result, next_measurement=following)
+
+    return result, whole
 
 
 def _silent(_: str, __: float) -> None:

@@ -7,11 +7,12 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,24 +48,44 @@ class Job:
 
 @dataclass(frozen=True)
 class Found:
-    """As `Diagnosed`, with what its figures are drawn from instead of these."""
+    """What the figures of a diagnosis are drawn from; or why there is nothing."""
 
-    json: dict[str, Any] | None
-    view: GapView | None = None
+    view: GapView | None
     reason: str = ""
 
 
-def run(job: Job) -> Found:
-    """Diagnoses one data set; a data set that can't be diagnosed says why."""
+Whole = Callable[[], "dict[str, Any] | None"]
+
+
+def look(job: Job) -> tuple[Found, Whole]:
+    """Diagnoses one data set but for what to measure next, which no figure shows, and what makes it
+    whole; a data set that can't be diagnosed says why."""
     from rig.dataset import load
-    from rig.diagnose import diagnose
+    from rig.diagnose import explain
     from rig.report.gap_pictures import view_of
 
     try:
-        diagnosis = diagnose(load(job.path))
+        diagnosis, whole = explain(load(job.path))
     except InputError as error:
-        return Found(None, reason=without_name(str(error), job.path))
-    return Found(diagnosis.to_json(), view_of(diagnosis, job.stem, png=job.png))
+        return Found(None, without_name(str(error), job.path)), lambda: None
+    return Found(view_of(diagnosis, job.stem, png=job.png)), lambda: whole().to_json()
+
+
+# Of the last job of this process: too large to be handed from one process to another.
+_unfinished: list[Whole] = []
+
+
+def begin(job: Job) -> Found:
+    """`look` in a process of a crew, which keeps what is left to do."""
+    _unfinished.clear()  # an earlier job's memory, before this one takes its own
+    found, whole = look(job)
+    _unfinished.append(whole)
+    return found
+
+
+def finish() -> dict[str, Any] | None:
+    """The whole of what this process began last (rig.diagnosis/1)."""
+    return _unfinished.pop()()
 
 
 def draw(view: GapView, names: Sequence[str]) -> tuple[Figure, ...]:
@@ -95,15 +116,19 @@ def load_drawing() -> None:
 class Crew:
     """The processes that diagnose, and one that draws half of the figures of what they find."""
 
-    def __init__(self, pool: ProcessPoolExecutor, artist: ProcessPoolExecutor) -> None:
-        self.pool = pool
+    def __init__(self, pools: Sequence[ProcessPoolExecutor], artist: ProcessPoolExecutor) -> None:
+        """pools: of one process each, so that a diagnosis is finished where it was begun."""
+        self.pools = pools
         self.artist = artist
         self.begun: list[Future[Found]] = []
+        self.finished: list[Future[dict[str, Any] | None]] = []
 
     def begin(self, jobs: Sequence[Job]) -> None:
         """Begins every diagnosis for which there is a process; the others follow."""
         with _ctrl_c_ignored():  # which the children inherit, from their first moment on
-            self.begun = [self.pool.submit(run, job) for job in jobs]
+            for job, pool in zip(jobs, cycle(self.pools), strict=False):
+                self.begun.append(pool.submit(begin, job))
+                self.finished.append(pool.submit(finish))
 
     def wait_for(self, number: int) -> Found:
         """What a diagnosis found. The artist starts only now: while this process waits, nobody
@@ -124,22 +149,25 @@ class Waiting:
         self._number = number
 
     def result(self) -> Diagnosed:
-        """Waits for it, `DEADLINE_S` at most, and draws."""
-        found = self._found()
-        figures = () if found.view is None else self._drawn(found.view)
-        return Diagnosed(found.json, figures, found.reason)
-
-    def _found(self) -> Found:
-        if self._crew is None:
-            return run(self._job)
+        """Waits for it, `DEADLINE_S` at most, and draws while it is finished."""
         try:
-            return self._crew.wait_for(self._number)
+            found, whole = self._found()
+            figures = () if found.view is None else self._drawn(found.view)
+            return Diagnosed(whole(), figures, found.reason)
         except TimeoutError:
-            return Found(
+            return Diagnosed(
                 None, reason=f"The diagnosis took longer than {DEADLINE_S:g} s and was given up."
             )
         except BrokenProcessPool:
-            return Found(None, reason="The diagnosis was ended from outside, or ran out of memory.")
+            return Diagnosed(
+                None, reason="The diagnosis was ended from outside, or ran out of memory."
+            )
+
+    def _found(self) -> tuple[Found, Whole]:
+        if self._crew is None:
+            return look(self._job)
+        finished = self._crew.finished[self._number]
+        return self._crew.wait_for(self._number), lambda: finished.result(DEADLINE_S)
 
     def _drawn(self, view: GapView) -> tuple[Figure, ...]:
         """Every other figure here, the rest beside: both take about as long."""
@@ -170,20 +198,20 @@ def diagnosing(jobs: Sequence[Job], processes: int) -> Iterator[list[Waiting]]:
         yield [Waiting(job) for job in jobs]
         return
     others = set(multiprocessing.active_children())
-    crew = Crew(_pool(min(processes, len(jobs))), _pool(1))
+    crew = Crew([_pool() for _ in range(min(processes, len(jobs)))], _pool())
     try:
         crew.begin(jobs)
         yield [Waiting(job, crew, number) for number, job in enumerate(jobs)]
     finally:
-        for pool in (crew.pool, crew.artist):
+        for pool in (*crew.pools, crew.artist):
             pool.shutdown(wait=False, cancel_futures=True)
         for child in set(multiprocessing.active_children()) - others:
             child.terminate()
 
 
-def _pool(processes: int) -> ProcessPoolExecutor:
-    """Starts them when there is work."""
-    return ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _deaf_to_ctrl_c)
+def _pool() -> ProcessPoolExecutor:
+    """Starts its process when there is work."""
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _deaf_to_ctrl_c)
 
 
 @contextmanager

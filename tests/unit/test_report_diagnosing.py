@@ -17,6 +17,7 @@ from rig.report.diagnosing import FIGURES, Crew, Found, Job, Waiting
 from rig.report.document import Figure
 
 VIEW: Any = object()
+JSON = {"verdict": "none"}
 
 
 class Beside:
@@ -35,6 +36,19 @@ class Beside:
         return future
 
 
+class Finishes(Future[Any]):
+    """The end of a diagnosis, which notes how often something had been drawn by then."""
+
+    def __init__(self, drawn: list[tuple[str, ...]]) -> None:
+        super().__init__()
+        self.drawn = drawn
+        self.drawn_before = -1
+
+    def result(self, timeout: float | None = None) -> Any:
+        self.drawn_before = len(self.drawn)
+        return JSON
+
+
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     """The names that each call of `draw` was asked for."""
@@ -48,15 +62,21 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     return calls
 
 
-def found_with(artist: Beside, outcome: Found | Exception) -> Waiting:
-    crew = Crew(cast("Any", Beside()), cast("Any", artist))
-    future: Future[Found] = Future()
-    if isinstance(outcome, Found):
-        future.set_result(outcome)
-    else:
-        future.set_exception(outcome)
-    crew.begun = [future]
+def found_with(
+    artist: Beside, begun: Found | Exception, finished: dict[str, Any] | Exception = JSON
+) -> Waiting:
+    crew = Crew([cast("Any", Beside())], cast("Any", artist))
+    crew.begun, crew.finished = [future_of(begun)], [future_of(finished)]
     return Waiting(Job(Path("a.h5"), "a", png=False), crew, 0)
+
+
+def future_of(outcome: Any) -> Future[Any]:
+    future: Future[Any] = Future()
+    if isinstance(outcome, Exception):
+        future.set_exception(outcome)
+    else:
+        future.set_result(outcome)
+    return future
 
 
 def test_the_figures_are_drawn_in_two_processes(
@@ -68,7 +88,7 @@ def test_the_figures_are_drawn_in_two_processes(
         loaded.append("drawing")
 
     monkeypatch.setattr(diagnosing, "load_drawing", load_drawing)
-    diagnosed = found_with(artist, Found({"verdict": "none"}, VIEW)).result()
+    diagnosed = found_with(artist, Found(VIEW)).result()
     assert tuple(f.name for f in diagnosed.figures) == FIGURES
     assert sorted(sum(drawn, ())) == sorted(FIGURES)  # each of them once
     assert len(drawn) == 2
@@ -87,8 +107,8 @@ def test_what_is_done_meanwhile_loads_no_diagnosis() -> None:
 
 
 def test_without_the_process_that_draws_all_is_drawn_here(drawn: list[tuple[str, ...]]) -> None:
-    diagnosed = found_with(Beside(gone=True), Found({"verdict": "none"}, VIEW)).result()
-    assert diagnosed.json == {"verdict": "none"}
+    diagnosed = found_with(Beside(gone=True), Found(VIEW)).result()
+    assert diagnosed.json == JSON
     assert tuple(f.name for f in diagnosed.figures) == FIGURES
     assert drawn == [FIGURES]
 
@@ -106,3 +126,49 @@ def test_a_diagnosis_that_did_not_end_says_so(
     diagnosed = found_with(Beside(), ending).result()
     assert (diagnosed.json, diagnosed.reason) == (None, words)
     assert not drawn
+
+
+def test_the_figures_are_drawn_while_the_diagnosis_is_finished(
+    drawn: list[tuple[str, ...]],
+) -> None:
+    waiting = found_with(Beside(), Found(VIEW))
+    finishes = Finishes(drawn)
+    cast("Any", waiting)._crew.finished = [finishes]
+    assert waiting.result().json == JSON
+    assert finishes.drawn_before == 2
+
+
+def test_a_process_that_is_gone_before_it_has_finished_leaves_no_half_diagnosis(
+    drawn: list[tuple[str, ...]],
+) -> None:
+    diagnosed = found_with(Beside(), Found(VIEW), BrokenProcessPool()).result()
+    assert (diagnosed.json, diagnosed.figures) == (None, ())
+    assert diagnosed.reason == "The diagnosis was ended from outside, or ran out of memory."
+
+
+def test_a_diagnosis_is_finished_by_the_process_that_began_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def begin(job: Job) -> Found:
+        return Found(None, job.stem)
+
+    def finish() -> None: ...
+
+    monkeypatch.setattr(diagnosing, "begin", begin)
+    monkeypatch.setattr(diagnosing, "finish", finish)
+    pools = [Beside(), Beside()]
+    crew = Crew(cast("Any", pools), cast("Any", Beside()))
+    crew.begin([Job(Path(f"{n}.h5"), n, png=False) for n in "abc"])
+    assert [f.result().reason for f in crew.begun] == ["a", "b", "c"]
+    assert [p.done for p in pools] == [["begin", "finish"] * 2, ["begin", "finish"]]
+
+
+def test_a_process_keeps_one_unfinished_diagnosis(monkeypatch: pytest.MonkeyPatch) -> None:
+    def look(job: Job) -> tuple[Found, Callable[[], Any]]:
+        return Found(None, job.stem), lambda: {"verdict": job.stem}
+
+    monkeypatch.setattr(diagnosing, "look", look)
+    for stem in ("a", "b", "c"):
+        assert diagnosing.begin(Job(Path("a.h5"), stem, png=False)).reason == stem
+        if stem != "a":  # whoever asked for the first one may be gone
+            assert diagnosing.finish() == {"verdict": stem}
