@@ -20,7 +20,7 @@ from rig.errors import InputError
 from rig.report.document import Figure
 
 if TYPE_CHECKING:
-    from rig.report.gap_pictures import GapView
+    from rig.report.gap_view import GapView
 
 # Of one data set; a million samples take half a minute.
 DEADLINE_S = 900.0
@@ -62,7 +62,7 @@ def look(job: Job) -> tuple[Found, Whole]:
     whole; a data set that can't be diagnosed says why."""
     from rig.dataset import load
     from rig.diagnose import explain
-    from rig.report.gap_pictures import view_of
+    from rig.report.gap_view import view_of
 
     try:
         diagnosis, whole = explain(load(job.path))

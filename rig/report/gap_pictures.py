@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from identification.gap.remainder import Remainder, remainder
-from rig.diagnose import Diagnosis
 from rig.gap_figures import curve, remaining, withheld
 from rig.gap_map import gap_map
-from rig.gap_points import (
-    Points,
-    Shown,
-    held_table,
-    point_table,
-    points,
-    remainder_table,
-    shown,
-)
+from rig.gap_points import held_table, point_table, remainder_table
 from rig.report.document import Figure
 from rig.report.drawing import draw
 from rig.report.figures import watermark
+from rig.report.gap_view import GapView
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Plot
@@ -29,28 +19,6 @@ if TYPE_CHECKING:
     from rig.gap_points import Table
 
 Rows = tuple[tuple[object, ...], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class GapView:
-    """What the figures of a diagnosis are drawn from, small enough to be handed to another process.
-
-    stem: what the figures' names begin with.
-    """
-
-    shown: Shown
-    points: Points
-    rest: Remainder
-    banners: tuple[str, ...]
-    stem: str
-    png: bool
-
-
-def view_of(diagnosis: Diagnosis, stem: str, *, png: bool) -> GapView:
-    """Of a diagnosis."""
-    r = diagnosis.result
-    rest = remainder(r.engine, r.fit)
-    return GapView(shown(r), points(r), rest, diagnosis.banners, stem, png)
 
 
 def gap_figures(view: GapView, names: Sequence[str]) -> Iterator[Figure]:

@@ -29,7 +29,7 @@ from rig.gap_points import (
     shown,
     write_table,
 )
-from rig.report.gap_pictures import view_of
+from rig.report.gap_view import view_of
 from rig.tables import import_table
 
 META = """robot: none

@@ -96,11 +96,17 @@ def test_the_figures_are_drawn_in_two_processes(
     assert loaded == ["drawing", "drawing"]  # and so has this process
 
 
-def test_what_is_done_meanwhile_loads_no_diagnosis() -> None:
-    code = (
-        "import sys, rig.report.compose, rig.report.gather, rig.report.pictures\n"
-        "print([m for m in sys.modules if m.startswith('identification.gap')])"
-    )
+@pytest.mark.parametrize(
+    ("work", "other"),
+    [
+        ("rig.report.compose, rig.report.gather, rig.report.pictures", "identification.gap"),
+        ("rig.dataset, rig.diagnose, rig.report.gap_view", "rig.report.figures"),
+        ("rig.dataset, rig.diagnose, rig.report.gap_view", "matplotlib"),
+    ],
+    ids=["who composes", "who diagnoses", "nothing that draws"],
+)
+def test_what_goes_on_side_by_side_loads_only_its_own(work: str, other: str) -> None:
+    code = f"import sys, {work}\nprint([m for m in sys.modules if m.startswith({other!r})])"
     command = [sys.executable, "-c", code]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert said.strip() == "[]"
