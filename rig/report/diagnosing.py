@@ -175,10 +175,12 @@ class Waiting:
             return draw(view, FIGURES)
         try:
             others = self._crew.artist.submit(draw, view, FIGURES[1::2])
-            pairs = zip(draw(view, FIGURES[::2]), others.result(DEADLINE_S), strict=True)
-            return tuple(figure for pair in pairs for figure in pair)
+            mine, beside = draw(view, FIGURES[::2]), others.result(DEADLINE_S)
         except (TimeoutError, BrokenProcessPool):
             return draw(view, FIGURES)
+        figures = [*mine, *beside]
+        figures[::2], figures[1::2] = mine, beside
+        return tuple(figures)
 
 
 def usable_cores() -> int:

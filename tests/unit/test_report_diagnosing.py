@@ -96,6 +96,16 @@ def test_the_figures_are_drawn_in_two_processes(
     assert loaded == ["drawing", "drawing"]  # and so has this process
 
 
+@pytest.mark.parametrize("number", [1, 3, 4])
+def test_figures_keep_their_order_however_many_there_are(
+    number: int, drawn: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(diagnosing, "FIGURES", FIGURES[:number])
+    diagnosed = found_with(Beside(), Found(VIEW)).result()
+    assert tuple(f.name for f in diagnosed.figures) == FIGURES[:number]
+    assert len(drawn) == 2
+
+
 @pytest.mark.parametrize(
     ("work", "other"),
     [
