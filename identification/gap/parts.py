@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -103,8 +104,7 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
     for p in parts:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
-        v = p.variant
-        limits = Limits.of([v])
+        limits = _limits(p.variant)
         if limits is not None:
             before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)
             odds = log_odds(limits, _ONE, before, w[None, s], roots[None, :, s])
@@ -113,6 +113,12 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
 
 
 _ONE = np.zeros(1, dtype=np.intp)
+
+
+@lru_cache(maxsize=256)
+def _limits(v: Variant) -> Limits | None:
+    """Of one variant; the same few come again in many explanations."""
+    return Limits.of([v])
 
 
 def log_joint(level: Level, parts: tuple[Part, ...]) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from scipy.special import log_ndtr
@@ -16,7 +18,7 @@ from identification.gap.finer import gained
 from identification.gap.imperfection import least_size, log_share
 from identification.gap.parts import Part, log_joint, log_joint_between, signs_kept
 from identification.gap.signs import Limits, log_odds
-from identification.gap.variants import variant
+from identification.gap.variants import Variant, variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 
 
@@ -101,6 +103,22 @@ def test_what_two_parts_keep_together_is_asked_part_by_part() -> None:
     right = Part(variant("joint_creep", "minus", [0], (1.0,), positive=-np.ones(1)), 1.0)
     assert signs_kept(engine.levels[0], (kept, wrong)) < -5.0
     assert signs_kept(engine.levels[0], (kept, right)) == 0.0
+
+
+def test_limits_of_a_part_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+    of = Limits.of
+
+    def noted(variants: Sequence[Variant]) -> Limits | None:
+        made.extend(v.label for v in variants)
+        return of(variants)
+
+    monkeypatch.setattr(Limits, "of", noted)
+    engine = small_engine(small_bench())
+    a, b = variant("joint_creep", "a", [0], (1.0,)), variant("joint_creep", "b", [1], (1.0,))
+    for scale in (1.0, 2.0):
+        signs_kept(engine.levels[0], (Part(a, scale), Part(b, scale)))
+    assert made == ["a", "b"]
 
 
 # --- between the levels --------------------------------------------------------------------------
