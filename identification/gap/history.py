@@ -239,6 +239,14 @@ def half_sample(rows: Rows) -> float:
     return float(np.min(inner)) / 2 if inner.size else 0.5
 
 
+def sampling_time(rows: Rows) -> float:
+    """Time between two samples of a hold; of a running recording, between most of its rows, s."""
+    if not rows.continuous:
+        return 2 * half_sample(rows)
+    step: Array = np.diff(rows.time)
+    return float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
+
+
 def delayed(values: Array, delay: float, rows: Rows) -> Array:
     """`values(t - delay)` of values (n,) or (n, k), within every run, the path between rows being
     straight ramps."""

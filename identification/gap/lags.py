@@ -9,7 +9,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.time_lag import late
-from identification.gap.history import half_sample
+from identification.gap.history import sampling_time
 
 _LAGS = np.geomspace(0.2, 16.0, 32)  # of the time between two samples: lags that are compared
 
@@ -44,17 +44,10 @@ def _mean_up_to(longest: float, delays: Array, does: Array) -> Array:
 _WINDOW = 24  # parts of a moving average
 
 
-def _sampling_time(bench: Bench) -> float:
-    if not bench.rows.continuous:
-        return 2 * half_sample(bench.rows)
-    step: Array = np.diff(bench.rows.time)
-    return float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
-
-
 @lru_cache(maxsize=3)
 def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
     """Lags (k,) s and what each does to the responses (k, n)."""
-    lags = _LAGS * _sampling_time(bench)
+    lags = _LAGS * sampling_time(bench.rows)
     if kind == "average":  # over twice the lag: the mean of what all delays up to that do
         delays, does = _lagging(bench, channel, "delay")
         lags = lags[: np.searchsorted(lags, lags[-1] / 2)]

@@ -3,6 +3,8 @@ other effects they can show at all."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from identification.gap.effects.drift import free_paths, shares
 from identification.gap.effects.joint_yield import grown
 from identification.gap.effects.time_lag import late
 from identification.gap.evidence import Engine
+from identification.gap.history import sampling_time
 from identification.gap.leftover import _falls
 from identification.gap.noise import standing, white_noise
 from identification.gap.parameters import parameters
@@ -52,6 +55,16 @@ def test_noise_of_turning_points_alone_is_told_by_every_second_one() -> None:
     rng = np.random.default_rng(3)
     peaks = np.where(np.arange(400) % 2, 1.0, -1.0)
     assert white_noise(peaks + rng.normal(0, 1e-3, 400)) == pytest.approx(1e-3, rel=0.2)
+
+
+def test_the_time_between_samples_is_that_within_a_hold_or_that_of_most_rows() -> None:
+    force = 100 * triangle(60, 3)
+    hold = np.arange(60) // 3
+    held = bench_data(force, force / SPRING, step=hold, time=0.5 * np.arange(60) + 7.0 * hold)
+    assert sampling_time(make_bench(held).rows) == pytest.approx(0.5)
+    time = 0.5 * np.arange(60) + 7.0 * (np.arange(60) > 30)  # it stood still once
+    runs_on = replace(running(force, force / SPRING), time=time)
+    assert sampling_time(make_bench(runs_on).rows) == pytest.approx(0.5)
 
 
 def test_an_understated_uncertainty_is_raised_to_what_the_samples_show() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.history import delayed, half_sample, rests, retarded
+from identification.gap.history import delayed, rests, retarded, sampling_time
 from identification.gap.variants import Variant, variant
 
 WORD = "time_lag"
@@ -31,7 +31,7 @@ def variants(bench: Bench) -> list[Variant]:
     """Lags of laser or force, as delays and as filters; coefficient 1 is the lag itself."""
     if bench.timeless or _like_a_soft_start(bench):
         return []
-    sample = 2 * half_sample(bench.rows) if not bench.rows.continuous else _typical_step(bench)
+    sample = sampling_time(bench.rows)
     out = []
     for multiple in LAGS:
         lag, likely = multiple * sample, min(1.0, _USUAL / multiple)
@@ -145,8 +145,3 @@ def _true_force(bench: Bench, kind: str, lag: float) -> Array:
 
 
 _HOLDS_BACK = 0.05  # of a sample's weight: keeps what nobody saw from running away
-
-
-def _typical_step(bench: Bench) -> float:
-    step: Array = np.diff(bench.rows.time)
-    return float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
