@@ -12,7 +12,8 @@ import pytest
 
 pytest.importorskip("dynesty", reason="dynesty is not installed (extra `engines`)")
 
-from bench.nested_sampling import CASES, Line, compare
+from bench.nested_cases import CASES
+from bench.nested_sampling import Line, compare
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 WITHIN = 20.0

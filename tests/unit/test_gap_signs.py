@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import log_ndtr
 
-from bench.nested_sampling import case_data, dense
+from bench.dense_model import dense
+from bench.nested_cases import case_data
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
 from identification.gap.compare import score
@@ -125,7 +126,7 @@ def test_limits_of_a_part_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_evidence_at_every_size_of_imperfection_is_that_of_one_dense_covariance() -> None:
-    """Nuisances and imperfection built anew by `bench/nested_sampling.py`, as one matrix."""
+    """Nuisances and imperfection built anew by `bench/dense_model.py`, as one matrix."""
     bench = make_bench(case_data("yield"))
     base, target = base_columns(bench), bench.observed - prediction(bench)
     engine = Engine(bench, base, target, np.array([0.0, 1e-6, 2e-5, 1e-4]))
