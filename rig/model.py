@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -126,14 +127,20 @@ def load_model(path: str | Path) -> ArmModel:
 
 def _robot(name_or_path: str | Path) -> tuple[Arm, float]:
     path = Path(name_or_path)
-    if path.suffix not in (".yaml", ".yml"):
-        path = MODELS / f"{name_or_path}.yaml"
-        known = robot_names()
-        if str(name_or_path) not in known:
-            hint = did_you_mean(str(name_or_path), known)
-            raise InputError(
-                f'robot "{name_or_path}" is unknown.{hint} Or give a robot file (.yaml).'
-            )
+    return _read(path) if path.suffix in (".yaml", ".yml") else _shipped(str(name_or_path))
+
+
+@cache
+def _shipped(name: str) -> tuple[Arm, float]:
+    """Of data/models, read once: commands ask for the same robot again and again."""
+    known = robot_names()
+    if name not in known:
+        hint = did_you_mean(name, known)
+        raise InputError(f'robot "{name}" is unknown.{hint} Or give a robot file (.yaml).')
+    return _read(MODELS / f"{name}.yaml")
+
+
+def _read(path: Path) -> tuple[Arm, float]:
     document = read_document(path, RobotFile)
     written = document.value
     arm = _checked(
