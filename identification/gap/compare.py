@@ -71,6 +71,7 @@ def _stack(engine: Engine, family: tuple[Variant, ...]) -> Stack:
             np.array([v.scales for v in family]),
             np.swapaxes(root, 1, 2) @ mean_squares(engine, columns, family[0].word) @ root,
             Limits.of(family),
+            engine.alike(columns),
         )
     found: Stack = engine.stacks[family]
     return found

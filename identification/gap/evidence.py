@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,9 @@ class Engine:
         counts = np.diff(np.append(self._edges, n))
         self._hold = np.repeat(np.arange(len(self._edges)), counts)
         self._alone = counts[self._hold] == 1
-        self._contrast_noise = self.sigma[:n][~self._alone]
+        inside = np.flatnonzero(~self._alone)
+        self._inside = inside[np.argsort(self.sigma[inside], kind="stable")]
+        self._groups = _groups(self.sigma[self._inside])
         self._freedom = n - len(self._edges)
         self._squares: dict[tuple[int, ...], list[Array]] = {}
         self._rows: dict[tuple[int, ...], list[Array]] = {}
@@ -114,17 +117,25 @@ class Engine:
         wanted = [self.bench.columns[i] for i in numbers]
         return np.array(wanted).reshape(len(wanted), self.bench.layout.size).T
 
-    def squares(self, columns: NDArray[np.intp], number: int) -> Array:
+    def alike(self, columns: NDArray[np.intp]) -> Array:
+        """(g, v, k, k): what `squares` of the columns (v, k) has in common at all levels."""
+        return self._white.alike(columns)
+
+    def squares(self, columns: NDArray[np.intp], number: int, alike: Array) -> Array:
         """(v, k, k): parts of a level's Gram matrix of the columns (v, k) of every variant."""
         shared = self._bases[number].pool[columns]
-        made = self._white.squares(columns, self._weights[number])
+        made = self._white.squares(columns, self._weights[number], alike)
         return np.asarray(made - shared @ np.swapaxes(shared, 1, 2))
 
     def square(self, columns: tuple[int, ...]) -> list[Array]:
         """Per level (k, k): the part of the Gram matrix of some columns, kept for the next time."""
         if columns not in self._squares:
-            at = np.array([columns], dtype=np.intp)
-            self._squares[columns] = [self.squares(at, i)[0] for i in range(len(self.etas))]
+            at = np.array(columns, dtype=np.intp)
+            white = self._white.picked(at)
+            made = white.between(white, self._weights)
+            for base, square in zip(self._bases, made, strict=True):
+                np.subtract(square, base.pool[at] @ base.pool[at].T, out=square)
+            self._squares[columns] = made
         return self._squares[columns]
 
     def beside(self, columns: tuple[int, ...]) -> list[Array]:
@@ -158,7 +169,7 @@ class Engine:
         response, inverse = white[:, :n], self._inverse
         means = np.add.reduceat(response * inverse, self._edges, axis=1) / self._length_u
         direction = inverse / self._length_u[self._hold]
-        contrast = (response - direction * means[:, self._hold])[:, ~self._alone]
+        contrast = (response - direction * means[:, self._hold])[:, self._inside]
         # most columns stand still within a hold
         size = np.abs(contrast).max(axis=1, initial=0.0)
         top = np.abs(response).max(axis=1, initial=0.0)
@@ -168,7 +179,7 @@ class Engine:
             Some.of(white[:, start : start + holds]) for start in range(q.start, q.stop, holds)
         )
         even = np.hstack([means, white[:, q.stop :]])
-        return White(even, readings, Some.of(contrast), holds)
+        return White(even, readings, Some.of(contrast), holds, self._groups)
 
     def _left(self, eta: float) -> Weights:
         """What an imperfection leaves of the precision."""
@@ -179,7 +190,7 @@ class Engine:
         return Weights(
             1 / (1 + hold * self._length_u**2),
             1 / (1 + lever * self._length_q**2),
-            1 / (1 + (row_part * eta / self._contrast_noise) ** 2),
+            1 / (1 + (row_part * eta / self.sigma[self._inside]) ** 2),
         )
 
     def _common(self, white: White, w: Weights) -> Array:
@@ -220,6 +231,17 @@ class Engine:
         self._bases[i] = replace(base, pool=np.vstack([base.pool, fresh.T]))
         both = np.concatenate([level.moment, moment])
         return replace(level, moment=both, taken=np.zeros((0, len(both))))
+
+
+_FEW = 8  # kinds of rows
+
+
+def _groups(noise: Array) -> tuple[slice, ...]:
+    """Rows in ascending order of their noise whose noise is the same; none where hardly any is."""
+    edges = np.flatnonzero(np.diff(noise) > 1e-12 * noise[1:]) + 1
+    if len(edges) >= _FEW:
+        return ()
+    return tuple(slice(a, b) for a, b in pairwise([0, *edges.tolist(), len(noise)]) if a < b)
 
 
 def _forward(factor: Array, values: Array) -> Array:

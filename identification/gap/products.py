@@ -5,7 +5,8 @@ would be most of the work, and gigabytes. What is asked for are the small square
 once, and whole rows for the few columns that an effect is built from.
 
 Columns are taken apart into what is common to a hold and what differs in it; an imperfection of
-holds and rows is then a weight of every part.
+holds and rows is then a weight of every part. Most rows are weighed like many others under every
+imperfection: products over these are made once for all sizes of it.
 """
 
 from __future__ import annotations
@@ -82,7 +83,13 @@ def _together(mine: Array, other: Array, weights: Sequence[Array]) -> list[Array
     if len(mine) * len(weights) > _FEW:
         return [np.asarray((mine * w) @ other.T) for w in weights]
     stacked = np.vstack([mine * w for w in weights]) @ other.T
-    return np.split(stacked, len(weights))
+    return list(stacked.reshape(len(weights), len(mine), -1))
+
+
+def _alike(mine: Array, other: Array, groups: Sequence[slice], weights: Array) -> Array:
+    """(w, p, k): the same for rows that come in groups, with weights (w, g) of these."""
+    each = np.stack([mine[:, g] @ other[:, g].T for g in groups])
+    return np.tensordot(weights, each, axes=1)
 
 
 def _scaled(thin: csr_matrix, weights: Array, other: Array) -> Array:
@@ -97,12 +104,14 @@ def _scaled(thin: csr_matrix, weights: Array, other: Array) -> Array:
 class White:
     """Whitened stacked columns (p): even (p, holds + rest), means of the response per hold and the
     channels without imperfection; q: per joint those that touch its readings; contrast: those
-    that vary within holds. holds: how many of `even` are means."""
+    that vary within holds. holds: how many of `even` are means. groups: of contrasts that are
+    weighed alike, all of them or none."""
 
     even: Array
     q: tuple[Some, ...]
     contrast: Some
     holds: int
+    groups: tuple[slice, ...]
 
     def __len__(self) -> int:
         return len(self.even)
@@ -115,21 +124,32 @@ class White:
             tuple(Some.joined(each) for each in zip(*(part.q for part in parts), strict=True)),
             Some.joined([part.contrast for part in parts]),
             parts[0].holds,
+            parts[0].groups,
         )
 
     def between(self, columns: White, weights: list[Weights]) -> list[Array]:
         """Per set of weights (k, p): products of all these columns with all those of another."""
-        evens = [self._even(w) for w in weights]
-        out = _together(self.even, columns.even, evens)
-        qs = list(zip(*(self._q(w) for w in weights), strict=True))
-        parts = [*zip(self.q, columns.q, qs, strict=True),
-                 (self.contrast, columns.contrast, [w.contrast for w in weights])]  # fmt: skip
-        for mine, other, each in parts:
+        means, others = self.even[:, : self.holds], columns.even[:, : self.holds]
+        out = _together(means, others, [w.hold for w in weights])
+        rest = self.even[:, self.holds :] @ columns.even[:, self.holds :].T
+        out = [products + rest for products in out]
+        qs = zip(*(self._q(w) for w in weights), strict=True)
+        for mine, other, each in zip(self.q, columns.q, qs, strict=True):
             if mine.none and other.none:
-                products = _together(mine.values, other.values, each)
-                for rows, product in zip(out, products, strict=True):
-                    np.add(rows, product[np.ix_(mine.at, other.at)], out=rows)
+                _add(out, mine, other, _together(mine.values, other.values, each))
+        mine, other = self.contrast, columns.contrast
+        if mine.none and other.none:
+            _add(out, mine, other, self._contrasts(mine.values, other.values, weights))
         return out
+
+    def _contrasts(self, mine: Array, other: Array, weights: list[Weights]) -> list[Array]:
+        if not self.groups:
+            return _together(mine, other, [w.contrast for w in weights])
+        shares = np.array([self._of_groups(w) for w in weights])
+        return list(_alike(mine, other, self.groups, shares))
+
+    def _of_groups(self, w: Weights) -> Array:
+        return w.contrast[[g.start for g in self.groups]]
 
     def sparsely(self, columns: White, w: Weights) -> Array:
         """The same, where most numbers of these columns are zero."""
@@ -155,23 +175,49 @@ class White:
     def picked(self, columns: NDArray[np.intp]) -> White:
         """Some of these columns (k,)."""
         q = tuple(s.picked(columns) for s in self.q)
-        return White(self.even[columns], q, self.contrast.picked(columns), self.holds)
+        return White(self.even[columns], q, self.contrast.picked(columns), self.holds, self.groups)
 
-    def squares(self, columns: NDArray[np.intp], w: Weights) -> Array:
+    def alike(self, columns: NDArray[np.intp]) -> Array:
+        """(1 + groups, v, k, k): what `squares` is made of that no weight is needed for."""
+        out = np.zeros((1 + len(self.groups), *columns.shape, columns.shape[1]))
+        out[0] = squares_of(self.even[:, self.holds :], columns)
+        for i, group in enumerate(self.groups, start=1):
+            _add_squares(out[i], self.contrast, columns, group)
+        return out
+
+    def squares(self, columns: NDArray[np.intp], w: Weights, alike: Array) -> Array:
         """(v, k, k): products of the columns (v, k) of every variant."""
-        out = squares_of(self.even, columns, self._even(w))
-        for some, weight in zip((*self.q, self.contrast), (*self._q(w), w.contrast), strict=True):
-            at = some.at[columns]
-            mine = np.flatnonzero((at != some.none).any(axis=1))
-            if mine.size:
-                out[mine] += squares_of(some.values, at[mine], weight)
+        out = np.tensordot(np.append(1.0, self._of_groups(w)), alike, axes=1)
+        out += squares_of(self.even[:, : self.holds], columns, w.hold)
+        for some, weight in zip(self.q, self._q(w), strict=True):
+            _add_squares(out, some, columns, weight=weight)
+        if not self.groups:
+            _add_squares(out, self.contrast, columns, weight=w.contrast)
         return out
 
     def _even(self, w: Weights) -> Array:
         return np.concatenate([w.hold, np.ones(self.even.shape[1] - self.holds)])
 
     def _q(self, w: Weights) -> list[Array]:
-        return np.split(w.q, len(self.q)) if self.q else []
+        return list(w.q.reshape(len(self.q), -1)) if self.q else []
+
+
+def _add(out: list[Array], mine: Some, other: Some, products: list[Array]) -> None:
+    """Adds products (p, k) of what is there of two to each of those of all columns."""
+    place = np.ix_(mine.at, other.at)
+    for rows, product in zip(out, products, strict=True):
+        np.add(rows, product[place], out=rows)
+
+
+def _add_squares(
+    out: Array, some: Some, columns: NDArray[np.intp], rows: slice = slice(None),
+    weight: Array | float = 1.0,
+) -> None:  # fmt: skip
+    """Adds weighted products over some rows, where columns (v, k) are there."""
+    at = some.at[columns]
+    mine = np.flatnonzero((at != some.none).any(axis=1))
+    if mine.size:
+        out[mine] += squares_of(some.values[:, rows], at[mine], weight)
 
 
 def squares_of(values: Array, columns: NDArray[np.intp], weight: Array | float = 1.0) -> Array:

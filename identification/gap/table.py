@@ -25,19 +25,22 @@ _COUNTS = 40.0  # nats below the best: what lies further down adds nothing; limi
 @dataclass(frozen=True, eq=False)
 class Stack:
     """Variants of one word: columns (v, k), roots (v, k, k), scales (v, s), mean squares (v, k, k),
-    limits; by number of the level their products (v, k, k), once they are asked for."""
+    limits; what their products at all levels have in common; by number of the level these products
+    (v, k, k), once they are asked for."""
 
     columns: Ints
     root: Array
     scales: Array
     plain: Array
     limits: Limits | None
+    alike: Array
     squares: dict[int, Array] = field(default_factory=dict)
 
     def at(self, level: Level) -> Array:
         """Products (v, k, k) of the columns at a level, but for what effects take there."""
         if level.number not in self.squares:
-            self.squares[level.number] = level.engine.squares(self.columns, level.number)
+            made = level.engine.squares(self.columns, level.number, self.alike)
+            self.squares[level.number] = made
         return self.squares[level.number]
 
 

@@ -160,7 +160,8 @@ def test_products_are_those_of_the_columns() -> None:
         rows = level.beside((0, 3))
         assert rows == pytest.approx(other.beside(tuple(range(6)))[[0, 3]], rel=1e-9)
         assert level.square((0, 3)) == pytest.approx(rows[:, [0, 3]], rel=1e-9)
-        many = engine.squares(np.array([[0, 3], [5, 2]]), level.number)
+        two = np.array([[0, 3], [5, 2]])
+        many = engine.squares(two, level.number, engine.alike(two))
         assert many[1] == pytest.approx(other.square((5, 2)), rel=1e-9)
         assert level.moment == pytest.approx(other.moment, rel=1e-9)
 
