@@ -90,7 +90,7 @@ class Engine:
         self._weights = [self._left(float(eta)) for eta in etas]
         self._first = self._whiten(np.column_stack([target, base.columns]))
         self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
-        self._bases = [self._integrate(e, w) for e, w in zip(etas, self._weights, strict=True)]
+        self._bases = self._integrated(etas, self._weights)
         self._finer: dict[float, tuple[Weights, _Integrated]] = {}
         self._white = self._whiten(self.columns([]))
         none = np.zeros(0)
@@ -108,7 +108,10 @@ class Engine:
         step = max(1, _AT_ONCE // self.bench.layout.size)
         blocks = [added[i : i + step] for i in range(0, len(added), step)]
         parts = [self._whiten(self.columns(block)) for block in blocks]
-        self.levels = [self._grown(level, parts) for level in self.levels]
+        beside = [
+            np.hstack(b) for b in zip(*(self._common(p, self._weights) for p in parts), strict=True)
+        ]
+        self.levels = [self._grown(*each) for each in zip(self.levels, beside, strict=True)]
         self._white = White.joined([self._white, *parts])
         self._rows.clear()
 
@@ -153,12 +156,12 @@ class Engine:
         columns of the pool, and the evidence of the base alone."""
         if eta not in self._finer:
             w = self._left(eta)
-            self._finer[eta] = w, self._integrate(eta, w)
+            self._finer[eta] = w, self._integrated([eta], [w])[0]
         w, base = self._finer[eta]
         if not columns:
             return np.zeros((0, 0)), np.zeros(0), base.log_base
         white = self._white.picked(np.array(columns, dtype=np.intp))
-        beside = self._common(white, w)
+        (beside,) = self._common(white, [w])
         shared = _forward(base.factor, base.root.T @ beside[1 : 1 + base.root.shape[0]])
         square = white.between(white, [w])[0] - shared.T @ shared
         return square, beside[0] - shared.T @ base.left, base.log_base
@@ -193,13 +196,21 @@ class Engine:
             1 / (1 + (row_part * eta / self.sigma[self._inside]) ** 2),
         )
 
-    def _common(self, white: White, w: Weights) -> Array:
-        """(c, p) products with target, base and repeatable imperfection."""
-        return np.vstack([self._first.between(white, [w])[0], self._second.sparsely(white, w)])
+    def _common(self, white: White, weights: list[Weights]) -> list[Array]:
+        """Per set of weights (c, p): products with target, base and repeatable imperfection."""
+        first, second = self._first.between(white, weights), self._second.sparsely(white, weights)
+        return [np.vstack(both) for both in zip(first, second, strict=True)]
 
-    def _integrate(self, eta: float, w: Weights) -> _Integrated:
+    def _integrated(self, etas: Iterable[float], weights: list[Weights]) -> list[_Integrated]:
         """Base and repeatable imperfection, integrated out of target and, later, of the pool."""
-        gram = np.hstack([self._common(self._first, w), self._common(self._second, w)])
+        first, second = (self._common(white, weights) for white in (self._first, self._second))
+        return [
+            self._integrate(eta, w, np.hstack(both))
+            for eta, w, *both in zip(etas, weights, first, second, strict=True)
+        ]
+
+    def _integrate(self, eta: float, w: Weights, gram: Array) -> _Integrated:
+        """gram: products of target, base and imperfection with each other."""
         kb = self.base.columns.shape[1]
         covariance = level_covariance(self.bench)
         levels = covariance.shape[0]
@@ -220,11 +231,10 @@ class Engine:
         none = np.zeros((0, kb + count))
         return _Integrated(root, factor.astype(float), left.astype(float), log_base, misfit, none)
 
-    def _grown(self, level: Level, parts: list[White]) -> Level:
-        """A level with further columns."""
+    def _grown(self, level: Level, beside: Array) -> Level:
+        """A level with further columns, of which the products (c, p) with its base are known."""
         i = level.number
         base = self._bases[i]
-        beside = np.hstack([self._common(white, self._weights[i]) for white in parts])
         b = slice(1, 1 + base.root.shape[0])
         fresh = _forward(base.factor, base.root.T @ beside[b])
         moment = beside[0] - fresh.T @ base.left

@@ -92,12 +92,14 @@ def _alike(mine: Array, other: Array, groups: Sequence[slice], weights: Array) -
     return np.tensordot(weights, each, axes=1)
 
 
-def _scaled(thin: csr_matrix, weights: Array, other: Array) -> Array:
-    """`(thin * weights) @ other.T`"""
-    from scipy.sparse import csr_matrix
-
-    each = csr_matrix((thin.data * weights[thin.indices], thin.indices, thin.indptr), thin.shape)
-    return np.asarray(each @ other.T)
+def _scaled(thin: csr_matrix, weights: Sequence[Array], other: Array) -> list[Array]:
+    """`(thin * w) @ other.T` for every w"""
+    rows, each = np.ascontiguousarray(other.T), thin.copy()
+    out = []
+    for w in weights:
+        each.data = thin.data * w[thin.indices]
+        out.append(np.asarray(each @ rows))
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,16 +153,16 @@ class White:
     def _of_groups(self, w: Weights) -> Array:
         return w.contrast[[g.start for g in self.groups]]
 
-    def sparsely(self, columns: White, w: Weights) -> Array:
+    def sparsely(self, columns: White, weights: list[Weights]) -> list[Array]:
         """The same, where most numbers of these columns are zero."""
         if self._thin is None:
-            return self.between(columns, [w])[0]
+            return self.between(columns, weights)
         even, contrast = self._thin
-        out = _scaled(even, self._even(w), columns.even)
+        out = _scaled(even, [self._even(w) for w in weights], columns.even)
         mine, other = self.contrast, columns.contrast
         if mine.none and other.none:
-            product = _scaled(contrast, w.contrast, other.values)
-            out += product[np.ix_(mine.at, other.at)]
+            each = _scaled(contrast, [w.contrast for w in weights], other.values)
+            _add(out, mine, other, each)
         return out
 
     @cached_property
