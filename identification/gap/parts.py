@@ -107,7 +107,8 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
         limits = _limits(p.variant)
         if limits is not None:
             before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)
-            odds = log_odds(limits, _ONE, before, w[None, s], roots[None, :, s])
+            rows = limits.rows
+            odds = log_odds(limits, _ONE, before, rows @ w[s], rows @ roots[:, s].T)
             out += min(0.0, float(odds[0]))
     return out
 

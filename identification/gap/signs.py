@@ -50,16 +50,15 @@ class Limits:
         return cls(rows, np.array([v.least for v in variants]), asked)
 
 
-def log_odds(limits: Limits, which: Ints, before: Array, mean: Array, roots: Array) -> Array:
-    """(n,) for variants which (n,), with coefficients of mean (n, k) and covariance `roots' roots`,
-    roots (n, r, k); before (n,): standard deviation of the first limit's sum in the prior."""
+def log_odds(limits: Limits, which: Ints, before: Array, sums: Array, roots: Array) -> Array:
+    """(n,) for variants which (n,): sums (n, m), what `rows w` is at the mean of the coefficients,
+    of covariance `roots roots'`, roots (n, m, r); before (n,): standard deviation of the first sum
+    in the prior."""
     from scipy.special import log_ndtr
 
-    across, asked = np.swapaxes(limits.rows[which], 1, 2), limits.asked[which]
-    along = roots @ across  # (n, r, m)
-    centre = (mean[:, None] @ across)[:, 0]  # (n, m)
+    asked, centre = limits.asked[which], sums.copy()
     centre[:, 0] -= limits.least[which]
-    variance = np.where(asked, np.sum(along**2, axis=1) + _TINY, 1.0)
+    variance = np.where(asked, np.einsum("nmr,nmr->nm", roots, roots) + _TINY, 1.0)
     z = centre / np.sqrt(variance)
     share = log_ndtr(-limits.least[which] / (before + _TINY))
     out = np.where(asked[:, 0], log_ndtr(z[:, 0]) - share, 0.0)
@@ -70,7 +69,7 @@ def log_odds(limits: Limits, which: Ints, before: Array, mean: Array, roots: Arr
     far = np.flatnonzero((wrong.any(axis=1) | (z[:, 0] < 0)) & asked[:, 0])
     if far.size and wrong.shape[1]:
         first, more = (centre[far, :1], variance[far, :1]), (centre[far, 1:], variance[far, 1:])
-        common = np.sum(along[far][:, :, :1] * along[far][:, :, 1:], axis=1)
+        common = np.einsum("nr,nmr->nm", roots[far, 0], roots[far, 1:])
         apart = np.where(asked[far, 1:], _distance(*more, *first, common), 0.0).max(axis=1)
         bound = np.where(apart > 0, log_ndtr(-apart) - share[far], np.inf)
         out[far] = np.minimum(out[far], bound)

@@ -94,9 +94,11 @@ class Table:
         logs = self.logs[:, mine]
         todo = (logs > logs.max() - _COUNTS) & ~done[:, mine]
         level, which, scale = np.nonzero(todo)
+        if not len(which):
+            return False
         logs[todo] += self._odds(limits, level, start, which, scale)
         done[:, mine] |= todo
-        return bool(len(which))
+        return True
 
     def _make(self, i: int, which: Ints) -> None:
         level, root = self._levels[i], self._root[which]
@@ -144,9 +146,11 @@ class Table:
         """log odds (w,) that coefficients of variants `which`, counted from `start`, at their
         levels and scales keep the limits."""
         at = start + which
-        root = self._root[at]
-        before = np.linalg.norm((limits.rows[which, :1] @ root)[:, 0], axis=1)
-        spread = np.swapaxes(root @ self._vectors[level, at], 1, 2)  # to the coefficients
-        centre = (self._mean[level, at, scale][:, None] @ spread)[:, 0]
-        roots = np.sqrt(self._variance[level, at, scale])[:, :, None] * spread
-        return log_odds(limits, which, before * self._scales[at, scale], centre, roots)
+        new = np.append(True, (np.diff(level) != 0) | (np.diff(which) != 0))
+        place = np.cumsum(new) - 1  # scales of one variant at one level share the rest
+        rows = limits.rows[which[new]] @ self._root[at[new]]  # (u, m, k), of unit coefficients,
+        before = np.linalg.norm(rows[:, 0], axis=1)[place] * self._scales[at, scale]
+        rows = (rows @ self._vectors[level[new], at[new]])[place]  # and along the eigenvectors
+        sums = np.einsum("wmk,wk->wm", rows, self._mean[level, at, scale])
+        rows *= np.sqrt(self._variance[level, at, scale])[:, None]
+        return log_odds(limits, which, before, sums, rows)

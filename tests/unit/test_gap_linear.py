@@ -35,10 +35,9 @@ def charged(v: Variant, w: list[float], sd: float = 0.01) -> float:
     """nats that coefficients known to sd cost against the limits."""
     limits = Limits.of([v])
     assert limits is not None
-    k = len(w)
-    before = np.array([np.linalg.norm(limits.rows[0, 0])])
-    roots = sd * np.eye(k)[None]
-    return float(log_odds(limits, np.zeros(1, int), before, np.array([w]), roots)[0])
+    rows = limits.rows
+    before = np.array([np.linalg.norm(rows[0, 0])])
+    return float(log_odds(limits, np.zeros(1, int), before, rows @ np.array(w), sd * rows)[0])
 
 
 @pytest.mark.parametrize(("word", "label", "good", "bad"), [

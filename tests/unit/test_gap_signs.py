@@ -29,8 +29,8 @@ def odds(mean: Array, covariance: Array, prior: Array, **limits: object) -> floa
     assert found is not None
     first = found.rows[0, 0]
     before = np.array([np.sqrt(first @ prior @ first)])
-    roots = np.linalg.cholesky(covariance).T
-    return float(log_odds(found, np.zeros(1, int), before, mean[None], roots[None])[0])
+    roots = found.rows @ np.linalg.cholesky(covariance)
+    return float(log_odds(found, np.zeros(1, int), before, found.rows @ mean, roots)[0])
 
 
 def sampled(mean: Array, covariance: Array, prior: Array, rows: Array, least: float) -> float:
