@@ -103,12 +103,10 @@ def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float)
     """The level with an effect of fixed scale integrated out as well."""
     c = np.array(columns)
     T = scale * root
-    gone = level.taken[:, c]
-    beside = T.T @ (level.beside(columns) - gone.T @ level.taken)
-    inner = np.eye(len(c)) + beside[:, c] @ T
-    factor = np.linalg.cholesky(inner)
-    cross = np.linalg.solve(factor, beside)
-    left = np.linalg.solve(factor, T.T @ level.moment[c])
+    beside = level.beside(columns) - level.taken[:, c].T @ level.taken
+    factor = np.linalg.cholesky(np.eye(len(c)) + T.T @ beside[:, c] @ T)
+    turn = np.linalg.solve(factor, T.T)
+    cross, left = turn @ beside, turn @ level.moment[c]
     return replace(
         level,
         moment=level.moment - cross.T @ left,

@@ -56,7 +56,7 @@ class Level:
 
     def square(self, columns: Sequence[int]) -> Array:
         """(k, k) part of the pool's Gram matrix of columns (k,), but for what was taken."""
-        return self.engine.square(tuple(columns))[self.number]
+        return np.asarray(self.engine.square(tuple(columns))[self.number])
 
     def beside(self, columns: Sequence[int]) -> Array:
         """(k, p) rows of the pool's Gram matrix of columns (k,), but for what was taken."""
@@ -85,7 +85,7 @@ class Engine:
         self._inside = inside[np.argsort(self.sigma[inside], kind="stable")]
         self._groups = _groups(self.sigma[self._inside])
         self._freedom = n - len(self._edges)
-        self._squares: dict[tuple[int, ...], list[Array]] = {}
+        self._squares: dict[tuple[int, ...], Array] = {}
         self._rows: dict[tuple[int, ...], list[Array]] = {}
         self._weights = [self._left(float(eta)) for eta in etas]
         self._first = self._whiten(np.column_stack([target, base.columns]))
@@ -130,15 +130,15 @@ class Engine:
         made = self._white.squares(columns, self._weights[number], alike)
         return np.asarray(made - shared @ np.swapaxes(shared, 1, 2))
 
-    def square(self, columns: tuple[int, ...]) -> list[Array]:
-        """Per level (k, k): the part of the Gram matrix of some columns, kept for the next time."""
+    def square(self, columns: tuple[int, ...]) -> Array:
+        """(l, k, k): per level the part of the Gram matrix of some columns, kept for the next
+        time."""
         if columns not in self._squares:
             at = np.array(columns, dtype=np.intp)
             white = self._white.picked(at)
+            shared = [base.pool[at] @ base.pool[at].T for base in self._bases]
             made = white.between(white, self._weights)
-            for base, square in zip(self._bases, made, strict=True):
-                np.subtract(square, base.pool[at] @ base.pool[at].T, out=square)
-            self._squares[columns] = made
+            self._squares[columns] = np.array(made) - np.array(shared)
         return self._squares[columns]
 
     def beside(self, columns: tuple[int, ...]) -> list[Array]:

@@ -13,7 +13,7 @@ from identification.gap.compare import logsumexp
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.imperfection import level_prior, log_share
-from identification.gap.parts import Part, log_joint, log_joint_between
+from identification.gap.parts import Part, log_joint_between, log_joints
 
 _PARTS = 3  # of a step between levels
 _POINTS = 25  # of the integral, per part of a step
@@ -24,7 +24,7 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
     """By how many nats the evidence of parts with that energy (mean square, m^2), integrated over
     the size of imperfection, is above what the levels give for it."""
     etas = engine.etas
-    joint = np.array([log_joint(level, parts) for level in engine.levels])
+    joint = log_joints(engine, parts)
     coarse = joint + [level_prior(engine.etas, i, energy) for i in range(len(etas))]
     best = int(coarse.argmax())
     last = min(max(best, 1) + 1, len(etas) - 1)

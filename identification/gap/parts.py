@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from identification.gap.compare import moved_response
+from identification.gap.compare import mean_squares, moved_response
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
@@ -122,22 +122,40 @@ def _limits(v: Variant) -> Limits | None:
     return Limits.of([v])
 
 
-def log_joint(level: Level, parts: tuple[Part, ...]) -> float:
-    """log evidence of all parts together with fixed scales at one level."""
-    columns = [c for p in parts for c in p.variant.columns]
-    return _together(parts, level.square(columns), level.moment[columns], level.log_base)
+def log_joints(engine: Engine, parts: tuple[Part, ...]) -> Array:
+    """log evidence (l,) of all parts together with fixed scales at every level."""
+    bases = np.array([level.log_base for level in engine.levels])
+    return _together(parts, *_asked(engine, parts), bases) if parts else bases
 
 
 def log_joint_between(engine: Engine, parts: tuple[Part, ...], eta: float) -> float:
     """The same for a size of imperfection (m) that is none of the levels."""
-    return _together(parts, *engine.between(eta, [c for p in parts for c in p.variant.columns]))
+    gram, moment, base = engine.between(eta, [c for p in parts for c in p.variant.columns])
+    return float(_together(parts, gram, moment, np.array(base)))
 
 
-def _together(parts: tuple[Part, ...], gram: Array, moment: Array, log_base: float) -> float:
+def energies(engine: Engine, parts: tuple[Part, ...]) -> Array:
+    """(l,) the `Sizes.energy` of the parts at every level."""
     root = block([p.root for p in parts])
-    factor = np.linalg.cholesky(np.eye(len(gram)) + root.T @ gram @ root)
-    left = np.linalg.solve(factor, root.T @ moment)
-    return log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum())
+    gram, moment = _asked(engine, parts)
+    inner = np.eye(len(root)) + root.T @ gram @ root
+    w = np.linalg.solve(inner, (moment @ root)[..., None])[..., 0] @ root.T
+    each = [mean_squares(engine, np.array([p.variant.columns]), p.word)[0] for p in parts]
+    return np.asarray(np.sum(w @ block(each) * w, axis=1))
+
+
+def _asked(engine: Engine, parts: tuple[Part, ...]) -> tuple[Array, Array]:
+    """Gram matrices (l, k, k) and moments (l, k) of the columns of all parts at every level."""
+    columns = [c for p in parts for c in p.variant.columns]
+    return engine.square(tuple(columns)), np.stack([lv.moment[columns] for lv in engine.levels])
+
+
+def _together(parts: tuple[Part, ...], gram: Array, moment: Array, log_base: Array) -> Array:
+    root = block([p.root for p in parts])
+    factor = np.linalg.cholesky(np.eye(len(root)) + root.T @ gram @ root)
+    left = np.linalg.solve(factor, (moment @ root)[..., None])[..., 0]
+    lost = np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(axis=-1)
+    return np.asarray(log_base + 0.5 * np.sum(left**2, axis=-1) - lost)
 
 
 def block(roots: list[Array]) -> Array:

@@ -15,7 +15,7 @@ from identification.gap.fit import Fit, fit
 from identification.gap.imperfection import IMPERFECTION, LINEAR, level_prior
 from identification.gap.interval import TWO_SIDED, Parameter, Softer
 from identification.gap.parameters import parameters
-from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
+from identification.gap.parts import Part, energies, log_joints, signs_kept
 from identification.gap.penalties import SAME_JOINT
 from identification.gap.search import Explanation, conditioned
 from identification.gap.variants import Variant
@@ -210,11 +210,11 @@ def _crowds(shape: Part, rest: tuple[Part, ...]) -> bool:
 def _levels(engine: Engine, explanation: Explanation, prior: float) -> _Weighed:
     """The explanation at every size of imperfection, with its log weight."""
     out = []
+    joint, energy = log_joints(engine, explanation.parts), energies(engine, explanation.parts)
     for i, level in enumerate(engine.levels):
-        energy = part_sizes(engine, explanation.parts, i).energy
-        weight = prior + log_joint(level, explanation.parts) + level_prior(engine.etas, i, energy)
+        weight = prior + joint[i] + level_prior(engine.etas, i, energy[i])
         weight += signs_kept(level, explanation.parts)
-        out.append((replace(explanation, eta=_size(engine, i, energy)), float(weight)))
+        out.append((replace(explanation, eta=_size(engine, i, energy[i])), float(weight)))
     return out
 
 

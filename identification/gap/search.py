@@ -15,7 +15,7 @@ from identification.gap.effects import WORDS
 from identification.gap.evidence import Engine, Level
 from identification.gap.finer import gained
 from identification.gap.imperfection import level_prior
-from identification.gap.parts import Part, log_joint, part_sizes, signs_kept
+from identification.gap.parts import Part, log_joints, part_sizes, signs_kept
 from identification.gap.penalties import cancelling, pettiness, straight, trifle
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN, prior_of
 from identification.gap.variants import Variant
@@ -296,8 +296,7 @@ def _with_one_more(
     known: dict[frozenset[str], Explanation],
 ) -> dict[frozenset[str], Explanation]:
     others = [v for v in variants if v.word not in start.words]
-    levels, energy = conditioned(engine, start.parts)
-    levels = _no_worse(levels)
+    levels, energy = _no_worse(engine, start.parts)
     out: dict[frozenset[str], Explanation] = {}
     found_words = _by_word(score(engine, levels, others, energy))
     promising = sorted(found_words, key=lambda w: -_marginal(found_words[w]))[:_PROMISING]
@@ -318,9 +317,9 @@ def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Expl
     for index in range(len(start.parts)):
         rest = tuple(p for i, p in enumerate(best.parts) if i != index)
         word = best.parts[index].word
-        levels, energy = conditioned(engine, rest)
+        levels, energy = _no_worse(engine, rest)
         family = [v for v in variants if v.word == word]
-        scored = score(engine, _no_worse(levels), family, energy)
+        scored = score(engine, levels, family, energy)
         top = _closest(scored)
         found = _explain(engine, (*rest, Part(top.variant, top.scale)), _marginal(scored))
         if found.log_weight > best.log_weight:
@@ -328,14 +327,19 @@ def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Expl
     return best
 
 
-def _no_worse(levels: list[Level]) -> list[Level]:
-    """Levels up to the likeliest: with an effect more, no more imperfection is needed."""
-    return levels[: int(np.argmax([lv.log_base for lv in levels])) + 1]
+def _no_worse(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
+    """The same as `conditioned`, at levels up to the likeliest: with an effect more, no more
+    imperfection is needed."""
+    likeliest = int(np.argmax(log_joints(engine, parts)))
+    return conditioned(engine, parts, engine.levels[: likeliest + 1])
 
 
-def conditioned(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
-    """Levels with the parts integrated out, and the whitened energy of the parts."""
-    levels = engine.levels
+def conditioned(
+    engine: Engine, parts: tuple[Part, ...], among: list[Level] | None = None
+) -> tuple[list[Level], float]:
+    """Levels (all of them, or some) with the parts integrated out, and the mean square (m^2) of
+    the parts at the likeliest of these."""
+    levels = engine.levels if among is None else among
     for p in parts:
         levels = [condition(lv, p.variant.columns, p.variant.root, p.scale) for lv in levels]
     if not parts:
@@ -364,7 +368,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     """The explanation with its prior; too small a part is charged as what it is: freedom of the
     larger one's law."""
     levels = engine.levels
-    bases = np.array([log_joint(lv, parts) for lv in levels])
+    bases = log_joints(engine, parts)
     sizes = part_sizes(engine, parts, int(bases.argmax()))
     each, energy = sizes.gap, sizes.energy
     logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]

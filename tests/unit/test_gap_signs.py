@@ -17,7 +17,7 @@ from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.finer import gained
 from identification.gap.imperfection import least_size, log_share
-from identification.gap.parts import Part, log_joint, log_joint_between, signs_kept
+from identification.gap.parts import Part, log_joint_between, log_joints, signs_kept
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant, variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
@@ -146,7 +146,7 @@ def test_between_two_levels_is_what_a_level_there_would_give() -> None:
     finer = Engine(bench, engine.base, engine.target, np.array([0.0, 3e-6, 4.7e-6, 7.5e-6]))
     parts = (Part(variant("joint_creep", "a", [0, 1], (0.5,)), 0.5),)
     found = log_joint_between(engine, parts, 4.7e-6)
-    assert found == pytest.approx(log_joint(finer.levels[2], parts), rel=1e-12)
+    assert found == pytest.approx(log_joints(finer, parts)[2], rel=1e-12)
 
 
 def test_steps_between_levels_lose_nothing_that_finer_ones_show() -> None:
