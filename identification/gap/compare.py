@@ -82,7 +82,7 @@ def mean_squares(engine: Engine, columns: Ints, word: str) -> Array:
     each setup; of a linear law only the part that counts as imperfect."""
     weight = engine.bench.rows.weight
     used, place = np.unique(columns, return_inverse=True)
-    moved = moved_response(engine, engine.columns(used)[: engine.bench.rows.n])
+    moved = moved_response(engine, engine.responses(used))
     moved *= np.sqrt(weight / weight.sum())[:, None]
     out = squares_of(moved.T, place.reshape(columns.shape))
     return out * (LAW_IMPERFECTION / IMPERFECTION) ** 2 if word in LINEAR else out
@@ -96,7 +96,8 @@ def moved_response(engine: Engine, response: Array) -> Array:
             :, None
         ]
         engine.cache["setups"] = share / np.maximum(share.sum(axis=0), 1e-300)
-    return np.asarray(response - (engine.cache["setups"].T @ response)[rows.setup])
+    means = response.T @ engine.cache["setups"]
+    return np.asarray(response - means[:, rows.setup].T)
 
 
 def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float) -> Level:

@@ -120,6 +120,11 @@ class Engine:
         wanted = [self.bench.columns[i] for i in numbers]
         return np.array(wanted).reshape(len(wanted), self.bench.layout.size).T
 
+    def responses(self, numbers: Iterable[int]) -> Array:
+        """(n, k) what columns of the pool do to the response."""
+        n, wanted = self.bench.rows.n, [self.bench.columns[i] for i in numbers]
+        return np.array([column[:n] for column in wanted]).reshape(len(wanted), n).T
+
     def alike(self, columns: NDArray[np.intp]) -> Array:
         """(g, v, k, k): what `squares` of the columns (v, k) has in common at all levels."""
         return self._white.alike(columns)

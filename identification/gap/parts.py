@@ -58,7 +58,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
-        moved = moved_response(engine, (engine.columns(c)[:n] @ part)[:, None])[:, 0]
+        moved = moved_response(engine, (engine.responses(c) @ part)[:, None])[:, 0]
         square = float(weight @ moved**2 / weight.sum())
         moves.append(square**0.5)
         if p.word in LINEAR:

@@ -36,17 +36,17 @@ class Limits:
         """None where none of them has any."""
         if not any(v.positive is not None for v in variants):
             return None
-        most = max(1 + sum(v.each) + len(v.within) for v in variants)
-        rows = np.zeros((len(variants), most, len(variants[0].columns)))
-        asked = np.zeros((len(variants), most), dtype=bool)
-        for i, v in enumerate(variants):
+        some = np.array([v.positive is not None for v in variants])
+        each = np.array([v.each for v in variants], dtype=bool) & some[:, None]
+        alone, within = each.sum(axis=1), np.array([len(v.within) for v in variants]) * some
+        rows = np.zeros((len(variants), 1 + int((alone + within).max()), each.shape[1]))
+        i, j = np.nonzero(each)
+        rows[i, np.cumsum(each, axis=1)[i, j], j] = 1.0
+        for v, before, mine in zip(variants, alone.tolist(), rows, strict=True):
             if v.positive is not None:
-                alone = np.flatnonzero(v.each)
-                count = 1 + len(alone)
-                rows[i, 0] = v.positive
-                rows[i, np.arange(1, count), alone] = 1.0
-                rows[i, count : count + len(v.within)] = v.within
-                asked[i, : count + len(v.within)] = True
+                mine[0] = v.positive
+                mine[1 + before : 1 + before + len(v.within)] = v.within
+        asked = some[:, None] & (np.arange(rows.shape[1]) <= (alone + within)[:, None])
         return cls(rows, np.array([v.least for v in variants]), asked)
 
 
