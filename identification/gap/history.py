@@ -189,9 +189,11 @@ def flowing_play(
     paused, during, stood = much(pause), much(ramp), much(stands)
     low, high = load[:, None] + below, load[:, None] + above
 
+    some = bool(np.any(square))
+
     def flown(state: Array, share: Array, least: Array, most: Array) -> Array:
         over = np.minimum(np.maximum(state, least), most) - state
-        if not np.any(square):
+        if not some:
             return state + share * over
         way = share * np.abs(over) / radius
         return state + np.where(square, way / (1 + way), share) * over
