@@ -73,7 +73,7 @@ def free_paths(bench: Bench) -> dict[str, int]:
         return {}
     if not bench.rows.continuous:
         return PIECES
-    most = PIECES["free path"] if bench.rests else LONG_PIECES
+    most = PIECES["winding path"] if bench.rests else LONG_PIECES
     pieces = min(3 * (bench.passes - 3), most)
     return {"free path": pieces} if pieces >= LEAST_PIECES else {}
 
