@@ -150,7 +150,8 @@ GRAMMAR: dict[str, Grammar] = {
     "joint_yield": Grammar(("joint", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "joint_hysteresis": Grammar(
-        ("joint", "law", "memory"), (("compliance", ("strength",)), ("compliance", ("reach",)))
+        ("joint", "law", "memory"),
+        (("compliance", ("strength",)), ("compliance", ("reach",)), ("compliance", ())),
     ),
     "joint_backlash": Grammar(
         ("joint", "zone", "crossing", "kind", "tool"),

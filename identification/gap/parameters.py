@@ -41,11 +41,26 @@ def parameters(
 def _hysteresis(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Of the strengths that slip within the range."""
     radius, joint = np.asarray(part.variant.info["radius"]), int(part.variant.info["joint"])
+    found = _beside_line(found, len(radius), joint)
     slips = (radius < float(np.ptp(np.append(bench.torque[:, joint], 0.0)))).astype(float)
     return {
         "friction": found.linear(slips * radius, torque_unit(bench)),
         "share_through_friction": found.per_spring(slips, joint),
     }
+
+
+def _beside_line(found: Found, k: int, joint: int) -> Found:
+    """The first k coefficients; a further one is what the joint's spring has more."""
+    if len(found.w) == k:
+        return found
+    softer, w, cov = found.softer, found.w, found.cov
+    value, variance = dict(softer.value), dict(softer.variance)
+    cross = {j: c[:k] for j, c in softer.cross.items()}
+    if joint in value:
+        value[joint] += float(w[k])
+        variance[joint] += float(cov[k, k] + 2 * softer.cross[joint][k])
+        cross[joint] = cross[joint] + cov[k, :k]
+    return Found(w[:k], cov[:k, :k], Softer(value, variance, cross))
 
 
 def _backlash(bench: Bench, _: Part, found: Found) -> dict[str, Parameter]:

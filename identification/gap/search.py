@@ -14,9 +14,9 @@ from identification.gap.data import Array
 from identification.gap.effects import WORDS
 from identification.gap.evidence import Engine, Level
 from identification.gap.finer import gained
-from identification.gap.imperfection import level_prior
+from identification.gap.imperfection import LINEAR, level_prior
 from identification.gap.parts import Part, log_joints, part_sizes, signs_kept
-from identification.gap.penalties import cancelling, pettiness, straight, trifle
+from identification.gap.penalties import FRICTION, cancelling, pettiness, straight, trifle
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN, prior_of
 from identification.gap.variants import Variant
 
@@ -370,7 +370,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     levels = engine.levels
     bases = log_joints(engine, parts)
     sizes = part_sizes(engine, parts, int(bases.argmax()))
-    each, energy = sizes.gap, sizes.energy
+    each, energy = _counted(engine, parts, sizes.gap), sizes.energy
     logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
     least = max(
@@ -394,6 +394,18 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
         tuple(float(each[i]) for i in order),
         weight + log(max(fraction, 1e-300)),
     )
+
+
+def _counted(engine: Engine, parts: tuple[Part, ...], each: Array) -> Array:
+    """Sizes of the parts. Without an arm friction brings its own mean stiffness, and what was
+    simulated may be its first slope: a spring that is off beside it counts by what the friction
+    leaves of the gap."""
+    linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
+    rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
+    if engine.bench.data.arm or not rubs.any():
+        return each
+    rest = max(engine.structural**2 - float(each[rubs].max()) ** 2, 0.0) ** 0.5
+    return np.where(linear, np.minimum(each, rest), each)
 
 
 # Of 132 verdicts of the blind check whose posterior was above 0.97, 128 named an effect that was

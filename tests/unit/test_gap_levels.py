@@ -30,6 +30,7 @@ from identification.gap.search import (
     EXPLAINED,
     THREE,
     Explanation,
+    _counted,
     _heir,
     _main,
     _sharpened,
@@ -181,6 +182,19 @@ def part(word: str, columns: list[int], **info: object) -> Part:
 def said(parts: tuple[Part, ...], sizes: tuple[float, ...], weight: float = 0.0,
          eta: float = 0.0) -> Explanation:  # fmt: skip
     return Explanation(parts, weight, eta, sizes, weight)
+
+
+def test_without_an_arm_a_wrong_spring_counts_by_what_friction_leaves_of_the_gap() -> None:
+    engine = small_engine_of(small_bench())
+    rubs, spring = part("joint_hysteresis", [0]), part("joint_stiffness_error", [1])
+    sizes = engine.structural * np.array([0.8, 9.0])
+    assert _counted(engine, (rubs, spring), sizes) == pytest.approx(
+        engine.structural * np.array([0.8, 0.6])
+    )
+    bent = part("joint_nonlinear_stiffness", [0])
+    assert _counted(engine, (bent, spring), sizes) is sizes  # a curve has its line from the spring
+    arm = replace_bench(engine, replace(engine.bench, data=replace(engine.bench.data, arm=True)))
+    assert _counted(arm, (rubs, spring), sizes) is sizes
 
 
 def test_the_main_cause_of_two_is_shared_by_what_they_do() -> None:

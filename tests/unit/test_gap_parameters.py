@@ -285,6 +285,25 @@ def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> Non
     assert found.high - 30.0 == pytest.approx(30.0 - found.low)
 
 
+def test_friction_with_a_spring_of_its_own_is_counted_against_that_spring() -> None:
+    """Of draws: share through friction over the spring as it is with the line."""
+    load = 80 * np.sin(np.arange(300) / 15)
+    bench = make_bench(bench_data(load, load * 1e-5, step=np.full(300, -1), branch=np.full(300, 3)))
+    rubs = of(bench, "joint_hysteresis", "r 0.2, other springs")
+    k, joint = len(rubs.columns) - 1, int(rubs.info["joint"])
+    rng = np.random.default_rng(2)
+    root = 0.01 * rng.normal(size=(k + 2, k + 2))
+    full = root @ root.T
+    w = np.array([*[0.3] * k, 0.5])
+    softer = Softer({joint: 0.1}, {joint: full[-1, -1]}, {joint: full[-1, :-1]})
+    found = parameters(bench, Part(rubs, 1.0), w, full[:-1, :-1], softer)
+    drawn = np.append(w, 0.1) + rng.normal(size=(40000, k + 2)) @ root.T
+    slips = np.asarray(rubs.info["radius"]) < np.ptp(np.append(bench.torque[:, joint], 0.0))
+    share = drawn[:, :k] @ slips / (1 + drawn[:, k] + drawn[:, k + 1])
+    through = found["share_through_friction"]
+    assert (through.value, sd(through)) == pytest.approx((share.mean(), share.std()), rel=0.03)
+
+
 def test_beside_another_effect_intervals_are_wider(monkeypatch: pytest.MonkeyPatch) -> None:
     engine = small_engine(small_bench())
     family = [

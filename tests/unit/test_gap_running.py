@@ -260,6 +260,20 @@ def test_a_specimen_that_is_only_let_go_does_not_flow_back() -> None:
         assert any("flows back" in label for label in labels) == back
 
 
+def test_friction_whose_first_slope_was_simulated_is_friction() -> None:
+    """Nothing but sliders, moved to and fro: all of the stiffness is theirs."""
+    u = 1e-3 * np.sin(np.arange(500) / 20)
+    force, state = np.zeros(500), np.zeros(6)
+    limits, stiff = np.geomspace(0.5, 8.0, 6), np.full(6, 1.5e4)
+    for i, step in enumerate(np.diff(u, prepend=0.0)):
+        state = np.clip(state + stiff * step, -limits, limits)
+        force[i] = state.sum()
+    force += np.random.default_rng(9).normal(0, 0.05, 500)
+    said = diagnose_gap(running(force, u, imposed="displacement"))
+    assert said.verdict == "joint_hysteresis"
+    assert said.effects[0].name == "joint_hysteresis"
+
+
 @pytest.mark.parametrize(("both", "seats"), [(False, True), (True, False)])
 def test_what_bears_both_ways_is_no_seat(both: bool, seats: bool) -> None:
     load = 100 * np.sin(np.arange(300) / 15)

@@ -46,6 +46,7 @@ NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # bends ever more from the first load on is a spectrum of strengths. Specimens yield.
 _SMALL = 5
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
+OTHER_SCALES, _MORE = (0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off by more than friction adds
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -71,7 +72,21 @@ def variants(bench: Bench) -> list[Variant]:
             out += _laws(bench, j, span, memory, fresh, path)
         if bench.feels_weight(j):
             out += _laws(bench, j, span, UNDER_WEIGHT, bench.moved, None, bench.weight(j))
+    if not bench.data.arm:
+        out += [_with_other_springs(bench, v) for v in out]
     return out
+
+
+def _with_other_springs(bench: Bench, v: Variant) -> Variant:
+    """A specimen's friction brings its own mean stiffness: what was simulated may be its first
+    slope, or the mean one."""
+    joint, k = int(v.info["joint"]), len(v.columns)
+    root = np.zeros((k + 1, k + 1))
+    root[:k, :k], root[k, k] = v.root, _MORE
+    line = bench.add_joint(joint, bench.elastic[:, joint])
+    return variant(WORD, f"{v.label}, other springs", [*v.columns, line], OTHER_SCALES, root,
+                   np.append(np.ones(k), 0.0), 0.5 * v.prior, each=(True,) * k,
+                   **{**v.info, "line": True})  # fmt: skip
 
 
 def _laws(

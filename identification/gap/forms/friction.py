@@ -22,15 +22,17 @@ def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
     key = "strength" if law == "Iwan" else "reach"
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
     terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
+    terms += (Term("compliance"),) if v.info.get("line") else ()
     return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
 
 
 def hysteresis(bench: Bench, law: Law) -> list[Array]:
-    """What the friction holds back: `S_r(tau)` (stop operator), or reach times bristle state."""
+    """What the friction holds back: `S_r(tau)` (stop operator), or reach times bristle state; of a
+    term without a strength the line of its own spring."""
     c = law.constants
     joint, iwan = c["joint"], c["law"] == "Iwan"
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
-    size = np.array([t.shape["strength" if iwan else "reach"] for t in law.terms])
+    size = np.array([t.shape["strength" if iwan else "reach"] for t in law.terms if t.shape])
     load, kept = torque, np.ones(len(torque), dtype=bool)
     rest, weight = bench.rest, None
     if c["memory"] == HUNG:
@@ -44,7 +46,8 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
         held = (load[:, None] - state)[kept]
     else:
         held = (size * bristles(load, size, fresh, c["law"] == "Bouc-Wen", weight))[kept]
-    return [bench.joint_column(joint, -bench.sense * h) for h in held.T]
+    lines = [bench.joint_column(joint, torque) for t in law.terms if not t.shape]
+    return [*(bench.joint_column(joint, -bench.sense * h) for h in held.T), *lines]
 
 
 def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
