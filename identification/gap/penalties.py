@@ -76,6 +76,31 @@ def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
 BENDS = 0.04  # of what a curve moves: so much the springs can't give at least
 
 
+def within_stated(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
+    """Penalty in nats, a steep wall, for an arm's gains that are off by no more than twice what is
+    stated: that is `none`."""
+    if not engine.bench.data.arm:
+        return 0.0
+    meter, penalty = engine.bench.data.instruments, 0.0
+    sds = {"force_scale": meter.force_gain, "displacement_scale": meter.displacement_gain}
+    for p, moved in zip(parts, found.moved, strict=True):
+        if p.word in sds:
+            off = max(float(moved) / _rms_of_line(engine, p), 1e-6)
+            penalty += 60.0 * max(0.0, float(np.log(_WITHIN * sds[p.word] / off)))
+    return penalty
+
+
+def _rms_of_line(engine: Engine, gain: Part) -> float:
+    """rms (m) by which a gain of one moves."""
+    n, weight = engine.bench.rows.n, engine.bench.rows.weight
+    line = engine.columns(gain.variant.columns)[:n, :1]
+    moved = moved_response(engine, line)[:, 0]
+    return max(float(np.sqrt(weight @ moved**2 / weight.sum())), 1e-300)
+
+
+_WITHIN = 2.0  # standard deviations
+
+
 def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats for effects below the noise of a single sample of a running recording:
     thousands of samples would show them, but for what noise of low frequency does to them."""

@@ -16,7 +16,14 @@ from identification.gap.evidence import Engine, Level
 from identification.gap.finer import gained
 from identification.gap.imperfection import LINEAR, level_prior
 from identification.gap.parts import Part, log_joints, part_sizes, signs_kept
-from identification.gap.penalties import FRICTION, cancelling, pettiness, straight, trifle
+from identification.gap.penalties import (
+    FRICTION,
+    cancelling,
+    pettiness,
+    straight,
+    trifle,
+    within_stated,
+)
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN, prior_of
 from identification.gap.variants import Variant
 
@@ -384,6 +391,7 @@ def _explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Ex
     order = np.argsort(-each, kind="stable")
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
     weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
+    weight -= within_stated(engine, parts, sizes)
     if len(parts) > 1:
         weight -= pettiness(engine, parts, sizes) + cancelling(engine, parts, each)
         weight += signs_kept(levels[best], parts)

@@ -15,7 +15,7 @@ from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, Sizes, _beyond_springs
-from identification.gap.penalties import straight
+from identification.gap.penalties import straight, within_stated
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
@@ -101,3 +101,20 @@ def test_a_curve_that_hardly_bends_is_a_wrong_spring(bench: Bench) -> None:
     assert charge(1e-6) == pytest.approx(60 * np.log(4))
     spring = (Part(of(bench, "joint_stiffness_error")[1]["joint 1"], 1.0),)
     assert straight(engine, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0
+
+
+@pytest.mark.parametrize("word", ["force_scale", "displacement_scale"])
+def test_a_gain_within_what_is_stated_is_no_effect(bench: Bench, word: str) -> None:
+    fresh, variants = of(bench, word)
+    engine = Engine(fresh, base_columns(fresh), fresh.observed, np.array([0.0, 3e-6]))
+    gain, meter = variants["gain"], fresh.data.instruments
+    sd = meter.force_gain if word == "force_scale" else meter.displacement_gain
+    line = moved_response(engine, engine.columns(gain.columns)[: fresh.rows.n])[:, 0]
+    one = np.sqrt(fresh.rows.weight @ line**2 / fresh.rows.weight.sum())
+
+    def charge(off: float) -> float:
+        sizes = Sizes(np.zeros(1), np.array([off * one]), 0.0)
+        return within_stated(engine, (Part(gain, 1.0),), sizes)
+
+    assert charge(sd) == pytest.approx(60 * np.log(2))
+    assert charge(2.1 * sd) == 0.0
