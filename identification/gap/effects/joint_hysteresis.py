@@ -73,17 +73,17 @@ def variants(bench: Bench) -> list[Variant]:
         if bench.feels_weight(j):
             out += _laws(bench, j, span, UNDER_WEIGHT, bench.moved, None, bench.weight(j))
     if not bench.data.arm:
-        out += [_with_other_springs(bench, v) for v in out]
+        lines = {j: bench.add_joint(j, bench.elastic[:, j]) for j in bench.moving_joints()}
+        out += [_with_other_springs(v, lines[int(v.info["joint"])]) for v in out]
     return out
 
 
-def _with_other_springs(bench: Bench, v: Variant) -> Variant:
+def _with_other_springs(v: Variant, line: int) -> Variant:
     """A specimen's friction brings its own mean stiffness: what was simulated may be its first
     slope, or the mean one."""
-    joint, k = int(v.info["joint"]), len(v.columns)
+    k = len(v.columns)
     root = np.zeros((k + 1, k + 1))
     root[:k, :k], root[k, k] = v.root, _MORE
-    line = bench.add_joint(joint, bench.elastic[:, joint])
     return variant(WORD, f"{v.label}, other springs", [*v.columns, line], OTHER_SCALES, root,
                    np.append(np.ones(k), 0.0), 0.5 * v.prior, each=(True,) * k,
                    **{**v.info, "line": True})  # fmt: skip
