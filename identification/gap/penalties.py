@@ -48,7 +48,7 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
                 penalty += SAME_JOINT
             share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
             least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
-            penalty += 60.0 * max(0.0, float(np.log(least / share)))
+            penalty += _wall(least / share)
     return penalty
 
 
@@ -57,7 +57,12 @@ def cancelling(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
     linear the springs of the base take back from it, and it is left alone."""
     bent = max((s for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR), default=0.0)
     share = max(float(bent) / max(engine.structural, 1e-300), 1e-6)
-    return 60.0 * max(0.0, float(np.log(share / CANCELLING)))
+    return _wall(share / CANCELLING)
+
+
+def _wall(beyond: float) -> float:
+    """Nats for what is so many times beyond its limit."""
+    return 60.0 * max(0.0, float(np.log(beyond)))
 
 
 def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
@@ -69,7 +74,7 @@ def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     for p, gap, moved in zip(parts, found.gap, found.moved, strict=True):
         if "line" in p.variant.info.get("kinds", ()) and moved > 0:
             share = max(float(gap / moved), 1e-6)
-            penalty += 60.0 * max(0.0, float(np.log(BENDS / share)))
+            penalty += _wall(BENDS / share)
     return penalty
 
 
@@ -86,7 +91,7 @@ def within_stated(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> floa
     for p, moved in zip(parts, found.moved, strict=True):
         if p.word in sds:
             off = max(float(moved) / _rms_of_line(engine, p), 1e-6)
-            penalty += 60.0 * max(0.0, float(np.log(_WITHIN * sds[p.word] / off)))
+            penalty += _wall(_WITHIN * sds[p.word] / off)
     return penalty
 
 
