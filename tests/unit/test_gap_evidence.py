@@ -98,13 +98,18 @@ def test_levels_of_imperfection_are_exact_too(monkeypatch: pytest.MonkeyPatch) -
     assert found[1] - found[0] == pytest.approx(exact[1] - exact[0], abs=1e-5)
 
 
-def test_levels_that_are_not_looked_at_add_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def large_gap(levels: int) -> Engine:
+    """The first column of the pool is really there, thirty times."""
     bench = small_bench()
     small_engine(bench)
     base, n = base_columns(bench), bench.rows.n
     target = bench.observed - prediction(bench)
     target[:n] += 30 * bench.columns[0][:n]
-    engine = Engine(bench, base, target, np.array([0.0, *(1e-6 * 2.5 ** np.arange(9))]))
+    return Engine(bench, base, target, np.array([0.0, *(1e-6 * 2.5 ** np.arange(levels))]))
+
+
+def test_levels_that_are_not_looked_at_add_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = large_gap(levels=9)
     shapes = [
         variant(word, word, columns, (3.0, 30.0), positive=positive)
         for word, columns, positive in (
@@ -121,6 +126,26 @@ def test_levels_that_are_not_looked_at_add_nothing(monkeypatch: pytest.MonkeyPat
     every = [s.log_evidence for s in score(engine, engine.levels, shapes)]
     assert not any(np.isneginf(logs).any() for logs in looked)
     assert few == pytest.approx(every, rel=1e-12)
+
+
+def test_far_worse_shapes_of_a_word_are_not_looked_at_further(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    engine = large_gap(levels=3)
+    right = variant("joint_creep", "right", [0], (3.0, 30.0))
+    near = variant("joint_creep", "near", [0], (2.0, 8.0))
+    wrong = variant("joint_creep", "wrong", [1], (3.0, 30.0))
+    shapes = [right, near, wrong]
+    looked, make = [], Table._make
+    monkeypatch.setattr(
+        Table, "_make", lambda self, i, which: (make(self, i, which), looked.extend(which))[0]
+    )
+    few = [s.log_evidence for s in score(engine, engine.levels, shapes)]
+    assert few[0] > few[2] + 90
+    assert looked.count(2) == 1 < looked.count(1)
+    monkeypatch.setattr(table, "_HOPELESS", np.inf)
+    every = [s.log_evidence for s in score(engine, engine.levels, shapes)]
+    assert few[:2] == pytest.approx(every[:2], rel=1e-12)
 
 
 def test_score_averages_over_scales_and_asks_for_the_sign() -> None:
