@@ -131,3 +131,29 @@ def log_mean(values: list[float], weights: list[float] | None = None) -> float:
     top = v[w > 0].max()
     v = np.minimum(v, top)  # what weighs nothing decides nothing
     return float(top + np.log(np.sum(w * np.exp(v - top)) / w.sum()))
+
+
+def by_word(scored: list[Scored]) -> dict[str, list[Scored]]:
+    """Word -> its variants."""
+    out: dict[str, list[Scored]] = {}
+    for s in scored:
+        out.setdefault(s.variant.word, []).append(s)
+    return out
+
+
+def marginal(scored: list[Scored]) -> float:
+    """log evidence of a word: mean over its variants, weighted by their prior."""
+    weights = [s.variant.prior for s in scored]
+    values = [s.log_evidence - log(s.variant.prior) for s in scored]
+    return log_mean(values, weights)
+
+
+def closest(scored: list[Scored]) -> Scored:
+    """Of the shapes of a word that are about equally likely, the one that needs least
+    imperfection: a word is judged by how well it can explain, not by its crudest shape."""
+    best = max(s.log_evidence for s in scored)
+    near = [s for s in scored if s.log_evidence > best - _ABOUT_EQUAL]
+    return min(near, key=lambda s: (s.level, -s.log_evidence))
+
+
+_ABOUT_EQUAL = 3.0  # nats

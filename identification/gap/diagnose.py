@@ -15,6 +15,7 @@ from identification.gap.discriminate import NextMeasurement, Others, next_measur
 from identification.gap.earned import FREE, earned, noise_of, sample_rms
 from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
+from identification.gap.explanation import Explanation, Found
 from identification.gap.fit import Fit, fit
 from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
@@ -24,9 +25,11 @@ from identification.gap.locate import Where, locate
 from identification.gap.noise import bursts
 from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
-from identification.gap.search import NOISY, Explanation, Found, force, refine, search
+from identification.gap.refine import refine
+from identification.gap.search import force, search
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
+from identification.gap.verdict import NOISY
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
 # laws themselves are only families.

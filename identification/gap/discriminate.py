@@ -27,9 +27,9 @@ from identification.gap.designs import (
     present_design,
 )
 from identification.gap.evidence import Engine, Level, eta_levels
+from identification.gap.explanation import Explanation, Found
 from identification.gap.fit import Fit, fit
 from identification.gap.forms import Form, Law, describe, law_of, lawful, realise, rows_of
-from identification.gap.search import Explanation, Found
 from identification.gap.twins import PLACE, twin_of
 from identification.gap.variants import Variant
 

@@ -13,10 +13,11 @@ from identification.gap.bench import Bench
 from identification.gap.compare import moved_response
 from identification.gap.data import Array, Ints
 from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation, Found
 from identification.gap.fit import fit
 from identification.gap.heldout import folds, held_out
 from identification.gap.imperfection import LINEAR
-from identification.gap.search import Explanation, Found, weighed
+from identification.gap.verdict import weighed
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
 CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same

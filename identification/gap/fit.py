@@ -18,9 +18,9 @@ from identification.gap.evidence import (
     level_covariance,
     run_columns,
 )
+from identification.gap.explanation import Explanation
 from identification.gap.parts import Part, block
 from identification.gap.rows import rises
-from identification.gap.search import Explanation
 
 _LATER = 3  # rows of a hold from here on count as one
 

@@ -17,8 +17,8 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
-from identification.gap.search import Explanation
 
 BLOCKS = 5
 ALWAYS_IN = -1  # number of the fold of rows that are never withheld

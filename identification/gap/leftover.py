@@ -14,10 +14,11 @@ import numpy as np
 
 from identification.gap.bench import way_back
 from identification.gap.evidence import Engine
+from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found
 from identification.gap.fit import fit
 from identification.gap.noise import bursts
 from identification.gap.penalties import CURVES
-from identification.gap.search import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found, weighed
+from identification.gap.verdict import weighed
 
 # An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.
 SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none of noise

@@ -11,13 +11,13 @@ import numpy as np
 from identification.gap.compare import score
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
 from identification.gap.imperfection import IMPERFECTION, LINEAR, level_prior
 from identification.gap.interval import TWO_SIDED, Parameter, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part, energies, log_joints, signs_kept
 from identification.gap.penalties import SAME_JOINT
-from identification.gap.search import Explanation, conditioned
 from identification.gap.variants import Variant
 
 Parameters = dict[str, Parameter]
@@ -50,7 +50,7 @@ def parameters_of(
 
 # Of 78 parameters in blind mixtures 78 % lay within what should have been 90 % intervals, of 94
 # alone 89 %: what one law leaves of the gap its neighbours take, and the posterior does not know
-# that the laws are only families. The same rule as with probabilities (`search.trusted`).
+# that the laws are only families. The same rule as with probabilities (`verdict.trusted`).
 SHARING = 1.25
 
 

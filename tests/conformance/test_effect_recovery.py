@@ -17,11 +17,11 @@ from identification.gap.bench import Bench
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
 from identification.gap.interval import Parameter
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
-from identification.gap.search import Explanation
 from identification.gap.signs import Limits
 from identification.gap.variants import Variant
 from tests.conformance.effect_benches import (

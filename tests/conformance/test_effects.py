@@ -15,9 +15,9 @@ import pytest
 from identification.gap import effects
 from identification.gap.data import GapData
 from identification.gap.effects import WORDS
+from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
 from identification.gap.parts import Part
-from identification.gap.search import Explanation
 from tests.conformance.effect_benches import (
     IN_JOINTS,
     OUTSIDE,

@@ -14,12 +14,13 @@ from identification.gap.diagnose import _chosen as chosen_of
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.earned import earned
 from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation, Found
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
 from identification.gap.noise import bursts
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import cancelling, pettiness, trifle
-from identification.gap.search import Explanation, Found, weighed
 from identification.gap.variants import variant
+from identification.gap.verdict import weighed
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, REPETITIONS, SAMPLES = 8, 3, 4

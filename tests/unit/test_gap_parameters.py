@@ -18,12 +18,12 @@ from identification.gap.evidence import (
     level_covariance,
     row_noise,
 )
+from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
 from identification.gap.interval import Parameter, Softer
 from identification.gap.parameters import parameters, run_seconds
 from identification.gap.parts import Part
 from identification.gap.posterior import SHARING, _mixture, _stretched, parameters_of
-from identification.gap.search import Explanation
 from identification.gap.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_operators import bench_data

@@ -8,9 +8,9 @@ import pytest
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation
 from identification.gap.fit import Fit, fit
 from identification.gap.remainder import Remainder, branches, remainder
-from identification.gap.search import Explanation
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, REPETITIONS, SAMPLES = 10, 4, 4

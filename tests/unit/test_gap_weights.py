@@ -19,8 +19,8 @@ from identification.gap.history import bristles, flowing_play, play
 from identification.gap.interval import TWO_SIDED, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
+from identification.gap.refine import _places, refine
 from identification.gap.rows import reduce_rows
-from identification.gap.search import _places, refine
 from identification.gap.variants import variant
 from rig.gap_data import arm_setup
 from rig.model import load_robot

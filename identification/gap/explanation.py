@@ -1,0 +1,129 @@
+"""An explanation: effects with what they leave of the gap, its evidence and its prior."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import log
+
+import numpy as np
+
+from identification.gap.compare import condition
+from identification.gap.data import Array
+from identification.gap.evidence import Engine, Level
+from identification.gap.imperfection import LINEAR, level_prior
+from identification.gap.parts import Part, log_joints, part_sizes, signs_kept
+from identification.gap.penalties import (
+    FRICTION,
+    cancelling,
+    pettiness,
+    straight,
+    trifle,
+    within_stated,
+)
+from identification.gap.priors import prior_of
+
+# An explanation must leave less than this share of the gap (rms), with two effects half of it and
+# so on: the more words are spent, the better they have to explain.
+REMAINDER = 0.25
+SOFT = 8.0  # how fast, per factor e beyond that, it loses what it explains to `unknown`
+# Nor can a law be met better than to a few percent of what it does.
+LAW_REMAINDER = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """Effects (largest first, none for the base alone), posterior weight as log, imperfection eta
+    m, sizes (rms m) of the effects, and log share of the posterior with little remainder."""
+
+    parts: tuple[Part, ...]
+    log_weight: float
+    eta: float
+    sizes: tuple[float, ...]
+    log_good: float
+
+    @property
+    def good(self) -> bool:
+        """It leaves little enough."""
+        return self.log_good > self.log_weight - log(2)
+
+    @cached_property
+    def words(self) -> frozenset[str]:
+        """Names of its effects."""
+        return frozenset(p.word for p in self.parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the search found: explanations (best first), evidence of the words alone (nats, against
+    none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
+    gap that no law explains, and what share of its weight withheld data leave an explanation."""
+
+    engine: Engine
+    explanations: tuple[Explanation, ...]
+    alone: dict[str, float]
+    probabilities: dict[str, float]
+    best: Explanation
+    unknown: float
+    unknown_eta: float
+    kept: Mapping[frozenset[str], float] = field(default_factory=dict)
+
+
+def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:
+    """The explanation with its prior; too small a part is charged as what it is: freedom of the
+    larger one's law."""
+    levels = engine.levels
+    bases = log_joints(engine, parts)
+    sizes = part_sizes(engine, parts, int(bases.argmax()))
+    each, energy = _counted(engine, parts, sizes.gap), sizes.energy
+    logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
+    best = int(logs.argmax())
+    least = max(
+        0.6 * engine.bench.noise.stated,
+        REMAINDER * engine.structural / max(len(parts), 1),
+        LAW_REMAINDER * float(each.max(initial=0.0)),
+    )
+    good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
+    share = np.exp(logs - logs.max())
+    fraction = float(share @ good / share.sum())
+    order = np.argsort(-each, kind="stable")
+    weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
+    weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
+    weight -= within_stated(engine, parts, sizes)
+    if len(parts) > 1:
+        weight -= pettiness(engine, parts, sizes) + cancelling(engine, parts, each)
+        weight += signs_kept(levels[best], parts)
+    return Explanation(
+        tuple(parts[i] for i in order),
+        weight,
+        levels[best].eta,
+        tuple(float(each[i]) for i in order),
+        weight + log(max(fraction, 1e-300)),
+    )
+
+
+def _counted(engine: Engine, parts: tuple[Part, ...], each: Array) -> Array:
+    """Sizes of the parts. Without an arm friction brings its own mean stiffness, and what was
+    simulated may be its first slope: a spring that is off beside it counts by what the friction
+    leaves of the gap."""
+    linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
+    rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
+    if engine.bench.data.arm or not rubs.any():
+        return each
+    rest = max(engine.structural**2 - float(each[rubs].max()) ** 2, 0.0) ** 0.5
+    return np.where(linear, np.minimum(each, rest), each)
+
+
+def conditioned(
+    engine: Engine, parts: tuple[Part, ...], among: list[Level] | None = None
+) -> tuple[list[Level], float]:
+    """Levels (all of them, or some) with the parts integrated out, and the mean square (m^2) of
+    the parts at the likeliest of these."""
+    levels = engine.levels if among is None else among
+    for p in parts:
+        levels = [condition(lv, p.variant.columns, p.variant.root, p.scale) for lv in levels]
+    if not parts:
+        return levels, 0.0
+    weights = np.array([lv.log_base for lv in levels])
+    return levels, part_sizes(engine, parts, int(weights.argmax())).energy
