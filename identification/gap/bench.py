@@ -121,8 +121,12 @@ class Bench:
     @cached_property
     def once(self) -> bool:
         """Every setup was loaded once, and never unloaded: all memory is hidden."""
-        back = self.unloads or (self.lets_go and self._reverses)
-        return not back and len(np.unique(self.rows.run)) <= len(self.data.setups)
+        return not self.returns and len(np.unique(self.rows.run)) <= len(self.data.setups)
+
+    @property
+    def returns(self) -> bool:
+        """What was loaded was unloaded as well, or an imposed stroke went back."""
+        return self.unloads or (self.lets_go and self._reverses)
 
     @property
     def _reverses(self) -> bool:

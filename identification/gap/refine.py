@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -13,6 +14,7 @@ from identification.gap.effects import (
     joint_nonlinear_stiffness,
     joint_yield,
     pose_error,
+    time_lag,
 )
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
@@ -32,6 +34,7 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
     least = engine.levels[0].log_base + _WINDOW
     ranked = sorted(families, key=lambda w: -marginal(families[w]))[:_LEADING]
     beside = _beside_first(engine, families, ranked)
+    closing_in = partial(_closing_in, engine, families, ranked)
     out: list[Variant] = []
     for word in ranked:
         if marginal(families[word]) < least:
@@ -42,13 +45,10 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
             for s in _places(found, second, "sharp"):
                 out += joint_yield.refined(engine.bench, s.variant)
         elif word == "joint_backlash":
-            finer = [v for s in _places(found, second)
-                     for v in joint_backlash.refined(engine.bench, s.variant)]  # fmt: skip
-            engine.extend()
-            if finer:
-                best = max(_scored_beside(engine, families, ranked, finer), key=_evidence)
-                finer += joint_backlash.refined(engine.bench, best.variant, _CLOSE)
-            out += finer
+            out += closing_in(joint_backlash.refined, _places(found, second))
+        elif word == "time_lag":
+            channels = {s.variant.info["channel"]: s for s in reversed(second or found)}
+            out += closing_in(time_lag.refined, list(channels.values()))
         elif word == "joint_nonlinear_stiffness":
             odd = [s for s in found if "line" in s.variant.info]
             for s in odd[:1]:
@@ -69,6 +69,22 @@ def _beside_first(
     return by_word(_scored_beside(engine, families, ranked, family)) if family else {}
 
 
+def _closing_in(
+    engine: Engine,
+    families: dict[str, list[Scored]],
+    ranked: list[str],
+    refined: Callable[..., list[Variant]],
+    starts: list[Scored],
+) -> list[Variant]:
+    """Finer shapes about those that were found, and finer ones still about the best of these."""
+    finer = [v for s in starts for v in refined(engine.bench, s.variant)]
+    engine.extend()
+    if not finer:
+        return []
+    best = max(_scored_beside(engine, families, ranked, finer), key=_evidence)
+    return finer + refined(engine.bench, best.variant, _CLOSE)
+
+
 def _scored_beside(
     engine: Engine, families: dict[str, list[Scored]], ranked: list[str], family: list[Variant]
 ) -> list[Scored]:
@@ -83,7 +99,7 @@ def _evidence(scored: Scored) -> float:
     return scored.log_evidence
 
 
-_GRIDS = ("joint_yield", "base_slip", "joint_backlash")
+_GRIDS = ("joint_yield", "base_slip", "joint_backlash", "time_lag")
 _CLOSE = 0.2  # of the first look's steps
 
 

@@ -14,8 +14,9 @@ from identification.gap.explanation import Explanation, Found
 TEMPER = 0.12
 
 # Of 132 verdicts of the blind check whose posterior was above 0.97, 128 named an effect that was
-# there, of 71 on other people's rigs that nobody had seen before 55, `none` no oftener than the
-# others: the families are not all that nature has, and the posterior does not know that.
+# there, of 71 on other people's rigs that nobody had seen before 55 were right, `none` and
+# `unknown` no oftener than the others: the families are not all that nature has, and the posterior
+# does not know that.
 DOUBT, BENCH_DOUBT = 0.05, 0.2
 
 
@@ -59,7 +60,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     total = sum(mass.values())
     doubted, doubt = set(found.alone), DOUBT
     if not found.engine.bench.data.arm:
-        doubted, doubt = doubted | {"none"}, BENCH_DOUBT
+        doubted, doubt = doubted | {"none", "unknown"}, BENCH_DOUBT
     probabilities = trusted({w: m / total for w, m in mass.items()}, doubted, doubt)
     return replace(found, probabilities=probabilities, kept=kept)
 

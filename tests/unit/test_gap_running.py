@@ -15,7 +15,6 @@ from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import STANDING, library
 from identification.gap.effects.drift import free_paths, shares
 from identification.gap.effects.joint_yield import grown
-from identification.gap.effects.time_lag import late
 from identification.gap.evidence import Engine
 from identification.gap.history import sampling_time
 from identification.gap.leftover import _falls
@@ -169,27 +168,6 @@ def test_a_record_that_rests_all_the_time_runs_on() -> None:
     assert rows.n == 150
 
 
-def test_a_driven_channel_that_lags_was_ahead_only_while_it_moved() -> None:
-    """Ramp and hold: what goes on in the hold is no lag of the channel that was driven."""
-    u = 1e-3 * np.minimum(np.arange(300) / 60, 1.0)
-    bench = make_bench(running(SPRING * u, u, imposed="displacement"))
-    held = np.arange(300) > 70
-    for kind in ("delay", "filter"):
-        driven = late(bench, "displacement", kind, 5.0)
-        assert np.abs(driven[:300][held]).max() < 1e-9 * np.abs(driven).max()
-        assert driven[30] == pytest.approx(1e-3 * 5 / 60, rel=1e-6)  # 5 s ahead, of 60
-        answering = late(bench, "force", kind, 5.0)
-        assert answering[62] < 0  # the force still comes up
-
-
-def test_a_lag_is_no_longer_than_half_a_stroke() -> None:
-    u = 1e-3 * np.minimum(np.arange(300) / 10, 1.0)
-    bench = make_bench(running(SPRING * u, u, imposed="displacement"))
-    assert 5 < bench.stroke_s < 25
-    longest = max(v.info["lag_s"] for v in library(bench, ["time_lag"]))
-    assert longest <= bench.stroke_s / 2
-
-
 def test_a_stiffening_specimen_that_relaxes_creeps() -> None:
     """Fung's quasi-linear law: an exponential toe times fading memory, as tissue shows."""
     rng = np.random.default_rng(7)
@@ -260,20 +238,6 @@ def test_a_specimen_that_is_only_let_go_does_not_flow_back() -> None:
         assert any("flows back" in label for label in labels) == back
 
 
-def test_friction_whose_first_slope_was_simulated_is_friction() -> None:
-    """Nothing but sliders, moved to and fro: all of the stiffness is theirs."""
-    u = 1e-3 * np.sin(np.arange(500) / 20)
-    force, state = np.zeros(500), np.zeros(6)
-    limits, stiff = np.geomspace(0.5, 8.0, 6), np.full(6, 1.5e4)
-    for i, step in enumerate(np.diff(u, prepend=0.0)):
-        state = np.clip(state + stiff * step, -limits, limits)
-        force[i] = state.sum()
-    force += np.random.default_rng(9).normal(0, 0.05, 500)
-    said = diagnose_gap(running(force, u, imposed="displacement"))
-    assert said.verdict == "joint_hysteresis"
-    assert said.effects[0].name == "joint_hysteresis"
-
-
 @pytest.mark.parametrize(("both", "seats"), [(False, True), (True, False)])
 def test_what_bears_both_ways_is_no_seat(both: bool, seats: bool) -> None:
     load = 100 * np.sin(np.arange(300) / 15)
@@ -310,21 +274,6 @@ def test_hardened_metal_yields_on_only_beyond_what_it_has_seen() -> None:
     fresh = np.arange(8) == 0
     assert grown(load, np.array([4.0]), fresh)[:, 0].tolist() == [0, 0, 1, 1, 1, 2, 2, 2]
     assert grown(-load, np.array([4.0]), fresh)[:, 0].tolist() == [0, 0, -1, -1, -1, -2, -2, -2]
-
-
-def test_lag_of_a_recording_without_lag_is_not_made_of_its_noise() -> None:
-    """Noise of what is driven is in the response too; a column with that noise would explain it."""
-    rng = np.random.default_rng(7)
-    true = 100 * triangle(400, 0.9)
-    force = true + rng.normal(0, 1.0, 400)
-    bench = make_bench(running(force, true / SPRING, imposed="force"))
-    left = bench.response - bench.load / SPRING
-    lags = [v for v in library(bench, ["time_lag"]) if v.info["channel"] == "displacement"]
-    n = bench.rows.n
-    assert lags
-    for v in lags:
-        column = bench.columns[v.columns[0]][:n]
-        assert abs(np.corrcoef(column, left)[0, 1]) < 0.3, v.label
 
 
 def test_what_is_below_the_noise_of_a_sample_is_no_effect_of_a_running_recording() -> None:
@@ -486,22 +435,3 @@ def test_turning_points_of_a_crank_are_no_holds() -> None:
     for cycles in (2, 3, 5, 8):
         force = 100 * np.sin(2 * np.pi * cycles * np.arange(900) / 900)
         assert make_bench(running(force, force / SPRING, imposed="force")).always_moves, cycles
-
-
-def test_steps_of_what_is_driven_are_no_noise_and_stay_sharp_in_a_lag() -> None:
-    force = np.repeat([0.0, 50.0, 0.0, -50.0, 0.0], 40)
-    bench = make_bench(running(force, force / SPRING, imposed="force"))
-    behind = late(bench, "displacement", "delay", 3.0)[: len(force)]
-    moved = np.flatnonzero(np.abs(behind) > 1e-9)
-    assert set(moved) <= {k * 40 + i for k in range(1, 5) for i in range(4)}
-    assert behind[41] == pytest.approx(-50.0 / SPRING)
-
-
-def test_one_reading_a_step_on_one_way_shows_no_lag() -> None:
-    up = np.arange(12.0)
-    for load, shows in ((up, False), (np.append(up, up[::-1]), True)):
-        bench = make_bench(bench_data(load, load * 1e-5))
-        assert bool(words_with(bench, "time_lag")) is shows
-    held = np.repeat(up, 3)
-    bench = make_bench(bench_data(held, held * 1e-5, step=np.repeat(np.arange(12), 3)))
-    assert words_with(bench, "time_lag")

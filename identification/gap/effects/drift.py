@@ -11,8 +11,8 @@ RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
 # Pieces of a free smooth path: slower than a run, as slow as an air conditioner's swing. In a
 # recording that runs on and on three passes of the load tell what comes again, and every further
 # one bears three pieces; where nothing is loaded, nothing tells a quick path from other events.
-PIECES = {"free path": 10, "winding path": 20}
-LONG_PIECES, LEAST_PIECES = 40, 4
+PIECES = {"free path": 10, "winding path": 32}
+LONG_PIECES, RESTING_PIECES, LEAST_PIECES = 40, 20, 4
 
 
 def warm_ups(bench: Bench) -> dict[str, Array]:
@@ -56,10 +56,14 @@ _LOADED = 0.3  # of the largest force
 
 
 def _loaded(bench: Bench) -> bool:
-    """A recording that starts with a force: drifts are recorded from zero on."""
+    """A recording that starts with a force: drifts are recorded from zero on. Where a stroke is
+    imposed and there is none, no force is due, and what is read is the instrument's."""
+    meter, stroke = bench.data.instruments, float(np.abs(bench.slope * bench.load).max())
+    if bench.imposed and stroke <= 3 * meter.displacement:
+        return False
     force = bench.rows.measured_force
     first = abs(float(force[: max(1, len(force) // 100)].mean()))
-    return first > max(_LOADED * float(np.abs(force).max()), 3 * bench.data.instruments.force)
+    return first > max(_LOADED * float(np.abs(force).max()), 3 * meter.force)
 
 
 # Of the deflection, or the largest force: what amplifiers and warming arms drift in minutes.
@@ -73,7 +77,7 @@ def free_paths(bench: Bench) -> dict[str, int]:
         return {}
     if not bench.rows.continuous:
         return PIECES
-    most = PIECES["winding path"] if bench.rests else LONG_PIECES
+    most = RESTING_PIECES if bench.rests else LONG_PIECES
     pieces = min(3 * (bench.passes - 3), most)
     return {"free path": pieces} if pieces >= LEAST_PIECES else {}
 

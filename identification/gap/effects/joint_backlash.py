@@ -3,7 +3,8 @@
 Net torque = load and, in an upright arm, its own weight. The joint lies at one side of its play w
 or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where it was pushed until
 the torque has turned: a play of radius `zone`, or half of it, on the torque, cut at the ends of
-the play, or of 0.7 zones with soft ends. Gears with play rub too: a stop operator of the zone's
+the play, or of 0.7 zones with soft ends; flanks that approach slowly leave `zone / |tau|` of the
+play to be taken up. Gears with play rub too: a stop operator of the zone's
 strength rides along. Without torque the joint lies anywhere in its play, a free place per setup at
 its first zero load and at later ones, or where the rubbing left it. The tool's mass is not known:
 the torque at which the weights are balanced is sought among masses of 0 to 3 kg.
@@ -27,7 +28,7 @@ from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
-KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "rubbing")
+KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing")
 PLACED = ("gap", "held")
 HELD = ("rubbing",)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
@@ -92,7 +93,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     zones = float(info["zone_Nm"]) * np.array([0.65, 1.0, 1.5]) ** max(close, 0.75)
     # what changes over more of the range is a curved spring
     zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
-    kinds, out = tuple(dict.fromkeys([info["kind"], "soft"])), []
+    kinds, out = tuple(dict.fromkeys([info["kind"], "soft", "slow"])), []
     share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
     for kg in masses:
@@ -177,6 +178,7 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
         "friction 1/2": [np.clip(state[:, 3] / zone, -1, 1) / 2, rub],
         "friction 3": [np.tanh(state[:, 1] / zone) / 2, rub],
         "soft": [-np.sign(x) * np.expm1(-np.abs(x) / zone) / 2, rub],
+        "slow": [x / (np.abs(x) + zone) / 2, rub],
         "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
     }
 

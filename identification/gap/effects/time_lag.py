@@ -21,7 +21,8 @@ from identification.gap.history import delayed, rests, retarded, sampling_time
 from identification.gap.variants import Variant, variant
 
 WORD = "time_lag"
-LAGS = (0.3, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 4.0, 7.0, 12.0)  # of the time between two samples
+# of the time between two samples
+LAGS = (0.3, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.2, 7.0, 9.0, 12.0)
 
 _USUAL = 2.5  # samples: a reading so late would have been noticed, the later the sooner
 _OF_STROKE = 0.5  # of the time that one pass of the load takes
@@ -34,23 +35,51 @@ def variants(bench: Bench) -> list[Variant]:
     sample = sampling_time(bench.rows)
     out = []
     for multiple in LAGS:
-        lag, likely = multiple * sample, min(1.0, _USUAL / multiple)
+        lag = multiple * sample
         if bench.rows.continuous and lag > _OF_STROKE * bench.stroke_s:
             break  # the load would have come before anybody turned a screw
         for channel in ("displacement", "force"):
-            pair = []
-            for kind in ("delay", "filter"):
-                change = late(bench, channel, kind, lag)
-                if not np.any(change):
-                    continue
-                pair.append(bench.add(change))
-                info: dict[str, Any] = {"lag_s": lag, "kind": kind, "channel": channel}
-                out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", pair[-1:], (0.5, 1.0),
-                                   prior=likely, **info))  # fmt: skip
-            if len(pair) > 1:
-                info = {"lag_s": lag, "kind": "window", "channel": channel}
-                out.append(variant(WORD, f"{channel} window {lag:.3g} s", pair, (0.5,),
-                                   prior=0.5 * likely, **info))  # fmt: skip
+            out += _of(bench, channel, lag, _likely(multiple))
+    return out
+
+
+_STEP = 1.13
+_STEPS = np.array([-3, -2, -1, 0, 1, 2, 3])
+
+
+def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
+    """Lags of the same channel about one that was found; in a running recording the grid will do,
+    whose loops any lag might be. close: share of the steps."""
+    if bench.rows.continuous:
+        return []
+    out, longest = [], float(found.info["lag_s"]) / sampling_time(bench.rows)
+    for step in _STEPS:
+        multiple = longest * _STEP ** (close * step)
+        likely = _likely(multiple) * 2 / len(_STEPS)
+        out += _of(bench, found.info["channel"], multiple * sampling_time(bench.rows), likely)
+    return out
+
+
+def _likely(multiple: float) -> float:
+    """Prior of a lag of so many samples against that of a short one."""
+    return min(1.0, _USUAL / multiple)
+
+
+def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
+    """A lag as a delay, as a filter, and as something in between."""
+    out, pair = [], []
+    for kind in ("delay", "filter"):
+        change = late(bench, channel, kind, lag)
+        if not np.any(change):
+            continue
+        pair.append(bench.add(change))
+        info: dict[str, Any] = {"lag_s": lag, "kind": kind, "channel": channel}
+        out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", pair[-1:], (0.5, 1.0),
+                           prior=likely, **info))  # fmt: skip
+    if len(pair) > 1:
+        info = {"lag_s": lag, "kind": "window", "channel": channel}
+        out.append(variant(WORD, f"{channel} window {lag:.3g} s", pair, (0.5,),
+                           prior=0.5 * likely, **info))  # fmt: skip
     return out
 
 

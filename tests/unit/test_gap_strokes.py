@@ -1,0 +1,165 @@
+"""Friction and lags: what strokes and steps show of them, and what they can't show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import make_bench
+from identification.gap.compare import score
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects import library, time_lag
+from identification.gap.effects.joint_backlash import variants as plays
+from identification.gap.effects.time_lag import late
+from identification.gap.evidence import Engine
+from identification.gap.refine import refine
+from tests.unit.test_gap_operators import bench_data
+from tests.unit.test_gap_running import SPRING, running, triangle, words_with
+from tests.unit.test_gap_weights import hanging
+
+
+def test_friction_whose_first_slope_was_simulated_is_friction() -> None:
+    """Nothing but sliders, moved to and fro: all of the stiffness is theirs."""
+    u = 1e-3 * np.sin(np.arange(500) / 20)
+    force, state = np.zeros(500), np.zeros(6)
+    limits, stiff = np.geomspace(0.5, 8.0, 6), np.full(6, 1.5e4)
+    for i, step in enumerate(np.diff(u, prepend=0.0)):
+        state = np.clip(state + stiff * step, -limits, limits)
+        force[i] = state.sum()
+    force += np.random.default_rng(9).normal(0, 0.05, 500)
+    said = diagnose_gap(running(force, u, imposed="displacement"))
+    assert said.verdict == "joint_hysteresis"
+    assert said.effects[0].name == "joint_hysteresis"
+
+
+def test_a_lag_is_no_longer_than_half_a_stroke() -> None:
+    u = 1e-3 * np.minimum(np.arange(300) / 10, 1.0)
+    bench = make_bench(running(SPRING * u, u, imposed="displacement"))
+    assert 5 < bench.stroke_s < 25
+    longest = max(v.info["lag_s"] for v in library(bench, ["time_lag"]))
+    assert longest <= bench.stroke_s / 2
+
+
+def test_a_driven_channel_that_lags_was_ahead_only_while_it_moved() -> None:
+    """Ramp and hold: what goes on in the hold is no lag of the channel that was driven."""
+    u = 1e-3 * np.minimum(np.arange(300) / 60, 1.0)
+    bench = make_bench(running(SPRING * u, u, imposed="displacement"))
+    held = np.arange(300) > 70
+    for kind in ("delay", "filter"):
+        driven = late(bench, "displacement", kind, 5.0)
+        assert np.abs(driven[:300][held]).max() < 1e-9 * np.abs(driven).max()
+        assert driven[30] == pytest.approx(1e-3 * 5 / 60, rel=1e-6)  # 5 s ahead, of 60
+        answering = late(bench, "force", kind, 5.0)
+        assert answering[62] < 0  # the force still comes up
+
+
+def test_lag_of_a_recording_without_lag_is_not_made_of_its_noise() -> None:
+    """Noise of what is driven is in the response too; a column with that noise would explain it."""
+    rng = np.random.default_rng(7)
+    true = 100 * triangle(400, 0.9)
+    force = true + rng.normal(0, 1.0, 400)
+    bench = make_bench(running(force, true / SPRING, imposed="force"))
+    left = bench.response - bench.load / SPRING
+    lags = [v for v in library(bench, ["time_lag"]) if v.info["channel"] == "displacement"]
+    n = bench.rows.n
+    assert lags
+    for v in lags:
+        column = bench.columns[v.columns[0]][:n]
+        assert abs(np.corrcoef(column, left)[0, 1]) < 0.3, v.label
+
+
+def test_steps_of_what_is_driven_are_no_noise_and_stay_sharp_in_a_lag() -> None:
+    force = np.repeat([0.0, 50.0, 0.0, -50.0, 0.0], 40)
+    bench = make_bench(running(force, force / SPRING, imposed="force"))
+    behind = late(bench, "displacement", "delay", 3.0)[: len(force)]
+    moved = np.flatnonzero(np.abs(behind) > 1e-9)
+    assert set(moved) <= {k * 40 + i for k in range(1, 5) for i in range(4)}
+    assert behind[41] == pytest.approx(-50.0 / SPRING)
+
+
+def test_one_reading_a_step_on_one_way_shows_no_lag() -> None:
+    up = np.arange(12.0)
+    for load, shows in ((up, False), (np.append(up, up[::-1]), True)):
+        bench = make_bench(bench_data(load, load * 1e-5))
+        assert bool(words_with(bench, "time_lag")) is shows
+    held = np.repeat(up, 3)
+    bench = make_bench(bench_data(held, held * 1e-5, step=np.repeat(np.arange(12), 3)))
+    assert words_with(bench, "time_lag")
+
+
+def test_friction_is_found_where_a_spring_far_too_stiff_was_simulated() -> None:
+    """A pad that is dragged to and fro once: plateaus of 2.5 N, where 300 N were foreseen."""
+    u = 0.03 * (2 * triangle(180, 1.0) - 1)
+    force, state = np.zeros(180), -2.5
+    for i, step in enumerate(np.diff(u, prepend=u[0])):
+        state = float(np.clip(state + 4e3 * step, -2.5, 2.5))
+        force[i] = state
+    ripple = 0.15 * np.sin(u * 900) + np.random.default_rng(4).normal(0, 0.03, 180)
+    said = diagnose_gap(running(force + ripple, u, imposed="displacement",
+                                compliance=np.array([1e-4])))  # fmt: skip
+    assert max(said.probabilities, key=lambda w: said.probabilities[w]) == "joint_hysteresis"
+    assert said.probabilities["joint_stiffness_error"] < 0.1
+
+
+@pytest.mark.parametrize(("returns", "loops"), [(False, False), (True, True)])
+def test_pulls_alone_show_no_loop_however_often(returns: bool, loops: bool) -> None:
+    up = np.arange(12.0)
+    one = np.append(up, up[::-1]) if returns else up
+    load, run = np.tile(one, 3), np.repeat(np.arange(3), len(one))
+    data = bench_data(load, load * 1e-5, run=run, repetition=run + 1, step=np.arange(len(load)))
+    assert bool(words_with(make_bench(data), "joint_hysteresis")) is loops
+
+
+@pytest.mark.parametrize(("stroke", "drifts"), [(0.0, True), (1e-3, False)])
+def test_a_force_that_is_read_where_nothing_is_moved_is_the_instrument_s(
+    stroke: float, drifts: bool
+) -> None:
+    """Under a stroke that stands the same readings may be relaxation."""
+    rng = np.random.default_rng(2)
+    force = 14.0 - np.linspace(0, 3, 200) + rng.normal(0, 1.0, 200)
+    data = running(force, np.full(200, stroke), imposed="displacement")
+    assert bool(words_with(make_bench(data), "force_drift")) is drifts
+
+
+@pytest.mark.parametrize("channel", ["force", "displacement"])
+def test_the_search_closes_in_on_a_lag_between_those_of_the_grid(channel: str) -> None:
+    steps = np.repeat(np.arange(13), 3)
+    levels = np.array([0.0, 20, 40, 60, 80, 100, 120, 100, 80, 60, 40, 20, 0])[steps]
+    branch = np.where(steps < 7, 1, 2)
+    data = bench_data(levels, 1e-5 * levels, step=steps, branch=branch)
+    bench = make_bench(data)
+    true = 1.42
+    assert min(abs(lag - true) for lag in time_lag.LAGS) > 0.1 * true
+    target = bench.observed - prediction(bench) + late(bench, channel, "delay", true)
+    variants = library(bench, ["time_lag"])
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 5e-6, 2e-5]))
+    first = score(engine, engine.levels, variants)
+    finer = refine(engine, first)
+    engine.extend()
+    second = score(engine, engine.levels, finer)
+    best = max(second, key=lambda s: s.log_evidence)
+    assert best.variant.info["lag_s"] == pytest.approx(true, rel=0.02)
+    assert best.log_evidence > max(s.log_evidence for s in first) + 20
+
+
+def test_loops_of_a_running_recording_are_no_reason_to_look_closer_at_lags() -> None:
+    load = 100 * np.sin(np.arange(300) / 15)
+    bench = make_bench(running(load, load / SPRING))
+    found = library(bench, ["time_lag"])[0]
+    assert time_lag.refined(bench, found) == []
+
+
+def test_flanks_that_approach_slowly_are_a_shape_of_a_play() -> None:
+    """Taken up as the arcus tangent, which the library does not have."""
+    up = np.concatenate([np.arange(0, 84, 8.0), np.arange(72, -1, -8.0)])
+    bench = hanging(np.concatenate([up, -up]), gravity=0.0)
+    wide = bench.joint_column(0, np.arctan(bench.true_torque[:, 0] / 8.0) / np.pi)
+    target = bench.observed - prediction(bench) + 5e-4 * wide
+    variants = plays(bench)
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 5e-6, 2e-5]))
+    best: dict[str, float] = {}
+    for s in score(engine, engine.levels, variants):
+        kind = str(s.variant.info["kind"])
+        best[kind] = max(best.get(kind, -np.inf), s.log_evidence)
+    assert best.pop("slow") > max(best.values()) + 20
