@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import log
 
 import numpy as np
 
-from identification.gap.data import Array, Ints
+from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
 from identification.gap.products import squares_of
@@ -69,7 +70,7 @@ def _stack(engine: Engine, family: tuple[Variant, ...]) -> Stack:
             columns,
             root,
             np.array([v.scales for v in family]),
-            np.swapaxes(root, 1, 2) @ mean_squares(engine, columns, family[0].word) @ root,
+            np.swapaxes(root, 1, 2) @ mean_squares(engine, family) @ root,
             Limits.of(family),
             engine.alike(columns),
         )
@@ -77,15 +78,26 @@ def _stack(engine: Engine, family: tuple[Variant, ...]) -> Stack:
     return found
 
 
-def mean_squares(engine: Engine, columns: Ints, word: str) -> Array:
-    """(v, k, k): mean square response (m^2) of coefficients of columns (v, k), without the datum of
-    each setup; of a linear law only the part that counts as imperfect."""
-    weight = engine.bench.rows.weight
+def mean_squares(engine: Engine, variants: Sequence[Variant]) -> Array:
+    """(v, k, k): mean square response (m^2) of the coefficients of variants with k columns each,
+    without the datum of each setup; of what is linear only the part that counts as imperfect."""
+    weight, columns = engine.bench.rows.weight, np.array([v.columns for v in variants])
     used, place = np.unique(columns, return_inverse=True)
     moved = moved_response(engine, engine.responses(used))
     moved *= np.sqrt(weight / weight.sum())[:, None]
-    out = squares_of(moved.T, place.reshape(columns.shape))
-    return out * (LAW_IMPERFECTION / IMPERFECTION) ** 2 if word in LINEAR else out
+    share = np.array([imperfect(v) for v in variants])
+    squares = squares_of(moved.T, place.reshape(columns.shape))
+    return np.asarray(squares * share[:, :, None] * share[:, None, :])
+
+
+def imperfect(variant: Variant) -> Array:
+    """(k,) how imperfect what each coefficient does is, against the laws of mechanisms: what is
+    linear is exact, a spring beside friction as well."""
+    exact = LAW_IMPERFECTION / IMPERFECTION
+    share = np.full(len(variant.columns), exact if variant.word in LINEAR else 1.0)
+    if variant.info.get("other_springs"):
+        share[-1] = exact
+    return share
 
 
 def moved_response(engine: Engine, response: Array) -> Array:

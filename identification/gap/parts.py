@@ -10,7 +10,7 @@ import numpy as np
 from identification.gap.compare import mean_squares, moved_response
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
-from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
+from identification.gap.imperfection import LINEAR
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 
@@ -63,12 +63,11 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
         moves.append(square**0.5)
         if p.word in LINEAR:
             sizes.append(_beyond_springs(engine, moved))
-            square *= (LAW_IMPERFECTION / IMPERFECTION) ** 2
         else:
             mine = slice(start, start + k)
             structural = float(part @ plain[mine, mine] @ part) / precision
             sizes.append(float(np.sqrt(min(structural, square))))
-        energy += square
+        energy += float(part @ mean_squares(engine, [p.variant])[0] @ part)
         start += k
     return Sizes(np.array(sizes), np.array(moves), energy)
 
@@ -140,7 +139,7 @@ def energies(engine: Engine, parts: tuple[Part, ...]) -> Array:
     gram, moment = _asked(engine, parts)
     inner = np.eye(len(root)) + root.T @ gram @ root
     w = np.linalg.solve(inner, (moment @ root)[..., None])[..., 0] @ root.T
-    each = [mean_squares(engine, np.array([p.variant.columns]), p.word)[0] for p in parts]
+    each = [mean_squares(engine, [p.variant])[0] for p in parts]
     return np.asarray(np.sum(w @ block(each) * w, axis=1))
 
 

@@ -161,9 +161,11 @@ def _no_worse(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], flo
 def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
     """With the evidence of those that matter between the levels of imperfection, best first."""
     done: dict[frozenset[str], Explanation] = {}
+    first = ranked[0].log_weight
     for _ in range(_SHARPENED):
         ranked = sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)
-        near = [e for e in ranked if e.log_weight > ranked[0].log_weight - _WINDOW / 2]
+        least = min(first, ranked[0].log_weight) - _WINDOW / 2  # what is not done yet may gain, too
+        near = [e for e in ranked if e.log_weight > least]
         todo = [e for e in near if e.parts and e.words not in done]
         if not todo:
             break

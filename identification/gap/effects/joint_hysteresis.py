@@ -46,10 +46,7 @@ NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # bends ever more from the first load on is a spectrum of strengths. Specimens yield.
 _SMALL = 5
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
-# Scales, and how many times them the spring beside the friction may be off. Where a stroke is
-# imposed, a spring far too stiff would take forces against which the friction is small.
-OTHER_SPRINGS = ((0.15, 0.5, 1.2, 3.0), 6.0)
-FAR_TOO_STIFF = ((0.01, 0.03, 0.1), 40.0)
+OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off by more than that
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -77,25 +74,19 @@ def variants(bench: Bench) -> list[Variant]:
             out += _laws(bench, j, span, UNDER_WEIGHT, bench.moved, None, bench.weight(j))
     if not bench.data.arm:
         lines = {j: bench.add_joint(j, bench.elastic[:, j]) for j in bench.moving_joints()}
-        off = [OTHER_SPRINGS, FAR_TOO_STIFF] if bench.imposed else [OTHER_SPRINGS]
-        out += [
-            _with_other_springs(v, lines[int(v.info["joint"])], scales, more, 0.5 / len(off))
-            for v in out for scales, more in off
-        ]  # fmt: skip
+        out += [_with_other_springs(v, lines[int(v.info["joint"])]) for v in out]
     return out
 
 
-def _with_other_springs(
-    v: Variant, line: int, scales: tuple[float, ...], more: float, share: float
-) -> Variant:
+def _with_other_springs(v: Variant, line: int) -> Variant:
     """A specimen's friction brings its own mean stiffness: what was simulated may be its first
     slope, or the mean one."""
     k = len(v.columns)
     root = np.zeros((k + 1, k + 1))
-    root[:k, :k], root[k, k] = v.root, more
-    return variant(WORD, f"{v.label}, other springs", [*v.columns, line], scales, root,
-                   np.append(np.ones(k), 0.0), share * v.prior, each=(True,) * k,
-                   **{**v.info, "line": True})  # fmt: skip
+    root[:k, :k], root[k, k] = v.root, _MORE
+    return variant(WORD, f"{v.label}, other springs", [*v.columns, line], OTHER_SCALES, root,
+                   np.append(np.ones(k), 0.0), 0.5 * v.prior, each=(True,) * k,
+                   **{**v.info, "other_springs": True})  # fmt: skip
 
 
 def _laws(

@@ -38,6 +38,8 @@ def variants(bench: Bench) -> list[Variant]:
         lag = multiple * sample
         if bench.rows.continuous and lag > _OF_STROKE * bench.stroke_s:
             break  # the load would have come before anybody turned a screw
+        if bench.rows.hold_starts.all() and multiple > _USUAL:
+            break  # one reading a step, and that of a step long past
         for channel in ("displacement", "force"):
             out += _of(bench, channel, lag, _likely(multiple))
     return out

@@ -22,7 +22,7 @@ def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
     key = "strength" if law == "Iwan" else "reach"
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
     terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
-    terms += (Term("compliance"),) if v.info.get("line") else ()
+    terms += (Term("compliance"),) if v.info.get("other_springs") else ()
     return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
 
 
