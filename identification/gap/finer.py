@@ -45,8 +45,19 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
 
 def _integral(etas: Array, x: Array, y: Array, energy: float) -> float:
     """log of the integral of `exp(y(x))` under the prior of log sizes x."""
-    from scipy.interpolate import CubicSpline
-
     edges = np.linspace(x[0], x[-1], (len(x) - 1) * _POINTS + 1)
     middle = (edges[1:] + edges[:-1]) / 2
-    return float(logsumexp(CubicSpline(x, y)(middle) + log_share(etas, edges, energy)))
+    return float(logsumexp(_smooth(x, y, middle) + log_share(etas, edges, energy)))
+
+
+def _smooth(x: Array, y: Array, at: Array) -> Array:
+    """Cubics between points with the slopes of their neighbours (Catmull and Rom 1974, uneven
+    ends by parabolas). scipy.interpolate would do it, too, but its import takes 0.2 s, a tenth of a
+    diagnosis."""
+    slope = np.gradient(y, x, edge_order=2)
+    k = np.clip(np.searchsorted(x, at) - 1, 0, len(x) - 2)
+    step = x[k + 1] - x[k]
+    t = (at - x[k]) / step
+    rise = y[k + 1] - y[k]
+    bend = (1 - t) * (slope[k] * step - rise) - t * (slope[k + 1] * step - rise)
+    return np.asarray(y[k] + t * rise + t * (1 - t) * bend)
