@@ -49,11 +49,11 @@ def looked_up(found: Found) -> Found:
 
 
 def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
-    """Of an arm: with no more of its weight than what it leaves allows it."""
-    bench = engine.bench
-    share = _share(_left(engine, explanation), engine, explanation, bench.noise.stated)
-    least = explanation.log_weight + float(np.log(max(share, 1e-300)))
-    return replace(explanation, log_good=min(explanation.log_good, least))
+    """Of an arm: with as much of its weight as what it leaves allows it, the less the more words
+    are spent."""
+    left, unseen = _left(engine, explanation), engine.bench.noise.stated
+    share = _share(left, engine, explanation, unseen, len(explanation.parts))
+    return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))
 
 
 def _left(engine: Engine, explanation: Explanation) -> float:
@@ -65,9 +65,12 @@ def _left(engine: Engine, explanation: Explanation) -> float:
     return float(np.sqrt(max(float(square), 0.0)))
 
 
-def _share(left: float, engine: Engine, explanation: Explanation, unseen: float) -> float:
+def _share(
+    left: float, engine: Engine, explanation: Explanation, unseen: float, words: int = 1
+) -> float:
     """Of the weight that is kept by what is left (m). unseen: what noise hides of it."""
-    most = max(REMAINDER * engine.structural, LAW_REMAINDER * max(explanation.sizes), unseen)
+    least = LAW_REMAINDER * max(explanation.sizes)
+    most = max(REMAINDER * engine.structural / words, least, unseen)
     return float(1 / (1 + (left / most) ** SOFT))
 
 

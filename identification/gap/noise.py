@@ -193,21 +193,22 @@ def _scatter(values: Array, hold: Ints) -> float | None:
     return float(np.sqrt(kept.mean() / 6.0) / 0.8713)
 
 
-_SETTLED = 2  # samples of a hold after which nothing jumps: a lag, or a joint that still creeps
+_SETTLED = 2  # samples of a hold at least: a lag, or a joint that still creeps
 _BEYOND, _BURSTS = 4.5, 0.03  # robust standard deviations, and the share that is too much
 _FEWEST_STEPS = 50
 
 
 def bursts(data: GapData) -> bool:
     """Whether readings at rest scatter in spells, far beyond what they scatter mostly: vibration,
-    glitches. Samples late in a hold, where no effect jumps, against the straight line between
-    their neighbours, which creep follows closely."""
+    glitches. Samples of the later half of a hold, where no effect jumps and lags have caught up,
+    against the straight line between their neighbours, which creep follows closely."""
     hold = hold_ids(data)
     if is_continuous(data, hold):
         return False
     starts = np.flatnonzero(np.diff(hold, prepend=-1))
     within = np.arange(len(hold)) - starts[hold]
-    late = (hold[2:] == hold[:-2]) & (within[1:-1] >= _SETTLED)
+    settled = np.maximum(_SETTLED, np.bincount(hold)[hold] // 2)
+    late = (hold[2:] == hold[:-2]) & (within >= settled)[1:-1]
     u, t = data.displacement, data.time
     share = np.clip((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-300), 0.0, 1.0)
     away = np.abs(u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]

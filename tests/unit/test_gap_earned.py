@@ -12,7 +12,7 @@ from identification.gap.bench import make_bench
 from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import _chosen as chosen_of
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.earned import earned
+from identification.gap.earned import DRIFTS, earned
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
@@ -87,6 +87,21 @@ def test_a_fit_of_the_session_loses_its_weight_to_what_foresees() -> None:
     assert after.probabilities["zero_shift"] < 0.05
     # what it loses goes to no other word: nothing says that that one explains what it explained
     assert after.probabilities["unknown"] > after.probabilities["joint_nonlinear_stiffness"]
+
+
+def test_what_a_drift_does_in_a_repetition_that_repetition_tells() -> None:
+    """What stands beside the drift is judged all the same."""
+    e = engine(np.array([1.0, -1.0, 2.0, 0.5])[:REPETITIONS] * BUMP)
+    drift = explained([1, 2, 3], "thermal_drift", 0.0).parts
+    law = explained([0], "joint_nonlinear_stiffness", 0.0).parts
+    fold = folds(e)["repetition"]
+    both = Explanation((*drift, *law), 0.0, 0.0, (BUMP, BUMP / 9), 0.0)
+    assert held_out(e, both, "repetition", fold).after > 5e-6
+    assert held_out(e, both, "repetition", fold, DRIFTS).after < 1e-6
+    assert held_out(e, both, "repetition", fold, frozenset({"zero_shift"})).after > 5e-6
+    assert earned(found(e, both)).kept[both.words] > 0.99
+    alone = replace(both, parts=law, sizes=(BUMP / 9,))
+    assert earned(found(e, alone)).kept[alone.words] < 0.01
 
 
 def test_beyond_the_loads_of_other_repetitions_nobody_is_judged() -> None:

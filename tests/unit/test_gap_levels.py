@@ -71,6 +71,14 @@ def test_creep_of_a_hold_is_no_burst_and_bursts_are() -> None:
     assert bursts(bench_data(given.pop("force"), given.pop("displacement"), **given))
 
 
+def test_a_lag_that_takes_half_a_hold_is_no_burst() -> None:
+    """A moving average catches up in one sample, three after the load has changed."""
+    step = np.repeat(np.arange(40), 10)
+    late = np.tile(np.where(np.arange(10) < 4, 0.3, 1.0), 40)
+    data = bench_data(20.0 * step, 2e-4 * (step - 1 + late), step=step)
+    assert not bursts(data)
+
+
 def test_a_line_read_at_odd_times_is_no_burst() -> None:
     steps = np.where(np.arange(200) % 20 == 7, 30.0, 1.0)
     t = np.concatenate([[0.0], np.cumsum(steps)])
@@ -379,17 +387,27 @@ def test_an_arm_s_explanation_that_leaves_much_of_the_gap_in_the_rows_is_none() 
         out = looked_up(replace(found, explanations=(two, few, other))).explanations
         assert [e.good for e in out] == [kept, kept, True]
         assert out[2] is other  # so far down nobody looks
-        assert looked_up(replace(found, explanations=(poor,))).explanations[0].log_good <= -30.0
+        seen = looked_up(replace(found, explanations=(poor,))).explanations[0]
+        assert seen.good is kept  # whatever the levels said
+    left = 0.12 * bumps
+    engine = Engine(bench, base, target + column + left, np.array([0.0, 3e-6]))
+    found = replace(searched, engine=engine, unknown=-800.0)
+    out = looked_up(replace(found, explanations=(two, few))).explanations
+    assert [e.good for e in out] == [False, True]  # two words have to explain better than one
 
 
 def test_explanations_that_matter_are_taken_between_the_levels(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    engine, asked = small_engine(small_bench()), []
+    engine, asked, more = (
+        small_engine(small_bench()),
+        [],
+        {"joint_creep": -10.0, "joint_yield": 1.0},
+    )
 
     def gains(_: Engine, parts: tuple[Part, ...], __: float) -> float:
         asked.append(parts[0].word)
-        return {"joint_creep": -10.0, "joint_yield": 1.0}[parts[0].word]
+        return more[parts[0].word]
 
     monkeypatch.setattr("identification.gap.search.gained", gains)
     words = ("joint_creep", "joint_yield", "joint_hysteresis")
@@ -398,3 +416,6 @@ def test_explanations_that_matter_are_taken_between_the_levels(
     assert [e.log_weight for e in found] == [-3.0, -10.0, -50.0, -60.0]
     assert [e.log_good for e in found] == [-3.0, -10.0, -50.0, -60.0]
     assert asked == ["joint_creep", "joint_yield"]  # what is hopeless is left as it is
+    more = {"joint_creep": 20.0, "joint_yield": 26.0}  # the first one's gain shuts out nobody
+    found = _sharpened(engine, [*ranked, said((), (), -60.0)])
+    assert [e.log_weight for e in found] == [22.0, 20.0, -50.0, -60.0]

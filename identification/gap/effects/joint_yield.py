@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
+from identification.gap.bench import Bench, way_back
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.history import flowing_play
 from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, variant
@@ -123,6 +123,7 @@ def _knees(
 
 
 HARDENED = " hardened"
+UNDER_A_TIP, _CAME_BACK = (0.0, 0.04, 0.1), 0.2  # of the range
 
 
 def _hardened(
@@ -135,10 +136,15 @@ def _hardened(
     info: dict[str, Any],
 ) -> list[Variant]:
     """Metal that hardens alike in both senses (Voce 1948) and is pulled, or pressed, again and
-    again: it yields on only beyond the largest load it has seen. Benches alone."""
+    again: it yields on only beyond the largest load it has seen, under a tip from the first load
+    on (said of loads that come back before they grow: a single loop may be friction). Benches
+    alone."""
     top = float(np.abs(load).max())
     if bench.data.arm or not bench.lets_go or not bench.one_sided:
         return []
+    size = np.abs(load)
+    if way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top:
+        radius = np.concatenate([top * np.array(UNDER_A_TIP), radius])
     columns = [column(s) for s in grown(load, radius, bench.moved).T]
     out = []
     for k in range(len(radius)):
