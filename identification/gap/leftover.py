@@ -26,6 +26,8 @@ SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none
 # is worth few degrees of freedom): what is left below twice that is no structure.
 _UNSURE = 3**0.5  # of it, beyond it in quadrature
 IN_SPELLS = 0.1  # share that is kept by laws of load and time where readings scatter in spells
+SWINGS = 0.03  # share that is kept by a drift that comes and goes,
+_SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
 
 
@@ -53,7 +55,23 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     are spent."""
     left, unseen = _left(engine, explanation), engine.bench.noise.stated
     share = _share(left, engine, explanation, unseen, len(explanation.parts))
+    if _swings(engine, explanation):
+        share *= SWINGS
     return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))
+
+
+def _swings(engine: Engine, explanation: Explanation) -> bool:
+    """Whether the largest effect is a drift that comes and goes again and again: warming rigs and
+    leaking charges do not, however they wander; air conditioning does, and machines next door."""
+    info = explanation.parts[0].variant.info
+    if info.get("path") != "free":
+        return False
+    pieces = int(info["pieces"])
+    path = fit(engine, explanation).of(0)[0].reshape(-1, pieces).T
+    path = path - path.mean(axis=0)
+    slow = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, pieces), _SLOW)
+    rest = path - slow @ np.linalg.lstsq(slow, path, rcond=None)[0]
+    return bool(np.sum(rest**2) > _MOSTLY * np.sum(path**2))
 
 
 def _left(engine: Engine, explanation: Explanation) -> float:

@@ -13,9 +13,11 @@ from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import _chosen as chosen_of
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.earned import DRIFTS, earned
+from identification.gap.effects.drift import free_path, path_root
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
+from identification.gap.leftover import looked_up
 from identification.gap.noise import bursts
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import cancelling, pettiness, trifle
@@ -256,3 +258,27 @@ def test_what_is_linear_counts_as_it_moves_and_not_by_what_springs_leave_of_it()
     spring = explained([0], "joint_stiffness_error", 0.0).parts
     assert trifle(running, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0
     assert trifle(running, spring, Sizes(np.zeros(1), np.array([1e-9]), 0.0)) > 20
+
+
+@pytest.mark.parametrize(("cycles", "swings"), [(1.0, False), (4.0, True)])
+def test_a_drift_that_comes_and_goes_is_no_drift(cycles: float, swings: bool) -> None:
+    n, pieces = 640, 32
+    force = np.tile(np.repeat([0.0, 40.0, 80.0, 40.0], 4), 40)
+    step, run = np.arange(n) // 4, np.arange(n) // 16
+    wave = 1e-5 * np.sin(2 * np.pi * cycles * np.arange(n) / n)
+    data = bench_data(force, 1e-5 * force + wave, step=step, run=run, repetition=run + 1,
+                      branch=np.where(force > 0, 1, 0), session=np.arange(float(n)))  # fmt: skip
+    bench = make_bench(replace(data, arm=True))
+    hats = free_path(bench, pieces)
+    columns = [bench.add(bench.stacked(hats[:, k])) for k in range(pieces)]
+    target = bench.observed - prediction(bench)
+    e = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6]))
+    v = variant("thermal_drift", "path", columns, (1e-5,), path_root(pieces), positive=False,
+                path="free", pieces=pieces)  # fmt: skip
+    law = Explanation((Part(v, 1e-5),), 0.0, 0.0, (7e-6,), 0.0)
+    jump = explained(columns[:1], "zero_shift", 0.0).parts
+    beside = Explanation((*jump, *law.parts), 0.0, 0.0, (9e-6, 7e-6), 0.0)
+    whole = replace(found(e, law, beside), unknown=-800.0)
+    kept = {x.words: x.good for x in looked_up(whole).explanations if x.parts}
+    assert kept[law.words] is not swings
+    assert kept[beside.words]  # only the largest effect is asked
