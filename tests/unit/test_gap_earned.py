@@ -102,6 +102,9 @@ def test_what_a_drift_does_in_a_repetition_that_repetition_tells() -> None:
     assert held_out(e, both, "repetition", fold, DRIFTS).after < 1e-6
     assert held_out(e, both, "repetition", fold, frozenset({"zero_shift"})).after > 5e-6
     assert earned(found(e, both)).kept[both.words] > 0.99
+    more = explained([0], "contact_seating", 0.0).parts
+    three = replace(both, parts=(*both.parts, *more), sizes=(BUMP, BUMP / 9, BUMP / 9))
+    assert earned(found(e, three)).kept[three.words] < 0.01
     alone = replace(both, parts=law, sizes=(BUMP / 9,))
     assert earned(found(e, alone)).kept[alone.words] < 0.01
 
