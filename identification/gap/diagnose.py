@@ -149,7 +149,9 @@ def check_words(words: set[str] | frozenset[str]) -> None:
 
 
 FAR_WORSE = 12.0  # nats
-WORTH = 3.0  # nats that one effect more has to bring before it is named
+WORTH = 3.0  # nats that one effect more has to bring before it is named;
+# a third one more: what it does to some channel may be how far the other two's laws are off.
+WORTH_OF_THIRD = 10.0
 # A third effect that moves less than this of the noise, and a small share of what the largest does,
 # is how far the other two's laws are off, however plainly a channel without noise shows it; but a
 # drift, or a jump of the datum, shows without load, where no law is off.
@@ -168,12 +170,23 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     held = [e for e in mine if _held(found, e)]
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]
-    near = [e for e in simpler if e.log_weight > best.log_weight - WORTH]
-    if near or len(best.parts) < 3:
-        return min(near, key=lambda e: len(e.words), default=best)
+    best = _worthwhile(best, simpler)
+    if len(best.parts) < 3:
+        return best
     least = min(LEAST_SHARE * max(best.sizes), BELOW_NOISE * noise_of(found.engine.bench))
     petty = {p.word for p, s in zip(best.parts, best.sizes, strict=True) if s < least} - FREE
     return next((e for e in simpler if best.words - e.words <= petty), best)
+
+
+def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:
+    """With no effect that brings less than it has to."""
+    while True:
+        worth = WORTH if len(best.parts) < 3 else WORTH_OF_THIRD
+        fewer = [e for e in simpler if e.words < best.words and len(e.parts) == len(best.parts) - 1]
+        near = [e for e in fewer if e.log_weight > best.log_weight - worth]
+        if not near:
+            return best
+        best = max(near, key=lambda e: e.log_weight)
 
 
 def _held(found: Found, explanation: Explanation) -> bool:

@@ -10,8 +10,8 @@ import pytest
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, Instruments
+from identification.gap.diagnose import WORTH_OF_THIRD, diagnose_gap
 from identification.gap.diagnose import _chosen as chosen_of
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.earned import DRIFTS, earned
 from identification.gap.effects.drift import free_path, path_root
 from identification.gap.evidence import Engine
@@ -214,6 +214,10 @@ def test_a_third_effect_that_hardly_moves_anything_is_not_named(share: float, na
     three = replace(two, parts=two.parts + explained([2], "load_misalignment", 0.0).parts,
                     sizes=(*two.sizes, share * 1e-6), log_weight=500.0, log_good=500.0)  # fmt: skip
     assert len(chosen_of(found(e, one, two, three), "joint_nonlinear_stiffness").parts) == named
+    # it has to bring more than a second one, however large it is
+    for worth, kept in ((WORTH_OF_THIRD - 1, min(2, named)), (WORTH_OF_THIRD + 1, named)):
+        weak = replace(three, log_weight=10.0 + worth, log_good=10.0 + worth)
+        assert len(chosen_of(found(e, one, two, weak), "joint_nonlinear_stiffness").parts) == kept
     # a drift shows where nothing is loaded
     drift = explained([2], "force_drift", 0.0).parts
     drifting = replace(three, parts=two.parts + drift)
