@@ -28,7 +28,8 @@ from identification.gap.priors import prior_of
 # so on: the more words are spent, the better they have to explain.
 REMAINDER = 0.25
 SOFT = 8.0  # how fast, per factor e beyond that, it loses what it explains to `unknown`
-# Nor can a law be met better than to a few percent of what it does.
+# Nor can a law be met better than to a few percent of what it does, where that is no more than such
+# a share of the gap: effects that cancel each other explain nothing.
 LAW_REMAINDER = 0.03
 
 
@@ -82,7 +83,7 @@ def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Exp
     least = max(
         0.6 * engine.bench.noise.stated,
         REMAINDER * engine.structural / max(len(parts), 1),
-        LAW_REMAINDER * float(each.max(initial=0.0)),
+        min(LAW_REMAINDER * float(each.max(initial=0.0)), REMAINDER * engine.structural),
     )
     good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
     share = np.exp(logs - logs.max())

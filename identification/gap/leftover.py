@@ -61,17 +61,22 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
 
 
 def _swings(engine: Engine, explanation: Explanation) -> bool:
-    """Whether the largest effect is a drift that comes and goes again and again: warming rigs and
-    leaking charges do not, however they wander; air conditioning does, and machines next door."""
-    info = explanation.parts[0].variant.info
-    if info.get("path") != "free":
+    """Whether a drift comes and goes again and again: warming rigs and leaking charges do not,
+    however they wander; air conditioning does, machines next door, and what a law leaves of every
+    run."""
+    wandering = [i for i, p in enumerate(explanation.parts) if p.variant.info.get("path") == "free"]
+    if not wandering:
         return False
-    pieces = int(info["pieces"])
-    path = fit(engine, explanation).of(0)[0].reshape(-1, pieces).T
-    path = path - path.mean(axis=0)
-    slow = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, pieces), _SLOW)
-    rest = path - slow @ np.linalg.lstsq(slow, path, rcond=None)[0]
-    return bool(np.sum(rest**2) > _MOSTLY * np.sum(path**2))
+    fitted = fit(engine, explanation)
+    for i in wandering:
+        pieces = int(explanation.parts[i].variant.info["pieces"])
+        path = fitted.of(i)[0].reshape(-1, pieces).T
+        path = path - path.mean(axis=0)
+        slow = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, pieces), _SLOW)
+        rest = path - slow @ np.linalg.lstsq(slow, path, rcond=None)[0]
+        if np.sum(rest**2) > _MOSTLY * np.sum(path**2):
+            return True
+    return False
 
 
 def _left(engine: Engine, explanation: Explanation) -> float:
@@ -87,8 +92,8 @@ def _share(
     left: float, engine: Engine, explanation: Explanation, unseen: float, words: int = 1
 ) -> float:
     """Of the weight that is kept by what is left (m). unseen: what noise hides of it."""
-    least = LAW_REMAINDER * max(explanation.sizes)
-    most = max(REMAINDER * engine.structural / words, least, unseen)
+    law = min(LAW_REMAINDER * max(explanation.sizes), REMAINDER * engine.structural)
+    most = max(REMAINDER * engine.structural / words, law, unseen)
     return float(1 / (1 + (left / most) ** SOFT))
 
 
