@@ -62,13 +62,24 @@ def variants(bench: Bench) -> list[Variant]:
         out.append(variant(WORD, label, columns, scales, root, positive=False, prior=2.0,
                            path="free", names=("",), pieces=pieces))  # fmt: skip
         if len(axes) > 1:
-            each = [bench.add(component(bench, axis, hats[:, k]))
-                    for axis in axes.values() for k in range(pieces)]  # fmt: skip
-            roots = np.kron(np.eye(len(axes)), root).astype(float)
-            out.append(variant(WORD, f"{label}, each component", each, scales, roots,
-                               positive=False, path="free", names=tuple(axes),
-                               pieces=pieces))  # fmt: skip
+            out.append(_each_component(bench, axes, label, min(pieces, EACH_PIECES), scales))
     return out
+
+
+def _each_component(
+    bench: Bench, axes: dict[str, tuple[float, float, float]], label: str, pieces: int,
+    scales: tuple[float, ...],
+) -> Variant:  # fmt: skip
+    """A free path of every amplifier's own."""
+    hats = free_path(bench, pieces)
+    columns = [bench.add(component(bench, axis, hats[:, k]))
+               for axis in axes.values() for k in range(pieces)]  # fmt: skip
+    root: Array = np.kron(np.eye(len(axes)), path_root(pieces)).astype(float)
+    return variant(WORD, f"{label}, each component", columns, scales, root, positive=False,
+                   path="free", names=tuple(axes), pieces=pieces)  # fmt: skip
+
+
+EACH_PIECES = 20  # at most, of one component's path
 
 
 def _each_run(bench: Bench, scales: tuple[float, ...]) -> list[Variant]:
