@@ -28,6 +28,7 @@ _UNSURE = 3**0.5  # of it, beyond it in quadrature
 IN_SPELLS = 0.1  # share that is kept by laws of load and time where readings scatter in spells
 SWINGS = 0.03  # share that is kept by a drift that comes and goes,
 _SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
+_STEP = 2.5  # of the grid of imperfections: so much it may be off
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
 
 
@@ -52,12 +53,16 @@ def looked_up(found: Found) -> Found:
 
 def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     """Of an arm: with as much of its weight as what it leaves allows it, the less the more words
-    are spent."""
-    left, unseen = _left(engine, explanation), engine.bench.noise.stated
-    share = _share(left, engine, explanation, unseen, len(explanation.parts))
+    are spent; with no more than what the sizes of the imperfection allow where these are far
+    beyond: another channel, which the rows of the response do not show, asks for them."""
+    allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.parts))
+    share = _share(_left(engine, explanation), allowed)
     if _swings(engine, explanation):
         share *= SWINGS
-    return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))
+    good = explanation.log_weight + float(np.log(max(share, 1e-300)))
+    if explanation.eta > _STEP * allowed:
+        good = min(good, explanation.log_good)
+    return replace(explanation, log_good=good)
 
 
 def _swings(engine: Engine, explanation: Explanation) -> bool:
@@ -88,19 +93,21 @@ def _left(engine: Engine, explanation: Explanation) -> float:
     return float(np.sqrt(max(float(square), 0.0)))
 
 
-def _share(
-    left: float, engine: Engine, explanation: Explanation, unseen: float, words: int = 1
-) -> float:
-    """Of the weight that is kept by what is left (m). unseen: what noise hides of it."""
+def _allowed(engine: Engine, explanation: Explanation, unseen: float, words: int = 1) -> float:
+    """What an explanation may leave, m. unseen: what noise hides."""
     law = min(LAW_REMAINDER * max(explanation.sizes), REMAINDER * engine.structural)
-    most = max(REMAINDER * engine.structural / words, law, unseen)
-    return float(1 / (1 + (left / most) ** SOFT))
+    return float(max(REMAINDER * engine.structural / words, law, unseen))
+
+
+def _share(left: float, allowed: float) -> float:
+    """Of the weight that is kept by what is left (m)."""
+    return float(1 / (1 + (left / allowed) ** SOFT))
 
 
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
     left = _left(engine, explanation)
-    share = _share(left, engine, explanation, _UNSURE * engine.bench.noise.stated)
+    share = _share(left, _allowed(engine, explanation, _UNSURE * engine.bench.noise.stated))
     if explanation.words & CURVES and _falls(engine):
         share *= SNAPS
     else:

@@ -123,7 +123,7 @@ def _knees(
 
 
 HARDENED = " hardened"
-UNDER_A_TIP, _CAME_BACK = (0.0, 0.04, 0.1), 0.2  # of the range
+UNDER_A_TIP, _CAME_BACK = (0.01, 0.04, 0.1), 0.2  # of the range
 
 
 def _hardened(

@@ -4,7 +4,7 @@ Pure delay of the laser, `u(t) = u_0(t - d)`, or of the force; or a first-order 
 Lags of filters, averaging and transmission: 0.05 to 10 s.
 
 Size: 0.05 to 10 s; 0.6 to 12 times the sampling interval here.
-Prior: coefficient positive, 1 is the lag itself; lags, channels and kinds equally likely.
+Prior: coefficient above LEAST, 1 is the lag itself; lags, channels and kinds equally likely.
 Source: averaging and filter settings of amplifiers and laser sensors.
 """
 
@@ -24,6 +24,7 @@ WORD = "time_lag"
 # of the time between two samples
 LAGS = (0.3, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.2, 7.0, 9.0, 12.0)
 
+LEAST = 0.6  # of the lag itself: a part of the response that comes late is creep
 _USUAL = 2.5  # samples: a reading so late would have been noticed, the later the sooner
 _OF_STROKE = 0.5  # of the time that one pass of the load takes
 
@@ -77,11 +78,11 @@ def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
         pair.append(bench.add(change))
         info: dict[str, Any] = {"lag_s": lag, "kind": kind, "channel": channel}
         out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", pair[-1:], (0.5, 1.0),
-                           prior=likely, **info))  # fmt: skip
+                           prior=likely, least=LEAST, **info))  # fmt: skip
     if len(pair) > 1:
         info = {"lag_s": lag, "kind": "window", "channel": channel}
         out.append(variant(WORD, f"{channel} window {lag:.3g} s", pair, (0.5,),
-                           prior=0.5 * likely, **info))  # fmt: skip
+                           prior=0.5 * likely, least=LEAST, **info))  # fmt: skip
     return out
 
 
