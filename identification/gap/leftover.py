@@ -96,7 +96,7 @@ def _left(engine: Engine, explanation: Explanation) -> float:
 def _allowed(engine: Engine, explanation: Explanation, unseen: float, words: int = 1) -> float:
     """What an explanation may leave, m. unseen: what noise hides."""
     law = min(LAW_REMAINDER * max(explanation.sizes), REMAINDER * engine.structural)
-    return float(max(REMAINDER * engine.structural / words, law, unseen))
+    return float(max(REMAINDER * engine.structural / words**0.5, law, unseen))
 
 
 def _share(left: float, allowed: float) -> float:
