@@ -15,7 +15,7 @@ import numpy as np
 from identification.gap.bench import way_back
 from identification.gap.evidence import Engine
 from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found
-from identification.gap.fit import fit
+from identification.gap.fit import Fit, fit
 from identification.gap.noise import bursts
 from identification.gap.penalties import CURVES
 from identification.gap.verdict import weighed
@@ -56,8 +56,9 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     are spent; with no more than what the sizes of the imperfection allow where these are far
     beyond: another channel, which the rows of the response do not show, asks for them."""
     allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.parts))
-    share = _share(_left(engine, explanation), allowed)
-    if _swings(engine, explanation):
+    fitted = fit(engine, explanation)
+    share = _share(_left(engine, fitted), allowed)
+    if _swings(fitted):
         share *= SWINGS
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
     if explanation.eta > _STEP * allowed:
@@ -65,16 +66,14 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     return replace(explanation, log_good=good)
 
 
-def _swings(engine: Engine, explanation: Explanation) -> bool:
+def _swings(fitted: Fit) -> bool:
     """Whether a drift comes and goes again and again: warming rigs and leaking charges do not,
     however they wander; air conditioning does, machines next door, and what a law leaves of every
     run."""
-    wandering = [i for i, p in enumerate(explanation.parts) if p.variant.info.get("path") == "free"]
-    if not wandering:
-        return False
-    fitted = fit(engine, explanation)
-    for i in wandering:
-        pieces = int(explanation.parts[i].variant.info["pieces"])
+    for i, part in enumerate(fitted.parts):
+        if part.variant.info.get("path") != "free":
+            continue
+        pieces = int(part.variant.info["pieces"])
         path = fitted.of(i)[0].reshape(-1, pieces).T
         path = path - path.mean(axis=0)
         slow = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, pieces), _SLOW)
@@ -84,11 +83,11 @@ def _swings(engine: Engine, explanation: Explanation) -> bool:
     return False
 
 
-def _left(engine: Engine, explanation: Explanation) -> float:
+def _left(engine: Engine, fitted: Fit) -> float:
     """rms (m) of rows beyond their noise."""
     bench, n = engine.bench, engine.bench.rows.n
     weight, noise = bench.rows.weight / bench.rows.weight.sum(), bench.noise
-    left = engine.target[:n] - fit(engine, explanation).response
+    left = engine.target[:n] - fitted.response
     square = weight @ (left**2 - noise.response**2 - noise.hold**2 - noise.run**2)
     return float(np.sqrt(max(float(square), 0.0)))
 
@@ -106,7 +105,7 @@ def _share(left: float, allowed: float) -> float:
 
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
-    left = _left(engine, explanation)
+    left = _left(engine, fit(engine, explanation))
     share = _share(left, _allowed(engine, explanation, _UNSURE * engine.bench.noise.stated))
     if explanation.words & CURVES and _falls(engine):
         share *= SNAPS

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from identification.gap.compare import mean_squares, moved_response
+from identification.gap.compare import imperfect, mean_squares, moved_response
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import LINEAR
@@ -58,7 +58,8 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
-        moved = moved_response(engine, (engine.responses(c) @ part)[:, None])[:, 0]
+        does = engine.responses(c) @ np.column_stack([part, imperfect(p.variant) * part])
+        moved, faulty = moved_response(engine, does).T
         square = float(weight @ moved**2 / weight.sum())
         moves.append(square**0.5)
         if p.word in LINEAR:
@@ -67,7 +68,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
             mine = slice(start, start + k)
             structural = float(part @ plain[mine, mine] @ part) / precision
             sizes.append(float(np.sqrt(min(structural, square))))
-        energy += float(part @ mean_squares(engine, [p.variant])[0] @ part)
+        energy += float(weight @ faulty**2 / weight.sum())
         start += k
     return Sizes(np.array(sizes), np.array(moves), energy)
 

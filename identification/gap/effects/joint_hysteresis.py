@@ -53,7 +53,7 @@ def variants(bench: Bench) -> list[Variant]:
     """Per joint and memory: kept while the arm stands, from no load or from the weight that came
     on first; lost when the rig is turned to another direction, or in the rest between runs; there
     from the beginning, of loads like those measured (rigs are cycled before they are measured)."""
-    if not bench.data.arm and (bench.once or not bench.returns):  # pulls show a curve, and no loop
+    if not bench.data.arm and not bench.returns:  # pulls show a curve, and no loop
         return []
     memories = {"": (bench.moved, False)}
     if not bench.once:
