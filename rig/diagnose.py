@@ -60,6 +60,7 @@ class Diagnosis:
             },
             "remainder_mm": r.remainder * MM,
             "remainder": _remainder(r),
+            "looks_like": _looks_like(r),
             "runners_up": {w: {"held_out_after_rms_mm": v * MM} for w, v in r.runners_up.items()},
             "notes": list(r.notes),
             "known_effects": [e["name"] for e in self.known_effects],
@@ -188,6 +189,18 @@ def _along(force: Any, f: Any, u: Any) -> Any:
     below = u[0] + (force - f[0]) * (u[1] - u[0]) / max(f[1] - f[0], 1e-300)
     above = u[-1] + (force - f[-1]) * (u[-1] - u[-2]) / max(f[-1] - f[-2], 1e-300)
     return np.where(force < f[0], below, np.where(force > f[-1], above, inner))
+
+
+def _looks_like(r: GapResult) -> dict[str, Any] | None:
+    """What an unknown gap looks like; None where nothing is plain."""
+    from rig.diagnose_text import looks_like
+
+    like = r.looks_like
+    if like is None:
+        return None
+    period = {"swings": "period_s", "waves": "period_mm"}.get(like.kind)
+    size = {} if period is None else {period: (like.period or 0.0) * (MM if "mm" in period else 1)}
+    return {"kind": like.kind, **size, "text": looks_like(like)}
 
 
 def _effect(e: Effect) -> dict[str, Any]:

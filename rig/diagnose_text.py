@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from identification.gap.diagnose import Effect, GapResult
     from identification.gap.interval import Parameter
+    from identification.gap.strange import Likeness
 
 MM = 1e3
 
@@ -34,6 +35,27 @@ MEANING = {
     "joint_stiffness_error": "the joints' stiffnesses are not the simulated ones",
 }
 
+# What an unknown gap looks like, and where to look for it; {}: its period.
+LOOKS_LIKE = {
+    "slopes": "every run has a stiffness of its own: see to what is fastened anew between runs, "
+    "and to the specimen",
+    "wanders": "the stiffness wanders during the session: see to bolts that loosen, and to damage",
+    "swings": "the displacement swings with time, {} a period: air conditioning, a pump, a machine "
+    "next door",
+    "waves": "a wave over the stroke, {} long: the screw's thread, or what the laser's spot "
+    "travels over",
+    "rough": "every level of the load is off by an amount of its own, the same whenever it is met: "
+    "bumps, cross-talk or a damaged instrument",
+}
+
+
+def looks_like(like: Likeness) -> str:
+    """In words, with the period in its unit."""
+    period = f"{like.period or 0.0:.3g} s"
+    if like.kind == "waves":
+        period = f"{(like.period or 0.0) * MM:.3g} mm"
+    return LOOKS_LIKE["wanders" if like.wanders else like.kind].format(period)
+
 
 def render(r: GapResult) -> str:
     """All lines, in the order of importance."""
@@ -51,9 +73,10 @@ def _answer(r: GapResult) -> str:
             "explain all that was measured. There is no gap to close."
         )
     if r.verdict == "unknown":
+        like = "" if r.looks_like is None else f" It looks like this: {looks_like(r.looks_like)}."
         return (
             f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
-            f"the uncertainty; about {r.remainder * MM:.3g} mm rms of structure remain."
+            f"the uncertainty; about {r.remainder * MM:.3g} mm rms of structure remain.{like}"
         )
     more = [e.name for e in r.effects if e.name != r.verdict]
     also = f" Beside it: {', '.join(more)}." if more else ""

@@ -27,6 +27,7 @@ from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
 from identification.gap.refine import refine
 from identification.gap.search import force, search
+from identification.gap.strange import Likeness, likenesses, strangers
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
 from identification.gap.verdict import NOISY
@@ -55,7 +56,8 @@ class GapResult:
     """All lengths in m. before, after, noise: rms over samples. held_out: the main fold first.
 
     runners_up: word -> rms after on the main fold, of the best explanations by other words.
-    remainder: rms of repeatable structure that is left unexplained.
+    remainder: rms of repeatable structure that is left unexplained. looks_like: of an unknown gap,
+    where that is plain.
     """
 
     verdict: str
@@ -69,6 +71,7 @@ class GapResult:
     runners_up: dict[str, float]
     next_measurement: NextMeasurement | None
     remainder: float
+    looks_like: Likeness | None
     notes: tuple[str, ...]
     bench: Bench
     engine: Engine
@@ -109,6 +112,7 @@ def explain_gap(
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])
+    strange = strangers(bench, base, target)
     tell("comparing effects", 0.2)
     etas = eta_levels(bench, base, target)
     engine = Engine(bench, base, target, etas)
@@ -118,7 +122,7 @@ def explain_gap(
         variants += finer
         engine.extend()
         singles += score(engine, engine.levels, finer)
-    found = search(engine, variants, singles)
+    found = search(engine, variants, singles, likenesses(engine, strange))
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
@@ -220,6 +224,7 @@ def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explana
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,
         remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
+        looks_like=found.looks_like if verdict == "unknown" else None,
         notes=_notes(bench),
         bench=bench,
         engine=engine,

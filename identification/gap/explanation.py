@@ -23,6 +23,7 @@ from identification.gap.penalties import (
     within_stated,
 )
 from identification.gap.priors import prior_of
+from identification.gap.strange import Likeness
 
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
@@ -59,7 +60,8 @@ class Explanation:
 class Found:
     """What the search found: explanations (best first), evidence of the words alone (nats, against
     none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
-    gap that no law explains, and what share of its weight withheld data leave an explanation."""
+    gap that no law explains, what share of its weight withheld data leave an explanation, and what
+    a gap that no law explains looks like, if like anything."""
 
     engine: Engine
     explanations: tuple[Explanation, ...]
@@ -69,6 +71,7 @@ class Found:
     unknown: float
     unknown_eta: float
     kept: Mapping[frozenset[str], float] = field(default_factory=dict)
+    looks_like: Likeness | None = None
 
 
 def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:

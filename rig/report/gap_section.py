@@ -48,12 +48,20 @@ def _answer(found: Node) -> Rich:
     if verdict == "unknown":
         rest = found["remainder_mm"].number(3, unit="mm")
         return (*start, "there is a gap, and no effect of the library explains it down to the "
-                "uncertainty; about ", *rest, " rms of structure remain.")  # fmt: skip
+                "uncertainty; about ", *rest, " rms of structure remain.",
+                *_alike(found))  # fmt: skip
     others = [e["name"].text() for e in found["effects"]][1:]
     beside = f" Beside it: {', '.join(others)}." if others else ""
     before, after, noise = (sizes[f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise"))
     return (*start, f"{MEANING[verdict]}.{beside} With it the gap shrinks from ", *before, " to ",
             *after, " mm rms; the instruments alone leave ", *noise, " mm.")  # fmt: skip
+
+
+def _alike(found: Node) -> Rich:
+    """What an unknown gap looks like, with its period as the diagnosis has it."""
+    if found["looks_like"].value is None:
+        return ()
+    return (f" It looks like this: {found['looks_like']['text'].text()}.",)
 
 
 def _where(found: Node) -> list[Block]:

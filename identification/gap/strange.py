@@ -1,0 +1,182 @@
+"""Troubles that no word names and many rigs have: shapes that stand against the words.
+
+`unknown` is not only what nothing explains. A swing of the air conditioning, a wave of the screw or
+of the laser's target, a stiffness that is another one in every run are as definite as any effect;
+where one of them explains a gap better than every word, the gap is unknown, and the note says what
+it looks like. Each kind is a family of columns with Gaussian priors, as the effects are, so that
+its evidence can be laid beside theirs.
+
+Swings and waves have a period out of many: those that take most of the gap are looked at, and the
+others count as having been looked at in vain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+
+from identification.gap.base import Base
+from identification.gap.bench import Bench
+from identification.gap.compare import by_word, marginal, score
+from identification.gap.data import Array
+from identification.gap.effects.drift import free_path, path_root
+from identification.gap.evidence import Engine, row_noise
+from identification.gap.parts import Part, part_sizes
+from identification.gap.variants import Variant, variant
+
+KINDS = 4
+SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the largest response
+# Of fewer periods (in the direction that was measured least, the setup with the shortest stroke) a
+# swing is a drift, and a wave an elastic curve.
+LEAST_SWINGS, LEAST_WAVES, MOST_WAVES = 2.0, 2.5, 20.0
+_PER_PERIOD = 4  # steps of the number of periods: more tell nothing new of a whole record
+_SHORTEST_ROWS = 4.0  # rows that a period lasts at least
+_PEAKS, _CLOSER = 3, 17
+_PIECES = 32
+_ALIKE, _MOST_LEVELS = 0.02, 200  # of the range of the load: loads that count as the same
+_FEWEST_ROWS = 30  # a table shorter than that any wave passes
+
+
+def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
+    """Variants of all kinds that these data could show (`word`: the kind); the pool of the bench
+    holds their columns afterwards."""
+    if bench.rows.continuous or bench.rows.n < _FEWEST_ROWS:
+        return []
+    swings, waves = _swings(bench, base, target), _waves(bench, base, target)
+    return [*_slopes(bench), *swings, *waves, *_rough(bench)]
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """What an unknown gap looks like. kind: slopes, swings, waves or rough; period: s of a swing, m
+    of a wave, None of others; log_evidence: of the kind, nats; wanders: slopes that change within
+    runs too."""
+
+    kind: str
+    period: float | None
+    log_evidence: float
+    wanders: bool = False
+
+
+def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[Likeness, ...]:
+    """What the kinds of strangers say of a gap, the likeliest first. Periods that were not looked
+    at count as nothing, and so does what lies below the noise of a sample: that is no gap."""
+    out = []
+    for kind, mine in by_word(score(engine, engine.levels, strangers)).items():
+        top = max(mine, key=lambda s: s.log_evidence)
+        part = Part(top.variant, top.scale)
+        size = float(part_sizes(engine, (part,), top.level).gap[0])
+        if size < LEAST_SIZE * engine.bench.noise.stated:
+            continue
+        looked_at = min(sum(s.variant.prior for s in mine), 1.0)
+        info = top.variant.info
+        out.append(
+            Likeness(kind, info.get("period"), marginal(mine) + log(looked_at), "wanders" in info)
+        )
+    return tuple(sorted(out, key=lambda x: -x.log_evidence))
+
+
+LEAST_SIZE = 0.6  # of the stated noise
+
+
+def _scales(bench: Bench) -> tuple[float, ...]:
+    return tuple(s * bench.reach for s in SHARES)
+
+
+def _slopes(bench: Bench) -> list[Variant]:
+    """Every run has a stiffness of its own, or the stiffness wanders over the session."""
+    rows, line = bench.rows, bench.slope * bench.load
+    top = float(np.abs(line).max())
+    runs = np.unique(rows.run)
+    if not top > 0 or len(runs) <= len(bench.data.setups):
+        return []
+    each = [bench.add(bench.outside_column(line / top * (rows.run == r))) for r in runs]
+    hats = free_path(bench, _PIECES)
+    path = [bench.add(bench.outside_column(line / top * hats[:, k])) for k in range(_PIECES)]
+    scales = _scales(bench)
+    return [
+        variant("slopes", "each run", each, scales, positive=False, prior=0.5),
+        variant("slopes", "wander", path, scales, path_root(_PIECES), positive=False, prior=0.5,
+                wanders=True),
+    ]  # fmt: skip
+
+
+def _swings(bench: Bench, base: Base, target: Array) -> list[Variant]:
+    """Displacement swings with time, in every direction by an amplitude of its own."""
+    if not bench.rows.clock:
+        return []
+    names = [s.direction for s in bench.data.setups]
+    masks = [np.array([n == m for n in names])[bench.rows.setup] for m in dict.fromkeys(names)]
+    span = bench.session_span
+    least = LEAST_SWINGS * bench.rows.n / min(int(m.sum()) for m in masks)
+    most = bench.rows.n / _SHORTEST_ROWS / 2
+    count = np.arange(least, max(most, least), 1 / _PER_PERIOD)
+    time = (bench.rows.session - bench.rows.session.min()) / span
+    return _periodic(bench, base, target, "swings", time, count, masks, span)
+
+
+def _waves(bench: Bench, base: Base, target: Array) -> list[Variant]:
+    """A wave over the stroke, in every setup with a phase of its own."""
+    u = bench.line  # what is seen has the wave in it
+    masks = [bench.rows.setup == s for s in range(len(bench.data.setups))]
+    strokes = [float(np.ptp(u[m])) for m in masks]
+    start = sum((m * u[m].min() for m in masks), np.zeros(len(u)))
+    span = max(strokes)
+    if not min(strokes) > LEAST_WAVES / MOST_WAVES * span:
+        return []
+    count = np.arange(LEAST_WAVES * span / min(strokes), MOST_WAVES, 1 / _PER_PERIOD)
+    return _periodic(bench, base, target, "waves", (u - start) / span, count, masks, span)
+
+
+def _rough(bench: Bench) -> list[Variant]:
+    """Every level of the load is off by an amount of its own, the same whenever it is met."""
+    rows = bench.rows
+    step = np.round(bench.load / (_ALIKE * float(np.ptp(bench.load)) or 1.0))
+    place = np.unique(np.column_stack([rows.setup, step]), axis=0, return_inverse=True)[1]
+    place = place.reshape(-1)
+    if not int(place.max()) < _MOST_LEVELS:
+        return []
+    columns = [bench.add(bench.outside_column((place == k).astype(float)))
+               for k in range(int(place.max()) + 1)]  # fmt: skip
+    return [variant("rough", "levels", columns, _scales(bench), positive=False)]
+
+
+def _periodic(
+    bench: Bench, base: Base, target: Array, kind: str, phase: Array, count: Array,
+    masks: list[Array], span: float,
+) -> list[Variant]:  # fmt: skip
+    """Sine and cosine of a phase (n,) from 0 to 1 for the numbers of periods in it that take most
+    of the gap."""
+    n = bench.rows.n
+    if not len(count):
+        return []
+    white = 1 / row_noise(bench)[:n]
+    known = np.linalg.qr(base.columns[:n] * white[:, None])[0]
+    left = white * target[:n]
+    left = left - known @ (known.T @ left)
+
+    def taken(number: float) -> float:
+        both = _both(phase, number, masks) * white[:, None]
+        both = both - known @ (known.T @ both)
+        return float(left @ both @ np.linalg.lstsq(both, left, rcond=None)[0])
+
+    power = np.array([taken(c) for c in count])
+    higher = np.append(True, power[1:] >= power[:-1]) & np.append(power[:-1] >= power[1:], True)
+    out = []
+    for i in sorted(np.flatnonzero(higher), key=lambda i: -power[i])[:_PEAKS]:
+        about = count[i] + np.linspace(-1, 1, _CLOSER) / _PER_PERIOD
+        best = float(max(about, key=taken))
+        columns = [bench.add(bench.outside_column(c)) for c in _both(phase, best, masks).T]
+        out.append(
+            variant(kind, f"{best:.3g} periods", columns, _scales(bench), positive=False,
+                    prior=1.0 / len(count), period=span / best)
+        )  # fmt: skip
+    return out
+
+
+def _both(phase: Array, count: float, masks: list[Array]) -> Array:
+    """(n, 2 m) sine and cosine, by mask."""
+    turn = 2 * np.pi * count * phase
+    return np.column_stack([m * f for m in masks for f in (np.sin(turn), np.cos(turn))])

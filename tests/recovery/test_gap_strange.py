@@ -1,0 +1,141 @@
+"""What no word names and many rigs have: called unknown, and said what it looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from identification.gap.data import GapData
+from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.strange import KINDS as KINDS_OF_STRANGERS
+from identification.gap.strange import Likeness
+from rig.diagnose_text import LOOKS_LIKE, looks_like, render
+from rig.gap_data import gap_data
+from tests.conformance.gap_designs import (
+    DESIGNS,
+    TRUE,
+    Array,
+    Design,
+    imported,
+    levers,
+    linear,
+    meta,
+    noisy,
+)
+
+SIZE_M = 30e-6
+Added = Callable[[pd.DataFrame], Array]  # (n,) displacement, of about 1
+
+
+def measured(added: Added, size: float = SIZE_M, design: Design = DESIGNS["medium"]) -> GapData:
+    """A linear rig, and what is added to its displacement."""
+
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        return size * added(rows), np.zeros((len(rows), 6))
+
+    return gap_data(imported(noisy(design, law), meta(design)))
+
+
+def run_of(rows: pd.DataFrame) -> Array:
+    """(n,) number of the run."""
+    return np.asarray(rows.groupby(["pose", "direction", "repetition"], sort=False).ngroup())
+
+
+def share_of(rows: pd.DataFrame) -> Array:
+    """(n,) load, of the largest in its direction."""
+    force = rows["force_N"].abs()
+    return np.asarray(force / force.groupby(rows["direction"]).transform("max"))
+
+
+def swing(period: float) -> Added:
+    return lambda rows: np.asarray(np.sin(2 * np.pi * rows["session_s"] / period + 1.0))
+
+
+def wave(length: float) -> Added:
+    """Over the elastic stroke, m."""
+
+    def added(rows: pd.DataFrame) -> Array:
+        stroke = np.sum(levers(rows) ** 2 / TRUE, axis=1) * rows["force_N"].to_numpy(float)
+        return np.asarray(np.sin(2 * np.pi * stroke / length + 0.5))
+
+    return added
+
+
+def slopes(rows: pd.DataFrame) -> Array:
+    each = np.array([1.0, -0.8, 0.4, -1.0, 0.9, -0.3])
+    return np.asarray(each[run_of(rows).astype(int) % len(each)] * share_of(rows))
+
+
+def rough(rows: pd.DataFrame) -> Array:
+    off = np.random.default_rng(3).standard_normal(100)
+    return np.asarray(off[np.round(20 * share_of(rows)).astype(int)] - off[0])
+
+
+KINDS: dict[str, Added] = {
+    "swings": swing(61.0),
+    "slopes": slopes,
+    "rough": rough,
+}
+
+
+@pytest.fixture(scope="module")
+def told() -> dict[str, GapResult]:
+    return {kind: diagnose_gap(measured(added)) for kind, added in KINDS.items()}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_no_word_names_is_unknown_and_told(told: dict[str, GapResult], kind: str) -> None:
+    result = told[kind]
+    assert result.verdict == "unknown"
+    assert result.looks_like is not None
+    assert result.looks_like.kind == kind
+    assert looks_like(result.looks_like) in render(result)
+
+
+def test_the_period_of_a_swing_is_found(told: dict[str, GapResult]) -> None:
+    like = told["swings"].looks_like
+    assert like is not None
+    assert like.period == pytest.approx(61.0, rel=0.01)
+    assert "61" in looks_like(like)
+
+
+FINE = Design(repetitions=2, steps=24, hold=2, readings=False)
+
+
+def test_a_wave_over_the_stroke_is_found_with_its_length() -> None:
+    result = diagnose_gap(measured(wave(0.31e-3), design=FINE))
+    assert result.verdict == "unknown"
+    like = result.looks_like
+    assert like is not None
+    assert like.kind == "waves"
+    assert like.period == pytest.approx(0.31e-3, rel=0.02)
+    assert "mm long" in looks_like(like)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_below_the_noise_there_is_no_gap(kind: str) -> None:
+    assert diagnose_gap(measured(KINDS[kind], 0.3e-6)).verdict == "none"
+
+
+@pytest.mark.parametrize("name", ["medium", "paper", "rich", "bench"])
+def test_nothing_strange_is_seen_in_noise(name: str) -> None:
+    result = diagnose_gap(linear(name))
+    assert result.verdict == "none"
+    assert result.looks_like is None
+
+
+def test_slow_swings_are_left_to_the_drifts() -> None:
+    """One and a half periods over the session are a warm-up and what follows."""
+    span = float(np.ptp(measured(slopes).session))
+    result = diagnose_gap(measured(swing(span / 1.5)))
+    assert result.verdict == "thermal_drift"
+
+
+def test_every_kind_has_its_words() -> None:
+    for kind in LOOKS_LIKE:
+        like = Likeness("slopes" if kind == "wanders" else kind, 0.01, 0.0, kind == "wanders")
+        assert looks_like(like)
+    assert len(LOOKS_LIKE) == KINDS_OF_STRANGERS + 1
