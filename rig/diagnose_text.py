@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from identification.gap.diagnose import Effect, GapResult
+    from identification.gap.explanation import Likeness
     from identification.gap.interval import Parameter
-    from identification.gap.strange import Likeness
 
 MM = 1e3
 

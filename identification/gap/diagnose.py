@@ -15,7 +15,7 @@ from identification.gap.discriminate import NextMeasurement, Others, next_measur
 from identification.gap.earned import FREE, earned, noise_of, sample_rms
 from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
-from identification.gap.explanation import Explanation, Found
+from identification.gap.explanation import Explanation, Found, Likeness
 from identification.gap.fit import Fit, fit
 from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
@@ -27,7 +27,7 @@ from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
 from identification.gap.refine import refine
 from identification.gap.search import force, search
-from identification.gap.strange import Likeness, likenesses, strangers
+from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
 from identification.gap.verdict import NOISY
@@ -112,7 +112,6 @@ def explain_gap(
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])
-    strange = strangers(bench, base, target)
     tell("comparing effects", 0.2)
     etas = eta_levels(bench, base, target)
     engine = Engine(bench, base, target, etas)
@@ -122,7 +121,7 @@ def explain_gap(
         variants += finer
         engine.extend()
         singles += score(engine, engine.levels, finer)
-    found = search(engine, variants, singles, likenesses(engine, strange))
+    found = with_strangers(search(engine, variants, singles))
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])

@@ -23,7 +23,6 @@ from identification.gap.penalties import (
     within_stated,
 )
 from identification.gap.priors import prior_of
-from identification.gap.strange import Likeness
 
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
@@ -54,6 +53,18 @@ class Explanation:
     def words(self) -> frozenset[str]:
         """Names of its effects."""
         return frozenset(p.word for p in self.parts)
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """What an unknown gap looks like. kind: slopes, swings, waves or rough; period: s of a swing, m
+    of a wave, None of others; log_evidence: of the kind, nats; wanders: slopes that change within
+    runs too."""
+
+    kind: str
+    period: float | None
+    log_evidence: float
+    wanders: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,27 +12,19 @@ from identification.gap.explanation import Explanation, Found, conditioned, expl
 from identification.gap.finer import gained
 from identification.gap.parts import Part, log_joints, part_sizes
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
-from identification.gap.strange import KINDS, Likeness
 from identification.gap.variants import Variant
 from identification.gap.verdict import weighed
 
 _SHARPENED = 8  # explanations at the most
 _PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
-_PLAIN = 3.0  # nats that a shape must explain an unknown gap better than none, to be told
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 
 
-def search(
-    engine: Engine,
-    variants: list[Variant],
-    singles: list[Scored] | None = None,
-    alike: tuple[Likeness, ...] = (),
-) -> Found:
+def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None = None) -> Found:
     """All single effects, then sets around the best ones, each re-fitted jointly. Where no levels
     repeat from run to run, a third effect is but freedom of the other two's laws. singles: scores
-    of the variants one by one, where they are known. alike: what the gap may look like that no word
-    names, the likeliest first."""
+    of the variants one by one, where they are known."""
     deepest = 2 if engine.bench.rows.continuous else 3
     levels = engine.levels
     families = by_word(singles or score(engine, levels, variants))
@@ -52,24 +44,16 @@ def search(
             break
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
     strange = [lv for lv in engine.levels if lv.eta > 0.6 * engine.bench.noise.stated]
-    generic = log_mean([lv.log_base for lv in strange])
     found = Found(
         engine=engine,
         explanations=tuple(ranked),
         alone={w: v - none for w, v in alone.items()},
         probabilities={},
         best=ranked[0],
-        unknown=_unknown(generic, alike) + LOG_UNKNOWN,
+        unknown=log_mean([lv.log_base for lv in strange]) + LOG_UNKNOWN,
         unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
-        looks_like=next((a for a in alike if a.log_evidence > generic + _PLAIN), None),
     )
     return weighed(found, {})
-
-
-def _unknown(generic: float, alike: tuple[Likeness, ...]) -> float:
-    """log evidence of a gap that no word names: half of the prior is on no shape at all."""
-    shares = [1.0, *(1.0 / KINDS for _ in alike)]
-    return log_mean([generic, *(a.log_evidence for a in alike)], shares)
 
 
 def force(

@@ -12,19 +12,22 @@ others count as having been looked at in vain.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from math import log
 
 import numpy as np
 
 from identification.gap.base import Base
 from identification.gap.bench import Bench
-from identification.gap.compare import by_word, marginal, score
+from identification.gap.compare import by_word, log_mean, marginal, score
 from identification.gap.data import Array
 from identification.gap.effects.drift import free_path, path_root
 from identification.gap.evidence import Engine, row_noise
+from identification.gap.explanation import Found, Likeness
 from identification.gap.parts import Part, part_sizes
+from identification.gap.priors import LOG_UNKNOWN
 from identification.gap.variants import Variant, variant
+from identification.gap.verdict import weighed
 
 KINDS = 4
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the largest response
@@ -39,6 +42,23 @@ _ALIKE, _MOST_LEVELS = 0.02, 200  # of the range of the load: loads that count a
 _FEWEST_ROWS = 30  # a table shorter than that any wave passes
 
 
+def with_strangers(found: Found) -> Found:
+    """With strangers beside the words: half of the prior of `unknown` is on no shape at all, half
+    on theirs; and what the gap looks like, where one of them is plain."""
+    engine = found.engine
+    variants = strangers(engine.bench, engine.base, engine.target)
+    engine.extend()
+    alike = likenesses(engine, variants)
+    none = found.unknown - LOG_UNKNOWN
+    shares = [1.0, *(1.0 / KINDS for _ in alike)]
+    unknown = log_mean([none, *(a.log_evidence for a in alike)], shares)
+    plain = next((a for a in alike if a.log_evidence > none + PLAIN), None)
+    return weighed(replace(found, unknown=unknown + LOG_UNKNOWN, looks_like=plain), found.kept)
+
+
+PLAIN = 3.0  # nats that a shape must explain the gap better than none, to be told
+
+
 def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     """Variants of all kinds that these data could show (`word`: the kind); the pool of the bench
     holds their columns afterwards."""
@@ -46,18 +66,6 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
         return []
     swings, waves = _swings(bench, base, target), _waves(bench, base, target)
     return [*_slopes(bench), *swings, *waves, *_rough(bench)]
-
-
-@dataclass(frozen=True)
-class Likeness:
-    """What an unknown gap looks like. kind: slopes, swings, waves or rough; period: s of a swing, m
-    of a wave, None of others; log_evidence: of the kind, nats; wanders: slopes that change within
-    runs too."""
-
-    kind: str
-    period: float | None
-    log_evidence: float
-    wanders: bool = False
 
 
 def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[Likeness, ...]:

@@ -10,8 +10,8 @@ import pytest
 
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.explanation import Likeness
 from identification.gap.strange import KINDS as KINDS_OF_STRANGERS
-from identification.gap.strange import Likeness
 from rig.diagnose_text import LOOKS_LIKE, looks_like, render
 from rig.gap_data import gap_data
 from tests.conformance.gap_designs import (
