@@ -41,7 +41,7 @@ _AS_FAST = 4.0  # times: passes that differ by less go at one rate
 _IDLE = 0.02  # of the response: what the springs make of a load that has no bearing on it
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
-_HELD = 2  # samples
+_HELD, _MANY_A_LEVEL = 2, 8  # samples
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
 _BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
 _FELT = 0.03  # of the range of the load's torque
@@ -168,8 +168,10 @@ class Bench:
 
     @property
     def timeless(self) -> bool:
-        """Nobody knows when a level was read: nothing can be said of rates, lags and creep."""
-        return not self.data.timed and not self.rows.continuous
+        """Nobody knows when a level was read: nothing can be said of rates, lags and creep. Where a
+        level was read many times in a row, the number of the reading tells the time."""
+        once = int(self.rows.hold_weight.max()) < _MANY_A_LEVEL
+        return not self.data.timed and not self.rows.continuous and once
 
     @cached_property
     def never_held(self) -> bool:

@@ -16,15 +16,12 @@ from identification.gap.bench import way_back
 from identification.gap.evidence import Engine
 from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found
 from identification.gap.fit import Fit, fit
-from identification.gap.noise import bursts
+from identification.gap.noise import UNSURE, bursts
 from identification.gap.penalties import CURVES
 from identification.gap.verdict import weighed
 
 # An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.
 SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none of noise
-# What is stated of a bench's instruments is known to a factor of two (GUM G.4.2: a type B estimate
-# is worth few degrees of freedom): what is left below twice that is no structure.
-_UNSURE = 3**0.5  # of it, beyond it in quadrature
 IN_SPELLS = 0.1  # share that is kept by laws of load and time where readings scatter in spells
 SWINGS = 0.03  # share that is kept by a drift that comes and goes,
 _SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
@@ -106,7 +103,7 @@ def _share(left: float, allowed: float) -> float:
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
     left = _left(engine, fit(engine, explanation))
-    share = _share(left, _allowed(engine, explanation, _UNSURE * engine.bench.noise.stated))
+    share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
     if explanation.words & CURVES and _falls(engine):
         share *= SNAPS
     else:

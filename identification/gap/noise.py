@@ -15,6 +15,9 @@ ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q again
 # to a run (datum); a third of it each leaves nine tenths for the single sample.
 HOLD_SHARE = 0.2
 RUN_SHARE = 0.33
+# What is stated of a bench's instruments is known to a factor of two (GUM G.4.2: a type B estimate
+# is worth few degrees of freedom): what is left below twice that is no structure.
+UNSURE = 3**0.5  # of it, beyond it in quadrature
 _ENOUGH = 30  # second differences: then their scatter is known to about an eighth
 
 

@@ -128,7 +128,9 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     same = bool(_joints(one) & _joints(other))
     words = {one.word, other.word}
     holds = "joint_creep" in words and not engine.bench.always_moves
-    if engine.bench.once and words <= MECHANISMS and not holds:
+    bench = engine.bench  # without any return all memory is hidden; arms are let go between runs
+    hidden = bench.once or not (bench.data.arm or bench.returns)
+    if hidden and words <= MECHANISMS and not holds:
         return True
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & MECHANISMS)):
         return True

@@ -10,11 +10,16 @@ from identification.gap.compare import Scored, by_word, closest, log_mean, margi
 from identification.gap.evidence import Engine, Level
 from identification.gap.explanation import Explanation, Found, conditioned, explain
 from identification.gap.finer import gained
+from identification.gap.noise import UNSURE
 from identification.gap.parts import Part, log_joints, part_sizes
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
 from identification.gap.variants import Variant
 from identification.gap.verdict import weighed
 
+# Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
+# factor of two.
+_SURE_SHARE, _UNSURE_SHARE = 0.05, 0.2
+_STEP = 0.6  # of the noise: between the least size of an imperfection and the next
 _SHARPENED = 8  # explanations at the most
 _PROMISING = 7  # further words of an explanation that are looked at closely
 _SEEDS = 6
@@ -34,7 +39,7 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
         top = closest(scored)
         part = Part(top.variant, top.scale)
         pool[frozenset([word])] = explain(engine, (part,), alone[word])
-    none = log_mean([levels[0].log_base, levels[1].log_base], [0.95, 0.05])
+    none = _as_stated(engine)
     empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
     front = _seeds(pool)
@@ -43,7 +48,7 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
         if not front:
             break
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
-    strange = [lv for lv in engine.levels if lv.eta > 0.6 * engine.bench.noise.stated]
+    strange = [lv for lv in engine.levels if lv.eta > _hidden(engine)]
     found = Found(
         engine=engine,
         explanations=tuple(ranked),
@@ -54,6 +59,24 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
         unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
     )
     return weighed(found, {})
+
+
+def _as_stated(engine: Engine) -> float:
+    """log evidence of what was stated: the noise, and a little more of it than that."""
+    more = [lv.log_base for lv in engine.levels[1:] if lv.eta <= _hidden(engine)]
+    more = more or [engine.levels[1].log_base]
+    less = _UNSURE_SHARE if len(more) > 1 else _SURE_SHARE
+    return log_mean(
+        [engine.levels[0].log_base, *more], [1 - less, *(less / len(more) for _ in more)]
+    )
+
+
+def _hidden(engine: Engine) -> float:
+    """Imperfection (m) that passes for noise: what is stated of a bench's instruments, where that
+    is all that is known of their noise, is known to a factor of two."""
+    bench = engine.bench
+    known = bench.data.arm or bench.rows.continuous
+    return (_STEP if known else UNSURE) * bench.noise.stated
 
 
 def force(

@@ -1,0 +1,57 @@
+"""Rigs without an arm that rest at levels: what noise hides, what a table without a clock tells,
+and what pulls that never come back leave hidden."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import make_bench
+from identification.gap.data import GapData
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects import library
+from identification.gap.evidence import Engine, eta_levels
+from identification.gap.parts import Part
+from identification.gap.penalties import _same_element
+from tests.unit.test_gap_operators import bench_data
+
+
+def levels(scatter: float, repeats: int = 1) -> GapData:
+    """Up and down in levels that are off by so many times the stated noise."""
+    force = np.array([0.0, 20, 40, 60, 80, 100, 80, 60, 40, 20, 0, 30, 60, 90, 60, 30, 0])
+    off = np.random.default_rng(5).standard_normal(len(force)) * scatter * 1e-6
+    back = np.append(0, np.diff(force) < 0)
+    branch = np.where(force == 0, 0, 1 + back)
+    shown = {"branch": branch, "step": np.arange(len(force))}
+    shown = {k: np.repeat(v, repeats).astype(np.int64) for k, v in shown.items()}
+    return bench_data(np.repeat(force, repeats), np.repeat(1e-5 * force + off, repeats), **shown)
+
+
+@pytest.mark.parametrize(("scatter", "noise"), [(0.8, True), (1.5, True), (6.0, False)])
+def test_what_is_stated_of_a_bench_is_known_to_a_factor_of_two(scatter: float, noise: bool) -> None:
+    assert (diagnose_gap(levels(scatter)).verdict == "none") is noise
+
+
+@pytest.mark.parametrize(("repeats", "told"), [(3, False), (8, True)])
+def test_many_readings_of_a_level_tell_the_time_without_a_clock(repeats: int, told: bool) -> None:
+    data = levels(0.5, repeats)
+    bench = make_bench(GapData(**{**vars(data), "timed": False}))
+    assert bench.timeless is not told
+    assert bool(library(bench, ["joint_creep"])) is told
+
+
+@pytest.mark.parametrize(("back", "hidden"), [(False, True), (True, False)])
+def test_pulls_that_never_come_back_hide_all_memory(back: bool, hidden: bool) -> None:
+    way = np.linspace(0.0, 100.0, 60)
+    one = np.append(way, way[::-1]) if back else way
+    force = np.tile(one, 2)
+    run = np.repeat([0, 1], len(one))
+    data = bench_data(force, 1e-5 * force, run=run, repetition=run + 1, step=np.full(len(run), -1))
+    bench = make_bench(data)
+    variants = library(bench, ["joint_yield", "joint_nonlinear_stiffness"])
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    engine = Engine(bench, base, target, eta_levels(bench, base, target))
+    words = {v.word: Part(v, v.scales[0]) for v in variants}
+    assert not bench.once
+    assert _same_element(engine, *words.values()) is hidden
