@@ -34,6 +34,7 @@ SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the largest response
 # Of fewer periods (in the direction that was measured least, the setup with the shortest stroke) a
 # swing is a drift, and a wave an elastic curve.
 LEAST_SWINGS, LEAST_WAVES, MOST_WAVES = 2.0, 2.5, 20.0
+RESTING_SWINGS = 6.0
 _PER_PERIOD = 4  # steps of the number of periods: more tell nothing new of a whole record
 _SHORTEST_ROWS = 4.0  # rows that a period lasts at least
 _PEAKS, _CLOSER = 3, 17
@@ -62,10 +63,12 @@ PLAIN = 3.0  # nats that a shape must explain the gap better than none, to be to
 def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     """Variants of all kinds that these data could show (`word`: the kind); the pool of the bench
     holds their columns afterwards."""
-    if bench.rows.continuous or bench.rows.n < _FEWEST_ROWS:
+    if bench.rows.n < _FEWEST_ROWS or (bench.rows.continuous and not bench.rests):
         return []
-    swings, waves = _swings(bench, base, target), _waves(bench, base, target)
-    return [*_slopes(bench), *swings, *waves, *_rough(bench)]
+    swings = _swings(bench, base, target)
+    if bench.rests:
+        return swings
+    return [*_slopes(bench), *swings, *_waves(bench, base, target), *_rough(bench)]
 
 
 def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[Likeness, ...]:
@@ -112,14 +115,17 @@ def _slopes(bench: Bench) -> list[Variant]:
 
 
 def _swings(bench: Bench, base: Base, target: Array) -> list[Variant]:
-    """Displacement swings with time, in every direction by an amplitude of its own."""
-    if not bench.rows.clock:
+    """Displacement swings with time, in every direction by an amplitude of its own. Where nothing
+    is loaded anew, the slower ones may be heat that comes and goes with the day."""
+    if not (bench.rows.clock or (bench.rests and bench.data.timed)):
         return []
     names = [s.direction for s in bench.data.setups]
     masks = [np.array([n == m for n in names])[bench.rows.setup] for m in dict.fromkeys(names)]
     span = bench.session_span
     least = LEAST_SWINGS * bench.rows.n / min(int(m.sum()) for m in masks)
     most = bench.rows.n / _SHORTEST_ROWS / 2
+    if bench.rests:
+        least = max(least, RESTING_SWINGS)
     count = np.arange(least, max(most, least), 1 / _PER_PERIOD)
     time = (bench.rows.session - bench.rows.session.min()) / span
     return _periodic(bench, base, target, "swings", time, count, masks, span)

@@ -67,14 +67,19 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
 
 def _of_the_strange(found: Found, kept: Mapping[frozenset[str], float]) -> float:
     """log weight of a gap that no law explains. A short table any smooth path passes as well as the
-    law that made it; but where a law leaves no more than the noise, it does explain."""
+    law that made it; but where a law leaves no more than the noise, it does explain. A drift that
+    takes any path is no such law."""
     bench = found.engine.bench
     if bench.data.arm:
         return found.unknown
     explains = [
         e.log_good - EXPLAINED
         for e in found.explanations
-        if e.parts and e.good and e.eta <= bench.noise.stated and kept.get(e.words, 1.0) > 0.5
+        if e.parts
+        and not any(p.variant.info.get("path") == "free" for p in e.parts)
+        and e.good
+        and e.eta <= bench.noise.stated
+        and kept.get(e.words, 1.0) > 0.5
     ]
     return min([found.unknown, *explains[:1]])
 

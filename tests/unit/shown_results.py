@@ -11,6 +11,7 @@ import numpy as np
 from drivers.errors import CannotConnect
 from identification.gap.diagnose import Effect, GapResult
 from identification.gap.discriminate import NextMeasurement, Option
+from identification.gap.explanation import Likeness
 from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
 from identification.gap.locate import Where
@@ -84,6 +85,7 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
         "runners_up": {},
         "next_measurement": None,
         "remainder": 0.0,
+        "looks_like": None,
         "notes": (),
         **more,
     }
@@ -137,7 +139,9 @@ def unexplained() -> Diagnosis:
     """A gap that no word explains."""
     where = Where(("x", "y"), ("",), {"x": (-20.0, 40.0), "y": (0.0, 1234.5)}, ("loading",), (2,),
                   (), False, 0.4)  # fmt: skip
-    return Diagnosis("id", _gap("unknown", 0.731, where=where, remainder=3.417e-5, before=8e-5))
+    swings = Likeness("swings", 121.4, -80.0)
+    return Diagnosis("id", _gap("unknown", 0.731, where=where, remainder=3.417e-5, before=8e-5,
+                                looks_like=swings))  # fmt: skip
 
 
 SPEC = CouplingSpec(1.5, np.deg2rad(36.5), "mirror", "compliant", None, "beam, steel, 30 mm")
