@@ -145,6 +145,42 @@ def force_dropouts(scene: Scene, random: Generator) -> Drawn:
     return Drawn(change, lambda size: {"burst_N": size}, (0.1, 30.0))
 
 
+def stiffness_of_each_run(scene: Scene, random: Generator) -> Drawn:
+    """The screw is set anew before every run, a little elsewhere each time."""
+    history = scene.history
+    each = random.standard_normal(int(history.run[-1]) + 1)
+    return _outside(each[history.run] * history.load / np.abs(history.load).max(), {})
+
+
+def bolt_works_loose(scene: Scene, random: Generator) -> Drawn:
+    """Softer from one moment of the session on; somebody tightens it later."""
+    history = scene.history
+    begin, end = np.sort(random.uniform(0.1, 0.95, 2)) * history.time[-1]
+    loose = (history.time > begin) & (history.time < end)
+    path = loose * history.load / np.abs(history.load).max()
+    return _outside(path, {"from_s": begin, "to_s": end})
+
+
+def somebody_leans(scene: Scene, random: Generator) -> Drawn:
+    """Somebody leans on the bench now and then, for some seconds to a minute."""
+    time = scene.history.time
+    path = np.zeros_like(time)
+    for _ in range(int(random.integers(2, 7))):
+        at, width = random.uniform(0.0, time[-1]), random.uniform(5.0, 60.0)
+        path += random.choice([-1.0, 1.0]) * np.exp(-(((time - at) / width) ** 2))
+    return _outside(path, {})
+
+
+def readings_of_the_wrong_step(scene: Scene, random: Generator) -> Drawn:
+    """After some steps the reading is off for a while."""
+    load = scene.history.load
+    path, steps = np.zeros_like(load), np.flatnonzero(np.diff(load))
+    for step in random.choice(steps, max(1, len(steps) // 6), replace=False):
+        last = step + 1 + int(random.integers(3, 20))
+        path[step + 1 : last] += random.choice([-1.0, 1.0]) * random.uniform(0.3, 1.0)
+    return _outside(path, {})
+
+
 _KINDS: tuple[Callable[[Scene, Generator], Drawn], ...] = (
     jumps_at_random_loads,
     room_air_periodic,
@@ -156,6 +192,10 @@ _KINDS: tuple[Callable[[Scene, Generator], Drawn], ...] = (
     heated_by_cycles,
     teeth,
     force_dropouts,
+    stiffness_of_each_run,
+    bolt_works_loose,
+    somebody_leans,
+    readings_of_the_wrong_step,
 )
 FORMS: dict[str, tuple[Form, ...]] = {
     "unknown": tuple(Form(kind.__name__, False, kind) for kind in _KINDS)
