@@ -46,6 +46,8 @@ LOOKS_LIKE = {
     "travels over",
     "rough": "every level of the load is off by an amount of its own, the same whenever it is met: "
     "bumps, cross-talk or a damaged instrument",
+    "jumps": "the displacement jumps between holds, elsewhere in every run: see to what sticks and "
+    "lets go, and to the laser's mounting",
 }
 
 

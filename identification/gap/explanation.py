@@ -57,9 +57,9 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Likeness:
-    """What an unknown gap looks like. kind: slopes, swings, waves or rough; period: s of a swing, m
-    of a wave, None of others; log_evidence: of the kind, nats; wanders: slopes that change within
-    runs too."""
+    """What an unknown gap looks like. kind: slopes, swings, waves, rough or jumps; period: s of a
+    swing, m of a wave, None of others; log_evidence: of the kind, nats; wanders: slopes that change
+    within runs too."""
 
     kind: str
     period: float | None

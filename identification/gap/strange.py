@@ -29,7 +29,7 @@ from identification.gap.priors import LOG_UNKNOWN
 from identification.gap.variants import Variant, variant
 from identification.gap.verdict import weighed
 
-KINDS = 4
+KINDS = 5
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the largest response
 # Of fewer periods (in the direction that was measured least, the setup with the shortest stroke) a
 # swing is a drift, and a wave an elastic curve.
@@ -68,7 +68,8 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     swings = _swings(bench, base, target)
     if bench.rests:
         return swings
-    return [*_slopes(bench), *swings, *_waves(bench, base, target), *_rough(bench)]
+    waves = _waves(bench, base, target)
+    return [*_slopes(bench), *swings, *waves, *_rough(bench), *_jumps(bench)]
 
 
 def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[Likeness, ...]:
@@ -155,6 +156,20 @@ def _rough(bench: Bench) -> list[Variant]:
     columns = [bench.add(bench.outside_column((place == k).astype(float)))
                for k in range(int(place.max()) + 1)]  # fmt: skip
     return [variant("rough", "levels", columns, _scales(bench), positive=False)]
+
+
+def _jumps(bench: Bench) -> list[Variant]:
+    """The displacement jumps between holds, and is back when the next run starts."""
+    rows = bench.rows
+    first = np.flatnonzero(rows.hold_starts & ~rows.starts)
+    if not 0 < len(first) <= _MOST_LEVELS:
+        return []
+    at = np.arange(rows.n)
+    columns = [
+        bench.add(bench.outside_column(((at >= k) & (rows.run == rows.run[k])).astype(float)))
+        for k in first
+    ]
+    return [variant("jumps", "between holds", columns, _scales(bench), positive=False)]
 
 
 def _periodic(

@@ -74,7 +74,19 @@ def rough(rows: pd.DataFrame) -> Array:
     return np.asarray(off[np.round(20 * share_of(rows)).astype(int)] - off[0])
 
 
+def jumps(rows: pd.DataFrame) -> Array:
+    """In half of the holds, anew in every run."""
+    random, out = np.random.default_rng(4), np.zeros(len(rows))
+    holds = rows.groupby(["pose", "direction", "repetition", "branch", "step"], sort=False)
+    hold, run = holds.ngroup().to_numpy(), run_of(rows)
+    for k in np.unique(hold):
+        if random.random() < 0.5 and np.any(hold < k):
+            out[(hold >= k) & (run == run[hold == k][0])] += random.choice([-0.6, 0.6])
+    return out
+
+
 KINDS: dict[str, Added] = {
+    "jumps": jumps,
     "swings": swing(61.0),
     "slopes": slopes,
     "rough": rough,
