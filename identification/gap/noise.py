@@ -25,7 +25,8 @@ _ENOUGH = 30  # second differences: then their scatter is known to about an eigh
 class Noise:
     """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
     already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
-    one sample. raised: how many times what is stated a running recording scatters, at least 1."""
+    one sample. raised: how many times what is stated a running recording scatters, at least 1.
+    sure: of an arm's instruments, or measured; what else is stated is known to a factor UNSURE."""
 
     response: Array
     q: Array
@@ -34,6 +35,7 @@ class Noise:
     run: float
     stated: float
     raised: float = 1.0
+    sure: bool = True
 
 
 def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Noise:
@@ -59,6 +61,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         response=per_sample / np.sqrt(weight), q=q, force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
         raised=_raised(data) if rows.continuous else 1.0,
+        sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
     )  # fmt: skip
 
 

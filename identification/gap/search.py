@@ -72,11 +72,9 @@ def _as_stated(engine: Engine) -> float:
 
 
 def _hidden(engine: Engine) -> float:
-    """Imperfection (m) that passes for noise: what is stated of a bench's instruments, where that
-    is all that is known of their noise, is known to a factor of two."""
-    bench = engine.bench
-    known = bench.data.arm or bench.rows.continuous
-    return (_STEP if known else UNSURE) * bench.noise.stated
+    """Imperfection (m) that passes for noise."""
+    noise = engine.bench.noise
+    return (_STEP if noise.sure else UNSURE) * noise.stated
 
 
 def force(

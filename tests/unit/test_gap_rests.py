@@ -8,7 +8,7 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
-from identification.gap.data import GapData
+from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence import Engine, eta_levels
@@ -60,3 +60,28 @@ def test_pulls_that_never_come_back_hide_all_memory(back: bool, hidden: bool) ->
     words = {v.word: Part(v, v.scales[0]) for v in variants}
     assert not bench.once
     assert _same_element(engine, *words.values()) is hidden
+
+
+def nothing_loaded(moved: Array) -> GapData:
+    """A recording without load."""
+    n = len(moved)
+    return bench_data(np.zeros(n), moved, step=np.full(n, -1))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_drift_on_any_path_explains_no_short_table(seed: int) -> None:
+    """Readings anywhere, up to twice the stated noise or far beyond: a path through is no law."""
+    anywhere = np.random.default_rng(seed).standard_normal(24) * 1e-6
+    assert diagnose_gap(nothing_loaded(1.5 * anywhere)).verdict == "none"
+    assert diagnose_gap(nothing_loaded(6.0 * anywhere)).verdict == "unknown"
+
+
+@pytest.mark.parametrize(("periods", "verdict"), [(1.3, "thermal_drift"), (11.0, "unknown")])
+def test_what_rests_may_swing(periods: float, verdict: str) -> None:
+    at = np.linspace(0.0, 1.0, 400)
+    noise = np.random.default_rng(2).standard_normal(400) * 1e-6
+    result = diagnose_gap(nothing_loaded(3e-5 * np.sin(2 * np.pi * periods * at) + noise))
+    assert result.verdict == verdict
+    if verdict == "unknown":
+        assert result.looks_like is not None
+        assert result.looks_like.period == pytest.approx(399 / periods, rel=0.01)

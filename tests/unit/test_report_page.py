@@ -161,6 +161,17 @@ def test_what_the_data_do_not_allow_is_said(tmp_path: Path) -> None:
     assert "No device is named in this data set." in text
 
 
+def test_an_unknown_gap_is_said_what_it_looks_like(tmp_path: Path) -> None:
+    off = {5 * k: (9, -7, 8, -9, 6)[k % 5] for k in range(1, 21)}
+    path = tmp_path / "rough.h5"
+    bench(path, lambda f, r: f / 95.0 + 3e-3 * off.get(int(f), 0), forces=(*map(float, off),))
+    report = make([path], Wishes(made="now"))
+    found = report.to_json()["datasets"][0]["diagnose"]
+    assert found["verdict"] == "unknown"
+    assert found["looks_like"]["kind"] == "rough"
+    assert f"It looks like this: {found['looks_like']['text']}." in Page(report.to_html()).text
+
+
 def test_without_the_gap(tmp_path: Path) -> None:
     page = Page(make([bench(tmp_path / "a.h5")], QUIET).to_html())
     assert "Left out, as asked for (--no-gap)." in page.text
