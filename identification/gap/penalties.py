@@ -83,36 +83,51 @@ BENDS = 0.04  # of what a curve moves: so much the springs can't give at least
 
 def within_stated(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats, a steep wall, for an arm's gains that are off by no more than twice what is
-    stated: that is `none`."""
+    stated, and for one spring that is off by no more than what is stated: that is `none`."""
     if not engine.bench.data.arm:
         return 0.0
     meter, penalty = engine.bench.data.instruments, 0.0
-    sds = {"force_scale": meter.force_gain, "displacement_scale": meter.displacement_gain}
+    least = {
+        "force_scale": _WITHIN * meter.force_gain,
+        "displacement_scale": _WITHIN * meter.displacement_gain,
+    }
     for p, moved in zip(parts, found.moved, strict=True):
-        if p.word in sds:
+        limit = least.get(p.word, 0.0)
+        if "joint" in p.variant.info and p.word == "joint_stiffness_error":
+            sds = engine.bench.data.compliance_relative_sd
+            limit = _SPRING_WITHIN * float(sds[p.variant.info["joint"]])
+        if limit > 0:
             off = max(float(moved) / _rms_of_line(engine, p), 1e-6)
-            penalty += _wall(_WITHIN * sds[p.word] / off)
+            penalty += _wall(limit / off)
     return penalty
 
 
-def _rms_of_line(engine: Engine, gain: Part) -> float:
-    """rms (m) by which a gain of one moves."""
+def _rms_of_line(engine: Engine, part: Part) -> float:
+    """rms (m) by which a gain of one, or a spring twice as soft, moves."""
     n, weight = engine.bench.rows.n, engine.bench.rows.weight
-    line = engine.columns(gain.variant.columns)[:n, :1]
+    line = engine.columns(part.variant.columns)[:n, :1]
     moved = moved_response(engine, line)[:, 0]
     return max(float(np.sqrt(weight @ moved**2 / weight.sum())), 1e-300)
 
 
-_WITHIN = 2.0  # standard deviations
+_WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
 
 
 def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats for effects below the noise of a single sample of a running recording:
-    thousands of samples would show them, but for what noise of low frequency does to them."""
-    if not engine.bench.rows.continuous:
-        return 0.0
-    size = max(float(_counted(parts, found).max(initial=0.0)), 1e-300)
-    return 20.0 * max(0.0, float(np.log(engine.bench.noise.stated / size)))
+    thousands of samples would show them, but for what noise of low frequency does to them. Of
+    levels at rest for every one far below that, but for what springs may hide or other channels
+    show: that is no gap."""
+    noise = engine.bench.noise.stated
+    if engine.bench.rows.continuous:
+        size = max(float(_counted(parts, found).max(initial=0.0)), 1e-300)
+        return 20.0 * max(0.0, float(np.log(noise / size)))
+    small = [s for p, s in zip(parts, found.gap, strict=True) if p.word not in _SHOWN_ELSEWHERE]
+    return sum(_wall(FAR_BELOW_NOISE * noise / max(float(s), 1e-300)) for s in small)
+
+
+FAR_BELOW_NOISE = 0.2
+_SHOWN_ELSEWHERE = LINEAR | {"force_drift"}
 
 
 def _counted(parts: tuple[Part, ...], found: Sizes) -> Array:

@@ -15,7 +15,7 @@ from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, Sizes, _beyond_springs
-from identification.gap.penalties import straight, within_stated
+from identification.gap.penalties import straight, trifle, within_stated
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
@@ -118,3 +118,40 @@ def test_a_gain_within_what_is_stated_is_no_effect(bench: Bench, word: str) -> N
 
     assert charge(sd) == pytest.approx(60 * np.log(2))
     assert charge(2.1 * sd) == 0.0
+
+
+def test_a_spring_within_what_is_stated_is_none(bench: Bench) -> None:
+    fresh, springs = of(bench, "joint_stiffness_error")
+    spring = next(v for v in springs.values() if "joint" in v.info)
+    base, target = base_columns(fresh), fresh.observed - prediction(fresh)
+    engine = Engine(fresh, base, target, np.array([0.0, 1e-6]))
+    sd = float(fresh.data.compliance_relative_sd[spring.info["joint"]])
+    column = engine.columns(spring.columns)[: fresh.rows.n]
+    weight = fresh.rows.weight
+    one = float(np.sqrt(weight @ moved_response(engine, column)[:, 0] ** 2 / weight.sum()))
+
+    def charge(off: float) -> float:
+        sizes = Sizes(np.zeros(1), np.array([off * one]), 0.0)
+        return within_stated(engine, (Part(spring, 1.0),), sizes)
+
+    assert charge(0.75 * sd) == pytest.approx(60 * np.log(2))
+    assert charge(1.6 * sd) == 0.0
+
+
+def test_at_rest_no_mechanism_far_below_the_noise_is_named(bench: Bench) -> None:
+    """Beside whatever else; what springs may hide or the force at zero load shows is none."""
+    fresh, found = of(bench, "joint_hysteresis")[0], {}
+    for word in ("joint_hysteresis", "link_flexibility", "force_drift"):
+        found[word] = Part(library(fresh, (word,))[0], 1.0)
+    base, target = base_columns(fresh), fresh.observed - prediction(fresh)
+    engine = Engine(fresh, base, target, np.array([0.0, 1e-6]))
+    noise = fresh.noise.stated
+
+    def charge(words: list[str], sizes: list[float]) -> float:
+        gap = np.array(sizes) * noise
+        return trifle(engine, tuple(found[w] for w in words), Sizes(gap, 1e3 * gap, 0.0))
+
+    assert charge(["joint_hysteresis"], [0.1]) == pytest.approx(60 * np.log(2))
+    assert charge(["joint_hysteresis"], [0.25]) == 0.0
+    assert charge(["link_flexibility", "joint_hysteresis"], [9.0, 0.1]) > 40
+    assert charge(["link_flexibility", "force_drift"], [0.01, 0.01]) == 0.0
