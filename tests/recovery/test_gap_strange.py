@@ -8,13 +8,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import make_bench
+from identification.gap.compare import score
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Likeness
 from identification.gap.strange import KINDS as KINDS_OF_STRANGERS
+from identification.gap.strange import likenesses, strangers
 from rig.diagnose_text import LOOKS_LIKE, looks_like, render
 from rig.gap_data import gap_data
 from tests.conformance.gap_designs import (
+    DESIGNS,
     TRUE,
     Array,
     Design,
@@ -127,9 +133,31 @@ def test_a_wave_over_the_stroke_is_found_with_its_length() -> None:
     assert "mm long" in looks_like(like)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["swings", "rough"])
 def test_below_the_noise_there_is_no_gap(kind: str) -> None:
-    assert diagnose_gap(measured(KINDS[kind], 0.3e-6)).verdict == "none"
+    """However plainly many samples show it."""
+    assert diagnose_gap(measured(KINDS[kind], 1.2e-6, DESIGNS["medium"])).verdict == "none"
+
+
+def test_waves_fit_into_the_shortest_stroke_at_least_twice() -> None:
+    """Longer ones are curves: of each setup its own, as the phases are free."""
+    bench = make_bench(measured(wave(1.1e-3), design=FINE))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    waves = [v for v in strangers(bench, base, target) if v.word == "waves"]
+    strokes = [np.ptp(bench.line[bench.rows.setup == s]) for s in range(2)]
+    assert waves
+    assert max(v.info["period"] for v in waves) < min(strokes) / 2.2
+
+
+def test_periods_that_were_not_looked_at_count_as_looked_at_in_vain() -> None:
+    bench = make_bench(measured(swing(61.0)))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    swings = [v for v in strangers(bench, base, target) if v.word == "swings"]
+    engine = Engine(bench, base, target, eta_levels(bench, base, target))
+    (like,) = likenesses(engine, swings)
+    each = [s.log_evidence for s in score(engine, engine.levels, swings)]
+    assert sum(v.prior for v in swings) < 0.2
+    assert like.log_evidence == pytest.approx(float(np.logaddexp.reduce(each)))
 
 
 @pytest.mark.parametrize("name", ["medium", "paper", "bench"])

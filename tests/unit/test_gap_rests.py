@@ -76,7 +76,9 @@ def test_a_drift_on_any_path_explains_no_short_table(seed: int) -> None:
     assert diagnose_gap(nothing_loaded(6.0 * anywhere)).verdict == "unknown"
 
 
-@pytest.mark.parametrize(("periods", "verdict"), [(1.3, "thermal_drift"), (11.0, "unknown")])
+@pytest.mark.parametrize(
+    ("periods", "verdict"), [(1.3, "thermal_drift"), (3.0, "thermal_drift"), (11.0, "unknown")]
+)
 def test_what_rests_may_swing(periods: float, verdict: str) -> None:
     at = np.linspace(0.0, 1.0, 400)
     noise = np.random.default_rng(2).standard_normal(400) * 1e-6
