@@ -65,7 +65,7 @@ def _as_stated(engine: Engine) -> float:
     """log evidence of what was stated: the noise, and a little more of it than that."""
     more = [lv.log_base for lv in engine.levels[1:] if lv.eta <= _hidden(engine)]
     more = more or [engine.levels[1].log_base]
-    less = _UNSURE_SHARE if len(more) > 1 else _SURE_SHARE
+    less = _SURE_SHARE if engine.bench.noise.sure else _UNSURE_SHARE
     return log_mean(
         [engine.levels[0].log_base, *more], [1 - less, *(less / len(more) for _ in more)]
     )

@@ -21,7 +21,7 @@ from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.compare import by_word, log_mean, marginal, score
 from identification.gap.data import Array
-from identification.gap.effects.drift import free_path, path_root
+from identification.gap.effects.drift import by_direction, free_path, path_root
 from identification.gap.evidence import Engine, row_noise
 from identification.gap.explanation import Found, Likeness
 from identification.gap.parts import Part, part_sizes
@@ -120,8 +120,7 @@ def _swings(bench: Bench, base: Base, target: Array) -> list[Variant]:
     is loaded anew, the slower ones may be heat that comes and goes with the day."""
     if not (bench.rows.clock or (bench.rests and bench.data.timed)):
         return []
-    names = [s.direction for s in bench.data.setups]
-    masks = [np.array([n == m for n in names])[bench.rows.setup] for m in dict.fromkeys(names)]
+    masks = list(by_direction(bench).values())
     span = bench.session_span
     least = LEAST_SWINGS * bench.rows.n / min(int(m.sum()) for m in masks)
     most = bench.rows.n / _SHORTEST_ROWS / 2

@@ -24,6 +24,12 @@ def warm_ups(bench: Bench) -> dict[str, Array]:
     return out
 
 
+def by_direction(bench: Bench) -> dict[str, Array]:
+    """Direction -> (n,) 1 where it was measured, else 0: what drifts is a vector."""
+    names = np.array([s.direction for s in bench.data.setups])
+    return {n: (names == n)[bench.rows.setup].astype(float) for n in dict.fromkeys(names.tolist())}
+
+
 def own_clock(bench: Bench) -> bool:
     """Whether time and load part company: the load comes and goes at least three times, in runs or
     in cycles of one, or there is none at all. Else a path in time is a curve of the load, or the

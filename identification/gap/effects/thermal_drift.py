@@ -15,6 +15,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
+    by_direction,
     free_path,
     free_paths,
     path_root,
@@ -30,12 +31,7 @@ SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the deflection
 def variants(bench: Bench) -> list[Variant]:
     """Paths times directions."""
     scales = tuple(s * bench.reach for s in shares(bench, SHARES))
-    names = [s.direction for s in bench.data.setups]
-    masks = [
-        np.array([n == name for n in names])[bench.rows.setup].astype(float)
-        for name in dict.fromkeys(names)
-    ]
-    named = tuple(dict.fromkeys(names))
+    named, masks = zip(*by_direction(bench).items(), strict=True)
     out, rates = [], []
     for label, path in {**paths(bench), **_temperatures(bench)}.items():
         columns = [bench.add(bench.outside_column(m * path)) for m in masks]
