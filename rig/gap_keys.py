@@ -81,7 +81,7 @@ SHAPES: dict[str, Key] = {
     "strain": Key("strain", "text", options=("bending", "twist")),
     "run": Key("run", "count"),
     "axis": Key("axis", "text", options=_SIDES),
-    "law": Key("law", "text", options=("exponential", "hyperbolic", "slack")),
+    "law": Key("law", "text", options=("exponential", "hyperbolic", "slack", "toe")),
     "force_scale": Key("force_scale_N", "positive"),
     "along": Key("along", "vector"),
     "across": Key("across", "vector"),

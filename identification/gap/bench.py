@@ -121,7 +121,22 @@ class Bench:
     @cached_property
     def once(self) -> bool:
         """Every setup was loaded once, and never unloaded: all memory is hidden."""
-        return not self.returns and len(np.unique(self.rows.run)) <= len(self.data.setups)
+        return not self.returns and not self.repeats
+
+    @property
+    def repeats(self) -> bool:
+        """Some setup was loaded again from the start."""
+        return len(np.unique(self.rows.run)) > len(self.data.setups)
+
+    @property
+    def left_behind(self) -> float:
+        """Share of the largest displacement that is left when the force was taken away in the end,
+        0 where it was not."""
+        force = np.abs(self.rows.measured_force if self.imposed else self.load)
+        path = self.load if self.imposed else self.response
+        moved = np.abs(path - path[0])
+        gone = force[-1] < _ASIDE * force.max()
+        return float(moved[-1] / moved.max()) if gone and moved.max() > 0 else 0.0
 
     @property
     def returns(self) -> bool:

@@ -16,13 +16,13 @@ from identification.gap.earned import FREE, earned, noise_of, sample_rms
 from identification.gap.effects import WORDS, library
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Explanation, Found, Likeness
+from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.interval import Parameter
 from identification.gap.leftover import looked_up
 from identification.gap.locate import Where, locate
-from identification.gap.noise import bursts
 from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
 from identification.gap.refine import refine
@@ -334,11 +334,7 @@ def _notes(bench: Bench) -> tuple[str, ...]:
         out.append("No session clock: drifts are seen only within runs and from run to run.")
     if bench.timeless:
         out.append("No time was recorded: lags, creep and how fast it flowed are left out.")
-    if bursts(data):
-        out.append(
-            "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "
-            "glitches, which no effect explains. See to the laser's mounting and to the cables."
-        )
+    out += faults(data)
     if bench.noise.raised > NOISY:
         out.append(
             f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "

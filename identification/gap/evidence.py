@@ -73,6 +73,7 @@ class Engine:
         self.cache: dict[object, Array] = {}
         self.stacks: dict[object, Any] = {}  # of variants that are compared again and again
         self.structural = structural_rms(bench, base, target)
+        self.most = _variance(bench)
         n = bench.rows.n
         self._edges = np.flatnonzero(bench.rows.hold_starts)
         self._inverse = 1 / self.sigma[:n]
@@ -297,6 +298,16 @@ def structural_rms(bench: Bench, base: Base, target: Array) -> float:
     weight = bench.rows.weight
     left = (target - base.columns @ beta)[:n]
     return float(np.sqrt(weight @ left**2 / weight.sum()))
+
+
+def _variance(bench: Bench) -> float:
+    """Mean square (m^2) of the response about its mean per setup: a law that does more, as what
+    yields far beyond its threshold on an imposed path, is no further off for that."""
+    weight, setup = bench.rows.weight, bench.rows.setup
+    mean = np.bincount(setup, weight * bench.response) / np.maximum(
+        np.bincount(setup, weight), 1e-300
+    )
+    return float(weight @ (bench.response - mean[setup]) ** 2 / weight.sum())
 
 
 def row_noise(bench: Bench) -> Array:

@@ -13,9 +13,10 @@ from identification.gap.compare import condition
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import LINEAR, level_prior
-from identification.gap.parts import Part, log_joints, part_sizes, signs_kept
+from identification.gap.parts import Part, Sizes, log_joints, part_sizes, signs_kept
 from identification.gap.penalties import (
     FRICTION,
+    TOE_AND_KNEE,
     cancelling,
     pettiness,
     straight,
@@ -91,7 +92,7 @@ def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Exp
     levels = engine.levels
     bases = log_joints(engine, parts)
     sizes = part_sizes(engine, parts, int(bases.argmax()))
-    each, energy = _counted(engine, parts, sizes.gap), sizes.energy
+    each, energy = _counted(engine, parts, sizes), sizes.energy
     logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
     least = max(
@@ -118,16 +119,21 @@ def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Exp
     )
 
 
-def _counted(engine: Engine, parts: tuple[Part, ...], each: Array) -> Array:
+def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
     """Sizes of the parts. Without an arm friction brings its own mean stiffness, and what was
     simulated may be its first slope: a spring that is off beside it counts by what the friction
-    leaves of the gap."""
-    linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
+    leaves of the gap. A toe and a knee count as they move: what a spring would hide of either, the
+    other shows."""
+    if engine.bench.data.arm:
+        return sizes.gap
+    if frozenset(p.word for p in parts) == TOE_AND_KNEE:
+        return sizes.moved
     rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
-    if engine.bench.data.arm or not rubs.any():
-        return each
-    rest = max(engine.structural**2 - float(each[rubs].max()) ** 2, 0.0) ** 0.5
-    return np.where(linear, np.minimum(each, rest), each)
+    if not rubs.any():
+        return sizes.gap
+    linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
+    rest = max(engine.structural**2 - float(sizes.gap[rubs].max()) ** 2, 0.0) ** 0.5
+    return np.where(linear, np.minimum(sizes.gap, rest), sizes.gap)
 
 
 def conditioned(

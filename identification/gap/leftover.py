@@ -15,14 +15,17 @@ import numpy as np
 from identification.gap.bench import way_back
 from identification.gap.evidence import Engine
 from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found
+from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
-from identification.gap.noise import UNSURE, bursts
+from identification.gap.noise import UNSURE
 from identification.gap.penalties import CURVES
 from identification.gap.verdict import weighed
 
 # An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.
 SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none of noise
-IN_SPELLS = 0.1  # share that is kept by laws of load and time where readings scatter in spells
+# A machine that moves by its own displacement reading: what would drift there it takes back.
+HELD = 0.02
+FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
 SWINGS = 0.03  # share that is kept by a drift that comes and goes,
 _SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
 _STEP = 2.5  # of the grid of imperfections: so much it may be off
@@ -31,10 +34,10 @@ _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that ar
 
 def looked_up(found: Found) -> Found:
     """The posterior with what the best explanations really leave; of levels that rest, after a look
-    for readings that scatter in spells, as nothing here makes them."""
+    for readings that nothing on a rig makes."""
     engine = found.engine
-    if bursts(engine.bench.data):
-        doubted = [replace(e, log_good=e.log_good + log(IN_SPELLS)) for e in found.explanations]
+    if faults(engine.bench.data):
+        doubted = [replace(e, log_good=e.log_good + log(FAULTY)) for e in found.explanations]
         return weighed(replace(found, explanations=tuple(doubted)), found.kept)
     judge = _still_good if engine.bench.data.arm else _judged
     best = found.explanations[0].log_weight
@@ -106,6 +109,8 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
     if explanation.words & CURVES and _falls(engine):
         share *= SNAPS
+    elif engine.bench.imposed and explanation.parts[0].word == "thermal_drift":
+        share *= HELD
     else:
         share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
     return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import Array, GapData, Ints
-from identification.gap.rows import Rows, hold_ids, is_continuous
+from identification.gap.rows import Rows, hold_ids
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -197,26 +197,3 @@ def _scatter(values: Array, hold: Ints) -> float | None:
         return None
     kept = squares[: int(0.95 * squares.size)]
     return float(np.sqrt(kept.mean() / 6.0) / 0.8713)
-
-
-_SETTLED = 2  # samples of a hold at least: a lag, or a joint that still creeps
-_BEYOND, _BURSTS = 4.5, 0.03  # robust standard deviations, and the share that is too much
-_FEWEST_STEPS = 50
-
-
-def bursts(data: GapData) -> bool:
-    """Whether readings at rest scatter in spells, far beyond what they scatter mostly: vibration,
-    glitches. Samples of the later half of a hold, where no effect jumps and lags have caught up,
-    against the straight line between their neighbours, which creep follows closely."""
-    hold = hold_ids(data)
-    if is_continuous(data, hold):
-        return False
-    starts = np.flatnonzero(np.diff(hold, prepend=-1))
-    within = np.arange(len(hold)) - starts[hold]
-    settled = np.maximum(_SETTLED, np.bincount(hold)[hold] // 2)
-    late = (hold[2:] == hold[:-2]) & (within >= settled)[1:-1]
-    u, t = data.displacement, data.time
-    share = np.clip((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-300), 0.0, 1.0)
-    away = np.abs(u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]
-    usual = max(1.4826 * float(np.median(away)), data.instruments.displacement) if away.size else 0
-    return bool(away.size >= _FEWEST_STEPS and np.mean(away > _BEYOND * usual) > _BURSTS)

@@ -22,6 +22,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effects.contact_seating import LAWS
 from identification.gap.effects.link_flexibility import STRAINS
 from identification.gap.history import half_sample, settling_share, standing_on
 from identification.gap.interval import NOMINAL, TWO_SIDED, Found, Parameter, Softer, normal
@@ -149,12 +150,8 @@ def _base(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 
 def _seating(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     f0, top = float(part.variant.info["force_N"]), float(np.abs(bench.load).max())
-    seated = {
-        "exponential": lambda scale: -np.expm1(-top / scale),
-        "hyperbolic": lambda scale: top / (top + scale),
-        "slack": lambda scale: min(top / scale, 1.0),
-    }
-    at_top = np.array([seated[law](scale) for law, scale in part.variant.info["laws"]])
+    scales = part.variant.info["laws"]
+    at_top = np.array([LAWS[law](np.array(top / scale)) for law, scale in scales])
     return {
         "depth": found.linear(at_top, "mm", 1e3),
         "force_scale": Parameter(f0, f0 / 2, f0 * 2, "N"),

@@ -70,7 +70,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
             sizes.append(float(np.sqrt(min(structural, square))))
         energy += float(weight @ faulty**2 / weight.sum())
         start += k
-    return Sizes(np.array(sizes), np.array(moves), energy)
+    return Sizes(np.array(sizes), np.array(moves), min(energy, engine.most))
 
 
 def _beyond_springs(engine: Engine, moved: Array) -> float:
@@ -141,7 +141,7 @@ def energies(engine: Engine, parts: tuple[Part, ...]) -> Array:
     inner = np.eye(len(root)) + root.T @ gram @ root
     w = np.linalg.solve(inner, (moment @ root)[..., None])[..., 0] @ root.T
     each = [mean_squares(engine, [p.variant])[0] for p in parts]
-    return np.asarray(np.sum(w @ block(each) * w, axis=1))
+    return np.asarray(np.minimum(np.sum(w @ block(each) * w, axis=1), engine.most))
 
 
 def _asked(engine: Engine, parts: tuple[Part, ...]) -> tuple[Array, Array]:

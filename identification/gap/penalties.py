@@ -29,6 +29,7 @@ MECHANISMS = frozenset(
 )
 # Curves of the load, which one direction without joint readings can't tell apart.
 CURVES = frozenset({"contact_seating", "joint_nonlinear_stiffness"})
+TOE_AND_KNEE = frozenset({"contact_seating", "joint_yield"})
 FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 
@@ -145,7 +146,8 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     holds = "joint_creep" in words and not engine.bench.always_moves
     bench = engine.bench  # without any return all memory is hidden; arms are let go between runs
     hidden = bench.once or not (bench.data.arm or bench.returns)
-    if hidden and words <= MECHANISMS and not holds:
+    # but what gets stiffer at the start and softer in the end is two things
+    if hidden and words <= MECHANISMS and not holds and words != TOE_AND_KNEE:
         return True
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & MECHANISMS)):
         return True

@@ -102,7 +102,7 @@ def _slopes(bench: Bench) -> list[Variant]:
     rows, line = bench.rows, bench.slope * bench.load
     top = float(np.abs(line).max())
     runs = np.unique(rows.run)
-    if not top > 0 or len(runs) <= len(bench.data.setups):
+    if not (top > 0 and bench.repeats):
         return []
     each = [bench.add(bench.outside_column(line / top * (rows.run == r))) for r in runs]
     hats = free_path(bench, _PIECES)

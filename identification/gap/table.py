@@ -123,6 +123,7 @@ class Table:
         fit = 0.5 * taken - 0.5 * np.log(gain).sum(axis=2)
         turned = mean @ np.swapaxes(vectors, 1, 2)
         energy = np.sum((turned @ self._plain[which]) * turned, axis=2) + self._already
+        energy = np.minimum(energy, self._engine.most)
         self.logs[i, which] = level.log_base + fit + log_level(self._engine.etas, i, energy)
         self._vectors[i, which], self._mean[i, which] = vectors, mean
         self._variance[i, which] = s2 / gain

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.gap.effects import WORDS
 from identification.gap.explanation import Explanation, Found
+from identification.gap.noise import UNSURE
 
 # Neighbouring points of one smooth run are no independent witnesses of its law.
 TEMPER = 0.12
@@ -28,11 +29,12 @@ def trusted(
     alike."""
     given = {w: p for w, p in probabilities.items() if w in doubted}
     lost = {w: most * p * max(0.0, 2 * p - 1) for w, p in given.items()}
-    doubt = sum(lost.values())
     out = {w: p - lost.get(w, 0.0) for w, p in probabilities.items()}
-    out["unknown"] += 0.5 * doubt
-    for w in given:
-        out[w] += 0.5 * doubt / len(given)
+    for word, share in lost.items():
+        others = 1.0 if word == "unknown" else 0.5
+        out["unknown"] += (1 - others) * share
+        for w in given:
+            out[w] += others * share / len(given)
     return out
 
 
@@ -78,7 +80,7 @@ def _of_the_strange(found: Found, kept: Mapping[frozenset[str], float]) -> float
         if e.parts
         and not any(p.variant.info.get("path") == "free" for p in e.parts)
         and e.good
-        and e.eta <= bench.noise.stated
+        and e.eta <= (1.0 if bench.noise.sure else UNSURE) * bench.noise.stated
         and kept.get(e.words, 1.0) > 0.5
     ]
     return min([found.unknown, *explains[:1]])

@@ -16,9 +16,9 @@ from identification.gap.earned import DRIFTS, earned
 from identification.gap.effects.drift import free_path, path_root
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
+from identification.gap.faults import bursts
 from identification.gap.heldout import ALWAYS_IN, folds, held_out
 from identification.gap.leftover import looked_up
-from identification.gap.noise import bursts
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import cancelling, pettiness, trifle
 from identification.gap.variants import variant

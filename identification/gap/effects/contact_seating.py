@@ -10,6 +10,8 @@ Source: flattening of asperities in clamped joints, Greenwood and Williamson 196
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from identification.gap.bench import Bench
@@ -24,6 +26,15 @@ BENCH_SHARES = (0.01, 0.03, 0.1)
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)  # of an imposed stroke
 SHARES = (0.003, 0.01, 0.03, 0.1)  # of the deflection
 
+# How much of the depth is gone at x times the force scale, or at x times the stroke of a slack: of
+# one that is taken up bit by bit the stiffness grows in proportion to the stroke.
+LAWS: dict[str, Callable[[Array], Array]] = {
+    "exponential": lambda x: np.asarray(-np.expm1(-x)),
+    "hyperbolic": lambda x: np.asarray(x / (x + 1)),
+    "slack": lambda x: np.minimum(x, 1.0),
+    "toe": lambda x: np.asarray(1 - np.maximum(1 - x, 0.0) ** 2),
+}
+
 
 def variants(bench: Bench) -> list[Variant]:
     """Per force scale and law, and a mixture of scales. What bears both ways is no seat: what is
@@ -37,11 +48,8 @@ def variants(bench: Bench) -> list[Variant]:
     forces = FORCES if bench.data.arm else BENCH_FORCES
     for share in forces:
         f0 = share * top
-        for law, shape in (
-            ("exponential", 1 - np.exp(-size / f0)),
-            ("hyperbolic", size / (size + f0)),
-        ):
-            column = bench.add(bench.outside_column(sign * shape))
+        for law in ("exponential", "hyperbolic"):
+            column = bench.add(bench.outside_column(sign * LAWS[law](size / f0)))
             if law == "exponential":
                 columns.append(column)
             out.append(
@@ -72,15 +80,22 @@ def pressed(bench: Bench) -> tuple[Array, Array]:
 
 
 def _slacks(bench: Bench, top: float) -> list[Variant]:
-    """Where the stroke is imposed, from one side: slack that is taken up before force rises,
-    `d min(u / d, 1)`, told by the stroke: the force that is simulated for it knows of no slack."""
+    """Where the stroke is imposed, from one side: slack that is taken up before force rises, at
+    once or bit by bit, told by the stroke: the force that is simulated for it knows of no slack;
+    and a toe of several."""
     if bench.data.arm or not bench.imposed or not bench.one_sided:
         return []
-    stroke = np.asarray(bench.slope * np.abs(bench.load))
+    stroke = float(np.abs(bench.slope * bench.load).max())
     out, (size, sign) = [], pressed(bench)
-    for share in SLACKS:
-        d, f0 = share * float(stroke.max()), share * top
-        column = bench.add(bench.outside_column(sign * np.minimum(size / f0, 1.0)))
-        out.append(variant(WORD, f"slack {share:g}", [column], (0.5 * d, d), force_N=f0,
-                           laws=(("slack", f0),)))  # fmt: skip
-    return out
+    for law, part in (("slack", 1.0), ("toe", 0.5)):  # of the stroke, that is lost
+        columns = []
+        for share in SLACKS:
+            d, f0 = part * share * stroke, share * top
+            columns.append(bench.add(bench.outside_column(sign * LAWS[law](size / f0))))
+            out.append(variant(WORD, f"{law} {share:g}", columns[-1:], (0.5 * d, d), force_N=f0,
+                               laws=((law, f0),)))  # fmt: skip
+    root = np.diag([part * share * stroke for share in SLACKS])
+    laws = tuple(("toe", share * top) for share in SLACKS)
+    toes = variant(WORD, "toes", columns, (0.1, 0.3, 1.0), root, each=True, prior=2.0,
+                   force_N=SLACKS[-1] * top, laws=laws)  # fmt: skip
+    return [*out, toes]

@@ -66,10 +66,13 @@ def variants(bench: Bench) -> list[Variant]:
                         positive=False, prior=0.2 / (len(PLACES) - 1),
                         kinds=("line", *hinges[k : k + 2]), **info)
             )  # fmt: skip
-        if not bench.data.arm and bench.rows.continuous and bench.unloads:
-            out.append(_fine(bench, j, line, top))
-            if not bench.one_sided and bench.passes > 2:  # in half a loop it could be anything
-                out.append(_uneven(bench, j, line, top))
+        if not bench.data.arm and bench.once and not bench.rests:
+            out += _locks(bench, j, line, top)
+        elif not bench.data.arm and bench.rows.continuous:
+            if bench.unloads or bench.repeats:
+                out.append(_fine(bench, j, line, top))
+            if bench.unloads and not bench.one_sided and bench.passes > 2:
+                out.append(_uneven(bench, j, line, top))  # in half a loop it could be anything
         if bench.feels_weight(j):
             out += _net(bench, j, line)
     return out
@@ -157,11 +160,42 @@ def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
 
 
 def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
-    """A curve of FINE hinges, from where the load begins if it stays on one side."""
-    x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
-    start = float(np.abs(x).min()) if x.min() * x.max() > 0 else 0.0
-    places = tuple(round(start + b * (1 - start), 6) for b in FINE)
-    columns = [bench.add_joint(j, c * hinge(x, b)) for b in places]
+    """A curve of FINE hinges."""
+    places, columns = _finely(bench, j, top)
     return variant(WORD, f"joint {j + 1} fine curve", [line, *columns], FINE_SCALES,
                    _root(len(places)), positive=False, prior=0.5, kinds=("line", *places),
                    joint=j, torque=top, hinges=places)  # fmt: skip
+
+
+def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
+    """Of a single pull, in which a free curve would pass for anything: what only gets stiffer,
+    however late and steeply, as nothing that flows does. Two neighbouring powers of the load, out
+    of FINE hinges."""
+    places, columns = _finely(bench, j, top)
+    b = np.array(places)
+    width = np.gradient(b)
+    bends = [p * (p - 1) * b ** (p - 2) * width for p in STEEPER]
+    bends = [w / (w @ (1 - b)) for w in bends]
+    out = []
+    for low, high, p in zip(bends, bends[1:], STEEPER, strict=False):
+        both = np.column_stack([low, high])
+        root = np.zeros((len(b) + 1,) * 2)
+        root[0, 0], root[1:, 1:3] = 1.0, both
+        powers = -bench.sense * np.column_stack([np.zeros(2), np.linalg.pinv(both)])
+        out.append(
+            variant(WORD, f"joint {j + 1} locks {p}", [line, *columns], FINE_SCALES, root,
+                    positive=powers.sum(axis=0), within=powers, prior=0.5 / (len(STEEPER) - 1),
+                    kinds=("line", *places), joint=j, torque=top, hinges=places)
+        )  # fmt: skip
+    return out
+
+
+STEEPER = (2, 3, 5, 9, 17, 33)
+
+
+def _finely(bench: Bench, j: int, top: float) -> tuple[tuple[float, ...], list[int]]:
+    """Places of FINE hinges, from where the load begins if it stays on one side, and columns."""
+    x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
+    start = float(np.abs(x).min()) if x.min() * x.max() > 0 else 0.0
+    places = tuple(round(start + b * (1 - start), 6) for b in FINE)
+    return places, [bench.add_joint(j, c * hinge(x, b)) for b in places]

@@ -124,6 +124,7 @@ def _knees(
 
 HARDENED = " hardened"
 UNDER_A_TIP, _CAME_BACK = (0.01, 0.04, 0.1), 0.2  # of the range
+_LEFT = 0.2  # of the largest response: as much as friction seldom holds
 
 
 def _hardened(
@@ -137,13 +138,13 @@ def _hardened(
 ) -> list[Variant]:
     """Metal that hardens alike in both senses (Voce 1948) and is pulled, or pressed, again and
     again: it yields on only beyond the largest load it has seen, under a tip from the first load
-    on (said of loads that come back before they grow: a single loop may be friction). Benches
-    alone."""
+    on (said of loads that come back before they grow, and of what is not taken back by a long way:
+    a single loop may be friction). Benches alone."""
     top = float(np.abs(load).max())
     if bench.data.arm or not bench.lets_go or not bench.one_sided:
         return []
     size = np.abs(load)
-    if way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top:
+    if way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top or bench.left_behind > _LEFT:
         radius = np.concatenate([top * np.array(UNDER_A_TIP), radius])
     columns = [column(s) for s in grown(load, radius, bench.moved).T]
     out = []

@@ -10,7 +10,7 @@ from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array
 from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import moments
-from identification.gap.effects.contact_seating import pressed
+from identification.gap.effects.contact_seating import LAWS, pressed
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import STRAINS
 from identification.gap.forms.law import Law, Term, along, scaled
@@ -144,17 +144,12 @@ def describe_seating(_: Bench, v: Variant) -> tuple[Law, Array]:
 
 
 def seating(bench: Bench, law: Law) -> list[Array]:
-    """`1 - exp(-F/F0)`, `F / (F + F0)`, or slack that a stroke takes up, `min(F/F0, 1)`."""
+    """The saturating curves of `LAWS`, of the force on the seat."""
     size, sign = pressed(bench)
-    out = []
-    for t in law.terms:
-        f0, kind = t.shape["force_scale"], t.shape["law"]
-        if kind == "slack":
-            shape = np.minimum(size / f0, 1.0)
-        else:
-            shape = 1 - np.exp(-size / f0) if kind == "exponential" else size / (size + f0)
-        out.append(bench.outside_column(sign * shape))
-    return out
+    return [
+        bench.outside_column(sign * LAWS[t.shape["law"]](size / t.shape["force_scale"]))
+        for t in law.terms
+    ]
 
 
 def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:

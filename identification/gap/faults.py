@@ -1,0 +1,84 @@
+"""Readings that nothing on a rig makes: faults of an instrument, which no effect explains.
+
+A laser on a loose mount rings in spells; a camera loses its target, and hands out its last number.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from identification.gap.data import Array, GapData
+from identification.gap.rows import hold_ids, is_continuous
+
+
+def faults(data: GapData) -> tuple[str, ...]:
+    """A note for every fault that is found, with what to see to."""
+    out = []
+    if bursts(data):
+        out.append(
+            "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "
+            "glitches, which no effect explains. See to the laser's mounting and to the cables."
+        )
+    since = frozen_since(data)
+    if since is not None:
+        at = f"After {since:.4g} s" if data.timed else f"After {since:.0f} readings of a run"
+        out.append(
+            f"{at} the displacement is the same number, less than was read before, while the force "
+            "goes on growing: the sensor has lost its target, or stands still. See to it."
+        )
+    return tuple(out)
+
+
+_SETTLED = 2  # samples of a hold at least: a lag, or a joint that still creeps
+_BEYOND, _BURSTS = 4.5, 0.03  # robust standard deviations, and the share that is too much
+_FEWEST_STEPS = 50
+
+
+def bursts(data: GapData) -> bool:
+    """Whether readings at rest scatter in spells, far beyond what they scatter mostly: vibration,
+    glitches. Samples of the later half of a hold, where no effect jumps and lags have caught up,
+    against the straight line between their neighbours, which creep follows closely."""
+    hold = hold_ids(data)
+    if is_continuous(data, hold):
+        return False
+    starts = np.flatnonzero(np.diff(hold, prepend=-1))
+    within = np.arange(len(hold)) - starts[hold]
+    settled = np.maximum(_SETTLED, np.bincount(hold)[hold] // 2)
+    late = (hold[2:] == hold[:-2]) & (within >= settled)[1:-1]
+    u, t = data.displacement, data.time
+    share = np.clip((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-300), 0.0, 1.0)
+    away = np.abs(u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]
+    usual = max(1.4826 * float(np.median(away)), data.instruments.displacement) if away.size else 0
+    return bool(away.size >= _FEWEST_STEPS and np.mean(away > _BEYOND * usual) > _BURSTS)
+
+
+_LONG = 10  # readings
+_GROWS = 0.2  # of the range of the force of a run
+_CLEARLY = 10.0  # standard uncertainties: so far back no law of mechanics goes under more force
+
+
+def frozen_since(data: GapData) -> float | None:
+    """Time (s, within a run) from which the displacement is one and the same number, which it had
+    passed before, while the force grows beyond all that was; None where there is no such time."""
+    for run in np.unique(data.run):
+        mine = data.run == run
+        at = _frozen(data.displacement[mine], data.force[mine], data.instruments.displacement)
+        if at is not None:
+            return float(data.time[mine][at])
+    return None
+
+
+def _frozen(u: Array, force: Array, uncertainty: float) -> int | None:
+    """First reading of a stretch of equal ones under a force that no earlier one was under."""
+    edges = np.flatnonzero(np.diff(u, prepend=np.nan, append=np.nan) != 0)
+    size, sign = np.abs(force - force[0]), np.sign(u[int(np.abs(u - u[0]).argmax())] - u[0])
+    for a, b in pairwise(edges.tolist()):
+        if b - a < _LONG or a == 0:
+            continue
+        grown = float(size[a:b].max()) - float(size[:a].max())
+        back = float(np.max(sign * (u[:a] - u[a])))
+        if grown > _GROWS * float(size.max()) and back > _CLEARLY * uncertainty:
+            return a
+    return None

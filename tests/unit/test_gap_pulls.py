@@ -1,0 +1,114 @@
+"""Single pulls and pulls that are repeated, of rigs without an arm: what only gets stiffer, what
+flows far beyond its knee, toes, dents, cracks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import make_bench
+from identification.gap.data import Array, Instruments
+from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.effects import library
+from identification.gap.verdict import BENCH_DOUBT, trusted
+from tests.unit.test_gap_running import SPRING, running
+
+METER = Instruments(0.1, 1e-6, 0.005, 0.003)
+STROKE = 1e-3  # m
+
+
+def pulled(force: Array, u: Array, imposed: str = "displacement", **changes: object) -> GapResult:
+    noise = np.random.default_rng(5).normal(0, METER.force, len(u))
+    return diagnose_gap(running(force + noise, u, imposed=imposed, instruments=METER, **changes))
+
+
+def voce(u: Array, knee: float = 30.0, more: float = 40.0) -> Array:
+    """N: elastic, a knee, then hardening that ends (Voce 1948)."""
+    elastic = knee / SPRING
+    beyond = np.maximum(u - elastic, 0.0)
+    return np.minimum(SPRING * u, knee) + more * -np.expm1(-beyond / (0.2 * u.max()))
+
+
+def test_what_only_gets_stiffer_is_a_curve_however_late() -> None:
+    """Two magnets: force over the cube of the gap."""
+    u = np.linspace(0.0, STROKE, 80)
+    found = pulled(10.0 * ((1.1 - u / STROKE) ** -3 - 1.1**-3), u)
+    assert found.verdict == "joint_nonlinear_stiffness"
+    assert found.fit.parts[0].variant.label.startswith("joint 1 locks")
+    assert found.after < 0.06 * found.before
+
+
+def test_metal_that_flows_far_beyond_its_knee_yields() -> None:
+    """A hundred times as far as it was elastic: how far a law is off is no matter of that."""
+    u = np.concatenate([np.linspace(0, 6e-4, 20), np.linspace(1e-3, 3e-2, 40)])
+    found = pulled(voce(u), u)
+    assert found.verdict == "joint_yield"
+    assert found.probabilities["joint_yield"] > 0.6
+    assert found.probabilities["unknown"] < 0.25
+    assert found.engine.most < (0.1 * SPRING**-1 * 1e4) ** 2
+
+
+def test_a_toe_before_a_knee_is_two_things_and_the_knee_is_the_larger() -> None:
+    u = np.linspace(0.0, STROKE, 200)
+    slack = 1e-4
+    straight = np.where(u < 2 * slack, u**2 / (4 * slack), u - slack)
+    found = pulled(SPRING * straight - 0.9 * np.maximum(SPRING * straight - 60.0, 0.0), u)
+    assert found.verdict == "joint_yield"
+    assert {e.name for e in found.effects} == {"contact_seating", "joint_yield"}
+
+
+def test_a_toe_alone_is_a_seat() -> None:
+    """Slack that is taken up bit by bit, then the straight line that was simulated."""
+    u = np.linspace(0.0, STROKE, 200)
+    slack = 1.2e-4
+    found = pulled(SPRING * np.where(u < 2 * slack, u**2 / (4 * slack), u - slack), u)
+    assert found.verdict == "contact_seating"
+    assert found.fit.parts[0].variant.label.startswith("toe")
+    lost = found.effects[0].parameters["depth"]
+    assert lost.low < 1e3 * slack < lost.high
+
+
+def test_pulls_that_start_from_zero_again_show_that_a_curve_comes_back() -> None:
+    """Soft in the middle and stiff at both ends, twice from the start, never unloaded."""
+    x = np.linspace(0.0, 1.0, 80)
+    force = 60 * x - 25 * x**2 + 60 * x**12
+    n = len(x)
+    run = np.repeat([0, 1], n)
+    found = pulled(np.tile(force, 2), np.tile(x * STROKE, 2), run=run, repetition=run + 1)
+    assert found.bench.repeats
+    assert not found.bench.unloads
+    assert found.verdict == "joint_nonlinear_stiffness"
+    assert found.fit.parts[0].variant.label == "joint 1 fine curve"
+
+
+@pytest.mark.parametrize(("left", "under_a_tip"), [(0.45, True), (0.1, False)])
+def test_a_dent_that_stays_yields_from_the_first_load_on(left: float, under_a_tip: bool) -> None:
+    """Pressed once and let go: depth goes with the root of the load, what is elastic comes back."""
+    x = np.concatenate([np.linspace(0, 1, 80), np.ones(10), np.linspace(1, 0, 80)])
+    most = np.maximum.accumulate(x)
+    depth = STROKE * (left * most**0.5 + (1 - left) * x**0.7)
+    data = running(100 * x, depth, imposed="force", instruments=METER)
+    assert make_bench(data).left_behind == pytest.approx(left, abs=0.02)
+    labels = [v.label for v in library(make_bench(data), ["joint_yield"])]
+    assert ("joint 1 hardened beyond 0.01" in labels) is under_a_tip
+    if under_a_tip:
+        assert diagnose_gap(data).verdict == "joint_yield"
+
+
+def test_cracks_under_an_imposed_stroke_are_no_drift_of_it() -> None:
+    """Every cycle goes further, and what has cracked stays soft: a machine that moves by its own
+    reading would take a drift back."""
+    t = np.arange(900) / 900
+    u = STROKE * (0.2 + 0.8 * t) * np.abs(np.sin(np.pi * 6 * t))
+    damage = 0.6 * np.maximum.accumulate(u) / STROKE
+    found = pulled(SPRING * u * (1 - damage), u)
+    assert found.verdict != "thermal_drift"
+    assert found.probabilities["thermal_drift"] < 0.4
+
+
+def test_nobody_is_surer_of_the_unknown_than_of_a_word() -> None:
+    doubted = {"joint_yield", "none", "unknown"}
+    for word in doubted:
+        sure = trusted({w: float(w == word) for w in doubted}, doubted, BENCH_DOUBT)
+        assert sum(sure.values()) == pytest.approx(1.0)
+        assert sure[word] < 1 - 0.6 * BENCH_DOUBT
