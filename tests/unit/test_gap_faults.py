@@ -37,7 +37,7 @@ def test_a_line_read_at_odd_times_is_no_burst() -> None:
     assert not bursts(bench_data(given.pop("force"), given.pop("displacement"), **given))
 
 
-def lost_target(at: int = 60, back: float = 3e-4, n: int = 160) -> tuple[Array, Array]:
+def lost_target(at: int = 60, back: float = 3e-5, n: int = 160) -> tuple[Array, Array]:
     """Force N and displacement m: pulled on and on, the reading jumps back and stays there."""
     force = np.linspace(0.0, 100.0, n)
     u = force / SPRING + np.random.default_rng(3).normal(0, 1e-6, n)
@@ -47,7 +47,7 @@ def lost_target(at: int = 60, back: float = 3e-4, n: int = 160) -> tuple[Array, 
 
 def test_a_reading_that_stands_still_under_more_load_than_ever_is_a_fault() -> None:
     force, u = lost_target()
-    data = running(force, u)
+    data = running(force, u, imposed="displacement")  # creep, if that were possible
     assert frozen_since(data) == 60.0
     found = diagnose_gap(data)
     assert found.verdict == "unknown"
@@ -64,7 +64,7 @@ def test_what_stands_still_for_a_reason_is_none(what: str) -> None:
     elif what == "coarse":  # as far back as noise goes
         u[60:] = u[:60].max() - 5e-6
     else:  # it goes on after nine readings
-        force, u = lost_target()
-        u[69:] = force[69:] / SPRING
+        force, u = lost_target(at=12, n=40)
+        u[21:] = force[21:] / SPRING
     assert frozen_since(running(force, u)) is None
     assert faults(running(force, u)) == ()

@@ -272,7 +272,8 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
     found = search(small_engine_of(bench), variants)
     law, noise = (part("joint_creep", [0]),), bench.noise.stated
     sure = 1 - 0.5 * BENCH_DOUBT  # on a bench; of two that are doubted, half comes back
-    shares = ((noise, False, None), (3 * noise, False, sure), (noise, True, 1.0))
+    shares = ((noise, False, None), (1.6 * noise, False, None), (3 * noise, False, sure),
+              (noise, True, 1.0))  # fmt: skip
     for eta, arm, unknown in shares:
         data = replace(bench.data, arm=arm)
         engine = replace_bench(found.engine, replace(bench, data=data))

@@ -10,7 +10,11 @@ from identification.gap.bench import make_bench
 from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import library
+from identification.gap.explanation import Explanation
+from identification.gap.leftover import HELD, _judged
+from identification.gap.parts import Part, energies
 from identification.gap.verdict import BENCH_DOUBT, trusted
+from tests.unit.test_gap_linear import charged
 from tests.unit.test_gap_running import SPRING, running
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)
@@ -57,15 +61,55 @@ def test_a_toe_before_a_knee_is_two_things_and_the_knee_is_the_larger() -> None:
     assert {e.name for e in found.effects} == {"contact_seating", "joint_yield"}
 
 
-def test_a_toe_alone_is_a_seat() -> None:
-    """Slack that is taken up bit by bit, then the straight line that was simulated."""
+@pytest.mark.parametrize("slacks", [(1.2e-4,), (3e-5, 1.4e-4)])
+def test_a_toe_alone_is_a_seat(slacks: tuple[float, ...]) -> None:
+    """Slack that is taken up bit by bit, at once or in two, then the line that was simulated."""
     u = np.linspace(0.0, STROKE, 200)
-    slack = 1.2e-4
-    found = pulled(SPRING * np.where(u < 2 * slack, u**2 / (4 * slack), u - slack), u)
+    lost = [np.where(u < 2 * s, u - u**2 / (4 * s), s) for s in slacks]
+    share = 1 / len(slacks)  # no more than all of the stiffness is gone at first
+    found = pulled(SPRING * (u - share * sum(lost, np.zeros(200))), u)
     assert found.verdict == "contact_seating"
     assert found.fit.parts[0].variant.label.startswith("toe")
-    lost = found.effects[0].parameters["depth"]
-    assert lost.low < 1e3 * slack < lost.high
+    depth = found.effects[0].parameters["depth"]
+    assert depth.low < 1e3 * share * sum(slacks) < depth.high
+
+
+def test_a_curve_that_locks_gets_stiffer_in_both_its_powers() -> None:
+    bench = make_bench(running(SPRING * LINE, LINE, imposed="displacement", instruments=METER))
+    variants = library(bench, ["joint_nonlinear_stiffness"])
+    for v in (v for v in variants if "locks" in v.label):
+        first, second = v.root[:, 1], v.root[:, 2]
+        assert charged(v, list(first + second)) > -1.0
+        for bad in (first - 0.2 * second, second - 0.2 * first):
+            assert charged(v, list(bad)) < -10.0
+
+
+LINE = np.linspace(0.0, STROKE, 60)
+
+
+def test_no_energy_is_larger_than_the_response() -> None:
+    u = np.concatenate([np.linspace(0, 6e-4, 20), np.linspace(1e-3, 3e-2, 40)])
+    engine = pulled(voce(u), u).engine
+    for v in library(engine.bench, ["joint_yield"])[:3]:
+        engine.extend()
+        assert energies(engine, (Part(v, 14.0),)).max() <= engine.most
+
+
+@pytest.mark.parametrize(("word", "kept"), [("thermal_drift", HELD), ("force_drift", 1.0)])
+def test_a_drift_of_an_imposed_stroke_is_taken_back(word: str, kept: float) -> None:
+    """As long as it is the main effect."""
+    t = np.arange(300) / 300
+    u, wanders = STROKE * np.abs(np.sin(8 * np.pi * t)), 0.2 * STROKE * np.sin(9 * t)
+    engine = pulled(SPRING * (u + wanders), u).engine
+    drift = next(v for v in library(engine.bench, [word]) if v.label == "free path")
+    curve = library(engine.bench, ["joint_nonlinear_stiffness"])[0]
+    engine.extend()
+    parts = (Part(drift, drift.scales[-1]), Part(curve, 0.05))
+    for order, share in ((parts, kept), (parts[::-1], 1.0)):
+        said = Explanation(order, 0.0, 0.0, (1.0, 0.1), -50.0)
+        judged = _judged(engine, said)
+        assert np.exp(judged.log_good) <= share
+        assert np.exp(judged.log_good) > 0.2 * share
 
 
 def test_pulls_that_start_from_zero_again_show_that_a_curve_comes_back() -> None:
