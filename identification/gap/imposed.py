@@ -25,7 +25,9 @@ _MARGIN = 0.05  # nats by which the displacement has to be simpler: half a piece
 _SLIDING = -0.4  # nats, where it slides to and fro: so much simpler the force may look by chance
 _FLAT = 0.33  # of the displacement's change, each in its range: what the force changes on a plateau
 _SPENT, _MOST = 0.15, 0.45  # of the time, and of the way, in each sense
+_BEYOND = 3.0  # standard deviations of a point: so far it goes from one mean of points to the next
 _STILL = 2.0  # stated standard uncertainties: a channel that spreads by no more stands still
+_FOLLOWS = 0.5  # of its variance that the other channel explains
 _MISJUDGED = 3.0  # factor by which a stated uncertainty may be too small
 _TURNS = (0.5, 0.2, 0.08)  # of the range: what counts as going back
 _TOP = 0.03  # of a leg: a level next to its turning point
@@ -48,7 +50,10 @@ def displacement_simpler(data: GapData) -> bool:
     mine = np.flatnonzero(data.setup == np.bincount(data.setup).argmax())
     force, moved = data.force[mine], data.displacement[mine]
     instruments = data.instruments
-    stands = _still(force, instruments.force), _still(moved, instruments.displacement)
+    stands = (
+        _still(force, instruments.force, moved),
+        _still(moved, instruments.displacement, force),
+    )
     if any(stands) or len(mine) < _FEWEST:
         return stands == (False, True)
     channels = _channels(
@@ -76,6 +81,13 @@ _SAME, _OTHER = 0.01, 0.03  # of the ranges of force and displacement
 def _slides(force: _Channel, moved: _Channel) -> bool:
     """Whether the displacement goes to and fro while the force hardly changes: a force that was
     driven would hold such a plateau in one sense only, as under a weight, or run through it."""
+    length = float(_senses(moved) @ np.diff(moved.values))  # of all legs
+    if not length > 0:
+        return False
+    step = max(1, int(np.ceil(_BEYOND * moved.noise * len(moved.values) / length)))
+    if step > len(moved.values) / _FEWEST:
+        return False  # noise hides which way it goes
+    force, moved = _coarser(force, step), _coarser(moved, step)
     went, time = np.diff(moved.values), np.diff(force.time)
     flat = np.abs(np.diff(force.values)) < _FLAT * np.abs(went)
     sense = _senses(moved)  # of its legs: what noise does back and forth is no way
@@ -86,6 +98,14 @@ def _slides(force: _Channel, moved: _Channel) -> bool:
     return True
 
 
+def _coarser(channel: _Channel, step: int) -> _Channel:
+    """Means of so many points each."""
+    edges = np.arange(0, len(channel.values), step)
+    count = np.diff(np.append(edges, len(channel.values)))
+    mean = [np.add.reduceat(y, edges) / count for y in (channel.time, channel.values)]
+    return _Channel(mean[0], mean[1], channel.noise / step**0.5)
+
+
 def _senses(channel: _Channel) -> Array:
     """(n - 1,) sense of the leg that every step from point to point belongs to."""
     y = channel.values
@@ -93,9 +113,13 @@ def _senses(channel: _Channel) -> Array:
     return np.repeat(np.sign(np.diff(y[edges])), np.diff(edges))
 
 
-def _still(values: Array, sd: float) -> bool:
-    """A channel that shows no more than its noise: what is held, or not loaded at all."""
-    return bool(np.std(values) <= _STILL * sd or not np.ptp(values) > 0)
+def _still(values: Array, sd: float, other: Array) -> bool:
+    """A channel that shows no more than its noise: what is held, or not loaded at all. One that
+    follows the other channel moves, however noisy it is."""
+    if not np.ptp(values) > 0:
+        return True
+    follows = np.ptp(other) > 0 and np.corrcoef(values, other)[0, 1] ** 2 > _FOLLOWS
+    return bool(np.std(values) <= _STILL * sd and not follows)
 
 
 def _clock(data: GapData, mine: Ints) -> Array:

@@ -231,3 +231,31 @@ def test_what_toggles_between_two_steps_of_its_scale_does_not_slide_to_and_fro()
     there = _Channel(t, np.where(t < 0.6, t, 1.2 - t) / 0.6, 0.03)
     rubs = _Channel(t, np.where(t < 0.6, 1.0, -1.0), 0.0)
     assert _slides(rubs, there)
+
+
+def test_noise_of_a_displacement_is_no_sliding_and_no_standing() -> None:
+    """A straight pull, the extensometer scatters by an eighth of its range, half of what is stated
+    beside: it moves all the same, and goes nowhere to and fro."""
+    t, ramp = np.arange(184.0), np.linspace(0.0, 1.0, 184)
+    u = ramp + 0.12 * np.random.default_rng(2).standard_normal(184)
+    data = bench_data(7e3 * ramp, 6e-5 * u, time=t, session=t, step=np.full(184, -1))
+    meter = replace(data.instruments, force=30.0, displacement=0.55 * 6e-5 * float(np.std(u)))
+    assert not displacement_simpler(replace(data, instruments=meter))
+    held = replace(data, displacement=6e-5 * (u - ramp), instruments=meter)
+    assert displacement_simpler(held)  # that one stands
+    assert not _slides(_Channel(t, ramp, 0.0), _Channel(t, u, 0.12))
+
+
+@pytest.mark.parametrize("noise", [0.012, 2.0])
+def test_a_spring_that_is_read_in_noise_does_not_slide(noise: float) -> None:
+    time, there = np.arange(1000.0), 1 - np.abs(np.arange(1000) / 500 - 1)  # and back
+    u = there + noise * np.random.default_rng(4).standard_normal(1000)
+    assert not _slides(_Channel(time, there, 0.0), _Channel(time, u, noise))
+
+
+def test_strokes_slide_however_finely_they_are_read_in_noise() -> None:
+    u = 0.5 - 0.5 * np.cos(np.arange(1000) / 80)
+    rubs = 0.4 * np.sign(np.gradient(u)) + 0.5
+    noisy = u + 0.02 * np.random.default_rng(8).standard_normal(1000)
+    time = np.arange(1000.0)
+    assert _slides(_Channel(time, rubs, 0.001), _Channel(time, noisy, 0.02))
