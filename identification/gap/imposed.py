@@ -84,9 +84,8 @@ def _slides(force: _Channel, moved: _Channel) -> bool:
     length = float(_senses(moved) @ np.diff(moved.values))  # of all legs
     if not length > 0:
         return False
-    step = max(1, int(np.ceil(_BEYOND * moved.noise * len(moved.values) / length)))
-    if step > len(moved.values) / _FEWEST:
-        return False  # noise hides which way it goes
+    points = len(moved.values)
+    step = int(np.clip(_BEYOND * moved.noise * points / length, 1, max(points // _FEWEST, 1)))
     force, moved = _coarser(force, step), _coarser(moved, step)
     went, time = np.diff(moved.values), np.diff(force.time)
     flat = np.abs(np.diff(force.values)) < _FLAT * np.abs(went)

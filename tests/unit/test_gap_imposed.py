@@ -246,7 +246,7 @@ def test_noise_of_a_displacement_is_no_sliding_and_no_standing() -> None:
     assert not _slides(_Channel(t, ramp, 0.0), _Channel(t, u, 0.12))
 
 
-@pytest.mark.parametrize("noise", [0.012, 2.0])
+@pytest.mark.parametrize("noise", [0.012, 0.2])
 def test_a_spring_that_is_read_in_noise_does_not_slide(noise: float) -> None:
     time, there = np.arange(1000.0), 1 - np.abs(np.arange(1000) / 500 - 1)  # and back
     u = there + noise * np.random.default_rng(4).standard_normal(1000)
