@@ -122,7 +122,8 @@ def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Exp
 def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
     """Sizes of the parts. Without an arm friction brings its own mean stiffness, and what was
     simulated may be its first slope: a spring that is off beside it counts by what the friction
-    leaves of the gap. A toe and a knee count as they move: what a spring would hide of either, the
+    leaves of the gap, and for less than the friction where it would move more than was measured
+    and the friction takes it back. A toe and a knee count as they move: what a spring would hide of either, the
     other shows."""
     if engine.bench.data.arm:
         return sizes.gap
@@ -132,8 +133,13 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
     if not rubs.any():
         return sizes.gap
     linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
-    rest = max(engine.structural**2 - float(sizes.gap[rubs].max()) ** 2, 0.0) ** 0.5
+    mine = float(sizes.gap[rubs].max())
+    rest = max(engine.structural**2 - mine**2, 0.0) ** 0.5
+    rest = np.where(sizes.moved**2 > engine.most, min(rest, _LESS * mine), rest)
     return np.where(linear, np.minimum(sizes.gap, rest), sizes.gap)
+
+
+_LESS = 0.99
 
 
 def conditioned(
