@@ -115,14 +115,14 @@ _WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
 
 
 def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats for effects below the noise of a single sample of a running recording:
-    thousands of samples would show them, but for what noise of low frequency does to them. Of
-    levels at rest for every one far below that, but for what springs may hide or other channels
+    """Penalty in nats for every effect below the noise of a single sample of a running recording:
+    thousands of samples would show it, but for what noise of low frequency does to it. Of levels at
+    rest for every one far below that, but for what springs may hide or other channels
     show: that is no gap."""
     noise = engine.bench.noise.stated
     if engine.bench.rows.continuous:
-        size = max(float(_counted(parts, found).max(initial=0.0)), 1e-300)
-        return 20.0 * max(0.0, float(np.log(noise / size)))
+        sizes = np.maximum(_counted(parts, found), 1e-300)
+        return 20.0 * float(np.maximum(np.log(noise / sizes), 0.0).sum())
     small = [s for p, s in zip(parts, found.gap, strict=True) if p.word not in _SHOWN_ELSEWHERE]
     return sum(_wall(FAR_BELOW_NOISE * noise / max(float(s), 1e-300)) for s in small)
 
