@@ -123,8 +123,8 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
     """Sizes of the parts. Without an arm friction brings its own mean stiffness, and what was
     simulated may be its first slope: a spring that is off beside it counts by what the friction
     leaves of the gap, and for less than the friction where it would move more than was measured
-    and the friction takes it back. A toe and a knee count as they move: what a spring would hide of either, the
-    other shows."""
+    and the friction takes it back. A toe and a knee count as they move: what a spring would hide of
+    either, the other shows."""
     if engine.bench.data.arm:
         return sizes.gap
     if frozenset(p.word for p in parts) == TOE_AND_KNEE:

@@ -265,6 +265,8 @@ def test_what_is_linear_counts_as_it_moves_and_not_by_what_springs_leave_of_it()
     spring = explained([0], "joint_stiffness_error", 0.0).parts
     assert trifle(running, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0
     assert trifle(running, spring, Sizes(np.zeros(1), np.array([1e-9]), 0.0)) > 20
+    beside = spring + drift  # a large one does not hide a small one
+    assert trifle(running, beside, Sizes(np.array([0.0, 1e-9]), np.array([1e-4, 1e-9]), 0.0)) > 20
 
 
 @pytest.mark.parametrize(("cycles", "swings"), [(1.0, False), (4.0, True)])

@@ -161,10 +161,14 @@ def test_without_an_arm_a_wrong_spring_counts_by_what_friction_leaves_of_the_gap
     engine = small_engine_of(small_bench())
     rubs, spring = part("joint_hysteresis", [0]), part("joint_stiffness_error", [1])
     gap = engine.structural * np.array([0.8, 9.0])
-    sizes = Sizes(gap, 2 * gap, 0.0)
+    sizes = Sizes(gap, np.full(2, 0.9) * engine.most**0.5, 0.0)
     assert _counted(engine, (rubs, spring), sizes) == pytest.approx(
         engine.structural * np.array([0.8, 0.6])
     )
+    far = Sizes(gap, np.array([0.0, 2.0]) * engine.most**0.5, 0.0)  # than was measured
+    assert _counted(engine, (rubs, spring), far)[1] < gap[0]
+    slight = Sizes(np.array([0.2, 9.0]) * engine.structural, far.moved, 0.0)
+    assert _counted(engine, (rubs, spring), slight)[1] < slight.gap[0]
     bent = part("joint_nonlinear_stiffness", [0])
     assert _counted(engine, (bent, spring), sizes) is gap  # a curve has its line from the spring
     toe, knee = part("contact_seating", [0]), part("joint_yield", [1])
