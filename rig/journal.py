@@ -1,7 +1,8 @@
 """The append-only journal: the truth while measuring.
 
 One JSON object a line, with a number and a CRC each. `append` returns after fsync: what it
-acknowledged survives kill -9 and a loss of power. The HDF5 file is only ever built from it.
+acknowledged survives kill -9 and a loss of power (of a run that is emulated faster than real time:
+kill -9). The HDF5 file is only ever built from it.
 """
 
 from __future__ import annotations
@@ -47,9 +48,10 @@ def journal_path(dataset: Path) -> Path:
 class Journal:
     """An open journal, locked against a second writer. Made by `create` or `reopen`."""
 
-    def __init__(self, path: Path, descriptor: int) -> None:
+    def __init__(self, path: Path, descriptor: int, synced: bool = True) -> None:
         """Use `create` or `reopen`."""
         self.path = path
+        self._synced = synced
         self.records: list[Record] = []  # what `reopen` found
         self._fd = descriptor
         # Records, and bytes of them: acknowledged, and with the one being written. Each pair is
@@ -59,8 +61,12 @@ class Journal:
         self._failed = ""
 
     @classmethod
-    def create(cls, path: Path, start: Mapping[str, Any]) -> Journal:
-        """A new journal that begins with a start record; InputError if it exists already."""
+    def create(cls, path: Path, start: Mapping[str, Any], synced: bool = True) -> Journal:
+        """A new journal that begins with a start record; InputError if it exists already.
+
+        synced: False where a clock runs ahead: what is emulated a hundred times faster than it
+        could be measured would stand still for a minute while a disk takes its time.
+        """
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
         try:
             descriptor = os.open(path, flags, 0o644)
@@ -71,7 +77,7 @@ class Journal:
             ) from None
         except OSError as error:
             raise InputError(f"{path}: cannot be created: {error.strerror or error}.") from error
-        journal = cls(path, descriptor)
+        journal = cls(path, descriptor, synced)
         try:
             _lock(descriptor, path)
             journal.append("start", {"schema": SCHEMA, **start})
@@ -83,8 +89,9 @@ class Journal:
         return journal
 
     @classmethod
-    def reopen(cls, path: Path) -> Journal:
-        """Goes on with a journal; a torn last line, and nothing else, is cut off.
+    def reopen(cls, path: Path, synced: bool = True) -> Journal:
+        """Goes on with a journal; a torn last line, and nothing else, is cut off. synced: as for
+        `create`.
 
         `records` then holds what was there. InputError if it is missing, damaged before its last
         line, or being written by another process.
@@ -96,7 +103,7 @@ class Journal:
                 f"{path}: cannot be opened: {error.strerror or error}. "
                 "Without its journal a measurement can't be resumed."
             ) from error
-        journal = cls(path, descriptor)
+        journal = cls(path, descriptor, synced)
         try:
             _lock(descriptor, path)
             journal._resume()
@@ -164,7 +171,8 @@ class Journal:
             rest = memoryview(line)
             while rest:
                 rest = rest[os.write(self._fd, rest) :]
-            os.fsync(self._fd)
+            if self._synced:
+                os.fsync(self._fd)
         except OSError as error:
             raise self._give_up(error) from error
 

@@ -88,7 +88,7 @@ def measure(
     }
     # The devices come first: a run that never began leaves no file behind.
     with _opened(protocol, station, Progress(), say, panel) as rig:
-        journal = Journal.create(journal_path(path), start)
+        journal = Journal.create(journal_path(path), start, _synced(station))
         return _carry_out(Job(path, protocol, station, journal, Progress()), rig, say)
 
 
@@ -112,9 +112,14 @@ def resume(
     with _opened(protocol, station, progress, say, panel) as rig:
         for record in records:  # the page shows the whole run, not only what is still to come
             rig.onlooker.record(record.kind, record.data)
-        journal = Journal.reopen(journal_file)
+        journal = Journal.reopen(journal_file, _synced(station))
         journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
         return _carry_out(Job(path, protocol, station, journal, progress), rig, say)
+
+
+def _synced(station: Station) -> bool:
+    """Whether rows wait for the disk: always, but where the clock runs ahead of real time."""
+    return station.emulation is None or station.emulation.speed <= 1
 
 
 def default_output(protocol_file: Path) -> Path:

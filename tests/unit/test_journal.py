@@ -80,6 +80,21 @@ def test_is_on_disk_before_append_returns(path: Path, monkeypatch: pytest.Monkey
     assert replay(path)[-1].data["text"] == "long enough for several writes"
 
 
+@pytest.mark.parametrize("synced", [True, False])
+def test_a_clock_that_runs_ahead_does_not_wait_for_the_disk(
+    path: Path, synced: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits: list[int] = []
+    monkeypatch.setattr(os, "fsync", waits.append)
+    with Journal.reopen(path, synced) as journal:
+        journal.append("event", {"kind": "note", "text": "there"})
+        assert bool(waits) is synced
+        assert replay(path)[-1].data["text"] == "there"  # kill -9 would leave it there
+    waits.clear()
+    Journal.create(path.parent / "another", start(), synced).close()
+    assert len(waits) == 1 + synced  # the folder in any case
+
+
 def test_its_name_is_on_disk_when_it_is_created(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

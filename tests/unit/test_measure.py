@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -33,3 +34,15 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
     protocol, station = load_protocol(PROTOCOL), load_station("emulated")
     with measure._opened(protocol, station, Progress(rows=225), said.append, None):
         assert said[-3:] == ["resuming after 225 rows", measure.SAFETY_NOTE, "(screen)"]
+
+
+@pytest.mark.parametrize(("speed", "synced"), [(50.0, False), (1.0, True), (0.5, True)])
+def test_only_a_clock_that_runs_ahead_does_not_wait_for_the_disk(
+    speed: float, synced: bool
+) -> None:
+    station = measure._at_speed(load_station("emulated"), speed)
+    assert measure._synced(station) is synced
+
+
+def test_a_real_station_waits_for_the_disk() -> None:
+    assert measure._synced(replace(load_station("emulated"), emulation=None))
