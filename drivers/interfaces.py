@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -34,8 +35,9 @@ class Device(Protocol):
     def identity(self) -> Mapping[str, str]:
         """What the device says of itself: model, serial number, versions, settings."""
 
-    def collect(self) -> Reading:
-        """Everything since the last call, reduced; each single value is given once."""
+    def collect(self, since: float = -math.inf) -> Reading:
+        """Everything since the last call, reduced; each single value is given once. What is older
+        than `since` (seconds of the clock) is left out where there is anything newer."""
 
     def latest(self) -> Reading:
         """About the last tenth of a second, collected or not."""

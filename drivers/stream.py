@@ -99,8 +99,9 @@ class Stream:
         """Wall-clock seconds since a block arrived; infinite before the first."""
         return math.inf if self._newest is None else time.monotonic() - self._arrived
 
-    def collect(self, wait_s: float) -> Reading | None:
-        """Everything since the last call; waits up to `wait_s` wall seconds for a first block."""
+    def collect(self, wait_s: float, since: float = -math.inf) -> Reading | None:
+        """Everything since the last call, but for blocks that ended before `since` (seconds of the
+        clock) where there are newer ones; waits up to `wait_s` wall seconds for a first block."""
         deadline = time.monotonic() + wait_s
         with self._condition:
             while not self._blocks:
@@ -112,7 +113,7 @@ class Stream:
                 self._condition.wait(remaining)
             blocks = list(self._blocks)
             self._blocks.clear()
-        return self._reading(blocks)
+        return self._reading([b for b in blocks if b.end >= since] or blocks[-1:])
 
     def latest(self) -> Reading | None:
         """The newest block, whether collected or not; None before the first."""

@@ -110,9 +110,9 @@ class Ild2200:
         """Serial number, range, rate and averaging as the sensor has them; empty before `open`."""
         return dict(self._identity)
 
-    def collect(self) -> Reading:
-        """Everything since the last call, at least one block."""
-        reading = self._stream.collect(self._settings.stale_after_s)
+    def collect(self, since: float = -math.inf) -> Reading:
+        """Everything since the last call, at least one block; `since`: as of the interface."""
+        reading = self._stream.collect(self._settings.stale_after_s, since)
         return self._fresh(reading)
 
     def latest(self) -> Reading:

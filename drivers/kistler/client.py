@@ -106,10 +106,11 @@ class Kistler9257B:
         """DAQ product type, serial number, driver version; calibration as used."""
         return dict(self._identity)
 
-    def collect(self) -> Reading:
+    def collect(self, since: float = -math.inf) -> Reading:
         """Everything since the last call; waits for a first block if there is none."""
         self._raise_if_unfit()
-        reading = self._stream.collect(max(0.0, self.settings.stale_after_s - self._stream.age_s()))
+        wait_s = max(0.0, self.settings.stale_after_s - self._stream.age_s())
+        reading = self._stream.collect(wait_s, since)
         self._raise_if_unfit()
         if reading is None:
             raise self._silent()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -188,10 +189,10 @@ class Ur10e:
 
     # -- reading
 
-    def collect(self) -> Reading:
+    def collect(self, since: float = -math.inf) -> Reading:
         """Everything since the last call. Raises SafetyStop, ReadTimeout."""
         self._check()
-        reading = self._stream.collect(self._settings.stale_after_s)
+        reading = self._stream.collect(self._settings.stale_after_s, since)
         self._check()
         if reading is None:
             raise self._stale()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil
+from math import ceil, inf
 
 from drivers.clock import Clock
 from drivers.readings import Reading
@@ -39,7 +39,7 @@ class Acquisition:
         """Sleeps until the next tick or slot; returns the slot when its time has come.
 
         Slots are multiples of the sampling period; one that could not be served in time is left
-        out, and the next one says how many are missing.
+        out, and the next one says how many are missing, and holds what its own period brought.
         """
         wake = min(self._next_tick, self._next_slot)
         self._clock.sleep_until(wake)
@@ -52,14 +52,15 @@ class Acquisition:
         missed = int(lateness // self._period)
         self._number += 1 + missed
         self._next_slot += (1 + missed) * self._period
+        since = now - self._period if missed else -inf
         return Slot(
             number=self._number,
             session_s=now - self._origin,
             lateness_s=lateness,
             missed=missed,
-            robot=self.devices.robot.collect(),
-            dynamometer=self.devices.dynamometer.collect(),
-            laser=self.devices.laser.collect(),
+            robot=self.devices.robot.collect(since),
+            dynamometer=self.devices.dynamometer.collect(since),
+            laser=self.devices.laser.collect(since),
         )
 
     def average(self, seconds: float) -> tuple[Reading, Reading, Reading]:

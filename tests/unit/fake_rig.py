@@ -5,6 +5,7 @@ For the procedure only; what the devices do on the wire is tested in tests/wire.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -56,7 +57,7 @@ class FakeDevice:
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
-        self.collected = 0.0
+        self.since = -math.inf  # of the last `collect`
 
     def open(self) -> None: ...
     def close(self) -> None: ...
@@ -74,7 +75,8 @@ class FakeDevice:
         values = self.values()
         return Reading(t - 0.1, t, values, (0.0,) * len(values), 10, 0, 0.0, "emulated+fake")
 
-    def collect(self) -> Reading:
+    def collect(self, since: float = -math.inf) -> Reading:
+        self.since = since
         return self.latest()
 
 

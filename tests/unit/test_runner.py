@@ -384,7 +384,7 @@ def test_a_slot_without_a_valid_value_is_no_row_but_an_event(bench: Bench) -> No
     collect = laser.collect
     empty = iter([True, False] * 500)
 
-    def sometimes() -> Any:
+    def sometimes(_since: float = 0.0) -> Any:
         reading = collect()
         return replace(reading, count=0) if next(empty) else reading
 
