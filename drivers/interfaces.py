@@ -36,7 +36,7 @@ class Device(Protocol):
         """What the device says of itself: model, serial number, versions, settings."""
 
     def collect(self, since: float = -math.inf) -> Reading:
-        """Everything since the last call, reduced; each single value is given once. What is older
+        """Everything since the last call, reduced; no single value is given twice. What is older
         than `since` (seconds of the clock) is left out where there is anything newer."""
 
     def latest(self) -> Reading:

@@ -107,7 +107,8 @@ class Kistler9257B:
         return dict(self._identity)
 
     def collect(self, since: float = -math.inf) -> Reading:
-        """Everything since the last call; waits for a first block if there is none."""
+        """Everything since the last call; waits for a first block if there is none. `since`: as of
+        the interface."""
         self._raise_if_unfit()
         wait_s = max(0.0, self.settings.stale_after_s - self._stream.age_s())
         reading = self._stream.collect(wait_s, since)

@@ -190,7 +190,8 @@ class Ur10e:
     # -- reading
 
     def collect(self, since: float = -math.inf) -> Reading:
-        """Everything since the last call. Raises SafetyStop, ReadTimeout."""
+        """Everything since the last call; `since`: as of the interface. Raises SafetyStop,
+        ReadTimeout."""
         self._check()
         reading = self._stream.collect(self._settings.stale_after_s, since)
         self._check()

@@ -83,6 +83,16 @@ def test_each_value_is_collected_once(device: Device) -> None:
     assert 0.2 < second.count / first.count < 5
 
 
+def test_what_is_older_than_asked_for_is_left_out(device: Device) -> None:
+    device.collect()
+    time.sleep(0.6)
+    until = device.latest().end
+    time.sleep(0.3)
+    late = device.collect(until)
+    assert late.end >= until
+    assert late.start > until - 0.25  # the block that ends there, of about a tenth of a second
+
+
 def test_peeking_takes_nothing_away(device: Device) -> None:
     device.collect()
     time.sleep(0.5)
