@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import log
+from typing import NamedTuple
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.gap.data import Array, Ints
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
 from identification.gap.products import squares_of
@@ -17,9 +17,9 @@ from identification.gap.table import Stack, Table
 from identification.gap.variants import Variant
 
 
-@dataclass(frozen=True, eq=False)
-class Scored:
-    """log evidence of a variant, with the scale and level that contribute most."""
+class Scored(NamedTuple):
+    """log evidence of a variant, with the scale and level that contribute most. A plain tuple: a
+    diagnosis makes 100 000 of them."""
 
     variant: Variant
     log_evidence: float
@@ -35,57 +35,66 @@ def score(
     already: mean square (m^2) of that effect: it brings imperfection of its own.
     """
     out: dict[Variant, Scored] = {}
-    by_size: dict[tuple[int, int], dict[str, list[Variant]]] = {}
+    by_size: dict[int, dict[str, list[Variant]]] = {}
     for v in variants:
-        words = by_size.setdefault((len(v.columns), len(v.scales)), {})
+        words = by_size.setdefault(_size(len(v.columns)), {})
         words.setdefault(v.word, []).append(v)
-    for words in by_size.values():
-        out |= _score_batch(engine, levels, list(words.values()), already)
+    for k, words in by_size.items():
+        out |= _score_batch(engine, levels, list(words.values()), k, already)
     return [out[v] for v in variants]
 
 
+# Variants of nearby sizes are padded to the same: a few large batches take less time than many.
+_SIZES = (1, 2, 3, 5, 7, 8, 11, 13)
+
+
+def _size(k: int) -> int:
+    return next((s for s in _SIZES if s >= k), k)
+
+
 def _score_batch(
-    engine: Engine, levels: list[Level], families: list[list[Variant]], already: float
+    engine: Engine, levels: list[Level], families: list[list[Variant]], k: int, already: float
 ) -> dict[Variant, Scored]:
-    """Of variants with as many coefficients and scales each, word by word."""
-    table = Table(engine, levels, [_stack(engine, tuple(f)) for f in families], already)
+    """Of variants with up to k coefficients each, word by word."""
+    table = Table(engine, levels, [_stack(engine, tuple(f), k) for f in families], already)
     table.look()
     table.limit()
     batch = [v for family in families for v in family]
     flat = table.logs.transpose(1, 0, 2).reshape(len(batch), -1)
-    number = len(batch[0].scales)
-    total = (logsumexp(flat) - log(number)).tolist()
+    number = table.logs.shape[2]
+    total = (logsumexp(flat) - np.log([len(v.scales) for v in batch])).tolist()
     return {
         v: Scored(v, t + log(v.prior), v.scales[b % number], b // number)
         for v, t, b in zip(batch, total, flat.argmax(axis=1).tolist(), strict=True)
     }
 
 
-def _stack(engine: Engine, family: tuple[Variant, ...]) -> Stack:
-    """Made once: families come again with every effect that is added."""
+def _stack(engine: Engine, family: tuple[Variant, ...], k: int) -> Stack:
+    """Of a word's variants, padded to k coefficients. Made once: families come again with every
+    effect that is added."""
     if family not in engine.stacks:
-        columns = np.array([v.columns for v in family])
-        root = np.stack([v.root for v in family])
-        engine.stacks[family] = Stack(
-            columns,
-            root,
-            np.array([v.scales for v in family]),
-            np.swapaxes(root, 1, 2) @ mean_squares(engine, family) @ root,
-            Limits.of(family),
-            engine.alike(columns),
-        )
+        columns = np.array([v.columns + v.columns[:1] * (k - len(v.columns)) for v in family])
+        root, share = np.zeros((*columns.shape, k)), np.zeros(columns.shape)
+        scales = np.zeros((len(family), max(len(v.scales) for v in family)))
+        for i, v in enumerate(family):
+            own = len(v.columns)
+            root[i, :own, :own], share[i, :own] = v.root, imperfect(v)
+            scales[i, : len(v.scales)] = v.scales
+        plain = np.swapaxes(root, 1, 2) @ mean_squares(engine, columns, share) @ root
+        limits = Limits.of(family, k)
+        engine.stacks[family] = Stack(columns, root, scales, plain, limits, engine.alike(columns))
     found: Stack = engine.stacks[family]
     return found
 
 
-def mean_squares(engine: Engine, variants: Sequence[Variant]) -> Array:
-    """(v, k, k): mean square response (m^2) of the coefficients of variants with k columns each,
-    without the datum of each setup; of what is linear only the part that counts as imperfect."""
-    weight, columns = engine.bench.rows.weight, np.array([v.columns for v in variants])
+def mean_squares(engine: Engine, columns: Ints, share: Array) -> Array:
+    """(v, k, k): mean square response (m^2) of the coefficients of variants with the columns
+    (v, k), without the datum of each setup; of what is linear only the part that counts as
+    imperfect, share (v, k)."""
+    weight = engine.bench.rows.weight
     used, place = np.unique(columns, return_inverse=True)
     moved = moved_response(engine, engine.responses(used))
     moved *= np.sqrt(weight / weight.sum())[:, None]
-    share = np.array([imperfect(v) for v in variants])
     squares = squares_of(moved.T, place.reshape(columns.shape))
     return np.asarray(squares * share[:, :, None] * share[:, None, :])
 

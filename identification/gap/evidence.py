@@ -366,12 +366,8 @@ def level_covariance(bench: Bench) -> Array:
     sums = np.bincount(rows.level, minlength=count)
     load = np.bincount(rows.level, weights=bench.load, minlength=count) / sums
     first = np.unique(rows.level, return_index=True)[1]
-    setup, branch = rows.setup[first], rows.branch[first]
-    if rows.continuous:
-        branch = (
-            np.searchsorted(np.unique(rows.level), rows.level[first]) * 0
-            + (rises(bench.load)[first])
-        )
+    setup = rows.setup[first]
+    branch = (rises(bench.load) if rows.continuous else rows.branch)[first]
     span = np.ptp(bench.load) or 1.0
     near = np.exp(-np.abs(load[:, None] - load) / (_NEIGHBOUR * span))
     same = setup[:, None] == setup

@@ -104,8 +104,8 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
     for p in parts:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
-        limits = _limits(p.variant)
-        if limits is not None:
+        if p.variant.positive is not None:
+            limits = _limits(p.variant)
             before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)
             rows = limits.rows
             odds = log_odds(limits, _ONE, before, rows @ w[s], rows @ roots[:, s].T)
@@ -117,7 +117,7 @@ _ONE = np.zeros(1, dtype=np.intp)
 
 
 @lru_cache(maxsize=256)
-def _limits(v: Variant) -> Limits | None:
+def _limits(v: Variant) -> Limits:
     """Of one variant; the same few come again in many explanations."""
     return Limits.of([v])
 
@@ -140,8 +140,12 @@ def energies(engine: Engine, parts: tuple[Part, ...]) -> Array:
     gram, moment = _asked(engine, parts)
     inner = np.eye(len(root)) + root.T @ gram @ root
     w = np.linalg.solve(inner, (moment @ root)[..., None])[..., 0] @ root.T
-    each = [mean_squares(engine, [p.variant])[0] for p in parts]
+    each = [_mean_square(engine, p.variant) for p in parts]
     return np.asarray(np.minimum(np.sum(w @ block(each) * w, axis=1), engine.most))
+
+
+def _mean_square(engine: Engine, v: Variant) -> Array:
+    return np.asarray(mean_squares(engine, np.array([v.columns]), imperfect(v)[None])[0])
 
 
 def _asked(engine: Engine, parts: tuple[Part, ...]) -> tuple[Array, Array]:

@@ -32,22 +32,35 @@ class Limits:
     asked: Flags
 
     @classmethod
-    def of(cls, variants: Sequence[Variant]) -> Limits | None:
-        """None where none of them has any."""
-        if not any(v.positive is not None for v in variants):
-            return None
-        some = np.array([v.positive is not None for v in variants])
-        each = np.array([v.each for v in variants], dtype=bool) & some[:, None]
-        alone, within = each.sum(axis=1), np.array([len(v.within) for v in variants]) * some
-        rows = np.zeros((len(variants), 1 + int((alone + within).max()), each.shape[1]))
-        i, j = np.nonzero(each)
-        rows[i, np.cumsum(each, axis=1)[i, j], j] = 1.0
-        for v, before, mine in zip(variants, alone.tolist(), rows, strict=True):
-            if v.positive is not None:
-                mine[0] = v.positive
-                mine[1 + before : 1 + before + len(v.within)] = v.within
-        asked = some[:, None] & (np.arange(rows.shape[1]) <= (alone + within)[:, None])
+    def of(cls, variants: Sequence[Variant], k: int | None = None) -> Limits:
+        """k: coefficients, where that is more than any of them has."""
+        k = k or max(len(v.columns) for v in variants)
+        limited = [v if v.positive is not None else None for v in variants]
+        most = max(sum(v.each) + len(v.within) if v else 0 for v in limited)
+        rows = np.zeros((len(variants), 1 + most, k))
+        asked = np.zeros(rows.shape[:2], dtype=bool)
+        for v, mine, mine_asked in zip(limited, rows, asked, strict=True):
+            if v is None or v.positive is None:
+                continue
+            own, alone = len(v.columns), np.flatnonzero(v.each)
+            mine[0, :own] = v.positive
+            mine[1 + np.arange(len(alone)), alone] = 1.0
+            mine[1 + len(alone) : 1 + len(alone) + len(v.within), :own] = v.within
+            mine_asked[: 1 + len(alone) + len(v.within)] = True
         return cls(rows, np.array([v.least for v in variants]), asked)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Limits]) -> Limits:
+        """The variants of all parts, one after the other."""
+        most = max(part.rows.shape[1] for part in parts)
+        wider = [most - part.rows.shape[1] for part in parts]
+        return cls(
+            np.concatenate([np.pad(p.rows, ((0, 0), (0, w), (0, 0)))
+                            for p, w in zip(parts, wider, strict=True)]),
+            np.concatenate([part.least for part in parts]),
+            np.concatenate([np.pad(p.asked, ((0, 0), (0, w)))
+                            for p, w in zip(parts, wider, strict=True)]),
+        )  # fmt: skip
 
 
 def log_odds(limits: Limits, which: Ints, before: Array, sums: Array, roots: Array) -> Array:

@@ -27,15 +27,16 @@ _HOPELESS = 60.0
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Variants of one word: columns (v, k), roots (v, k, k), scales (v, s), mean squares (v, k, k),
-    limits; what their products at all levels have in common; by number of the level these products
-    (v, k, k), once they are asked for."""
+    """Variants of one word: columns (v, k), roots (v, k, k), scales (v, s), 0 for one that is not
+    there, mean squares (v, k, k) of unit coefficients, limits; what the products of the columns at
+    all levels have in common; by number of the level these products (v, k, k), once they are asked
+    for. Of a variant with fewer coefficients than k the further ones have a root of 0."""
 
     columns: Ints
     root: Array
     scales: Array
     plain: Array
-    limits: Limits | None
+    limits: Limits
     alike: Array
     squares: dict[int, Array] = field(default_factory=dict)
 
@@ -58,7 +59,11 @@ class Table:
         self._engine, self._levels, self._stacks, self._already = engine, levels, stacks, already
         self._columns = np.concatenate([s.columns for s in stacks])
         self._root = np.concatenate([s.root for s in stacks])
-        self._scales = np.concatenate([s.scales for s in stacks])
+        most = max(s.scales.shape[1] for s in stacks)
+        self._scales = np.concatenate(
+            [np.pad(s.scales, ((0, 0), (0, most - s.scales.shape[1]))) for s in stacks]
+        )
+        self._limits = Limits.joined([s.limits for s in stacks])
         self._plain = np.concatenate([s.plain for s in stacks])
         self._edges = np.cumsum([0, *(len(s.columns) for s in stacks)]).tolist()
         v, k = self._columns.shape
@@ -84,31 +89,26 @@ class Table:
 
     def _hopeless(self, best: Array) -> Flags:
         """Variants that were looked at and lie far below the best one of their word."""
-        top = np.maximum.reduceat(best, self._edges[:-1])
-        top = np.repeat(top, np.diff(self._edges))
-        return (best > -np.inf) & (best < top - _HOPELESS)
+        return (best > -np.inf) & (best < self._of_word(best) - _HOPELESS)
+
+    def _of_word(self, best: Array) -> Array:
+        """(v,) the best of each one's word."""
+        return np.repeat(np.maximum.reduceat(best, self._edges[:-1]), np.diff(self._edges))
 
     def limit(self) -> None:
         """Takes away what the limits cost that physics sets, where it counts among the shapes of
         the word."""
         done = np.zeros(self.logs.shape, dtype=bool)
-        while sum(self._limited(k, done) for k in range(len(self._stacks))):
+        done[:, ~self._limits.asked[:, 0]] = True
+        while True:
+            top = self._of_word(self.logs.max(axis=(0, 2)))
+            todo = (self.logs > top[:, None] - _COUNTS) & ~done
+            level, which, scale = np.nonzero(todo)
+            if not len(which):
+                return
+            self.logs[todo] += self._odds(level, which, scale)
+            done |= todo
             self.look()
-
-    def _limited(self, k: int, done: Flags) -> bool:
-        """Whether there was anything to take away in one stack that was not done (l, v, s)."""
-        limits, start = self._stacks[k].limits, self._edges[k]
-        mine = slice(start, self._edges[k + 1])
-        if limits is None:
-            return False
-        logs = self.logs[:, mine]
-        todo = (logs > logs.max() - _COUNTS) & ~done[:, mine]
-        level, which, scale = np.nonzero(todo)
-        if not len(which):
-            return False
-        logs[todo] += self._odds(limits, level, start, which, scale)
-        done[:, mine] |= todo
-        return True
 
     def _make(self, i: int, which: Ints) -> None:
         level, root = self._levels[i], self._root[which]
@@ -121,6 +121,7 @@ class Table:
         mean = s2 * beta[:, None, :] / gain
         taken = np.sum(mean * beta[:, None, :], axis=2)
         fit = 0.5 * taken - 0.5 * np.log(gain).sum(axis=2)
+        fit = np.where(s2[..., 0] > 0, fit, -np.inf)
         turned = mean @ np.swapaxes(vectors, 1, 2)
         energy = np.sum((turned @ self._plain[which]) * turned, axis=2) + self._already
         energy = np.minimum(energy, self._engine.most)
@@ -153,15 +154,14 @@ class Table:
         self._most[:i, which] = np.minimum(self._most[:i, which], below)
         self._most[i + 1 :, which] = np.minimum(self._most[i + 1 :, which], above)
 
-    def _odds(self, limits: Limits, level: Ints, start: int, which: Ints, scale: Ints) -> Array:
-        """log odds (w,) that coefficients of variants `which`, counted from `start`, at their
-        levels and scales keep the limits."""
-        at = start + which
+    def _odds(self, level: Ints, which: Ints, scale: Ints) -> Array:
+        """log odds (w,) that coefficients of variants `which`, at their levels and scales, keep the
+        limits."""
         new = np.append(True, (np.diff(level) != 0) | (np.diff(which) != 0))
         place = np.cumsum(new) - 1  # scales of one variant at one level share the rest
-        rows = limits.rows[which[new]] @ self._root[at[new]]  # (u, m, k), of unit coefficients,
-        before = np.linalg.norm(rows[:, 0], axis=1)[place] * self._scales[at, scale]
-        rows = (rows @ self._vectors[level[new], at[new]])[place]  # and along the eigenvectors
-        sums = np.einsum("wmk,wk->wm", rows, self._mean[level, at, scale])
-        rows *= np.sqrt(self._variance[level, at, scale])[:, None]
-        return log_odds(limits, which, before, sums, rows)
+        rows = self._limits.rows[which[new]] @ self._root[which[new]]  # (u, m, k), of unit
+        before = np.linalg.norm(rows[:, 0], axis=1)[place] * self._scales[which, scale]
+        rows = (rows @ self._vectors[level[new], which[new]])[place]  # and along the eigenvectors
+        sums = np.einsum("wmk,wk->wm", rows, self._mean[level, which, scale])
+        rows *= np.sqrt(self._variance[level, which, scale])[:, None]
+        return log_odds(self._limits, which, before, sums, rows)

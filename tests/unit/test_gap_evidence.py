@@ -162,6 +162,27 @@ def test_score_averages_over_scales_and_asks_for_the_sign() -> None:
     assert abs(b - c) > 1.0  # the column is there with one sign, and that one is known
 
 
+def test_shapes_of_different_sizes_score_together_as_alone() -> None:
+    """Those of nearby sizes go through in one batch, padded to the largest of it."""
+    bench = small_bench()
+    for bend in (2.0, 3.0, 4.0):
+        bench.add(bench.stacked(1e-5 * np.sin(bend * bench.load / 20.0)))
+    engine = small_engine(bench)
+    mixed = [
+        variant("joint_yield", "four", [0, 1, 2, 3], (0.5, 2.0), np.diag([1.0, 0.5, 0.2, 0.1])),
+        variant("base_slip", "five", [0, 1, 2, 3, 4], (0.1, 1.0, 9.0), least=0.3, each=True),
+        variant("joint_yield", "three and a sum", [2, 3, 4], (1.0,), positive=np.ones(3),
+                within=np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]])),
+        variant("joint_yield", "either sense", [1, 2, 3, 4, 0], (1.0, 3.0), positive=False),
+    ]  # fmt: skip
+    together = score(engine, engine.levels, mixed)
+    engine.stacks.clear()
+    for v, found in zip(mixed, together, strict=True):
+        (alone,) = score(engine, engine.levels, [v])
+        assert found.log_evidence == pytest.approx(alone.log_evidence, rel=1e-12)
+        assert (found.scale, found.level) == (alone.scale, alone.level)
+
+
 def test_priors_of_all_sets_up_to_two_sum_below_one() -> None:
     n = len(WORDS)
     none, one = frozenset[str](), frozenset({"joint_yield"})

@@ -26,7 +26,6 @@ from tests.unit.test_gap_evidence import small_bench, small_engine
 def odds(mean: Array, covariance: Array, prior: Array, **limits: object) -> float:
     v = variant("joint_yield", "v", list(range(len(mean))), (1.0,), **limits)  # type: ignore[arg-type]
     found = Limits.of([v])
-    assert found is not None
     first = found.rows[0, 0]
     before = np.array([np.sqrt(first @ prior @ first)])
     roots = found.rows @ np.linalg.cholesky(covariance)
@@ -54,7 +53,9 @@ def test_one_coefficient_and_its_sign_are_exact() -> None:
 
 
 def test_no_limit_costs_nothing() -> None:
-    assert Limits.of([variant("joint_yield", "v", [0, 1], (1.0,), positive=False)]) is None
+    free = Limits.of([variant("joint_yield", "v", [0, 1], (1.0,), positive=False)])
+    sums, roots = np.full((1, 1), -9.0), np.ones((1, 1, 2))
+    assert log_odds(free, np.zeros(1, dtype=int), np.ones(1), sums, roots) == 0.0
 
 
 def test_one_coefficient_may_not_pay_for_another_with_the_wrong_sign() -> None:
@@ -110,7 +111,7 @@ def test_limits_of_a_part_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None
     made: list[str] = []
     of = Limits.of
 
-    def noted(variants: Sequence[Variant]) -> Limits | None:
+    def noted(variants: Sequence[Variant]) -> Limits:
         made.extend(v.label for v in variants)
         return of(variants)
 
