@@ -35,28 +35,32 @@ MEANING = {
     "joint_stiffness_error": "the joints' stiffnesses are not the simulated ones",
 }
 
-# What an unknown gap looks like, and where to look for it; {}: its period.
+# What an unknown gap looks like, where to look for it, and what would show it by itself; {}: its
+# period, and three of them.
 LOOKS_LIKE = {
     "slopes": "every run has a stiffness of its own: see to what is fastened anew between runs, "
-    "and to the specimen",
-    "wanders": "the stiffness wanders during the session: see to bolts that loosen, and to damage",
+    "and to the specimen; to be sure, repeat runs without touching the rig",
+    "wanders": "the stiffness wanders during the session: see to bolts that loosen, and to damage; "
+    "to be sure, measure again now",
     "swings": "the displacement swings with time, {} a period: air conditioning, a pump, a machine "
-    "next door",
+    "next door; to be sure, watch the unloaded rig for {}",
     "waves": "a wave over the stroke, {} long: the screw's thread, or what the laser's spot "
-    "travels over",
+    "travels over; to be sure, shift the laser's spot a little to the side, and measure again",
     "rough": "every level of the load is off by an amount of its own, the same whenever it is met: "
-    "bumps, cross-talk or a damaged instrument",
+    "bumps, cross-talk or a damaged instrument; to be sure, measure between these levels",
     "jumps": "the displacement jumps between holds, elsewhere in every run: see to what sticks and "
-    "lets go, and to the laser's mounting",
+    "lets go, and to the laser's mounting; to be sure, hold one load for long",
 }
+_SURE = 3  # periods
 
 
 def looks_like(like: Likeness) -> str:
     """In words, with the period in its unit."""
-    period = f"{like.period or 0.0:.3g} s"
+    period = like.period or 0.0
+    told = [f"{t:.3g} s" for t in (period, _SURE * period)]
     if like.kind == "waves":
-        period = f"{(like.period or 0.0) * MM:.3g} mm"
-    return LOOKS_LIKE["wanders" if like.wanders else like.kind].format(period)
+        told = [f"{period * MM:.3g} mm"]
+    return LOOKS_LIKE["wanders" if like.wanders else like.kind].format(*told)
 
 
 def render(r: GapResult) -> str:
