@@ -39,6 +39,9 @@ _TREMBLES, _WAVERS = 2.0, 10.0  # stated standard deviations
 _CLEARLY, _A_LITTLE = 5.0, 0.005  # standard deviations, and share of the range, of a way back
 _AS_FAST = 4.0  # times: passes that differ by less go at one rate
 _IDLE = 0.02  # of the response: what the springs make of a load that has no bearing on it
+_STRETCHES, _LAST = 20, 3  # of a pull; so many of them are its end,
+_FLOWS = 0.03  # whose stiffness is less than that of the steepest
+_WANDERS = 0.05  # of the way: a displacement that goes back by more wanders
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
 _HELD, _MANY_A_LEVEL = 2, 8  # samples
@@ -218,6 +221,20 @@ class Bench:
         return self._moving_share * self.session_span / self.passes
 
     @cached_property
+    def flows_out(self) -> bool:
+        """Of a single pull: it ends nearly flat, with a small share of its steepest stiffness, as
+        what flows does, and elastic curves seldom."""
+        if not (self.once and self.always_moves) or len(self.data.setups) > 1:
+            return False
+        path, force = (np.abs(v - v[0]) for v in (self.data.displacement, self.data.force))
+        if way_back(path) > _WANDERS * float(path.max()):
+            return False
+        edges = np.linspace(0.0, float(path.max()), _STRETCHES + 1)
+        order = np.argsort(path, kind="stable")
+        stiffness = np.diff(np.interp(edges, path[order], force[order]))
+        return bool(stiffness[-_LAST:].mean() < _FLOWS * stiffness.max())
+
+    @cached_property
     def _moving_share(self) -> float:
         """Share of the session in which the load moves, by means of even pieces of it: noise of the
         driven channel moves as well."""
@@ -226,9 +243,15 @@ class Bench:
         at = np.minimum((t * count).astype(np.int64), count - 1)
         rows = np.bincount(at, minlength=count)
         held = np.flatnonzero(rows)
-        mean = np.bincount(at, weights=self.load, minlength=count)[held] / rows[held]
-        speed = np.abs(np.diff(mean)) / np.diff(held)
-        slow = np.pad(speed < _STANDS * float(np.ptp(self.load)) / count, 1)
+
+        def speed(values: Array) -> Array:
+            mean = np.bincount(at, weights=values, minlength=count)[held] / rows[held]
+            return np.asarray(np.diff(mean) / np.diff(held) * count / (np.ptp(values) or 1.0))
+
+        slow = np.abs(speed(self.load)) < _STANDS
+        if self.imposed:  # a force that grows is no hold, wherever the displacement was read
+            slow &= speed(np.abs(self.rows.measured_force)) < _STANDS
+        slow = np.pad(slow, 1)
         stands = slow[1:-1] & (slow[:-2] | slow[2:])  # a turning point alone is no hold
         return float(np.diff(held)[~stands].sum()) / max(count - 1, 1)
 

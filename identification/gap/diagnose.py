@@ -14,6 +14,7 @@ from identification.gap.data import GapData, Ints
 from identification.gap.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.earned import FREE, earned, noise_of, sample_rms
 from identification.gap.effects import WORDS, library
+from identification.gap.ends import without_ends
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Explanation, Found, Likeness
 from identification.gap.faults import faults
@@ -108,7 +109,7 @@ def explain_gap(
     out, forced = set(withhold), frozenset(add)
     check_words(out | forced)
     tell("preparing", 0.0)
-    bench = make_bench(without_glitches(data))
+    bench = make_bench(without_glitches(without_ends(data)))
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])

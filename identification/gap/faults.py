@@ -1,6 +1,7 @@
 """Readings that nothing on a rig makes: faults of an instrument, which no effect explains.
 
-A laser on a loose mount rings in spells; a camera loses its target, and hands out its last number.
+A laser on a loose mount rings in spells; a camera loses its target, and hands out its last number;
+a specimen has long been broken.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.gap.data import Array, GapData
+from identification.gap.ends import after_break
 from identification.gap.rows import hold_ids, is_continuous
 
 
@@ -27,6 +29,13 @@ def faults(data: GapData) -> tuple[str, ...]:
         out.append(
             f"{at} the displacement is the same number, less than was read before, while the force "
             "goes on growing: the sensor has lost its target, or stands still. See to it."
+        )
+    broken = after_break(data)
+    if broken.any():
+        out.append(
+            f"The force falls at once while the stroke goes on (at {data.time[broken][0]:.4g} s), "
+            f"and {broken.mean():.0%} of the readings come after that: a break. End the recording "
+            "there to learn of what was before."
         )
     return tuple(out)
 

@@ -36,7 +36,7 @@ def without_glitches(data: GapData) -> GapData:
         f"{count} of {len(off)} readings jump off and come back at once: set aside as glitches "
         f"(the first at {data.time[off][0]:.4g} s). See to cables, converter and clamps."
     )
-    return replace(_picked(data, ~off), notes=(*data.notes, note))
+    return picked(data, ~off, note)
 
 
 def _off(values: Array, run: Ints) -> Flags:
@@ -78,13 +78,14 @@ def _minor(data: GapData, off: Flags) -> bool:
     return bool(np.sum(jump**2) < _MINOR**2 * np.sum(left[~off] ** 2))
 
 
-def _picked(data: GapData, kept: Flags) -> GapData:
+def picked(data: GapData, kept: Flags, *notes: str) -> GapData:
+    """Some of the rows, kept (n,), with further notes."""
     n, out = len(kept), dict[str, Any]()
     for f in fields(data):
         value = getattr(data, f.name)
         if isinstance(value, np.ndarray) and len(value) == n and f.name not in _NOT_ROWS:
             out[f.name] = value[kept]
-    return replace(data, **out)
+    return replace(data, **out, notes=(*data.notes, *notes))
 
 
 _NOT_ROWS = frozenset({"compliance", "compliance_relative_sd"})

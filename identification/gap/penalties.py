@@ -67,15 +67,17 @@ def _wall(beyond: float) -> float:
 
 
 def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats, a steep wall, for curves of an arm's joint that hardly bend: a spring is
-    off there, and the arm's turning bends its line a little."""
-    if not engine.bench.data.arm:
-        return 0.0
+    """Penalty in nats, a steep wall, for curves of a joint that hardly bend: a spring is off there.
+    An arm's turning bends its line a little; a bench's line that is far off may bend within the
+    noise of a sample, which is stated to a factor."""
     penalty = 0.0
     for p, gap, moved in zip(parts, found.gap, found.moved, strict=True):
-        if "line" in p.variant.info.get("kinds", ()) and moved > 0:
-            share = max(float(gap / moved), 1e-6)
-            penalty += _wall(BENDS / share)
+        if "line" not in p.variant.info.get("kinds", ()) or not moved > 0:
+            continue
+        least = BENDS * moved
+        if not engine.bench.data.arm:
+            least = engine.bench.noise.stated if moved > _FAR_MORE * gap else 0.0
+        penalty += _wall(max(least, 1e-300) / max(float(gap), 1e-6 * float(moved)))
     return penalty
 
 

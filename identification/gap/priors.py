@@ -11,6 +11,7 @@ from math import comb, log
 
 from identification.gap.bench import Bench
 from identification.gap.effects import WORDS
+from identification.gap.penalties import CURVES
 
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
 LOG_ONE = log(0.37)
@@ -23,6 +24,9 @@ LOG_UNSEEN, LOG_HELD = log(0.05), log(0.05)
 # Loops at one rate are commonly friction; what comes late differs from it in details of the curve
 # only (tempered, as all of a running recording: odds of 40).
 LOG_ONE_RATE = -30.0
+# A single pull that ends nearly flat: of 12 such records of others, 11 were of what yields
+# (tempered: odds of 10).
+LOG_FLOWS = -20.0
 _LATE = frozenset({"joint_creep", "time_lag"})
 
 
@@ -35,6 +39,8 @@ def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
         rare += LOG_UNSEEN * ("joint_hysteresis" in words and bench.once)
         rare += LOG_HELD * ("thermal_drift" in words and bench.imposed)
         rare += LOG_ONE_RATE * (bool(words & _LATE) and bench.one_rate)
+        bent = bool(words & CURVES) and "joint_yield" not in words
+        rare += LOG_FLOWS * (bent and bench.flows_out)
         rare += _by_calibration(words, bench)
     return LOG_ONE + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(words))) + rare
 
