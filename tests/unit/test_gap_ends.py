@@ -8,8 +8,11 @@ import pytest
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects import library
 from identification.gap.ends import after_break, without_ends
 from identification.gap.faults import faults
+from identification.gap.parts import Part, Sizes
+from identification.gap.penalties import straight
 from identification.gap.priors import prior_of
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
@@ -137,6 +140,9 @@ def test_a_line_far_off_that_bends_within_the_noise_is_a_spring(
     assert (found.verdict == "joint_nonlinear_stiffness") == curve
     alone = next(e for e in found.found.explanations if e.words == {"joint_nonlinear_stiffness"})
     assert (alone.log_weight > found.found.explanations[0].log_weight - 8.0) == curve
+    line = next(v for v in library(found.bench, list(alone.words)) if "line" in v.info["kinds"])
+    sizes = Sizes(np.array([4e-6]), np.array([1.5e-4 if off > 1 else 1.5e-5]), 0.0)
+    assert (straight(found.engine, (Part(line, 1.0),), sizes) == 0.0) == curve
 
 
 def test_a_force_that_grows_while_the_reading_stands_is_no_hold() -> None:
