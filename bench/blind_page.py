@@ -37,6 +37,7 @@ with at least `--snr-min` (3), and those without an effect; the table by size co
 | unknown: AUROC | probability that a case outside the library gets a larger p(unknown) than a known effect; ties count half |
 | two effects: F1 | pooled over the mixtures; an effect is hit by a found word that the answers accept for it, each once |
 | ECE, reliability | the verdict's probability against *exact*, ten bins of equal width; an accepted stand-in does not count here, since the probability is that of the word |
+| ECE by chance | the same error of as many verdicts whose probabilities are exactly right: its mean, and what it exceeds once in twenty times; bins of a few cases are off by chance |
 | Brier | verdict: mean of (p - exact)^2; all words: mean over the cases of the sum of (p_word - 1 if true)^2 |
 | intervals | parameters that answers and diagnosis define alike, of effects found under their own word; the 90 % interval follows from the 95 % one by the normal law |
 | where | of single effects named exactly: the joints are the true ones, the direction with the largest gap is named, the same directions are named (those with 15 % of the largest), the encoders' view is right |

@@ -79,3 +79,19 @@ def ece(confidence: Sequence[float], right: Sequence[bool]) -> float | None:
     if not total:
         return None
     return float(sum(row["n"] * abs(row["confidence"] - row["right"]) for row in table) / total)
+
+
+def ece_by_chance(confidence: Sequence[float]) -> list[float | None]:
+    """Mean and 95th percentile of the calibration error that as many cases show when every one of
+    these probabilities is right: bins of a few cases are off by chance."""
+    if not len(confidence):
+        return [None, None]
+    c = np.asarray(confidence, dtype=float)
+    number = np.minimum((c * BINS).astype(int), BINS - 1)
+    right = np.random.default_rng(0).random((_DRAWS, len(c))) < c
+    off = [np.abs((right[:, number == b] - c[number == b]).sum(axis=1)) for b in range(BINS)]
+    found = np.sum(off, axis=0) / len(c)
+    return [float(found.mean()), float(np.quantile(found, 0.95))]
+
+
+_DRAWS = 4000

@@ -9,7 +9,7 @@ from typing import Any
 from rig.blind import judge as j
 from rig.blind.campaign import Campaign
 from rig.blind.judge import Judged
-from rig.blind.rates import auroc, ece, quantiles, rate, reliability
+from rig.blind.rates import auroc, ece, ece_by_chance, quantiles, rate, reliability
 from rig.software import software_version
 
 SCHEMA = "rig.blind/1"
@@ -161,9 +161,11 @@ def _calibration(cases: list[Judged]) -> dict[str, Any]:
         sum((p - (w == c.main)) ** 2 for w, p in c.diagnosis["probabilities"].items()) for c in came
     ]
     covered = [i for c in came for i in j.intervals(c)]
+    mean, p95 = ece_by_chance(top)
     return {
         "n": len(came),
         "ece": ece(top, exact),
+        "ece_by_chance": {"mean": mean, "p95": p95},
         "ece_against_accepted": ece(top, [c.right for c in came]),
         "brier_top": sum((p - e) ** 2 for p, e in zip(top, exact, strict=True)) / len(came)
         if came

@@ -67,6 +67,8 @@ MEASURES = (
     Measure("two effects: F1, exact words", "mixtures.f1_exact_words"),
     Measure("two effects: verdict right", "mixtures.main_cause_right"),
     Measure("calibration: ECE", "calibration.ece", 0.04, at_least=False),
+    Measure("calibration: ECE by chance, mean", "calibration.ece_by_chance.mean"),
+    Measure("calibration: ECE by chance, 95 %", "calibration.ece_by_chance.p95"),
     Measure("calibration: Brier, verdict", "calibration.brier_top"),
     Measure("calibration: Brier, all words", "calibration.brier_all_words"),
     Measure("90 % intervals hold the truth", "calibration.coverage_90", 0.87, upper=0.93),

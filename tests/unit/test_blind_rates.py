@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from rig.blind.rates import auroc, ece, quantiles, rate, reliability, wilson
+from rig.blind.rates import auroc, ece, ece_by_chance, quantiles, rate, reliability, wilson
 
 
 def test_wilson_against_published_values() -> None:
@@ -37,6 +38,18 @@ def test_ece_by_hand() -> None:
         (0.5, 1, 1.0),
         (0.9, 3, pytest.approx(2 / 3)),
     ]
+
+
+def test_what_chance_makes_of_right_probabilities() -> None:
+    """One case of even odds is off by a half, whatever comes; of many the share of those that are
+    right is normal about theirs, and its distance sqrt(2 / pi) of its standard deviation."""
+    assert ece_by_chance([0.5]) == [0.5, 0.5]
+    mean, p95 = ece_by_chance([0.72] * 400 + [0.97] * 600)
+    sds = [0.4 * (0.72 * 0.28 / 400) ** 0.5, 0.6 * (0.97 * 0.03 / 600) ** 0.5]
+    assert mean == pytest.approx((2 / np.pi) ** 0.5 * sum(sds), rel=0.04)
+    assert p95 is not None
+    assert 1.5 * sum(sds) < p95 < 2.0 * sum(sds)
+    assert ece_by_chance([]) == [None, None]
 
 
 def test_certainty_falls_into_the_last_bin() -> None:
