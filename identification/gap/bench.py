@@ -17,6 +17,7 @@ import numpy as np
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
 from identification.gap.imposed import displacement_simpler, on_plateau
+from identification.gap.loops import lost
 from identification.gap.noise import Noise, estimate_noise, standing
 from identification.gap.rows import Rows, hold_ids, is_continuous, passes, reduce_rows, turns
 
@@ -42,6 +43,8 @@ _IDLE = 0.02  # of the response: what the springs make of a load that has no bea
 _STRETCHES, _LAST = 20, 3  # of a pull; so many of them are its end,
 _FLOWS = 0.03  # whose stiffness is less than that of the steepest
 _WANDERS = 0.05  # of the way: a displacement that goes back by more wanders
+_PULLED = 0.3  # of the largest force: by less of the other sign metal does not flow back
+_ENCLOSES, _AGAIN = 0.05, 0.1  # of its box, by a loop; of that, by the next ones
 _STANDS = 0.1  # of the mean speed, and of the time
 _FURTHER = 6  # radii
 _HELD, _MANY_A_LEVEL = 2, 8  # samples
@@ -233,6 +236,28 @@ class Bench:
         order = np.argsort(path, kind="stable")
         stiffness = np.diff(np.interp(edges, path[order], force[order]))
         return bool(stiffness[-_LAST:].mean() < _FLOWS * stiffness.max())
+
+    @cached_property
+    def lost_in_loops(self) -> tuple[float, float]:
+        """As `loops.lost` has it, of a load that stays on one side; nan for all others."""
+        data, force = self.data, np.abs(self.data.force).max()
+        sides = min(-float(data.force.min()), float(data.force.max()))
+        once = len(np.unique(data.run)) == 1 and len(data.setups) == 1
+        if not (once and self.rows.continuous and self.returns and sides < _PULLED * force):
+            return float("nan"), float("nan")
+        return lost(data.displacement, data.force, self.imposed)
+
+    @property
+    def comes_back_as_it_went(self) -> bool:
+        """What was lost the first time is not lost again: nothing rubs there."""
+        first, again = self.lost_in_loops
+        return first > _ENCLOSES and again < _AGAIN * first
+
+    @property
+    def rubs(self) -> bool:
+        """Every loop of a load from one side encloses much: nothing flows back there."""
+        first, again = self.lost_in_loops
+        return again > max(2 * _ENCLOSES, 0.5 * first)
 
     @cached_property
     def _moving_share(self) -> float:

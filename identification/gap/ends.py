@@ -18,7 +18,7 @@ from identification.gap.rows import hold_ids, is_continuous
 _FEWEST = 20  # readings: of fewer nothing is known of what is sudden
 _FALLS, _LOADED = 0.25, 0.5  # of the largest force: so far it falls, from that at least,
 _SUDDENLY = 8.0  # times the usual step between readings, and the stated uncertainty
-_BACK = 0.05  # of the stroke: a pull goes on
+_BACK, _LITTLE = 0.05, 0.005  # of the stroke: a pull goes on, also while it breaks
 _RECOVERS = 0.9  # of what it fell from: a slip, a crack that is bridged
 _MOST = 0.1  # of the readings of a run
 
@@ -77,12 +77,12 @@ def _break(force: Array, u: Array, uncertainty: float) -> int | None:
     first = int(sudden.argmax())  # of two readings that a fall may take
     k = first + 1 + int(step[first + 1] > step[first])
     path = (u[: k + 1] - u[0]) * np.sign(u[k - 1] - u[0])
-    pulled = way_back(path) < _BACK * np.ptp(u)
+    pulled = way_back(path[:k]) < _BACK * np.ptp(u) and path[k] > path[k - 1] - _LITTLE * np.ptp(u)
     gone = size[k:].max() < _RECOVERS * size[k - 1] or len(size) - k <= _MOST * len(size)
     return k if sudden[first] and pulled and gone else None
 
 
-_LITTLE = 0.02  # of the range: as good as none
+_NONE = 0.02  # of the range: as good as none
 
 
 def _before_zero(data: GapData) -> Flags:
@@ -94,7 +94,7 @@ def _before_zero(data: GapData) -> Flags:
         force = force * np.sign(force[1 + int(np.abs(force[1:]).argmax())])
         first, rest = force[0], force[1:]
         usual = float(np.median(np.abs(np.diff(rest))))
-        zero = max(_LITTLE * float(np.ptp(rest)), _SUDDENLY * usual)
-        stands = abs(u[1] - u[0]) < _LITTLE * np.ptp(u)
+        zero = max(_NONE * float(np.ptp(rest)), _SUDDENLY * usual)
+        stands = abs(u[1] - u[0]) < _NONE * np.ptp(u)
         out[mine[0]] = stands and first < min(rest.min(), 0.0) - zero and abs(rest[0]) < zero
     return out

@@ -197,11 +197,11 @@ def passes(force: Array) -> int:
     return len(turns(force)) + 1
 
 
-def turns(force: Array) -> list[int]:
-    """Where it turns from one such pass to the next."""
+def turns(force: Array, share: float = 0.25) -> list[int]:
+    """Where it turns from one such pass to the next. share: of its range that a pass takes."""
     stride = max(1, len(force) // 20_000)
     coarse = force[::stride].tolist()
-    back = 0.25 * float(np.ptp(force))
+    back = share * float(np.ptp(force))
     out: list[int] = []
     low, high, rising = coarse[0], coarse[0], None
     at_low = at_high = 0

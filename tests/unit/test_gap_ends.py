@@ -61,7 +61,7 @@ def test_a_recording_that_goes_on_long_after_a_break_is_unknown() -> None:
     assert any("31% of the readings come after that: a break" in n for n in found.notes)
 
 
-@pytest.mark.parametrize("what", ["knee", "slips", "cycle", "noise", "levels", "bridged"])
+@pytest.mark.parametrize("what", ["knee", "slips", "cycle", "stiff", "noise", "levels", "bridged"])
 def test_what_goes_on_or_back_has_not_broken(what: str) -> None:
     force, u = line(), np.linspace(0.0, 1e-3, N)
     if what == "knee":  # an upper yield point, and necking
@@ -72,6 +72,9 @@ def test_what_goes_on_or_back_has_not_broken(what: str) -> None:
     elif what == "cycle":  # let go at once, and the stroke goes back
         u = np.where(np.arange(N) < 80, u, 0.0)
         force = SPRING * u
+    elif what == "stiff":  # a cycle across a gap, steep where it ends
+        u = 1e-3 * np.sin(np.linspace(0.0, 15.0, N))
+        force = 20 * SPRING * np.sign(u) * np.maximum(np.abs(u) - 0.95e-3, 0.0)
     elif what == "noise":  # nothing is pulled
         force = np.where(np.arange(N) < N - 6, np.minimum(np.arange(N), 1) * 0.4, 0.0)
     elif what == "bridged":
@@ -143,6 +146,11 @@ def test_a_line_far_off_that_bends_within_the_noise_is_a_spring(
     line = next(v for v in library(found.bench, list(alone.words)) if "line" in v.info["kinds"])
     sizes = Sizes(np.array([4e-6]), np.array([1.5e-4 if off > 1 else 1.5e-5]), 0.0)
     assert (straight(found.engine, (Part(line, 1.0),), sizes) == 0.0) == curve
+    measured = diagnose_gap(recording(SPRING * np.linspace(0.0, 1e-3, 600))).engine
+    assert measured.bench.noise.sure
+    noise = measured.bench.noise.stated
+    sizes = Sizes(np.array([0.4 * noise]), np.array([1.5e-4]), 0.0)
+    assert straight(measured, (Part(line, 1.0),), sizes) == 0.0
 
 
 def test_a_force_that_grows_while_the_reading_stands_is_no_hold() -> None:

@@ -1,0 +1,115 @@
+"""Loops of a load from one side: what rubs, what flowed once, and what is told of neither."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import make_bench
+from identification.gap.data import Array, GapData, Instruments
+from identification.gap.history import play
+from identification.gap.loops import lost
+from identification.gap.priors import prior_of
+from tests.unit.test_gap_running import SPRING, running
+
+METER = Instruments(0.1, 1e-6, 0.005, 0.003)
+STROKE = 1e-3
+
+
+def strokes(cycles: int = 3, growing: bool = False, n: int = 120) -> Array:
+    """m: to and fro from zero, further each time where it grows."""
+    ends = [STROKE * (k + 1) / cycles if growing else STROKE for k in range(cycles)]
+    legs = [x for end in ends for x in (np.linspace(0, end, n), np.linspace(end, 0, n))]
+    return np.concatenate(legs)
+
+
+def flowed(u: Array, knee: float = 4e-4) -> tuple[Array, Array]:
+    """Displacement m and force N of metal that is let go until no force is left."""
+    plastic = np.maximum.accumulate(np.maximum(u - knee, 0.0))
+    force = SPRING * (u - plastic)
+    kept = force >= 0
+    return u[kept], force[kept]
+
+
+def rubbed(u: Array, radius: float = 20.0) -> Array:
+    """N: a spring with friction beside it."""
+    state = play((SPRING * u)[:, None], np.array([radius]), u == -1.0, u == -1.0)[:, 0]
+    return np.asarray(SPRING * u + 0.8 * (SPRING * u - state))
+
+
+def recording(u: Array, force: Array) -> GapData:
+    noise = np.random.default_rng(4).normal(0, METER.force, len(u))
+    return running(force + noise, u, imposed="displacement", instruments=METER)
+
+
+def test_what_a_loop_encloses_is_a_share_of_its_box() -> None:
+    """A parallelogram: 40 N high beside a slope that goes up by 100 N."""
+    u = strokes(2)
+    up = np.diff(u, prepend=-1.0) >= 0
+    first, again = lost(u, SPRING * u + np.where(up, 40.0, 0.0), imposed=True)
+    assert first == pytest.approx(40 / 140, abs=0.01)
+    assert again == pytest.approx(40 / 140, abs=0.01)
+
+
+def test_no_loop_is_made_of_a_pull_or_of_one_cycle() -> None:
+    u = strokes(1)
+    assert np.isnan(lost(u[:120], SPRING * u[:120], imposed=True)).all()
+    first, again = lost(u, SPRING * u, imposed=True)
+    assert first == pytest.approx(0.0, abs=1e-9)
+    assert np.isnan(again)
+
+
+@pytest.mark.parametrize("knee", [1e-4, 4e-4])
+def test_metal_that_flows_on_comes_back_as_it_went(knee: float) -> None:
+    u, force = flowed(strokes(4, growing=True), knee)
+    bench = make_bench(recording(u, force))
+    first, again = bench.lost_in_loops
+    assert first > 0.2
+    assert again < 0.04
+    assert bench.comes_back_as_it_went
+    assert not bench.rubs
+
+
+def test_friction_rubs_every_time() -> None:
+    u = strokes(4)
+    bench = make_bench(recording(u, rubbed(u) + 25.0))
+    assert bench.rubs
+    assert not bench.comes_back_as_it_went
+
+
+@pytest.mark.parametrize("what", ["both ways", "two runs", "a spring", "seats", "flows and rubs"])
+def test_nothing_is_said_of_other_loads(what: str) -> None:
+    u = strokes(4)
+    data = recording(u, rubbed(u) + 25.0)
+    if what == "both ways":  # metal flows back there
+        data = recording(u, rubbed(u) - 40.0)
+    elif what == "two runs":
+        half = (np.arange(len(u)) >= len(u) // 2).astype(np.int64)
+        data = running(data.force, u, imposed="displacement", instruments=METER, run=half,
+                       repetition=half + 1)  # fmt: skip
+    elif what == "seats":  # by so little that anything may
+        data = running(SPRING * u + 3.0 * (np.arange(len(u)) < 120), u, imposed="displacement",
+                       instruments=METER)  # fmt: skip
+    elif what == "flows and rubs":
+        u, force = flowed(strokes(4, growing=True))
+        data = recording(u, force + 6.0 * (np.diff(u, prepend=-1.0) >= 0))
+    else:
+        data = recording(u, SPRING * u)
+    bench = make_bench(data)
+    assert not bench.rubs
+    assert not bench.comes_back_as_it_went
+
+
+def test_loops_count_for_friction_and_against_it() -> None:
+    u = strokes(4)
+    rubs = make_bench(recording(u, rubbed(u) + 25.0))
+    flows = make_bench(recording(*flowed(strokes(4, growing=True))))
+
+    def prior(bench: object, *words: str) -> float:
+        return prior_of(frozenset(words), bench)  # type: ignore[arg-type]
+
+    assert prior(rubs, "joint_yield") < prior(flows, "joint_yield") - 10.0
+    assert prior(flows, "joint_hysteresis") < prior(rubs, "joint_hysteresis") - 10.0
+    both = ("joint_yield", "joint_hysteresis")
+    assert prior(rubs, *both) > prior(flows, *both) + 10.0
+    assert prior(rubs, "joint_creep") == prior(flows, "joint_creep")
