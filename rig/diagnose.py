@@ -39,12 +39,15 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """The diagnosis as plain values."""
+        from rig.diagnose_text import meanings
+
         r = self.result
         return {
             "schema": "rig.diagnosis/1",
             "dataset": self.dataset,
             "verdict": r.verdict,
             "probabilities": {w: float(p) for w, p in r.probabilities.items()},
+            "meanings": meanings(arm=r.bench.data.arm),
             "effects": [_effect(e) for e in r.effects],
             "where": _where(r),
             "gap": _gap(r),

@@ -35,6 +35,25 @@ MEANING = {
     "joint_stiffness_error": "the joints' stiffnesses are not the simulated ones",
 }
 
+# Of a rig without an arm, of which all words speak of one spring.
+_OF_ONE_SPRING = {
+    "joint_yield": "it gives way above a threshold load",
+    "joint_backlash": "there is lost motion where the load passes zero",
+    "joint_nonlinear_stiffness": "the spring is curved, reversibly",
+    "joint_hysteresis": "it rubs: loading and unloading differ from the first load on",
+    "joint_creep": "it creeps under the held load",
+    "base_slip": "it slips above a threshold load, and stays there",
+    "contact_seating": "what is loaded seats itself in its fixture",
+    "displacement_scale": "the gain of the displacement sensor is off",
+    "joint_stiffness_error": "the stiffness is not the simulated one",
+}
+
+
+def meanings(*, arm: bool) -> dict[str, str]:
+    """Word -> what happens there, in a line."""
+    return MEANING if arm else MEANING | _OF_ONE_SPRING
+
+
 # What an unknown gap looks like, where to look for it, and what would show it by itself; {}: its
 # period, and three of them.
 LOOKS_LIKE = {
@@ -86,8 +105,9 @@ def _answer(r: GapResult) -> str:
         )
     more = [e.name for e in r.effects if e.name != r.verdict]
     also = f" Beside it: {', '.join(more)}." if more else ""
+    meaning = meanings(arm=r.bench.data.arm)[r.verdict]
     return (
-        f"{r.verdict} ({p:.0%}): {MEANING[r.verdict]}.{also} With it the gap shrinks from "
+        f"{r.verdict} ({p:.0%}): {meaning}.{also} With it the gap shrinks from "
         f"{r.before * MM:.3g} to {r.after * MM:.3g} mm rms; the instruments alone leave "
         f"{r.noise * MM:.3g} mm."
     )

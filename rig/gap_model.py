@@ -15,7 +15,7 @@ from identification.gap.diagnose import Effect, GapResult
 from identification.gap.forms import Form, describe
 from rig.dataset import Dataset
 from rig.diagnose import Diagnosis
-from rig.diagnose_text import MEANING
+from rig.diagnose_text import meanings
 from rig.errors import InputError
 from rig.gap_forms import to_entry
 from rig.gap_keys import CONTAINED, SPRINGS
@@ -109,9 +109,10 @@ def forms(result: GapResult) -> list[Form]:
 def _effects(diagnosis: Diagnosis, dataset: Dataset) -> list[str]:
     entries = list(diagnosis.known_effects)
     comments = ["of the model that was given"] * len(entries)
+    words = meanings(arm=diagnosis.result.bench.data.arm)
     for effect, form in zip(diagnosis.result.effects, forms(diagnosis.result), strict=True):
         entries.append(to_entry(form, _about(effect, dataset)))
-        comments.append(_comment(effect))
+        comments.append(_comment(effect, words[effect.name]))
     if not entries:
         return ["effects: []"]
     lines = ["effects:"]
@@ -138,8 +139,8 @@ def _about(effect: Effect, dataset: Dataset) -> dict[str, Any]:
     return out
 
 
-def _comment(effect: Effect) -> str:
-    text = f"{MEANING[effect.name]}; {effect.share_of_gap:.0%} of the gap"
+def _comment(effect: Effect, meaning: str) -> str:
+    text = f"{meaning}; {effect.share_of_gap:.0%} of the gap"
     if effect.indistinguishable_from:
         text += f"; not told apart from {', '.join(effect.indistinguishable_from)}"
     return text

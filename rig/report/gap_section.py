@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from rig.diagnose_text import MEANING
 from rig.report.document import (
     Block,
     Bullets,
@@ -53,7 +52,8 @@ def _answer(found: Node) -> Rich:
     others = [e["name"].text() for e in found["effects"]][1:]
     beside = f" Beside it: {', '.join(others)}." if others else ""
     before, after, noise = (sizes[f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise"))
-    return (*start, f"{MEANING[verdict]}.{beside} With it the gap shrinks from ", *before, " to ",
+    meaning = found["meanings"][verdict].text()
+    return (*start, f"{meaning}.{beside} With it the gap shrinks from ", *before, " to ",
             *after, " mm rms; the instruments alone leave ", *noise, " mm.")  # fmt: skip
 
 
@@ -111,7 +111,7 @@ def _effects(found: Node) -> list[Block]:
 def _probabilities(found: Node) -> Table:
     ranked = sorted(found["probabilities"].items(), key=lambda i: -i[1].value)
     rows = tuple(
-        (word, MEANING.get(word) or _OTHERWISE[word], p.percent(2))
+        (word, _OTHERWISE.get(word) or found["meanings"][word].text(), p.percent(2))
         for word, p in ranked
         if p.value >= _LEAST_PROBABILITY
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from rig.diagnose_text import MEANING
 from rig.report.document import (
     Block,
     Bullets,
@@ -71,7 +70,7 @@ def _gap(data: Node) -> Cell:
     if verdict in ("none", "unknown") or not held:
         return words
     shrinks = held["shrink_factor"].number(3)
-    meaning = f", {MEANING[verdict]}"
+    meaning = f", {found['meanings'][verdict].text()}"
     return (*words, meaning, "; with it the gap shrinks ", *shrinks, " times on withheld data")
 
 

@@ -4,6 +4,7 @@ the text is the same on every machine."""
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -90,8 +91,9 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
         **more,
     }
     probabilities = {verdict: p, "base_slip": 0.9961 - p, "zero_shift": 0.0039}
-    unseen = dict.fromkeys(("bench", "engine", "fit", "found"), NOWHERE)
-    return GapResult(verdict=verdict, probabilities=probabilities, **known, **unseen)
+    unseen = dict.fromkeys(("engine", "fit", "found"), NOWHERE)
+    arm: Any = SimpleNamespace(data=SimpleNamespace(arm=True))
+    return GapResult(verdict=verdict, probabilities=probabilities, bench=arm, **known, **unseen)
 
 
 def explained() -> Diagnosis:

@@ -9,11 +9,12 @@ import pytest
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.effects import library
+from identification.gap.effects import WORDS, library
 from identification.gap.explanation import Explanation
 from identification.gap.leftover import HELD, _judged
 from identification.gap.parts import Part, energies
 from identification.gap.verdict import BENCH_DOUBT, trusted
+from rig.diagnose_text import meanings, render
 from tests.unit.test_gap_linear import charged
 from tests.unit.test_gap_running import SPRING, running
 
@@ -50,6 +51,12 @@ def test_metal_that_flows_far_beyond_its_knee_yields() -> None:
     assert found.probabilities["joint_yield"] > 0.6
     assert found.probabilities["unknown"] < 0.25
     assert found.engine.most < (0.1 * SPRING**-1 * 1e4) ** 2
+    assert "): it gives way above a threshold load." in render(found)  # no joint there
+
+
+def test_every_word_is_said_in_words() -> None:
+    assert set(meanings(arm=True)) == set(meanings(arm=False)) == set(WORDS)
+    assert "torque" in meanings(arm=True)["joint_yield"]
 
 
 def test_a_toe_before_a_knee_is_two_things_and_the_knee_is_the_larger() -> None:
