@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
-from identification.gap.imposed import displacement_simpler, on_plateau
+from identification.gap.imposed import approaches, displacement_simpler, on_plateau
 from identification.gap.loops import lost
 from identification.gap.noise import Noise, estimate_noise, standing
 from identification.gap.rows import Rows, hold_ids, is_continuous, passes, reduce_rows, turns
@@ -236,6 +236,11 @@ class Bench:
         order = np.argsort(path, kind="stable")
         stiffness = np.diff(np.interp(edges, path[order], force[order]))
         return bool(stiffness[-_LAST:].mean() < _FLOWS * stiffness.max())
+
+    @cached_property
+    def approaches(self) -> bool:
+        """A single pull that begins with a way at no force, as before a contact."""
+        return self.once and approaches(self.data, np.arange(len(self.data.force)))
 
     @cached_property
     def lost_in_loops(self) -> tuple[float, float]:

@@ -49,6 +49,8 @@ def displacement_simpler(data: GapData) -> bool:
     most samples; False where they are alike."""
     mine = np.flatnonzero(data.setup == np.bincount(data.setup).argmax())
     force, moved = data.force[mine], data.displacement[mine]
+    if approaches(data, mine):
+        return True
     instruments = data.instruments
     stands = (
         _still(force, instruments.force, moved),
@@ -62,6 +64,29 @@ def displacement_simpler(data: GapData) -> bool:
     floor = max(_CLOSEST, *(c.noise**2 / np.sqrt(len(c.time)) for c in channels))
     by_force, by_moved = (_cost(c, floor) for c in channels)
     return by_force - by_moved > (_SLIDING if _slides(*channels) else _MARGIN)
+
+
+def approaches(data: GapData, mine: Ints) -> bool:
+    """Whether samples mine (m,), in order, are a single pull that begins with a way at no force,
+    faster than the rest: a platen that comes nearer. Nobody finds such a place by setting a force;
+    what creeps or drifts there is slow."""
+    if len(mine) < _FEWEST:
+        return False
+    force, path = (np.abs(v[mine] - v[mine[0]]) for v in (data.force, data.displacement))
+    none = max(_NO_FORCE * float(force.max()), _BEYOND * data.instruments.force)
+    end = int(np.argmax(force > none))
+    early = np.abs(data.force[mine[:end]]).max(initial=0.0) > 2 * none
+    back = float((np.maximum.accumulate(path) - path).max()) > _NO_FORCE * float(path.max())
+    if early or back or not force[end] > none:
+        return False
+    time = _clock(data, mine)
+    spent = (time[end] - time[0]) / (time[-1] - time[0] or 1.0)
+    went = float(path[end] / path.max()) if path.max() > 0 else 0.0
+    return bool(went > max(_APPROACH, _FAST * spent))
+
+
+_NO_FORCE, _APPROACH = 0.02, 0.3  # of the largest force (or a way back), and of the way
+_FAST = 2.0  # times as fast as all of it
 
 
 def on_plateau(data: GapData, hold: Ints) -> bool:

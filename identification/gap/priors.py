@@ -27,6 +27,8 @@ LOG_ONE_RATE = -30.0
 # A single pull that ends nearly flat: of 12 such records of others, 11 were of what yields
 # (tempered: odds of 10).
 LOG_FLOWS = -20.0
+# A way at no force before all of it: what is not there yet has no curve (tempered: odds of 10).
+LOG_APPROACH = -20.0
 # Loaded from one side and let go again and again: friction that is seen the first time only, metal
 # that flows back under a pull (tempered: odds of 40 and 10).
 LOG_NO_LOOP, LOG_ALL_LOOPS = -30.0, -20.0
@@ -44,6 +46,8 @@ def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
         rare += LOG_ONE_RATE * (bool(words & _LATE) and bench.one_rate)
         bent = bool(words & CURVES) and "joint_yield" not in words
         rare += LOG_FLOWS * (bent and bench.flows_out)
+        touches = "contact_seating" in words or "joint_backlash" in words
+        rare += LOG_APPROACH * (bool(words) and not touches and bench.approaches)
         rare += LOG_NO_LOOP * ("joint_hysteresis" in words and bench.comes_back_as_it_went)
         flows = "joint_yield" in words and "joint_hysteresis" not in words
         rare += LOG_ALL_LOOPS * (flows and bench.rubs)

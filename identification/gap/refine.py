@@ -10,6 +10,7 @@ import numpy as np
 from identification.gap.compare import Scored, by_word, closest, marginal, score
 from identification.gap.data import Array
 from identification.gap.effects import (
+    contact_seating,
     joint_backlash,
     joint_nonlinear_stiffness,
     joint_yield,
@@ -46,6 +47,10 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
                 out += joint_yield.refined(engine.bench, s.variant)
         elif word == "joint_backlash":
             out += closing_in(joint_backlash.refined, _places(found, second))
+        elif word == "contact_seating":
+            slacks = [s for s in reversed(found) if contact_seating.single_slack(s.variant)]
+            best_of_law = {s.variant.info["laws"][0][0]: s for s in slacks}
+            out += closing_in(contact_seating.refined, list(best_of_law.values()))
         elif word == "time_lag":
             channels = {s.variant.info["channel"]: s for s in reversed(second or found)}
             out += closing_in(time_lag.refined, list(channels.values()))

@@ -13,6 +13,7 @@ from identification.gap.effects import WORDS, library
 from identification.gap.explanation import Explanation
 from identification.gap.leftover import HELD, _judged
 from identification.gap.parts import Part, energies
+from identification.gap.priors import prior_of
 from identification.gap.verdict import BENCH_DOUBT, trusted
 from rig.diagnose_text import meanings, render
 from tests.unit.test_gap_linear import charged
@@ -22,7 +23,9 @@ METER = Instruments(0.1, 1e-6, 0.005, 0.003)
 STROKE = 1e-3  # m
 
 
-def pulled(force: Array, u: Array, imposed: str = "displacement", **changes: object) -> GapResult:
+def pulled(
+    force: Array, u: Array, imposed: str | None = "displacement", **changes: object
+) -> GapResult:
     noise = np.random.default_rng(5).normal(0, METER.force, len(u))
     return diagnose_gap(running(force + noise, u, imposed=imposed, instruments=METER, **changes))
 
@@ -163,3 +166,52 @@ def test_nobody_is_surer_of_the_unknown_than_of_a_word() -> None:
         sure = trusted({w: float(w == word) for w in doubted}, doubted, BENCH_DOUBT)
         assert sum(sure.values()) == pytest.approx(1.0)
         assert sure[word] < 1 - 0.6 * BENCH_DOUBT
+
+
+def approached(travel: float = 2e-3, faster: float = 5.0, n: int = 160) -> tuple[Array, Array]:
+    """Displacement m and force N: a platen comes nearer for a quarter of the readings, faster than
+    it presses afterwards; forces are noise before."""
+    u = np.concatenate([np.linspace(0.0, travel, n // 4, endpoint=False),
+                        travel + np.linspace(0.0, 3 * travel / faster, 3 * n // 4)])  # fmt: skip
+    return u, SPRING * np.maximum(u - travel, 0.0)
+
+
+def test_a_way_at_no_force_before_a_contact_is_taken_up_slack() -> None:
+    """Nobody says that the machine drives the displacement; the force is as simple."""
+    u, force = approached()
+    found = pulled(force, u, imposed=None)
+    assert found.bench.imposed
+    assert found.bench.approaches
+    assert found.verdict == "contact_seating"
+    assert found.probabilities["contact_seating"] > 0.6
+    (depth,) = (p for n, p in found.effects[0].parameters.items() if n == "depth")
+    assert depth.value == pytest.approx(2.0, rel=0.05)
+    slow, press = approached(faster=1.7)
+    plain = make_bench(running(press, slow, instruments=METER, imposed="displacement"))
+    for word, less in (("joint_nonlinear_stiffness", True), ("contact_seating", False)):
+        words = frozenset({word})
+        assert (prior_of(words, found.bench) < prior_of(words, plain) - 10.0) == less
+
+
+@pytest.mark.parametrize("slack", [0.33e-3, 0.72e-3])
+def test_the_width_of_a_slack_is_met_between_those_of_the_grid(slack: float) -> None:
+    u = np.linspace(0.0, STROKE, 200)
+    found = pulled(SPRING * np.maximum(u - slack, 0.0), u)
+    assert found.verdict == "contact_seating"
+    assert found.after < 1.5 * found.noise
+
+
+@pytest.mark.parametrize("what", ["slow", "short", "preload", "curve", "again"])
+def test_a_way_at_some_force_or_a_slow_one_is_no_approach(what: str) -> None:
+    u, force = approached()
+    if what == "slow":  # as fast as all of it: a drift before the first load
+        u, force = approached(faster=1.7)
+    elif what == "short":
+        u, force = approached(travel=1e-4, faster=0.2)
+    elif what == "preload":
+        force = np.where(np.arange(len(u)) > 0, force + 30.0, 0.0)
+    elif what == "again":
+        u, force = (np.concatenate([v, v[::-1]]) for v in (u, force))
+    else:
+        force = 100.0 * (u / u[-1]) ** 2
+    assert not make_bench(running(force, u, instruments=METER, imposed="displacement")).approaches

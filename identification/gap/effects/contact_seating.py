@@ -23,7 +23,9 @@ FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
 # A bench has no second direction that would tell a seat from a curved spring: only low forces.
 BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
 BENCH_SHARES = (0.01, 0.03, 0.1)
-SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)  # of an imposed stroke
+SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8)  # of an imposed stroke
+LOST = {"slack": 1.0, "toe": 0.5}  # share of a slack's stroke by which the rest comes late
+FINER = np.linspace(-0.32, 0.32, 9)  # of a slack that was found
 SHARES = (0.003, 0.01, 0.03, 0.1)  # of the deflection
 
 # How much of the depth is gone at x times the force scale, or at x times the stroke of a slack: of
@@ -85,17 +87,41 @@ def _slacks(bench: Bench, top: float) -> list[Variant]:
     and a toe of several."""
     if bench.data.arm or not bench.imposed or not bench.one_sided:
         return []
-    stroke = float(np.abs(bench.slope * bench.load).max())
-    out, (size, sign) = [], pressed(bench)
-    for law, part in (("slack", 1.0), ("toe", 0.5)):  # of the stroke, that is lost
-        columns = []
-        for share in SLACKS:
-            d, f0 = part * share * stroke, share * top
-            columns.append(bench.add(bench.outside_column(sign * LAWS[law](size / f0))))
-            out.append(variant(WORD, f"{law} {share:g}", columns[-1:], (0.5 * d, d), force_N=f0,
-                               laws=((law, f0),)))  # fmt: skip
-    root = np.diag([part * share * stroke for share in SLACKS])
+    out, columns = [], []
+    for law in LOST:
+        single = [_slack(bench, law, share * top) for share in SLACKS]
+        columns = [v.columns[0] for v in single]
+        out += single
+    root = np.diag([LOST["toe"] * _stroke(bench, share * top) for share in SLACKS])
     laws = tuple(("toe", share * top) for share in SLACKS)
     toes = variant(WORD, "toes", columns, (0.1, 0.3, 1.0), root, each=True, prior=2.0,
                    force_N=SLACKS[-1] * top, laws=laws)  # fmt: skip
     return [*out, toes]
+
+
+def _slack(bench: Bench, law: str, force: float, prior: float = 1.0) -> Variant:
+    """One slack, as wide as the simulated spring gives under a force N."""
+    size, sign = pressed(bench)
+    column = bench.add(bench.outside_column(sign * LAWS[law](size / force)))
+    d = LOST[law] * _stroke(bench, force)
+    share = force / float(np.abs(bench.load).max())
+    return variant(WORD, f"{law} {share:.3g}", [column], (0.5 * d, d), force_N=force,
+                   laws=((law, force),), prior=prior)  # fmt: skip
+
+
+def _stroke(bench: Bench, force: float) -> float:
+    """m that the simulated spring gives under a force N."""
+    return force * float(np.abs(bench.slope * bench.load).max() / np.abs(bench.load).max())
+
+
+def single_slack(v: Variant) -> bool:
+    """Whether it is one slack, of which the width has to be met well."""
+    return v.word == WORD and len(v.columns) == 1 and v.info["laws"][0][0] in LOST
+
+
+def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
+    """Slacks about one that was found, close: of the steps of a first look."""
+    ((law, force),) = found.info["laws"]
+    top = float(np.abs(bench.load).max())
+    wide = [force * (1 + close * step) for step in FINER]
+    return [_slack(bench, law, f, 1 / len(FINER)) for f in wide if f < top]
