@@ -227,7 +227,7 @@ class Bench:
     def flows_out(self) -> bool:
         """Of a single pull: it ends nearly flat, with a small share of its steepest stiffness, as
         what flows does, and elastic curves seldom."""
-        if not (self.once and self.always_moves) or len(self.data.setups) > 1:
+        if not (self.once and self.always_moves) or self.data.arm or len(self.data.setups) > 1:
             return False
         path, force = (np.abs(v - v[0]) for v in (self.data.displacement, self.data.force))
         if way_back(path) > _WANDERS * float(path.max()):
@@ -239,15 +239,16 @@ class Bench:
 
     @cached_property
     def approaches(self) -> bool:
-        """A single pull that begins with a way at no force, as before a contact."""
-        return self.once and approaches(self.data, np.arange(len(self.data.force)))
+        """A single pull without an arm that begins with a way at no force, as before a contact."""
+        every = np.arange(len(self.data.force))
+        return self.once and not self.data.arm and approaches(self.data, every)
 
     @cached_property
     def lost_in_loops(self) -> tuple[float, float]:
         """As `loops.lost` has it, of a load that stays on one side; nan for all others."""
         data, force = self.data, np.abs(self.data.force).max()
         sides = min(-float(data.force.min()), float(data.force.max()))
-        once = len(np.unique(data.run)) == 1 and len(data.setups) == 1
+        once = len(np.unique(data.run)) == 1 and len(data.setups) == 1 and not data.arm
         if not (once and self.rows.continuous and self.returns and sides < _PULLED * force):
             return float("nan"), float("nan")
         return lost(data.displacement, data.force, self.imposed)
