@@ -241,7 +241,7 @@ class Bench:
     def approaches(self) -> bool:
         """A single pull without an arm that begins with a way at no force, as before a contact."""
         every = np.arange(len(self.data.force))
-        return self.once and not self.data.arm and approaches(self.data, every)
+        return not self.data.arm and approaches(self.data, every)
 
     @cached_property
     def lost_in_loops(self) -> tuple[float, float]:

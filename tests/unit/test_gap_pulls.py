@@ -3,6 +3,8 @@ flows far beyond its knee, toes, dents, cracks."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -215,3 +217,17 @@ def test_a_way_at_some_force_or_a_slow_one_is_no_approach(what: str) -> None:
     else:
         force = 100.0 * (u / u[-1]) ** 2
     assert not make_bench(running(force, u, instruments=METER, imposed="displacement")).approaches
+
+
+def test_an_arm_is_asked_nothing_of_all_that() -> None:
+    u, force = approached()
+    flat = 60.0 * np.tanh(4e3 * np.linspace(0.0, STROKE, 160))
+    of_pulls = [
+        make_bench(running(f, x, instruments=METER, imposed="displacement"))
+        for f, x in ((force, u), (flat, np.linspace(0.0, STROKE, 160)))
+    ]
+    assert of_pulls[0].approaches
+    assert of_pulls[1].flows_out
+    near, flows = (replace(b, data=replace(b.data, arm=True)) for b in of_pulls)
+    assert not near.approaches
+    assert not flows.flows_out
