@@ -19,7 +19,15 @@ from identification.gap.history import moves, play, rests
 from identification.gap.imposed import approaches, displacement_simpler, on_plateau
 from identification.gap.loops import lost
 from identification.gap.noise import Noise, estimate_noise, standing
-from identification.gap.rows import Rows, hold_ids, is_continuous, passes, reduce_rows, turns
+from identification.gap.rows import (
+    Rows,
+    hold_ids,
+    is_continuous,
+    passes,
+    reduce_rows,
+    turns,
+    way_back,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -482,11 +490,6 @@ class Bench:
         part = np.abs(self.lever * self.elastic)
         total = part.sum(axis=1).max() or 1.0
         return [j for j in range(self.data.joints) if part[:, j].max() > 0.01 * total]
-
-
-def way_back(path: Array) -> float:
-    """How far a path (n,) falls back from the largest value before."""
-    return float((np.maximum.accumulate(path) - path).max())
 
 
 def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None = None) -> Bench:

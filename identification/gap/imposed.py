@@ -17,6 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.gap.data import Array, GapData, Ints
+from identification.gap.rows import way_back
 
 _POINTS = 1000  # bins of a recording: more do not tell the path better
 _CLOSEST = 3e-7  # of the squared range: a piece that leaves less is as good as exact
@@ -76,7 +77,7 @@ def approaches(data: GapData, mine: Ints) -> bool:
     none = max(_NO_FORCE * float(force.max()), _BEYOND * data.instruments.force)
     end = int(np.argmax(force > none))
     early = np.abs(data.force[mine[:end]]).max(initial=0.0) > 2 * none
-    back = float((np.maximum.accumulate(path) - path).max()) > _NO_FORCE * float(path.max())
+    back = way_back(path) > _NO_FORCE * float(path.max())
     if early or back or not force[end] > none:
         return False
     time = _clock(data, mine)

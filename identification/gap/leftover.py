@@ -12,13 +12,13 @@ from math import log
 
 import numpy as np
 
-from identification.gap.bench import way_back
 from identification.gap.evidence import Engine
 from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found
 from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.noise import UNSURE
 from identification.gap.penalties import CURVES
+from identification.gap.rows import way_back
 from identification.gap.verdict import weighed
 
 # An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.

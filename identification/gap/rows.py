@@ -232,6 +232,11 @@ def _blocks(run: Ints) -> Ints:
 _STRETCHES = 50
 
 
+def way_back(path: Array) -> float:
+    """How far a path (n,) falls back from the largest value before."""
+    return float((np.maximum.accumulate(path) - path).max())
+
+
 def rises(values: Array) -> Flags:
     """(n,): whether a signal goes up there, or stands."""
     return np.gradient(values) >= 0 if len(values) > 1 else np.ones(len(values), dtype=bool)

@@ -35,12 +35,11 @@ class Limits:
     def of(cls, variants: Sequence[Variant], k: int | None = None) -> Limits:
         """k: coefficients, where that is more than any of them has."""
         k = k or max(len(v.columns) for v in variants)
-        limited = [v if v.positive is not None else None for v in variants]
-        most = max(sum(v.each) + len(v.within) if v else 0 for v in limited)
+        most = max(0 if v.positive is None else sum(v.each) + len(v.within) for v in variants)
         rows = np.zeros((len(variants), 1 + most, k))
         asked = np.zeros(rows.shape[:2], dtype=bool)
-        for v, mine, mine_asked in zip(limited, rows, asked, strict=True):
-            if v is None or v.positive is None:
+        for v, mine, mine_asked in zip(variants, rows, asked, strict=True):
+            if v.positive is None:
                 continue
             own, alone = len(v.columns), np.flatnonzero(v.each)
             mine[0, :own] = v.positive

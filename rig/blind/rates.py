@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 Z95 = 1.959963984540054
 BINS = 10
@@ -53,7 +54,7 @@ def auroc(positive: Sequence[float], negative: Sequence[float]) -> float | None:
 def reliability(confidence: Sequence[float], right: Sequence[bool]) -> list[dict[str, Any]]:
     """Ten bins of equal width over 0..1: n, mean confidence, share right; empty ones left out."""
     c, r = np.asarray(confidence, dtype=float), np.asarray(right, dtype=float)
-    number = np.minimum((c * BINS).astype(int), BINS - 1)
+    number = _bin(c)
     out = []
     for b in range(BINS):
         mine = number == b
@@ -72,6 +73,10 @@ def reliability(confidence: Sequence[float], right: Sequence[bool]) -> list[dict
     return out
 
 
+def _bin(confidence: NDArray[np.float64]) -> NDArray[np.int64]:
+    return np.minimum((confidence * BINS).astype(np.int64), BINS - 1)
+
+
 def ece(confidence: Sequence[float], right: Sequence[bool]) -> float | None:
     """Expected calibration error: mean over the cases of |confidence - share right| of the bin."""
     table = reliability(confidence, right)
@@ -87,7 +92,7 @@ def ece_by_chance(confidence: Sequence[float]) -> list[float | None]:
     if not len(confidence):
         return [None, None]
     c = np.asarray(confidence, dtype=float)
-    number = np.minimum((c * BINS).astype(int), BINS - 1)
+    number = _bin(c)
     right = np.random.default_rng(0).random((_DRAWS, len(c))) < c
     off = [np.abs((right[:, number == b] - c[number == b]).sum(axis=1)) for b in range(BINS)]
     found = np.sum(off, axis=0) / len(c)

@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench, way_back
+from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.history import flowing_play
+from identification.gap.rows import way_back
 from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, variant
 
 WORD = "joint_yield"
