@@ -13,6 +13,7 @@ others count as having been looked at in vain.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from math import log
 
 import numpy as np
@@ -177,31 +178,57 @@ def _periodic(
 ) -> list[Variant]:  # fmt: skip
     """Sine and cosine of a phase (n,) from 0 to 1 for the numbers of periods in it that take most
     of the gap."""
-    n = bench.rows.n
     if not len(count):
         return []
-    white = 1 / row_noise(bench)[:n]
-    known = np.linalg.qr(base.columns[:n] * white[:, None])[0]
-    left = white * target[:n]
-    left = left - known @ (known.T @ left)
-
-    def taken(number: float) -> float:
-        both = _both(phase, number, masks) * white[:, None]
-        both = both - known @ (known.T @ both)
-        return float(left @ both @ np.linalg.lstsq(both, left, rcond=None)[0])
-
-    power = np.array([taken(c) for c in count])
+    taken = partial(_taken, bench, base, target, phase, masks)
+    power = taken(count)
     higher = np.append(True, power[1:] >= power[:-1]) & np.append(power[:-1] >= power[1:], True)
     out = []
     for i in sorted(np.flatnonzero(higher), key=lambda i: -power[i])[:_PEAKS]:
         about = count[i] + np.linspace(-1, 1, _CLOSER) / _PER_PERIOD
-        best = float(max(about, key=taken))
+        best = float(about[int(taken(about).argmax())])
         columns = [bench.add(bench.outside_column(c)) for c in _both(phase, best, masks).T]
         out.append(
             variant(kind, f"{best:.3g} periods", columns, _scales(bench), positive=False,
                     prior=1.0 / len(count), period=span / best)
         )  # fmt: skip
     return out
+
+
+def _taken(
+    bench: Bench, base: Base, target: Array, phase: Array, masks: list[Array], count: Array
+) -> Array:
+    """(c,) how much of the square of the whitened gap, beyond the base, a sine and a cosine of each
+    number of periods (c,) take, in every one of the masks, which share no row."""
+    n = bench.rows.n
+    white = 1 / row_noise(bench)[:n]
+    known = np.linalg.qr(base.columns[:n] * white[:, None])[0]
+    left = white * target[:n]
+    left = left - known @ (known.T @ left)
+    parts = [count[i : i + _AT_ONCE] for i in range(0, len(count), _AT_ONCE)]
+    return np.concatenate([_square_of(known, left, white, phase, masks, c) for c in parts])
+
+
+def _square_of(
+    known: Array, left: Array, white: Array, phase: Array, masks: list[Array], count: Array
+) -> Array:
+    """(c,) the same, of an orthonormal base (n, b), what it leaves (n,) and weights (n,)."""
+    shape = len(count), 2 * len(masks)
+    gram, moment = np.zeros((*shape, shape[1])), np.empty(shape)
+    shared = np.empty((*shape, known.shape[1]))
+    for k, mask in enumerate(masks):
+        mine, at = np.flatnonzero(mask), slice(2 * k, 2 * k + 2)
+        turn = 2 * np.pi * count[:, None] * phase[mine]
+        both = np.stack([np.sin(turn), np.cos(turn)], axis=1) * white[mine]  # (c, 2, rows)
+        gram[:, at, at] = both @ np.swapaxes(both, 1, 2)
+        moment[:, at], shared[:, at] = both @ left[mine], both @ known[mine]
+    gram -= shared @ np.swapaxes(shared, 1, 2)
+    fitted = np.linalg.pinv(gram, rcond=_ALREADY_KNOWN, hermitian=True) @ moment[..., None]
+    return np.asarray(np.sum(moment * fitted[..., 0], axis=1))
+
+
+_AT_ONCE = 32  # numbers of periods: what they take stays near the processor
+_ALREADY_KNOWN = 1e-10  # share of a square beyond the base, below which it is rounding
 
 
 def _both(phase: Array, count: float, masks: list[Array]) -> Array:
