@@ -93,7 +93,7 @@ def mean_squares(engine: Engine, columns: Ints, share: Array) -> Array:
     imperfect, share (v, k)."""
     weight = engine.bench.rows.weight
     used, place = np.unique(columns, return_inverse=True)
-    moved = moved_response(engine, engine.responses(used))
+    moved = engine.bench.rows.moved(engine.responses(used))
     moved *= np.sqrt(weight / weight.sum())[:, None]
     squares = squares_of(moved.T, place.reshape(columns.shape))
     return np.asarray(squares * share[:, :, None] * share[:, None, :])
@@ -107,18 +107,6 @@ def imperfect(variant: Variant) -> Array:
     if variant.info.get("other_springs"):
         share[-1] = exact
     return share
-
-
-def moved_response(engine: Engine, response: Array) -> Array:
-    """Responses (n, k) less their mean per setup: the datum says nothing."""
-    rows = engine.bench.rows
-    if "setups" not in engine.cache:
-        share = (rows.setup[:, None] == np.arange(len(engine.bench.data.setups))) * rows.weight[
-            :, None
-        ]
-        engine.cache["setups"] = share / np.maximum(share.sum(axis=0), 1e-300)
-    means = response.T @ engine.cache["setups"]
-    return np.asarray(response - means[:, rows.setup].T)
 
 
 def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float) -> Level:

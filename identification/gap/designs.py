@@ -79,7 +79,7 @@ def present_design(bench: Bench) -> Design:
     if not rows.continuous:
         hold = float(np.median(rows.hold_weight[~rows.zero])) * sample if ~rows.zero.all() else hold
     else:
-        once = max(bench.session_span / max(len(np.unique(rows.run)), 1), 1e-6)
+        once = max(bench.course.session_span / max(len(np.unique(rows.run)), 1), 1e-6)
         hold, approach, zero, sample = once / 20, 0.0, 0.0, once / 100
     sizes = np.sign(bench.load) * (np.abs(bench.load) > 0.2 * np.abs(bench.load).max())
     return Design(
@@ -95,7 +95,11 @@ def present_design(bench: Bench) -> Design:
 
 def _unloads(bench: Bench) -> bool:
     """Whether it comes back step by step, not only to zero at once."""
-    return bench.unloads if bench.rows.continuous else bool(np.any(bench.rows.branch == UNLOADING))
+    return (
+        bench.course.unloads
+        if bench.rows.continuous
+        else bool(np.any(bench.rows.branch == UNLOADING))
+    )
 
 
 def _zero_s(bench: Bench, sample: float) -> float:

@@ -324,7 +324,7 @@ def _notes(bench: Bench) -> tuple[str, ...]:
     data, rows, out = bench.data, bench.rows, list(bench.data.notes)
     if not np.ptp(bench.load) > 0:
         out.append("The load does not change: nothing can be said of stiffness or of joints.")
-    if not bench.unloads:
+    if not bench.course.unloads:
         out.append("Nothing was unloaded: lasting and elastic deflection look alike.")
     if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
         out.append("One repetition: what repeats and what does not can't be told apart.")
@@ -333,7 +333,7 @@ def _notes(bench: Bench) -> tuple[str, ...]:
         out.append(f"Joint readings are {reason}: joints, links and base look alike.")
     if data.session is None and data.arm:
         out.append("No session clock: drifts are seen only within runs and from run to run.")
-    if bench.timeless:
+    if bench.course.timeless:
         out.append("No time was recorded: lags, creep and how fast it flowed are left out.")
     out += faults(data)
     if bench.noise.raised > NOISY:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.compare import moved_response
 from identification.gap.data import Array, Ints
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
@@ -78,7 +77,7 @@ def _moved(engine: Engine, explanation: Explanation) -> float:
     fitted, n = fit(engine, explanation), engine.bench.rows.n
     bent = [i for i, p in enumerate(explanation.parts) if p.word not in LINEAR]
     moved = sum((fitted.contribution(engine, i)[:n] for i in bent), np.zeros(n))
-    square = moved_response(engine, moved[:, None])[:, 0] ** 2
+    square = engine.bench.rows.moved(moved[:, None])[:, 0] ** 2
     weight = engine.bench.rows.weight
     return max(engine.structural, float(np.sqrt(weight @ square / weight.sum())))
 

@@ -303,11 +303,8 @@ def structural_rms(bench: Bench, base: Base, target: Array) -> float:
 def _variance(bench: Bench) -> float:
     """Mean square (m^2) of the response about its mean per setup: a law that does more, as what
     yields far beyond its threshold on an imposed path, is no further off for that."""
-    weight, setup = bench.rows.weight, bench.rows.setup
-    mean = np.bincount(setup, weight * bench.response) / np.maximum(
-        np.bincount(setup, weight), 1e-300
-    )
-    return float(weight @ (bench.response - mean[setup]) ** 2 / weight.sum())
+    weight, moved = bench.rows.weight, bench.rows.moved(bench.response[:, None])[:, 0]
+    return float(weight @ moved**2 / weight.sum())
 
 
 def row_noise(bench: Bench) -> Array:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.compare import moved_response
 from identification.gap.data import Array, Flags
 from identification.gap.evidence import (
     HOLD_PART,
@@ -105,7 +104,7 @@ def _misled(engine: Engine, parts: tuple[Part, ...], w: Array, eta: float) -> Ar
     n, weight = engine.bench.rows.n, engine.bench.rows.weight
     columns = engine.columns(c for p in parts for c in p.variant.columns)
     does = (columns[:n] @ w)[:, None]
-    moved = moved_response(engine, does)[:, 0]
+    moved = engine.bench.rows.moved(does)[:, 0]
     size = float(np.sqrt(weight @ moved**2 / weight.sum()))
     own = [engine.bench.stacked(moved * m / size) for m in _phases(engine) if size > 0]
     return eta * np.column_stack([engine.cache["imperfection"], *own])

@@ -120,7 +120,7 @@ def _falls(engine: Engine) -> bool:
     """Whether the response goes back in a single pull whose load goes on; one reading that jumps
     off does not."""
     bench = engine.bench
-    if not bench.once or not bench.always_moves:
+    if not bench.course.once or not bench.course.always_moves:
         return False
     size = np.abs(bench.response - bench.response[0])
     fall = way_back(np.median([size[:-2], size[1:-1], size[2:]], axis=0))

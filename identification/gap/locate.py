@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.compare import moved_response
 from identification.gap.data import BRANCH_NAMES, Array, Flags, Ints
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit
@@ -61,7 +60,7 @@ def locate(engine: Engine, fit: Fit, gap: Array) -> Where:
 
 def _visible(engine: Engine, fit: Fit, main: Array) -> Array:
     """The main effect less what the springs would take over per setup, unless it is linear."""
-    moved = moved_response(engine, main[:, None])[:, 0]
+    moved = engine.bench.rows.moved(main[:, None])[:, 0]
     if not fit.parts or fit.parts[0].word in LINEAR:
         return moved
     out = moved.copy()

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from identification.gap.compare import imperfect, mean_squares, moved_response
+from identification.gap.compare import imperfect, mean_squares
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import LINEAR
@@ -59,7 +59,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
         does = engine.responses(c) @ np.column_stack([part, imperfect(p.variant) * part])
-        moved, faulty = moved_response(engine, does).T
+        moved, faulty = engine.bench.rows.moved(does).T
         square = float(weight @ moved**2 / weight.sum())
         moves.append(square**0.5)
         if p.word in LINEAR:
@@ -80,7 +80,7 @@ def _beyond_springs(engine: Engine, moved: Array) -> float:
     root = np.sqrt(engine.bench.rows.weight / engine.bench.rows.weight.sum())
     if "springs" not in engine.cache:
         springs = base.index("spring")
-        A = moved_response(engine, base.columns[:n, springs]) * base.sd[springs] * root[:, None]
+        A = engine.bench.rows.moved(base.columns[:n, springs]) * base.sd[springs] * root[:, None]
         engine.cache["springs"], engine.cache["to springs"] = A, np.linalg.pinv(A, rcond=1e-6)
     t = engine.cache["to springs"] @ (moved * root)
     left = float(np.linalg.norm(moved * root - engine.cache["springs"] @ t))

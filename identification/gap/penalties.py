@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.compare import moved_response
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.imperfection import LINEAR
@@ -110,7 +109,7 @@ def _rms_of_line(engine: Engine, part: Part) -> float:
     """rms (m) by which a gain of one, or a spring twice as soft, moves."""
     n, weight = engine.bench.rows.n, engine.bench.rows.weight
     line = engine.columns(part.variant.columns)[:n, :1]
-    moved = moved_response(engine, line)[:, 0]
+    moved = engine.bench.rows.moved(line)[:, 0]
     return max(float(np.sqrt(weight @ moved**2 / weight.sum())), 1e-300)
 
 
@@ -146,9 +145,9 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     linear part of the other: a mechanism's law brings its own mean stiffness."""
     same = bool(_joints(one) & _joints(other))
     words = {one.word, other.word}
-    holds = "joint_creep" in words and not engine.bench.always_moves
+    holds = "joint_creep" in words and not engine.bench.course.always_moves
     bench = engine.bench  # without any return all memory is hidden; arms are let go between runs
-    hidden = bench.once or not (bench.data.arm or bench.returns)
+    hidden = bench.course.once or not (bench.data.arm or bench.course.returns)
     # but what gets stiffer at the start and softer in the end is two things
     if hidden and words <= MECHANISMS and not holds and words != TOE_AND_KNEE:
         return True
@@ -184,7 +183,7 @@ def _by_direction(engine: Engine, part: Part) -> Array:
     names = [s.direction for s in engine.bench.data.setups]
     number = np.array([names.index(n) for n in names])[engine.bench.rows.setup]
     does = engine.columns(part.variant.columns)[: engine.bench.rows.n] @ part.root
-    square = np.sum(moved_response(engine, does) ** 2, axis=1)
+    square = np.sum(engine.bench.rows.moved(does) ** 2, axis=1)
     sums = np.bincount(number, weights=square, minlength=len(names))
     return np.asarray(sums / max(float(sums.sum()), 1e-300))
 

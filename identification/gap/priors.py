@@ -7,9 +7,12 @@ for what some data make rarer.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import comb, log
+from typing import NamedTuple
 
 from identification.gap.bench import Bench
+from identification.gap.course import Course
 from identification.gap.effects import WORDS
 from identification.gap.penalties import CURVES
 
@@ -18,21 +21,39 @@ LOG_ONE = log(0.37)
 LOG_MORE = log(0.05)
 # A bolted stand slips less often than a joint or its controller gives way.
 LOG_RARE = {"base_slip": log(0.5)}
-# Friction that was never seen to make a loop; a target that warms up while it is held in place.
-LOG_UNSEEN, LOG_HELD = log(0.05), log(0.05)
 
-# Loops at one rate are commonly friction; what comes late differs from it in details of the curve
-# only (tempered, as all of a running recording: odds of 40).
-LOG_ONE_RATE = -30.0
-# A single pull that ends nearly flat: of 12 such records of others, 11 were of what yields
-# (tempered: odds of 10).
-LOG_FLOWS = -20.0
-# A way at no force before all of it: what is not there yet has no curve (tempered: odds of 10).
-LOG_APPROACH = -20.0
-# Loaded from one side and let go again and again: friction that is seen the first time only, metal
-# that flows back under a pull (tempered: odds of 40 and 10).
-LOG_NO_LOOP, LOG_ALL_LOOPS = -30.0, -20.0
+
+class Rarer(NamedTuple):
+    """Sets with one of the words, and with none of those `without`, are so many nats rarer where
+    the course of the load is such."""
+
+    nats: float
+    words: frozenset[str]
+    without: frozenset[str]
+    where: Callable[[Course], bool]
+
+
+_HYSTERESIS, _YIELD = frozenset({"joint_hysteresis"}), frozenset({"joint_yield"})
 _LATE = frozenset({"joint_creep", "time_lag"})
+_TOUCHES = frozenset({"contact_seating", "joint_backlash"})
+_ANY, _NO_WORD = frozenset(WORDS), frozenset[str]()
+# Evidence of running recordings is tempered: 10 nats there are odds of about 3, 20 of 10, 30 of 40.
+RARER = (
+    # Friction that was never seen to make a loop.
+    Rarer(log(0.05), _HYSTERESIS, _NO_WORD, lambda c: c.once),
+    # A target that warms up while it is held in place.
+    Rarer(log(0.05), frozenset({"thermal_drift"}), _NO_WORD, lambda c: c.imposed),
+    # Loops at one rate are commonly friction; what comes late differs from it in details only.
+    Rarer(-30.0, _LATE, _NO_WORD, lambda c: c.one_rate),
+    # A single pull that ends nearly flat: of 12 such records of others, 11 were of what yields.
+    Rarer(-20.0, CURVES, _YIELD, lambda c: c.flows_out),
+    # A way at no force before all of it: what is not there yet has no curve.
+    Rarer(-20.0, _ANY, _TOUCHES, lambda c: c.approaches),
+    # Loaded from one side and let go again and again: friction that is seen the first time only,
+    Rarer(-30.0, _HYSTERESIS, _NO_WORD, lambda c: c.comes_back_as_it_went),
+    # and metal that flows back under a pull.
+    Rarer(-20.0, _YIELD, _HYSTERESIS, lambda c: c.rubs),
+)
 
 
 def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
@@ -41,18 +62,14 @@ def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
         return LOG_NONE
     rare = sum(LOG_RARE.get(w, 0.0) for w in words)
     if bench is not None:
-        rare += LOG_UNSEEN * ("joint_hysteresis" in words and bench.once)
-        rare += LOG_HELD * ("thermal_drift" in words and bench.imposed)
-        rare += LOG_ONE_RATE * (bool(words & _LATE) and bench.one_rate)
-        bent = bool(words & CURVES) and "joint_yield" not in words
-        rare += LOG_FLOWS * (bent and bench.flows_out)
-        touches = "contact_seating" in words or "joint_backlash" in words
-        rare += LOG_APPROACH * (bool(words) and not touches and bench.approaches)
-        rare += LOG_NO_LOOP * ("joint_hysteresis" in words and bench.comes_back_as_it_went)
-        flows = "joint_yield" in words and "joint_hysteresis" not in words
-        rare += LOG_ALL_LOOPS * (flows and bench.rubs)
-        rare += _by_calibration(words, bench)
+        rare += _of_course(words, bench.course) + _by_calibration(words, bench)
     return LOG_ONE + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(words))) + rare
+
+
+def _of_course(words: frozenset[str], course: Course) -> float:
+    return sum(
+        r.nats for r in RARER if words & r.words and not words & r.without and r.where(course)
+    )
 
 
 def _by_calibration(words: frozenset[str], bench: Bench) -> float:

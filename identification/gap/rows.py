@@ -8,6 +8,7 @@ one is kept as it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -63,6 +64,19 @@ class Rows:
     def n(self) -> int:
         """Number of rows."""
         return len(self.force)
+
+    @cached_property
+    def _share_of_setup(self) -> Array:
+        """(n, s) what each row weighs in the mean of its setup."""
+        weight = (
+            np.equal.outer(self.setup, np.arange(int(self.setup.max()) + 1)) * self.weight[:, None]
+        )
+        return np.asarray(weight / np.maximum(weight.sum(axis=0), 1e-300))
+
+    def moved(self, values: Array) -> Array:
+        """Values (n, k) less their mean per setup: the datum says nothing."""
+        means = values.T @ self._share_of_setup
+        return np.asarray(values - means[:, self.setup].T)
 
 
 def reduce_rows(data: GapData) -> Rows:

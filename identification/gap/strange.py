@@ -64,10 +64,10 @@ PLAIN = 3.0  # nats that a shape must explain the gap better than none, to be to
 def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     """Variants of all kinds that these data could show (`word`: the kind); the pool of the bench
     holds their columns afterwards."""
-    if bench.rows.n < _FEWEST_ROWS or (bench.rows.continuous and not bench.rests):
+    if bench.rows.n < _FEWEST_ROWS or (bench.rows.continuous and not bench.course.rests):
         return []
     swings = _swings(bench, base, target)
-    if bench.rests:
+    if bench.course.rests:
         return swings
     waves = _waves(bench, base, target)
     return [*_slopes(bench), *swings, *waves, *_rough(bench), *_jumps(bench)]
@@ -103,7 +103,7 @@ def _slopes(bench: Bench) -> list[Variant]:
     rows, line = bench.rows, bench.slope * bench.load
     top = float(np.abs(line).max())
     runs = np.unique(rows.run)
-    if not (top > 0 and bench.repeats):
+    if not (top > 0 and bench.course.repeats):
         return []
     each = [bench.add(bench.outside_column(line / top * (rows.run == r))) for r in runs]
     hats = free_path(bench, _PIECES)
@@ -119,13 +119,13 @@ def _slopes(bench: Bench) -> list[Variant]:
 def _swings(bench: Bench, base: Base, target: Array) -> list[Variant]:
     """Displacement swings with time, in every direction by an amplitude of its own. Where nothing
     is loaded anew, the slower ones may be heat that comes and goes with the day."""
-    if not (bench.rows.clock or (bench.rests and bench.data.timed)):
+    if not (bench.rows.clock or (bench.course.rests and bench.data.timed)):
         return []
     masks = list(by_direction(bench).values())
-    span = bench.session_span
+    span = bench.course.session_span
     least = LEAST_SWINGS * bench.rows.n / min(int(m.sum()) for m in masks)
     most = bench.rows.n / _SHORTEST_ROWS / 2
-    if bench.rests:
+    if bench.course.rests:
         least = max(least, RESTING_SWINGS)
     count = np.arange(least, max(most, least), 1 / _PER_PERIOD)
     time = (bench.rows.session - bench.rows.session.min()) / span

@@ -118,9 +118,9 @@ def test_what_ends_nearly_flat_flows_rather_than_bends() -> None:
     u = np.linspace(0.0, 1e-3, N)
     flat = 60.0 * np.tanh(4 * SPRING * u / 60.0)
     flows, bends = make_bench(recording(flat)), make_bench(recording(60.0 * np.tanh(2e3 * u)))
-    assert flows.flows_out
-    assert not bends.flows_out  # to a seventh of its stiffness
-    assert not make_bench(recording(flat, u + 1e-4 * np.sin(np.arange(N)))).flows_out
+    assert flows.course.flows_out
+    assert not bends.course.flows_out  # to a seventh of its stiffness
+    assert not make_bench(recording(flat, u + 1e-4 * np.sin(np.arange(N)))).course.flows_out
     words = frozenset({"joint_nonlinear_stiffness"})
     assert prior_of(words, flows) < prior_of(words, bends) - 10.0
     both = words | {"joint_yield"}
@@ -156,7 +156,7 @@ def test_a_line_far_off_that_bends_within_the_noise_is_a_spring(
 def test_a_force_that_grows_while_the_reading_stands_is_no_hold() -> None:
     """An extensometer that grips late."""
     u = np.maximum(np.linspace(-4e-4, 1e-3, N), 0.0)
-    assert make_bench(recording(line(), u)).never_held
+    assert make_bench(recording(line(), u)).course.never_held
     held = np.minimum(np.linspace(0.0, 1.4e-3, N), 1e-3)
     relaxing = SPRING * held * np.where(held < 1e-3, 1.0, np.linspace(1.3, 0.6, N))
-    assert not make_bench(recording(relaxing, held)).never_held
+    assert not make_bench(recording(relaxing, held)).course.never_held

@@ -93,7 +93,7 @@ def test_a_table_without_a_clock_says_nothing_of_lags_and_creep(
     data = gap_data(load(tmp_path / "d.h5"))
     assert data.timed is clock
     bench = make_bench(data)
-    assert bench.timeless is not clock
+    assert bench.course.timeless is not clock
     knee = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")
     assert any(" flow " in v.label for v in joint_yield.refined(bench, knee)) is clock
     words = {v.word for v in library(bench, ["joint_creep", "time_lag", "joint_hysteresis"])}
@@ -104,11 +104,11 @@ def test_a_table_without_a_clock_says_nothing_of_lags_and_creep(
 def test_one_reading_a_level_in_a_single_pull_shows_no_creep() -> None:
     force = np.arange(10) * 20.0
     once = make_bench(bench_data(force, 1e-5 * force))
-    assert once.never_held
+    assert once.course.never_held
     assert not library(once, ["joint_creep"])
     twice = make_bench(bench_data(np.repeat(force, 2), 1e-5 * np.repeat(force, 2),
                                   step=np.repeat(np.arange(10), 2) + 1))  # fmt: skip
-    assert not twice.never_held
+    assert not twice.course.never_held
     assert library(twice, ["joint_creep"])
 
 

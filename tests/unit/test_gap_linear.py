@@ -10,7 +10,6 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import moved_response
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence import Engine
@@ -82,7 +81,7 @@ def test_of_what_the_springs_hide_a_little_counts(bench: Bench) -> None:
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
     spring = engine.base.index("spring")[:1]
     column = engine.base.columns[: bench.rows.n, spring] * engine.base.sd[spring]
-    moved = 0.5 * moved_response(engine, column)[:, 0]  # half a standard deviation
+    moved = 0.5 * engine.bench.rows.moved(column)[:, 0]  # half a standard deviation
     size = np.sqrt(bench.rows.weight @ moved**2 / bench.rows.weight.sum())
     assert _beyond_springs(engine, moved) == pytest.approx(0.03 * size)
     assert _beyond_springs(engine, 100 * moved) > 0.9 * 100 * size
@@ -109,7 +108,7 @@ def test_a_gain_within_what_is_stated_is_no_effect(bench: Bench, word: str) -> N
     engine = Engine(fresh, base_columns(fresh), fresh.observed, np.array([0.0, 3e-6]))
     gain, meter = variants["gain"], fresh.data.instruments
     sd = meter.force_gain if word == "force_scale" else meter.displacement_gain
-    line = moved_response(engine, engine.columns(gain.columns)[: fresh.rows.n])[:, 0]
+    line = engine.bench.rows.moved(engine.columns(gain.columns)[: fresh.rows.n])[:, 0]
     one = np.sqrt(fresh.rows.weight @ line**2 / fresh.rows.weight.sum())
 
     def charge(off: float) -> float:
@@ -128,7 +127,7 @@ def test_a_spring_within_what_is_stated_is_none(bench: Bench) -> None:
     sd = float(fresh.data.compliance_relative_sd[spring.info["joint"]])
     column = engine.columns(spring.columns)[: fresh.rows.n]
     weight = fresh.rows.weight
-    one = float(np.sqrt(weight @ moved_response(engine, column)[:, 0] ** 2 / weight.sum()))
+    one = float(np.sqrt(weight @ engine.bench.rows.moved(column)[:, 0] ** 2 / weight.sum()))
 
     def charge(off: float) -> float:
         sizes = Sizes(np.zeros(1), np.array([off * one]), 0.0)

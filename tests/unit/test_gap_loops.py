@@ -63,18 +63,18 @@ def test_no_loop_is_made_of_a_pull_or_of_one_cycle() -> None:
 def test_metal_that_flows_on_comes_back_as_it_went(knee: float) -> None:
     u, force = flowed(strokes(4, growing=True), knee)
     bench = make_bench(recording(u, force))
-    first, again = bench.lost_in_loops
+    first, again = bench.course.lost_in_loops
     assert first > 0.2
     assert again < 0.04
-    assert bench.comes_back_as_it_went
-    assert not bench.rubs
+    assert bench.course.comes_back_as_it_went
+    assert not bench.course.rubs
 
 
 def test_friction_rubs_every_time() -> None:
     u = strokes(4)
     bench = make_bench(recording(u, rubbed(u) + 25.0))
-    assert bench.rubs
-    assert not bench.comes_back_as_it_went
+    assert bench.course.rubs
+    assert not bench.course.comes_back_as_it_went
 
 
 @pytest.mark.parametrize("what", ["both ways", "two runs", "a spring", "seats", "flows and rubs"])
@@ -96,8 +96,8 @@ def test_nothing_is_said_of_other_loads(what: str) -> None:
     else:
         data = recording(u, SPRING * u)
     bench = make_bench(data)
-    assert not bench.rubs
-    assert not bench.comes_back_as_it_went
+    assert not bench.course.rubs
+    assert not bench.course.comes_back_as_it_went
 
 
 def test_loops_count_for_friction_and_against_it() -> None:

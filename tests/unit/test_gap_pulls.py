@@ -131,8 +131,8 @@ def test_pulls_that_start_from_zero_again_show_that_a_curve_comes_back() -> None
     n = len(x)
     run = np.repeat([0, 1], n)
     found = pulled(np.tile(force, 2), np.tile(x * STROKE, 2), run=run, repetition=run + 1)
-    assert found.bench.repeats
-    assert not found.bench.unloads
+    assert found.bench.course.repeats
+    assert not found.bench.course.unloads
     assert found.verdict == "joint_nonlinear_stiffness"
     assert found.fit.parts[0].variant.label == "joint 1 fine curve"
 
@@ -144,7 +144,7 @@ def test_a_dent_that_stays_yields_from_the_first_load_on(left: float, under_a_ti
     most = np.maximum.accumulate(x)
     depth = STROKE * (left * most**0.5 + (1 - left) * x**0.7)
     data = running(100 * x, depth, imposed="force", instruments=METER)
-    assert make_bench(data).left_behind == pytest.approx(left, abs=0.02)
+    assert make_bench(data).course.left_behind == pytest.approx(left, abs=0.02)
     labels = [v.label for v in library(make_bench(data), ["joint_yield"])]
     assert ("joint 1 hardened beyond 0.01" in labels) is under_a_tip
     if under_a_tip:
@@ -183,7 +183,7 @@ def test_a_way_at_no_force_before_a_contact_is_taken_up_slack() -> None:
     u, force = approached()
     found = pulled(force, u, imposed=None)
     assert found.bench.imposed
-    assert found.bench.approaches
+    assert found.bench.course.approaches
     assert found.verdict == "contact_seating"
     assert found.probabilities["contact_seating"] > 0.6
     (depth,) = (p for n, p in found.effects[0].parameters.items() if n == "depth")
@@ -216,7 +216,9 @@ def test_a_way_at_some_force_or_a_slow_one_is_no_approach(what: str) -> None:
         u, force = (np.concatenate([v, v[::-1]]) for v in (u, force))
     else:
         force = 100.0 * (u / u[-1]) ** 2
-    assert not make_bench(running(force, u, instruments=METER, imposed="displacement")).approaches
+    assert not make_bench(
+        running(force, u, instruments=METER, imposed="displacement")
+    ).course.approaches
 
 
 def test_an_arm_is_asked_nothing_of_all_that() -> None:
@@ -226,8 +228,8 @@ def test_an_arm_is_asked_nothing_of_all_that() -> None:
         make_bench(running(f, x, instruments=METER, imposed="displacement"))
         for f, x in ((force, u), (flat, np.linspace(0.0, STROKE, 160)))
     ]
-    assert of_pulls[0].approaches
-    assert of_pulls[1].flows_out
+    assert of_pulls[0].course.approaches
+    assert of_pulls[1].course.flows_out
     near, flows = (replace(b, data=replace(b.data, arm=True)) for b in of_pulls)
-    assert not near.approaches
-    assert not flows.flows_out
+    assert not near.course.approaches
+    assert not flows.course.flows_out

@@ -42,7 +42,7 @@ def test_what_is_stated_of_a_bench_is_known_to_a_factor_of_two() -> None:
 def test_many_readings_of_a_level_tell_the_time_without_a_clock(repeats: int, told: bool) -> None:
     data = levels(0.5, repeats)
     bench = make_bench(GapData(**{**vars(data), "timed": False}))
-    assert bench.timeless is not told
+    assert bench.course.timeless is not told
     assert bool(library(bench, ["joint_creep"])) is told
 
 
@@ -58,7 +58,7 @@ def test_pulls_that_never_come_back_hide_all_memory(back: bool, hidden: bool) ->
     base, target = base_columns(bench), bench.observed - prediction(bench)
     engine = Engine(bench, base, target, eta_levels(bench, base, target))
     words = {v.word: Part(v, v.scales[0]) for v in variants}
-    assert not bench.once
+    assert not bench.course.once
     assert _same_element(engine, *words.values()) is hidden
 
 

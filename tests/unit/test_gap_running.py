@@ -125,7 +125,7 @@ def test_one_running_pass_or_cycle_shows_no_drift(word: str) -> None:
     for cycles in (0.5, 1.0):
         force = 100 * triangle(400, cycles)
         bench = make_bench(running(force, force / SPRING, imposed="force"))
-        assert bench.passes < 3
+        assert bench.course.passes < 3
         assert words_with(bench, word) == []
 
 
@@ -143,7 +143,7 @@ def test_cycles_and_an_unloaded_rig_show_drifts_of_any_path(word: str) -> None:
     assert "free path" in words_with(make_bench(running(force, force / SPRING)), word)
     still, moving = rng.normal(0, 0.1, 900), np.cumsum(rng.normal(0, 1e-7, 900))
     rest = make_bench(running(still, moving, imposed="force"))
-    assert rest.stands
+    assert rest.course.stands
     assert "free path" in words_with(rest, word)
     assert free_paths(rest) == {"free path": 20}  # a quicker one could be anything
     assert max(shares(rest, (0.1, 0.3))) == 3.0
@@ -261,8 +261,8 @@ def test_one_factor_is_shared_as_calibrations_are_stated() -> None:
 def test_one_pull_that_never_stood_shows_neither_creep_nor_exponential_friction() -> None:
     force = 100 * triangle(400, 0.5)
     bench = make_bench(running(force, force / SPRING, imposed="force"))
-    assert bench.once
-    assert bench.always_moves
+    assert bench.course.once
+    assert bench.course.always_moves
     assert words_with(bench, "joint_creep") == []
     assert not any("Dahl" in w or "worked in" in w for w in words_with(bench, "joint_hysteresis"))
     cycled = make_bench(running(100 * triangle(400, 2), 1e-3 * triangle(400, 2), imposed="force"))
@@ -354,14 +354,14 @@ def test_passes_that_go_about_as_fast_go_at_one_rate(slower: float, one: bool) -
     data = bench_data(force, force / SPRING, step=np.full(400, -1), branch=np.full(400, 3),
                       session=seconds, time=seconds, imposed="force")  # fmt: skip
     bench = make_bench(data)
-    assert bench.one_rate is one
+    assert bench.course.one_rate is one
     slow = prior_of(frozenset(["joint_creep"]), bench)
     assert (slow < prior_of(frozenset(["joint_creep"])) - 20) is one
 
 
 def test_what_was_held_goes_at_no_rate() -> None:
     force = 100 * np.minimum(np.arange(400) / 100, 1.0)
-    assert not make_bench(running(force, force / SPRING, imposed="force")).one_rate
+    assert not make_bench(running(force, force / SPRING, imposed="force")).course.one_rate
 
 
 def test_a_stroke_that_hardly_comes_back_has_come_back() -> None:
@@ -371,19 +371,23 @@ def test_a_stroke_that_hardly_comes_back_has_come_back() -> None:
     force = np.concatenate([np.linspace(0, 50, 100), np.linspace(50, 10, 50),
                             np.linspace(10, 70, 80)])  # fmt: skip
     meter = Instruments(0.1, 1e-7, 0.005, 0.003)
-    assert not make_bench(running(force, depth, imposed="displacement", instruments=meter)).once
+    assert not make_bench(
+        running(force, depth, imposed="displacement", instruments=meter)
+    ).course.once
     slipped = np.linspace(0, 1e-3, 230)  # the force falls, the stroke goes on
-    assert make_bench(running(force, slipped, imposed="displacement", instruments=meter)).once
+    assert make_bench(
+        running(force, slipped, imposed="displacement", instruments=meter)
+    ).course.once
 
 
 def test_a_load_that_wavers_without_any_bearing_stands() -> None:
     rng = np.random.default_rng(10)
     force = rng.normal(0, 0.5, 400)  # five times what is stated
     drifting = make_bench(running(force, np.linspace(0, 1e-3, 400), imposed="force"))
-    assert drifting.stands
+    assert drifting.course.stands
     assert "free path" in words_with(drifting, "thermal_drift")
     spring = make_bench(running(force, force / SPRING, imposed="force"))
-    assert not spring.stands
+    assert not spring.course.stands
 
 
 def test_a_cell_at_rest_says_nothing_of_any_stiffness() -> None:
@@ -391,7 +395,7 @@ def test_a_cell_at_rest_says_nothing_of_any_stiffness() -> None:
     rng = np.random.default_rng(11)
     force = np.round(rng.normal(0, 0.1, 250), 2)
     bench = make_bench(running(force, np.zeros(250), imposed="force"))
-    assert bench.stands
+    assert bench.course.stands
     assert {v.word for v in library(bench)} <= set(STANDING)
     found = diagnose_gap(running(force, np.zeros(250), imposed="force"))
     assert found.verdict in ("none", "force_drift")
@@ -408,7 +412,7 @@ def test_several_rates_at_once_are_as_free_as_a_path_of_pieces(cycles: float, ma
 def test_strokes_that_grow_in_the_same_time_go_at_one_rate() -> None:
     t = np.arange(600) / 600
     force = 100 * (0.1 + t) * np.sin(2 * np.pi * 5 * t)
-    assert make_bench(running(force, force / SPRING, imposed="force")).one_rate
+    assert make_bench(running(force, force / SPRING, imposed="force")).course.one_rate
 
 
 def test_a_melt_that_flows_on_creeps_however_far() -> None:
@@ -434,4 +438,6 @@ def test_a_melt_that_flows_on_creeps_however_far() -> None:
 def test_turning_points_of_a_crank_are_no_holds() -> None:
     for cycles in (2, 3, 5, 8):
         force = 100 * np.sin(2 * np.pi * cycles * np.arange(900) / 900)
-        assert make_bench(running(force, force / SPRING, imposed="force")).always_moves, cycles
+        assert make_bench(running(force, force / SPRING, imposed="force")).course.always_moves, (
+            cycles
+        )

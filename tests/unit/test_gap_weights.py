@@ -237,7 +237,7 @@ def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> 
 def test_a_joint_shows_strong_friction_in_a_single_loading_a_specimen_none() -> None:
     """One strength alone stays small: what bends all at once is a knee."""
     bench = hanging(UP[:5], gravity=0.0)
-    assert bench.once
+    assert bench.course.once
     found = library(bench, ["joint_hysteresis"])
     whole = next(v for v in found if v.label.endswith("spectrum"))
     span = bench.reach_of(bench.true_torque[:, 0])

@@ -37,7 +37,7 @@ STANDING = ("joint_creep", "force_drift", "thermal_drift", "zero_shift")
 def library(bench: Bench, words: Iterable[str] = WORDS) -> list[Variant]:
     """All variants of the words; the pool of the bench holds their columns afterwards."""
     out: list[Variant] = []
-    idle = bench.rows.continuous and bench.stands
+    idle = bench.rows.continuous and bench.course.stands
     for word in words:
         if idle and word not in STANDING:
             continue

@@ -42,7 +42,7 @@ def variants(bench: Bench) -> list[Variant]:
     """Per force scale and law, and a mixture of scales. What bears both ways is no seat: what is
     slack there is a play."""
     top = float(np.abs(bench.load).max())
-    if not top > 0 or not (bench.data.arm or bench.one_sided):
+    if not top > 0 or not (bench.data.arm or bench.course.one_sided):
         return []
     scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else BENCH_SHARES))
     size, sign = pressed(bench)
@@ -74,7 +74,7 @@ def variants(bench: Bench) -> list[Variant]:
 def pressed(bench: Bench) -> tuple[Array, Array]:
     """Force (n,) N on the seat and its sense. A bench that is loaded from one side presses on it
     from where its load begins, wherever the zero of its force is."""
-    if bench.data.arm or not bench.one_sided:
+    if bench.data.arm or not bench.course.one_sided:
         return np.abs(bench.load), np.sign(bench.load)
     sense = 1.0 if bench.load.max() >= -bench.load.min() else -1.0
     pushed = sense * bench.load
@@ -85,7 +85,7 @@ def _slacks(bench: Bench, top: float) -> list[Variant]:
     """Where the stroke is imposed, from one side: slack that is taken up before force rises, at
     once or bit by bit, told by the stroke: the force that is simulated for it knows of no slack;
     and a toe of several."""
-    if bench.data.arm or not bench.imposed or not bench.one_sided:
+    if bench.data.arm or not bench.imposed or not bench.course.one_sided:
         return []
     out, columns = [], []
     for law in LOST:

@@ -17,7 +17,7 @@ LONG_PIECES, RESTING_PIECES, LEAST_PIECES = 40, 20, 4
 
 def warm_ups(bench: Bench) -> dict[str, Array]:
     """Named paths (n,), 0 at the start, about 1 at the end: line, exponentials, root of time."""
-    t = (bench.rows.session - bench.rows.session.min()) / bench.session_span
+    t = (bench.rows.session - bench.rows.session.min()) / bench.course.session_span
     out = {"linear": t, "root": np.sqrt(t)}
     for share in RATES:
         out[f"T {share:g}"] = (1 - np.exp(-t / share)) / (1 - np.exp(-1 / share))
@@ -34,9 +34,9 @@ def own_clock(bench: Bench) -> bool:
     """Whether time and load part company: the load comes and goes at least three times, in runs or
     in cycles of one, or there is none at all. Else a path in time is a curve of the load, or the
     creep under one that stands."""
-    if bench.stands and _loaded(bench):
+    if bench.course.stands and _loaded(bench):
         return False
-    return bench.passes >= 3
+    return bench.course.passes >= 3
 
 
 def paths(bench: Bench) -> dict[str, Array]:
@@ -55,7 +55,7 @@ def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
         return usual[:SMALL]
     if not bench.rows.continuous:
         return usual
-    return (*(s for s in usual if s < 0.3), 0.3, *((1.0, 3.0) if bench.rests else ()))
+    return (*(s for s in usual if s < 0.3), 0.3, *((1.0, 3.0) if bench.course.rests else ()))
 
 
 _LOADED = 0.3  # of the largest force
@@ -83,14 +83,14 @@ def free_paths(bench: Bench) -> dict[str, int]:
         return {}
     if not bench.rows.continuous:
         return PIECES
-    most = RESTING_PIECES if bench.rests else LONG_PIECES
-    pieces = min(3 * (bench.passes - 3), most)
+    most = RESTING_PIECES if bench.course.rests else LONG_PIECES
+    pieces = min(3 * (bench.course.passes - 3), most)
     return {"free path": pieces} if pieces >= LEAST_PIECES else {}
 
 
 def free_path(bench: Bench, pieces: int) -> Array:
     """Hat functions (n, pieces) over the session; with correlated coefficients a smooth path."""
-    t = (bench.rows.session - bench.rows.session.min()) / bench.session_span
+    t = (bench.rows.session - bench.rows.session.min()) / bench.course.session_span
     at = np.linspace(0, 1, pieces)
     return np.asarray(np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (pieces - 1)))
 

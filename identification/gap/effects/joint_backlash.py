@@ -44,7 +44,7 @@ _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: zone, with and without friction, crossing where weight and load balance; none on
     a recording that runs on from one side: what is slack there is a seat."""
-    if not bench.data.arm and bench.rows.continuous and bench.one_sided:
+    if not bench.data.arm and bench.rows.continuous and bench.course.one_sided:
         return []
     out = []
     for j in bench.moving_joints():

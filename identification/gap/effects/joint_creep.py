@@ -29,12 +29,12 @@ def times(bench: Bench) -> np.ndarray:
     like a line."""
     inner = np.diff(bench.rows.time)
     step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 1.0
-    longest = min(bench.session_span / 3, 1000.0 * max(step, 1.0))
+    longest = min(bench.course.session_span / 3, 1000.0 * max(step, 1.0))
     if not (bench.data.arm or bench.rows.continuous):
         step = 2 * half_sample(bench.rows)  # of rows there are the fewer, the longer it stood
-    if not (bench.data.arm or bench.always_moves):
-        longest = 3 * bench.session_span
-    first = max(step * 3 if bench.always_moves else step, 1e-6)
+    if not (bench.data.arm or bench.course.always_moves):
+        longest = 3 * bench.course.session_span
+    first = max(step * 3 if bench.course.always_moves else step, 1e-6)
     count = max(2, int(np.ceil(np.log(max(longest / first, 3.0)) / np.log(3))))
     return np.asarray(first * 3.0 ** np.arange(count))
 
@@ -52,7 +52,7 @@ def scales(bench: Bench) -> tuple[float, ...]:
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: single times with their neighbour, and the whole spectrum; none of one pull that
     never stood: how fast it went and how far are one thing there, and a curve is simpler."""
-    if bench.never_held or bench.timeless:
+    if bench.course.never_held or bench.course.timeless:
         return []
     rest, spectrum = rests(bench.rows), times(bench)
     out, sizes = [], scales(bench)

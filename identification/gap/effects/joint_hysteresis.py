@@ -53,10 +53,10 @@ def variants(bench: Bench) -> list[Variant]:
     """Per joint and memory: kept while the arm stands, from no load or from the weight that came
     on first; lost when the rig is turned to another direction, or in the rest between runs; there
     from the beginning, of loads like those measured (rigs are cycled before they are measured)."""
-    if not bench.data.arm and not bench.returns:  # pulls show a curve, and no loop
+    if not bench.data.arm and not bench.course.returns:  # pulls show a curve, and no loop
         return []
     memories = {"": (bench.moved, False)}
-    if not bench.once:
+    if not bench.course.once:
         memories[" worked in"] = (bench.moved, True)
     if np.sum(bench.rebuilt) > np.sum(bench.moved):
         memories[SET_UP_ANEW] = (bench.rebuilt, False)
@@ -96,7 +96,7 @@ def _laws(
     """All laws of one joint and memory."""
     name = f"joint {joint + 1}{memory}"
     found = _spectrum(bench, joint, name, span, fresh, path, weight)
-    if not bench.once:  # a curve that saturates would be taken for friction
+    if not bench.course.once:  # a curve that saturates would be taken for friction
         found += _exponential(bench, joint, name, span, fresh, path, weight)
     return [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
 
@@ -107,8 +107,8 @@ def _spectrum(
 ) -> list[Variant]:  # fmt: skip
     """The whole spectrum of strengths, and each strength with its neighbour."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
-    radius = span * np.array(RADII if bench.unloads or bench.data.arm else RADII[:_SMALL])
-    radius = bench.radii(torque, radius) if bench.unloads else radius
+    radius = span * np.array(RADII if bench.course.unloads or bench.data.arm else RADII[:_SMALL])
+    radius = bench.radii(torque, radius) if bench.course.unloads else radius
     radius = np.append(radius, NEVER * span)
     if path is None:
         states = bench.plays(torque, radius, fresh, weight)
@@ -123,7 +123,7 @@ def _spectrum(
     out = [variant(WORD, f"{name} spectrum", columns, SCALES, root, prior=0.25, each=True,
                    joint=joint, radius=radius, law="Iwan")]  # fmt: skip
     # friction acts from the first load on: one strength alone is a small one
-    alone = min(_SMALL + bench.unloads, len(columns) - 2)
+    alone = min(_SMALL + bench.course.unloads, len(columns) - 2)
     if bench.imposed:
         alone = len(columns) - 2
     for k in range(alone):
@@ -142,7 +142,7 @@ def _exponential(
 ) -> list[Variant]:  # fmt: skip
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
-    reach = span * np.array(REACHES if bench.unloads else REACHES[:2])
+    reach = span * np.array(REACHES if bench.course.unloads else REACHES[:2])
     out = []
     for law in ("Dahl", "Bouc-Wen"):
         if path is None:

@@ -66,12 +66,12 @@ def variants(bench: Bench) -> list[Variant]:
                         positive=False, prior=0.2 / (len(PLACES) - 1),
                         kinds=("line", *hinges[k : k + 2]), **info)
             )  # fmt: skip
-        if not bench.data.arm and bench.once and not bench.rests:
+        if not bench.data.arm and bench.course.once and not bench.course.rests:
             out += _locks(bench, j, line, top)
         elif not bench.data.arm and bench.rows.continuous:
-            if bench.unloads or bench.repeats:
+            if bench.course.unloads or bench.course.repeats:
                 out.append(_fine(bench, j, line, top))
-            if bench.unloads and not bench.one_sided and bench.passes > 2:
+            if bench.course.unloads and not bench.course.one_sided and bench.course.passes > 2:
                 out.append(_uneven(bench, j, line, top))  # in half a loop it could be anything
         if bench.feels_weight(j):
             out += _net(bench, j, line)

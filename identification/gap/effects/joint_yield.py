@@ -142,10 +142,13 @@ def _hardened(
     on (said of loads that come back before they grow, and of what is not taken back by a long way:
     a single loop may be friction). Benches alone."""
     top = float(np.abs(load).max())
-    if bench.data.arm or not bench.lets_go or not bench.one_sided:
+    if bench.data.arm or not bench.course.lets_go or not bench.course.one_sided:
         return []
     size = np.abs(load)
-    if way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top or bench.left_behind > _LEFT:
+    if (
+        way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top
+        or bench.course.left_behind > _LEFT
+    ):
         radius = np.concatenate([top * np.array(UNDER_A_TIP), radius])
     columns = [column(s) for s in grown(load, radius, bench.moved).T]
     out = []
@@ -233,7 +236,7 @@ def after_yield(bench: Bench, load: Array, top: float, fresh: Flags) -> list[Arr
     a curve or friction does that. top: range of the load."""
     peak_of = peaks(load, BACK_FROM * top, fresh)
     after = peak_of >= 0
-    if not after.any() or (not bench.data.arm and bench.one_sided):
+    if not after.any() or (not bench.data.arm and bench.course.one_sided):
         return []
     states = bench.plays(load, top * np.array(BACK), fresh)
     back = [np.where(after, s - s[peak_of], 0.0) for s in states.T]
@@ -289,7 +292,7 @@ def _flowing(
 ) -> dict[tuple[float, bool], Array]:
     """(flow time s, whether squared) -> play states (n, k), for no flow and all in one go."""
     out = {(0.0, False): bench.plays(load, radius, fresh, weight)}
-    if bench.rows.continuous or bench.timeless:
+    if bench.rows.continuous or bench.course.timeless:
         return out
     # what slows down so under a load that stands, a single spring can't tell from creep
     squared = SQUARE_S if bench.data.arm else ()

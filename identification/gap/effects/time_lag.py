@@ -31,13 +31,13 @@ _OF_STROKE = 0.5  # of the time that one pass of the load takes
 
 def variants(bench: Bench) -> list[Variant]:
     """Lags of laser or force, as delays and as filters; coefficient 1 is the lag itself."""
-    if bench.timeless or _like_a_soft_start(bench):
+    if bench.course.timeless or _like_a_soft_start(bench):
         return []
     sample = sampling_time(bench.rows)
     out = []
     for multiple in LAGS:
         lag = multiple * sample
-        if bench.rows.continuous and lag > _OF_STROKE * bench.stroke_s:
+        if bench.rows.continuous and lag > _OF_STROKE * bench.course.stroke_s:
             break  # the load would have come before anybody turned a screw
         if bench.rows.hold_starts.all() and multiple > _USUAL:
             break  # one reading a step, and that of a step long past

@@ -109,7 +109,7 @@ def drift_of_displacement(bench: Bench, law: Law) -> list[Array]:
 
 def _path(bench: Bench, v: Variant) -> tuple[dict[str, object], tuple[Term, ...], Array]:
     """Constants, terms and scales of a path of the library, in seconds and kelvin."""
-    span, label = bench.session_span, str(v.info["path"])
+    span, label = bench.course.session_span, str(v.info["path"])
     if label == "linear":
         return {"path": "linear"}, (Term("drift_rate"),), np.array([1 / span])
     if label == "root":
