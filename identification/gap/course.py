@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 
-from identification.gap.data import Array, GapData
+from identification.gap.data import Array, Flags, GapData
 from identification.gap.imposed import approaches
 from identification.gap.loops import lost
 from identification.gap.rows import Rows, passes, turns, way_back
@@ -26,6 +27,7 @@ _FLOWS = 0.03  # whose stiffness is less than that of the steepest
 _WANDERS = 0.05  # of the way: a displacement that goes back by more wanders
 _PULLED = 0.3  # of the largest force: by less of the other sign metal does not flow back
 _ENCLOSES, _AGAIN = 0.05, 0.1  # of its box, by a loop; of that, by the next ones
+_MET_AGAIN = 0.2  # of the smaller one's range of load
 _STANDS = 0.1  # of the mean speed, and of the time
 _HELD, _MANY_A_LEVEL = 2, 8  # samples
 
@@ -90,15 +92,30 @@ class Course:
     @property
     def one_sided(self) -> bool:
         """The load, and the force, keep their sign: nothing passes zero."""
-        return all(
-            min(-float(v.min()), float(v.max())) < _ASIDE * float(np.abs(v).max())
-            for v in (self.load, self.rows.measured_force)
-        )
+        return _keeps_its_sign(self.load) and self.force_keeps_its_sign
+
+    @property
+    def force_keeps_its_sign(self) -> bool:
+        """It was only pressed, or only pulled."""
+        return _keeps_its_sign(self.rows.measured_force)
 
     @property
     def repeats(self) -> bool:
         """Some setup was loaded again from the start."""
         return len(np.unique(self.rows.run)) > len(self.data.setups)
+
+    @cached_property
+    def comes_again(self) -> bool:
+        """Two runs of some setup went through the same loads: else what differs between runs may as
+        well be a curve of the load."""
+        pairs = combinations(np.unique(self.rows.run).tolist(), 2)
+        return any(self._overlap(self.rows.run == a, self.rows.run == b) for a, b in pairs)
+
+    def _overlap(self, one: Flags, other: Flags) -> bool:
+        a, b = self.load[one], self.load[other]
+        both = min(float(a.max()), float(b.max())) - max(float(a.min()), float(b.min()))
+        same = self.rows.setup[one][0] == self.rows.setup[other][0]
+        return bool(same and both > _MET_AGAIN * min(float(np.ptp(a)), float(np.ptp(b))))
 
     @cached_property
     def once(self) -> bool:
@@ -235,3 +252,7 @@ class Course:
         """Every loop of a load from one side encloses much: nothing flows back there."""
         first, again = self.lost_in_loops
         return again > max(2 * _ENCLOSES, 0.5 * first)
+
+
+def _keeps_its_sign(values: Array) -> bool:
+    return min(-float(values.min()), float(values.max())) < _ASIDE * float(np.abs(values).max())

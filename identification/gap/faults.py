@@ -1,7 +1,7 @@
 """Readings that nothing on a rig makes: faults of an instrument, which no effect explains.
 
 A laser on a loose mount rings in spells; a camera loses its target, and hands out its last number;
-a specimen has long been broken.
+a dial is misread by a whole turn; a specimen has long been broken.
 """
 
 from __future__ import annotations
@@ -29,6 +29,14 @@ def faults(data: GapData) -> tuple[str, ...]:
         out.append(
             f"{at} the displacement is the same number, less than was read before, while the force "
             "goes on growing: the sensor has lost its target, or stands still. See to it."
+        )
+    back = goes_back(data)
+    if back is not None:
+        out.append(
+            f"At {data.force[back]:.4g} N the displacement goes back, from "
+            f"{1e3 * data.displacement[back - 1]:.4g} to {1e3 * data.displacement[back]:.4g} mm, "
+            "though the force grows: misread, mistyped, or a sensor that slipped. See to these "
+            "readings."
         )
     broken = after_break(data)
     if broken.any():
@@ -61,6 +69,31 @@ def bursts(data: GapData) -> bool:
     away = np.abs(u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]
     usual = max(1.4826 * float(np.median(away)), data.instruments.displacement) if away.size else 0
     return bool(away.size >= _FEWEST_STEPS and np.mean(away > _BEYOND * usual) > _BURSTS)
+
+
+_MORE, _BACK = 0.02, 0.1  # of the ranges of force and displacement in a run
+
+
+def goes_back(data: GapData) -> int | None:
+    """First reading of a level that is read further back than the one before it, by far more than
+    the instrument's uncertainty, under a larger force, as nothing goes that is pressed; None where
+    there is none. Of levels at rest: in a running recording glitches are set aside."""
+    hold = hold_ids(data)
+    if is_continuous(data, hold):
+        return None
+    first = np.flatnonzero(np.diff(hold, prepend=-1))
+    count = np.bincount(hold)
+    force, u = (np.add.reduceat(v, first) / count for v in (data.force, data.displacement))
+    for run in np.unique(data.run):
+        at = np.flatnonzero(data.run[first] == run)
+        size, way = np.abs(force[at]), np.sign(force[at]) * u[at]
+        far = max(_CLEARLY * data.instruments.displacement, _BACK * float(np.ptp(u[at])))
+        same = force[at][1:] * force[at][:-1] >= 0
+        grows = np.diff(size) > _MORE * float(np.ptp(force[at]))
+        wrong = np.flatnonzero(same & grows & (np.diff(way) < -far))
+        if wrong.size:
+            return int(first[at[wrong[0] + 1]])
+    return None
 
 
 _LONG = 10  # readings

@@ -68,9 +68,10 @@ def displacement_simpler(data: GapData) -> bool:
 
 
 def approaches(data: GapData, mine: Ints) -> bool:
-    """Whether samples mine (m,), in order, are a single pull that begins with a way at no force,
-    faster than the rest: a platen that comes nearer. Nobody finds such a place by setting a force;
-    what creeps or drifts there is slow."""
+    """Whether samples mine (m,), in order, are a single pull that begins with a way at no force: a
+    platen that comes nearer. Nobody finds such a place by setting a force; what creeps or drifts
+    there is slower than the rest. Where the displacement is known to be driven, nothing at all may
+    be felt until shortly before."""
     if len(mine) < _FEWEST:
         return False
     force, path = (np.abs(v[mine] - v[mine[0]]) for v in (data.force, data.displacement))
@@ -80,14 +81,19 @@ def approaches(data: GapData, mine: Ints) -> bool:
     back = way_back(path) > _NO_FORCE * float(path.max())
     if early or back or not force[end] > none:
         return False
+    went = float(path[end] / path.max()) if path.max() > 0 else 0.0
+    if data.imposed == "displacement":
+        before = force[:end][path[:end] < _WELL_BEFORE * path[end]]
+        return went > _APPROACH and before.max(initial=0.0) < _NOTHING * data.instruments.force
     time = _clock(data, mine)
     spent = (time[end] - time[0]) / (time[-1] - time[0] or 1.0)
-    went = float(path[end] / path.max()) if path.max() > 0 else 0.0
     return bool(went > max(_APPROACH, _FAST * spent))
 
 
 _NO_FORCE, _APPROACH = 0.02, 0.3  # of the largest force (or a way back), and of the way
 _FAST = 2.0  # times as fast as all of it
+_WELL_BEFORE, _NOTHING = 0.75, 4.0  # of the way at no force; standard uncertainties: a curve that
+# begins to stiffen shows more force there
 
 
 def on_plateau(data: GapData, hold: Ints) -> bool:

@@ -48,9 +48,9 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
         elif word == "joint_backlash":
             out += closing_in(joint_backlash.refined, _places(found, second))
         elif word == "contact_seating":
-            slacks = [s for s in reversed(found) if contact_seating.single_slack(s.variant)]
-            best_of_law = {s.variant.info["laws"][0][0]: s for s in slacks}
-            out += closing_in(contact_seating.refined, list(best_of_law.values()))
+            kinds = {contact_seating.slack_of(s.variant): s for s in reversed(found)}
+            slacks = [s for kind, s in kinds.items() if kind]
+            out += closing_in(contact_seating.refined, slacks)
         elif word == "time_lag":
             channels = {s.variant.info["channel"]: s for s in reversed(second or found)}
             out += closing_in(time_lag.refined, list(channels.values()))

@@ -103,7 +103,7 @@ def _slopes(bench: Bench) -> list[Variant]:
     rows, line = bench.rows, bench.slope * bench.load
     top = float(np.abs(line).max())
     runs = np.unique(rows.run)
-    if not (top > 0 and bench.course.repeats):
+    if not (top > 0 and bench.course.comes_again):
         return []
     each = [bench.add(bench.outside_column(line / top * (rows.run == r))) for r in runs]
     hats = free_path(bench, _PIECES)
@@ -206,13 +206,13 @@ def _taken(
     left = white * target[:n]
     left = left - known @ (known.T @ left)
     parts = [count[i : i + _AT_ONCE] for i in range(0, len(count), _AT_ONCE)]
-    return np.concatenate([_square_of(known, left, white, phase, masks, c) for c in parts])
+    return np.concatenate([square_of(known, left, white, phase, masks, c) for c in parts])
 
 
-def _square_of(
+def square_of(
     known: Array, left: Array, white: Array, phase: Array, masks: list[Array], count: Array
 ) -> Array:
-    """(c,) the same, of an orthonormal base (n, b), what it leaves (n,) and weights (n,)."""
+    """(c,) the same, of an orthonormal base (n, b), what that leaves (n,) and weights (n,)."""
     shape = len(count), 2 * len(masks)
     gram, moment = np.zeros((*shape, shape[1])), np.empty(shape)
     shared = np.empty((*shape, known.shape[1]))

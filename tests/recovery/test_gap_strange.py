@@ -16,7 +16,7 @@ from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Likeness
 from identification.gap.strange import KINDS as KINDS_OF_STRANGERS
-from identification.gap.strange import likenesses, strangers
+from identification.gap.strange import likenesses, square_of, strangers
 from rig.diagnose_text import LOOKS_LIKE, looks_like, render
 from rig.gap_data import gap_data
 from tests.conformance.gap_designs import (
@@ -178,3 +178,23 @@ def test_every_kind_has_its_words() -> None:
         like = Likeness("slopes" if kind == "wanders" else kind, 0.01, 0.0, kind == "wanders")
         assert looks_like(like)
     assert len(LOOKS_LIKE) == KINDS_OF_STRANGERS + 1
+
+
+def test_what_periods_take_is_what_least_squares_takes() -> None:
+    """Beside a base that has a slow swing already, in two stretches of rows."""
+    n, count = 120, np.linspace(0.5, 9.0, 70)
+    rng = np.random.default_rng(2)
+    phase, white = np.sort(rng.random(n)), rng.uniform(0.5, 2.0, n)
+    first = np.arange(n) < 50
+    masks = [first.astype(float), 1.0 - first]
+    swing = np.sin(2 * np.pi * count[0] * phase) * masks[0]
+    known = np.linalg.qr(np.column_stack([np.ones(n), phase, swing]) * white[:, None])[0]
+    left = rng.normal(size=n)
+    left -= known @ (known.T @ left)
+    found = square_of(known, left, white, phase, masks, count)
+    for number, square in zip(count, found, strict=True):
+        turn = 2 * np.pi * number * phase
+        both = np.column_stack([m * f * white for m in masks for f in (np.sin(turn), np.cos(turn))])
+        both -= known @ (known.T @ both)
+        fitted = both @ np.linalg.lstsq(both, left, rcond=1e-6)[0]
+        assert square == pytest.approx(float(fitted @ left), rel=1e-6)

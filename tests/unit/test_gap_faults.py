@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.data import Array
+from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.faults import bursts, faults, frozen_since
+from identification.gap.faults import bursts, faults, frozen_since, goes_back
 from tests.unit.test_gap_levels import creeping, one_hold
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
@@ -68,3 +68,59 @@ def test_what_stands_still_for_a_reason_is_none(what: str) -> None:
         u[21:] = force[21:] / SPRING
     assert frozen_since(running(force, u)) is None
     assert faults(running(force, u)) == ()
+
+
+PRECISE = Instruments(0.1, 1e-7, 0.005, 0.003)
+
+
+def misread(**changes: object) -> GapData:
+    """Weights put on and taken off; the dial is misread by a whole turn at one of them, twice."""
+    force = np.concatenate([np.arange(10.0), np.arange(9.0, -1.0, -1.0)])
+    u = force / SPRING
+    u[[6, 7]] -= 3e-5
+    step = np.concatenate([np.arange(10), np.arange(20, 10, -1)])
+    branch = np.repeat([1, 2], 10)
+    given: dict[str, object] = {"displacement": u, "step": step, "branch": branch}
+    return bench_data(force, **(given | changes))  # type: ignore[arg-type]
+
+
+def test_a_displacement_that_goes_back_under_more_force_was_misread() -> None:
+    assert goes_back(misread()) == 6
+    found = diagnose_gap(misread())
+    assert found.verdict == "unknown"
+    (note,) = (n for n in found.notes if "misread" in n)
+    assert "At 6 N the displacement goes back, from 0.05 to 0.03 mm" in note
+    one = misread()
+    force, u = (np.concatenate([v, v]) for v in (one.force, one.displacement))
+    u[:20] = force[:20] / SPRING
+    run, step = np.repeat([0, 1], 20), np.arange(40)
+    assert goes_back(bench_data(force, u, run=run, step=step)) == 26
+
+
+@pytest.mark.parametrize(
+    "what", ["fine", "coarse", "small", "other sense", "through zero", "unloading", "next run"]
+)
+def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
+    data = misread()
+    force, u, run = data.force, data.force / SPRING, data.run
+    if what == "coarse":  # within ten standard uncertainties, whatever the share
+        data = misread(instruments=Instruments(0.1, 4e-6, 0.005, 0.003))
+        assert goes_back(data) is None
+        return
+    if what == "other sense":
+        force, u = -force, -u
+    elif what == "small":  # a twentieth of the range, far beyond the noise
+        u[6] = u[5] - 5e-6
+        assert goes_back(misread(displacement=u, instruments=PRECISE)) is None
+        return
+    elif what == "through zero":  # friction holds it back
+        force = np.concatenate([np.linspace(-5, 6, 4), np.linspace(6, 7, 16)])
+        u = np.concatenate([[-5e-5, -5e-5, -5e-5, 2e-5], np.linspace(2e-5, 3e-5, 16)])
+    elif what == "unloading":  # it creeps on while the load comes off
+        u[10:] = u[9] + 4e-6 * np.arange(10)
+    elif what == "next run":  # the datum is another one
+        run = np.repeat([0, 1], 10)
+        force = np.tile(np.arange(1.0, 11.0), 2)
+        u = force / SPRING - 5e-4 * run
+    step, branch = np.arange(20), np.ones(20, dtype=np.int64)
+    assert goes_back(bench_data(force, u, step=step, branch=branch, run=run)) is None

@@ -8,17 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.base import base_columns
 from identification.gap.bench import make_bench
-from identification.gap.data import Array, Instruments
+from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import WORDS, library
+from identification.gap.effects.contact_seating import refined
 from identification.gap.explanation import Explanation
 from identification.gap.leftover import HELD, _judged
 from identification.gap.parts import Part, energies
 from identification.gap.priors import prior_of
+from identification.gap.strange import strangers
 from identification.gap.verdict import BENCH_DOUBT, trusted
 from rig.diagnose_text import meanings, render
 from tests.unit.test_gap_linear import charged
+from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)
@@ -188,8 +192,7 @@ def test_a_way_at_no_force_before_a_contact_is_taken_up_slack() -> None:
     assert found.probabilities["contact_seating"] > 0.6
     (depth,) = (p for n, p in found.effects[0].parameters.items() if n == "depth")
     assert depth.value == pytest.approx(2.0, rel=0.05)
-    slow, press = approached(faster=1.7)
-    plain = make_bench(running(press, slow, instruments=METER, imposed="displacement"))
+    plain = make_bench(running(force[40:], u[40:], instruments=METER, imposed="displacement"))
     for word, less in (("joint_nonlinear_stiffness", True), ("contact_seating", False)):
         words = frozenset({word})
         assert (prior_of(words, found.bench) < prior_of(words, plain) - 10.0) == less
@@ -206,8 +209,9 @@ def test_the_width_of_a_slack_is_met_between_those_of_the_grid(slack: float) -> 
 @pytest.mark.parametrize("what", ["slow", "short", "preload", "curve", "again"])
 def test_a_way_at_some_force_or_a_slow_one_is_no_approach(what: str) -> None:
     u, force = approached()
-    if what == "slow":  # as fast as all of it: a drift before the first load
-        u, force = approached(faster=1.7)
+    driven: str | None = "displacement"
+    if what == "slow":  # as fast as all of it, and nobody says what was driven: a drift
+        (u, force), driven = approached(faster=1.7), None
     elif what == "short":
         u, force = approached(travel=1e-4, faster=0.2)
     elif what == "preload":
@@ -216,9 +220,41 @@ def test_a_way_at_some_force_or_a_slow_one_is_no_approach(what: str) -> None:
         u, force = (np.concatenate([v, v[::-1]]) for v in (u, force))
     else:
         force = 100.0 * (u / u[-1]) ** 2
-    assert not make_bench(
-        running(force, u, instruments=METER, imposed="displacement")
-    ).course.approaches
+    assert not make_bench(running(force, u, instruments=METER, imposed=driven)).course.approaches
+
+
+@pytest.mark.parametrize("power", [1, 6])
+def test_a_driven_approach_need_not_be_fast_but_nothing_may_be_felt_on_it(power: int) -> None:
+    u, force = approached(faster=1.7)
+    if power > 1:  # stiffens so late that half of the way looks like no force at a glance
+        force = 1500.0 * (u / u[-1]) ** power
+    bench = make_bench(running(force, u, instruments=METER, imposed="displacement"))
+    assert bench.course.approaches == (power == 1)
+
+
+def test_what_is_met_after_an_approach_may_seat_itself() -> None:
+    """A gap, a soft stage, then the specimen: a stiffness that rises by steps, from nothing."""
+    u = np.linspace(0.0, STROKE, 200)
+    soft, stiff = np.maximum(u - 0.37 * STROKE, 0.0), np.maximum(u - 0.53 * STROKE, 0.0)
+    found = pulled(0.2 * SPRING * soft + 0.8 * SPRING * stiff, u)
+    assert found.verdict == "contact_seating"
+    assert "then seats" in found.effects[0].label
+    shapes = {v.label: v for v in library(found.bench)}
+    for start in ("slack 0.4", "slack 0.4, then seats"):
+        nearer = {v.label for v in refined(found.bench, shapes[start], close=0.5)}
+        assert start.replace("0.4", "0.384") in nearer
+    plain = library(make_bench(running(SPRING * u, u, imposed="displacement")))
+    assert not any("then seats" in v.label for v in plain)
+    assert found.after < 1.5 * found.noise
+
+
+def test_a_tip_that_is_lifted_off_and_comes_back_meets_a_contact() -> None:
+    """The stroke passes zero, the force keeps its sign: there is nothing to pull at."""
+    u = 1e-4 * np.concatenate([np.linspace(0, -4, 60), np.linspace(-4, 2, 90)])
+    found = pulled(SPRING * np.maximum(u, 0.0), u)
+    assert found.verdict == "contact_seating"
+    both = pulled(SPRING * (np.maximum(u, 0.0) + np.minimum(u + 2e-4, 0.0)), u)
+    assert both.verdict == "joint_backlash"  # what bears both ways
 
 
 def test_an_arm_is_asked_nothing_of_all_that() -> None:
@@ -233,3 +269,34 @@ def test_an_arm_is_asked_nothing_of_all_that() -> None:
     near, flows = (replace(b, data=replace(b.data, arm=True)) for b in of_pulls)
     assert not near.course.approaches
     assert not flows.course.flows_out
+
+
+def pulled_and_pressed(again: bool = False) -> GapData:
+    """Rubber in two runs from zero, each way a curve of its own, 34 levels; again: both pulled, and
+    softer the second time."""
+    pull, push = np.linspace(0, 80, 17), np.linspace(0, -140, 17)
+    u = [np.interp(pull, [0, 20, 60, 80], [0, 8e-3, 40e-3, 46e-3]), 0.06 * np.expm1(push / 150)]
+    if again:
+        push, u[1] = pull, 1.3 * u[0]
+    force = np.concatenate([pull, push])
+    rng = np.random.default_rng(4)
+    return bench_data(
+        force, np.concatenate(u) + rng.normal(0, 2e-5, 34), run=np.repeat([0, 1], 17),
+        repetition=np.repeat([1, 2], 17), compliance=np.array([4e-4]),
+        instruments=Instruments(0.1, 2e-5, 0.005, 0.003),
+    )  # fmt: skip
+
+
+def test_pull_and_press_may_each_have_a_curve_of_its_own() -> None:
+    found = diagnose_gap(pulled_and_pressed())
+    assert found.verdict == "joint_nonlinear_stiffness"
+    assert "uneven" in found.effects[0].label
+    assert not found.bench.course.comes_again  # no load was met twice: that no stiffness wanders
+    for data, told in ((pulled_and_pressed(), False), (pulled_and_pressed(again=True), True)):
+        bench = make_bench(data)
+        assert bench.course.comes_again == told
+        found_there = strangers(bench, base_columns(bench), bench.observed)
+        assert any(v.word == "slopes" for v in found_there) == told
+    data = pulled_and_pressed(again=True)  # along two directions, once each
+    bench = make_bench(replace(data, setups=data.setups * 2, setup=data.run))
+    assert not bench.course.comes_again

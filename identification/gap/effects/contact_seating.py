@@ -24,6 +24,7 @@ FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
 BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
 BENCH_SHARES = (0.01, 0.03, 0.1)
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8)  # of an imposed stroke
+SEATS = (0.08, 0.16, 0.25, 0.35, 0.5, 0.7)  # of the stroke beyond a slack
 LOST = {"slack": 1.0, "toe": 0.5}  # share of a slack's stroke by which the rest comes late
 FINER = np.linspace(-0.32, 0.32, 9)  # of a slack that was found
 SHARES = (0.003, 0.01, 0.03, 0.1)  # of the deflection
@@ -42,7 +43,7 @@ def variants(bench: Bench) -> list[Variant]:
     """Per force scale and law, and a mixture of scales. What bears both ways is no seat: what is
     slack there is a play."""
     top = float(np.abs(bench.load).max())
-    if not top > 0 or not (bench.data.arm or bench.course.one_sided):
+    if not top > 0 or not (bench.data.arm or bench.course.force_keeps_its_sign):
         return []
     scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else BENCH_SHARES))
     size, sign = pressed(bench)
@@ -68,60 +69,86 @@ def variants(bench: Bench) -> list[Variant]:
             laws=tuple(("exponential", s * top) for s in forces),
         )
     )
-    return [*out, *_slacks(bench, top)]
+    return [*out, *_slacks(bench)]
 
 
 def pressed(bench: Bench) -> tuple[Array, Array]:
     """Force (n,) N on the seat and its sense. A bench that is loaded from one side presses on it
-    from where its load begins, wherever the zero of its force is."""
-    if bench.data.arm or not bench.course.one_sided:
+    from where its load begins, wherever the zero of its force is; an imposed stroke may begin on
+    the way there."""
+    if bench.data.arm or not bench.course.force_keeps_its_sign:
         return np.abs(bench.load), np.sign(bench.load)
-    sense = 1.0 if bench.load.max() >= -bench.load.min() else -1.0
+    force = bench.rows.measured_force
+    sense = 1.0 if force.max() >= -force.min() else -1.0
     pushed = sense * bench.load
     return np.asarray(pushed - pushed.min()), np.full(bench.rows.n, sense)
 
 
-def _slacks(bench: Bench, top: float) -> list[Variant]:
+def _slacks(bench: Bench) -> list[Variant]:
     """Where the stroke is imposed, from one side: slack that is taken up before force rises, at
     once or bit by bit, told by the stroke: the force that is simulated for it knows of no slack;
-    and a toe of several."""
-    if bench.data.arm or not bench.imposed or not bench.course.one_sided:
+    and a toe of several. After an approach what is met may seat itself."""
+    if bench.data.arm or not bench.imposed:
         return []
-    out, columns = [], []
-    for law in LOST:
-        single = [_slack(bench, law, share * top) for share in SLACKS]
-        columns = [v.columns[0] for v in single]
-        out += single
-    root = np.diag([LOST["toe"] * _stroke(bench, share * top) for share in SLACKS])
-    laws = tuple(("toe", share * top) for share in SLACKS)
-    toes = variant(WORD, "toes", columns, (0.1, 0.3, 1.0), root, each=True, prior=2.0,
-                   force_N=SLACKS[-1] * top, laws=laws)  # fmt: skip
-    return [*out, toes]
+    stroke = _stroke(bench)
+    single = {law: [_slack(bench, law, s * stroke) for s in SLACKS] for law in LOST}
+    toes = [v.columns[0] for v in single["toe"]]
+    root = np.diag([LOST["toe"] * _given(bench, s * stroke) for s in SLACKS])
+    laws = tuple(("toe", s * stroke) for s in SLACKS)
+    several = variant(WORD, "toes", toes, (0.1, 0.3, 1.0), root, each=True, prior=2.0,
+                      force_N=SLACKS[-1] * stroke, laws=laws)  # fmt: skip
+    out = [v for vs in single.values() for v in vs]
+    if bench.course.approaches:
+        out += [_then_seats(bench, s * stroke, 1 / len(SLACKS)) for s in SLACKS]
+    return [*out, several]
 
 
 def _slack(bench: Bench, law: str, force: float, prior: float = 1.0) -> Variant:
     """One slack, as wide as the simulated spring gives under a force N."""
+    d = LOST[law] * _given(bench, force)
+    share = force / _stroke(bench)
+    return variant(WORD, f"{law} {share:.3g}", [_late(bench, law, force)], (0.5 * d, d),
+                   force_N=force, laws=((law, force),), prior=prior)  # fmt: skip
+
+
+def _then_seats(bench: Bench, force: float, prior: float) -> Variant:
+    """A slack, as wide as the simulated spring gives under a force N; what it meets there seats
+    itself, and gets stiffer by steps."""
+    stroke = _stroke(bench)
+    wide = [force, *(force + s * (stroke - force) for s in SEATS)]
+    root = np.diag([_given(bench, w) for w in wide])
+    return variant(WORD, f"slack {force / stroke:.3g}, then seats",
+                   [_late(bench, "slack", w) for w in wide], (0.1, 0.3, 1.0), root, each=True,
+                   prior=prior, force_N=force, laws=tuple(("slack", w) for w in wide))  # fmt: skip
+
+
+def _late(bench: Bench, law: str, force: float) -> int:
+    """Column of what is lost to one slack."""
     size, sign = pressed(bench)
-    column = bench.add(bench.outside_column(sign * LAWS[law](size / force)))
-    d = LOST[law] * _stroke(bench, force)
-    share = force / float(np.abs(bench.load).max())
-    return variant(WORD, f"{law} {share:.3g}", [column], (0.5 * d, d), force_N=force,
-                   laws=((law, force),), prior=prior)  # fmt: skip
+    return bench.add(bench.outside_column(sign * LAWS[law](size / force)))
 
 
-def _stroke(bench: Bench, force: float) -> float:
+def _stroke(bench: Bench) -> float:
+    """N that the simulated spring takes for all of the stroke."""
+    return float(pressed(bench)[0].max())
+
+
+def _given(bench: Bench, force: float) -> float:
     """m that the simulated spring gives under a force N."""
     return force * float(np.abs(bench.slope * bench.load).max() / np.abs(bench.load).max())
 
 
-def single_slack(v: Variant) -> bool:
-    """Whether it is one slack, of which the width has to be met well."""
-    return v.word == WORD and len(v.columns) == 1 and v.info["laws"][0][0] in LOST
+def slack_of(v: Variant) -> str | None:
+    """The kind of slack of which the width has to be met well, None of what is none."""
+    kinds = [law for law, _ in v.info["laws"]]
+    return " ".join(kinds[:2]) if kinds[0] == "slack" or kinds == ["toe"] else None
 
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Slacks about one that was found, close: of the steps of a first look."""
-    ((law, force),) = found.info["laws"]
-    top = float(np.abs(bench.load).max())
+    law, force = found.info["laws"][0]
     wide = [force * (1 + close * step) for step in FINER]
-    return [_slack(bench, law, f, 1 / len(FINER)) for f in wide if f < top]
+    wide = [w for w in wide if w < _stroke(bench)]
+    if len(found.columns) > 1:
+        return [_then_seats(bench, w, 1 / len(SLACKS) / len(FINER)) for w in wide]
+    return [_slack(bench, law, w, 1 / len(FINER)) for w in wide]

@@ -68,11 +68,10 @@ def variants(bench: Bench) -> list[Variant]:
             )  # fmt: skip
         if not bench.data.arm and bench.course.once and not bench.course.rests:
             out += _locks(bench, j, line, top)
-        elif not bench.data.arm and bench.rows.continuous:
-            if bench.course.unloads or bench.course.repeats:
-                out.append(_fine(bench, j, line, top))
-            if bench.course.unloads and not bench.course.one_sided and bench.course.passes > 2:
-                out.append(_uneven(bench, j, line, top))  # in half a loop it could be anything
+        elif not bench.data.arm and bench.rows.continuous and _came_back(bench):
+            out.append(_fine(bench, j, line, top))
+        if not bench.data.arm and _both_ways(bench):
+            out.append(_uneven(bench, j, line, top))
         if bench.feels_weight(j):
             out += _net(bench, j, line)
     return out
@@ -146,6 +145,20 @@ def hinge(x: Array, bend: float) -> Array:
 def above(torque: Array, weight: Array, bend: float) -> Array:
     """(n,) by how much the net torque is above a bend more than under the weight (n,) alone."""
     return np.asarray(np.maximum(torque + weight - bend, 0.0) - np.maximum(weight - bend, 0.0))
+
+
+def _came_back(bench: Bench) -> bool:
+    return bench.course.unloads or bench.course.repeats
+
+
+def _both_ways(bench: Bench) -> bool:
+    """Pulled and pressed, from zero either way, or to and fro: half a loop could be anything."""
+    course = bench.course
+    if course.one_sided:
+        return False
+    if not bench.rows.continuous:
+        return len(np.unique(bench.rows.run)) > 1
+    return course.unloads and course.passes > 2
 
 
 def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
