@@ -35,8 +35,8 @@ def faults(data: GapData) -> tuple[str, ...]:
         out.append(
             f"At {data.force[back]:.4g} N the displacement goes back, from "
             f"{1e3 * data.displacement[back - 1]:.4g} to {1e3 * data.displacement[back]:.4g} mm, "
-            "though the force grows: misread, mistyped, or a sensor that slipped. See to these "
-            "readings."
+            "though the force grows: misread, mistyped, a sensor that slipped, or something else "
+            "that moves the target. See to these readings."
         )
     broken = after_break(data)
     if broken.any():

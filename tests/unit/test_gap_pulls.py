@@ -300,3 +300,18 @@ def test_pull_and_press_may_each_have_a_curve_of_its_own() -> None:
     data = pulled_and_pressed(again=True)  # along two directions, once each
     bench = make_bench(replace(data, setups=data.setups * 2, setup=data.run))
     assert not bench.course.comes_again
+
+
+@pytest.mark.parametrize("imposed", ["force", "displacement"])
+def test_what_stiffens_from_the_first_weight_on_is_a_curve(imposed: str) -> None:
+    """A sensor that saturates: of each further weight it shows less, in proportion to the load."""
+    force = np.array([0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
+    u = 1e-3 * np.log1p(force / 0.04)
+    meter = Instruments(0.001, 5e-6, 0.005, 0.003)
+    data = bench_data(force, u, compliance=np.array([2e-2]), instruments=meter, imposed=imposed)
+    labels = [v.label for v in library(make_bench(data))]
+    assert any("stops" in label for label in labels) == (imposed == "force")
+    if imposed == "force":
+        found = diagnose_gap(data)
+        assert found.verdict == "joint_nonlinear_stiffness"
+        assert "stops" in found.effects[0].label

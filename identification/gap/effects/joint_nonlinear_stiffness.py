@@ -182,28 +182,33 @@ def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
 
 def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
     """Of a single pull, in which a free curve would pass for anything: what only gets stiffer,
-    however late and steeply, as nothing that flows does. Two neighbouring powers of the load, out
-    of FINE hinges."""
+    however late and steeply, as nothing that flows does; under a driven force, which finds what is
+    soft in its first readings, also however early. Two neighbouring shapes out of FINE hinges."""
     places, columns = _finely(bench, j, top)
     b = np.array(places)
-    width = np.gradient(b)
-    bends = [p * (p - 1) * b ** (p - 2) * width for p in STEEPER]
+    shapes = {f"locks {p}": p * (p - 1) * b ** (p - 2) for p in STEEPER}
+    if not bench.imposed:
+        start = b - b[0] + FINE[0]
+        shapes = {f"stops {e:g}": (start + e) ** -3 for e in EARLY} | shapes
+    bends = [shape * np.gradient(b) for shape in shapes.values()]
     bends = [w / (w @ (1 - b)) for w in bends]
     out = []
-    for low, high, p in zip(bends, bends[1:], STEEPER, strict=False):
+    for low, high, name in zip(bends, bends[1:], shapes, strict=False):
         both = np.column_stack([low, high])
         root = np.zeros((len(b) + 1,) * 2)
         root[0, 0], root[1:, 1:3] = 1.0, both
         powers = -bench.sense * np.column_stack([np.zeros(2), np.linalg.pinv(both)])
         out.append(
-            variant(WORD, f"joint {j + 1} locks {p}", [line, *columns], FINE_SCALES, root,
-                    positive=powers.sum(axis=0), within=powers, prior=0.5 / (len(STEEPER) - 1),
+            variant(WORD, f"joint {j + 1} {name}", [line, *columns], FINE_SCALES, root,
+                    positive=powers.sum(axis=0), within=powers,
+                    prior=(0.25 if "stops" in name else 0.5) / (len(STEEPER) - 1),
                     kinds=("line", *places), joint=j, torque=top, hinges=places)
         )  # fmt: skip
     return out
 
 
-STEEPER = (2, 3, 5, 9, 17, 33)
+STEEPER = (2, 3, 5, 9, 17, 33)  # powers of the load
+EARLY = (0.01, 0.03, 0.1, 0.3)  # b of `x / (x + b)`, of the load
 
 
 def _finely(bench: Bench, j: int, top: float) -> tuple[tuple[float, ...], list[int]]:
