@@ -315,3 +315,15 @@ def test_what_stiffens_from_the_first_weight_on_is_a_curve(imposed: str) -> None
         found = diagnose_gap(data)
         assert found.verdict == "joint_nonlinear_stiffness"
         assert "stops" in found.effects[0].label
+
+
+def test_what_stiffens_early_does_so_from_where_its_load_begins() -> None:
+    """Under a preload of 50 N: the shapes bend within the first newtons beyond it."""
+    force = 50.0 + np.linspace(0.0, 5.0, 30)
+    labels = {
+        v.label: v
+        for v in library(make_bench(bench_data(force, (force - 50) / SPRING, imposed="force")))
+    }
+    first = labels["joint 1 stops 0.01"]
+    early = first.root[1:4, 1] / first.root[1:, 1].sum()
+    assert early[0] > 2 * early[1]

@@ -188,8 +188,7 @@ def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
     b = np.array(places)
     shapes = {f"locks {p}": p * (p - 1) * b ** (p - 2) for p in STEEPER}
     if not bench.imposed:
-        start = b - b[0] + FINE[0]
-        shapes = {f"stops {e:g}": (start + e) ** -3 for e in EARLY} | shapes
+        shapes = {f"stops {e:g}": (np.array(FINE) + e) ** -3 for e in EARLY} | shapes
     bends = [shape * np.gradient(b) for shape in shapes.values()]
     bends = [w / (w @ (1 - b)) for w in bends]
     out = []
@@ -208,7 +207,7 @@ def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
 
 
 STEEPER = (2, 3, 5, 9, 17, 33)  # powers of the load
-EARLY = (0.01, 0.03, 0.1, 0.3)  # b of `x / (x + b)`, of the load
+EARLY = (0.01, 0.03, 0.1, 0.3)  # b of `x / (x + b)`, of the range of the load
 
 
 def _finely(bench: Bench, j: int, top: float) -> tuple[tuple[float, ...], list[int]]:
