@@ -94,7 +94,7 @@ class Course:
         """The load, and the force, keep their sign: nothing passes zero."""
         return _keeps_its_sign(self.load) and self.force_keeps_its_sign
 
-    @property
+    @cached_property
     def force_keeps_its_sign(self) -> bool:
         """It was only pressed, or only pulled."""
         return _keeps_its_sign(self.rows.measured_force)
@@ -234,10 +234,10 @@ class Course:
     @cached_property
     def lost_in_loops(self) -> tuple[float, float]:
         """As `loops.lost` has it, of a load that stays on one side; nan for all others."""
-        data, force = self.data, np.abs(self.data.force).max()
-        sides = min(-float(data.force.min()), float(data.force.max()))
+        data = self.data
         once = len(np.unique(data.run)) == 1 and len(data.setups) == 1 and not data.arm
-        if not (once and self.rows.continuous and self.returns and sides < _PULLED * force):
+        one_way = _keeps_its_sign(data.force, _PULLED)
+        if not (once and self.rows.continuous and self.returns and one_way):
             return float("nan"), float("nan")
         return lost(data.displacement, data.force, self.imposed)
 
@@ -254,5 +254,5 @@ class Course:
         return again > max(2 * _ENCLOSES, 0.5 * first)
 
 
-def _keeps_its_sign(values: Array) -> bool:
-    return min(-float(values.min()), float(values.max())) < _ASIDE * float(np.abs(values).max())
+def _keeps_its_sign(values: Array, aside: float = _ASIDE) -> bool:
+    return min(-float(values.min()), float(values.max())) < aside * float(np.abs(values).max())

@@ -95,11 +95,9 @@ def present_design(bench: Bench) -> Design:
 
 def _unloads(bench: Bench) -> bool:
     """Whether it comes back step by step, not only to zero at once."""
-    return (
-        bench.course.unloads
-        if bench.rows.continuous
-        else bool(np.any(bench.rows.branch == UNLOADING))
-    )
+    if bench.rows.continuous:
+        return bench.course.unloads
+    return bool(np.any(bench.rows.branch == UNLOADING))
 
 
 def _zero_s(bench: Bench, sample: float) -> float:

@@ -180,8 +180,12 @@ def _periodic(
     of the gap."""
     if not len(count):
         return []
-    taken = partial(_taken, bench, base, target, phase, masks)
-    power = taken(count)
+    white = 1 / row_noise(bench)[: bench.rows.n]
+    known = np.linalg.qr(base.columns[: bench.rows.n] * white[:, None])[0]
+    left = white * target[: bench.rows.n]
+    taken = partial(square_of, known, left - known @ (known.T @ left), white, phase, masks)
+    parts = [count[i : i + _AT_ONCE] for i in range(0, len(count), _AT_ONCE)]
+    power = np.concatenate([taken(part) for part in parts])
     higher = np.append(True, power[1:] >= power[:-1]) & np.append(power[:-1] >= power[1:], True)
     out = []
     for i in sorted(np.flatnonzero(higher), key=lambda i: -power[i])[:_PEAKS]:
@@ -195,24 +199,12 @@ def _periodic(
     return out
 
 
-def _taken(
-    bench: Bench, base: Base, target: Array, phase: Array, masks: list[Array], count: Array
-) -> Array:
-    """(c,) how much of the square of the whitened gap, beyond the base, a sine and a cosine of each
-    number of periods (c,) take, in every one of the masks, which share no row."""
-    n = bench.rows.n
-    white = 1 / row_noise(bench)[:n]
-    known = np.linalg.qr(base.columns[:n] * white[:, None])[0]
-    left = white * target[:n]
-    left = left - known @ (known.T @ left)
-    parts = [count[i : i + _AT_ONCE] for i in range(0, len(count), _AT_ONCE)]
-    return np.concatenate([square_of(known, left, white, phase, masks, c) for c in parts])
-
-
 def square_of(
     known: Array, left: Array, white: Array, phase: Array, masks: list[Array], count: Array
 ) -> Array:
-    """(c,) the same, of an orthonormal base (n, b), what that leaves (n,) and weights (n,)."""
+    """(c,) how much of the square of what a whitened, orthonormal base (n, b) leaves (n,) a sine
+    and a cosine of each number of periods (c,) take beyond it, in every one of the masks, which
+    share no row; white (n,): what whitens."""
     shape = len(count), 2 * len(masks)
     gram, moment = np.zeros((*shape, shape[1])), np.empty(shape)
     shared = np.empty((*shape, known.shape[1]))

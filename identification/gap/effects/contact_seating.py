@@ -147,8 +147,8 @@ def slack_of(v: Variant) -> str | None:
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Slacks about one that was found, close: of the steps of a first look."""
     law, force = found.info["laws"][0]
-    wide = [force * (1 + close * step) for step in FINER]
-    wide = [w for w in wide if w < _stroke(bench)]
+    wide = force * (1 + close * FINER)
+    wide = wide[wide < _stroke(bench)].tolist()
     if len(found.columns) > 1:
         return [_then_seats(bench, w, 1 / len(SLACKS) / len(FINER)) for w in wide]
     return [_slack(bench, law, w, 1 / len(FINER)) for w in wide]
