@@ -28,6 +28,7 @@ _WANDERS = 0.05  # of the way: a displacement that goes back by more wanders
 _PULLED = 0.3  # of the largest force: by less of the other sign metal does not flow back
 _ENCLOSES, _AGAIN = 0.05, 0.1  # of its box, by a loop; of that, by the next ones
 _MET_AGAIN = 0.2  # of the smaller one's range of load
+_RUNS_ON = 2.0  # times its mean speed: faster than anything creeps at rest
 _STANDS = 0.1  # of the mean speed, and of the time
 _HELD, _MANY_A_LEVEL = 2, 8  # samples
 
@@ -207,6 +208,8 @@ class Course:
         slow = np.abs(speed(self.load)) < _STANDS
         if self.imposed:  # a force that grows is no hold, wherever the displacement was read
             slow &= speed(np.abs(self.rows.measured_force)) < _STANDS
+        elif self.data.imposed != "force":  # a stroke that runs on while the force stands
+            slow &= np.abs(speed(self.response)) < _RUNS_ON
         slow = np.pad(slow, 1)
         stands = slow[1:-1] & (slow[:-2] | slow[2:])  # a turning point alone is no hold
         return float(np.diff(held)[~stands].sum()) / max(count - 1, 1)

@@ -38,6 +38,14 @@ def faults(data: GapData) -> tuple[str, ...]:
             "though the force grows: misread, mistyped, a sensor that slipped, or something else "
             "that moves the target. See to these readings."
         )
+    stuck = jumps_to(data)
+    if stuck is not None:
+        share = float(np.mean(data.displacement == stuck))
+        out.append(
+            f"The displacement jumps to one and the same number, {1e3 * stuck:.6g} mm, and back "
+            f"again and again ({share:.0%} of the readings) while the force stands: what a sensor, "
+            "or its converter, says when it has nothing to say. See to it."
+        )
     broken = after_break(data)
     if broken.any():
         out.append(
@@ -93,6 +101,30 @@ def goes_back(data: GapData) -> int | None:
         wrong = np.flatnonzero(same & grows & (np.diff(way) < -far))
         if wrong.size:
             return int(first[at[wrong[0] + 1]])
+    return None
+
+
+_OFTEN, _SHARE, _SAME = 5, 0.05, 0.02  # times; share of the readings; of the range of the force
+
+
+def jumps_to(data: GapData) -> float | None:
+    """The number (m) to which the displacement jumps from one side, and comes back from, again and
+    again, by far more than the instrument's uncertainty while the force stands; None where there is
+    none."""
+    u, force = data.displacement, data.force
+    far = max(_CLEARLY * data.instruments.displacement, _BACK * float(np.ptp(u)))
+    still = _SAME * float(np.ptp(force))
+    values, count = np.unique(u, return_counts=True)
+    for value in values[count >= max(_OFTEN, _SHARE * len(u))]:
+        at = np.diff(u == value, prepend=False, append=False).nonzero()[0]
+        first, last = at[::2] - 1, at[1::2]  # the readings before and after
+        inside = (first >= 0) & (last < len(u))
+        a, b = first[inside], last[inside]
+        jumps = np.minimum((u[a] - value) * np.sign(u[b] - value), np.abs(u[b] - value)) > far
+        stands = (data.run[a] == data.run[b]) & (np.abs(force[a] - force[b]) <= still)
+        stands &= np.abs(force[a + 1] - force[b]) <= still
+        if np.sum(jumps & stands) >= _OFTEN and np.mean(jumps & stands) > 0.5:
+            return float(value)
     return None
 
 

@@ -29,7 +29,8 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
     best = int(coarse.argmax())
     last = min(max(best, 1) + 1, len(etas) - 1)
     lowest = np.log(etas[1]) - 2 * _STEP if best <= 1 else np.log(etas[best - 1])
-    parts_between = round((np.log(etas[last]) - lowest) / _STEP * _PARTS)
+    # a parabola takes three points, however near the levels lie
+    parts_between = max(2, round((np.log(etas[last]) - lowest) / _STEP * _PARTS))
     x = np.linspace(lowest, np.log(etas[last]), parts_between + 1)
     known = {round(float(v), 6): j for v, j in zip(np.log(etas[1:]), joint[1:], strict=True)}
     missing = [v for v in x.tolist() if round(v, 6) not in known]

@@ -17,12 +17,13 @@ from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Expla
 from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.noise import UNSURE
-from identification.gap.penalties import CURVES
+from identification.gap.penalties import CURVES, FRICTION
 from identification.gap.rows import way_back
 from identification.gap.verdict import weighed
 
-# An elastic curve that falls while it is pushed on: a snap, a slip, a crack are likelier.
-SNAPS, _FALL = 0.1, 0.15  # share that is kept; fall, of the range, that is none of noise
+# An elastic curve that falls while it is pushed on, or a force that is nearly lost, as none is that
+# has made something yield or slide: a snap, a slip, a crack are likelier.
+SNAPS, _FALL, _LOST = 0.1, 0.15, 0.6  # share that is kept; falls, of the range: beyond noise, most
 # A machine that moves by its own displacement reading: what would drift there it takes back.
 HELD = 0.02
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
@@ -107,7 +108,11 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
     left = _left(engine, fit(engine, explanation))
     share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
-    if explanation.words & CURVES and _falls(engine):
+    fall = _fall(engine)
+    snaps = (fall > _FALL and explanation.words & CURVES) or (
+        fall > _LOST and explanation.words & FRICTION
+    )
+    if snaps:
         share *= SNAPS
     elif engine.bench.imposed and explanation.parts[0].word == "thermal_drift":
         share *= HELD
@@ -116,12 +121,12 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))
 
 
-def _falls(engine: Engine) -> bool:
-    """Whether the response goes back in a single pull whose load goes on; one reading that jumps
-    off does not."""
+def _fall(engine: Engine) -> float:
+    """By what share of its range the response goes back in a single pull whose load goes on; one
+    reading that jumps off does not."""
     bench = engine.bench
-    if not bench.course.once or not bench.course.always_moves:
-        return False
+    if not bench.course.once or not bench.course.always_moves or not np.ptp(bench.response) > 0:
+        return 0.0
     size = np.abs(bench.response - bench.response[0])
     fall = way_back(np.median([size[:-2], size[1:-1], size[2:]], axis=0))
-    return bool(fall > _FALL * np.ptp(bench.response))
+    return float(fall / np.ptp(bench.response))

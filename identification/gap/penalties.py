@@ -151,6 +151,8 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     # but what gets stiffer at the start and softer in the end is two things
     if hidden and words <= MECHANISMS and not holds and words != TOE_AND_KNEE:
         return True
+    if bench.course.never_held and "time_lag" in words and words & MECHANISMS:
+        return True  # of a single pull: what comes late and what bends are one curve
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & MECHANISMS)):
         return True
     springs = "joint_stiffness_error" in words and words & MECHANISMS

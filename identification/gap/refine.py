@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -12,6 +13,7 @@ from identification.gap.data import Array
 from identification.gap.effects import (
     contact_seating,
     joint_backlash,
+    joint_hysteresis,
     joint_nonlinear_stiffness,
     joint_yield,
     pose_error,
@@ -28,6 +30,18 @@ _LEADING = 6  # words that are refined
 _WINDOW = 12.0  # nats above `none` that a word must have to be refined
 
 
+@dataclass(frozen=True, eq=False)
+class _Word:
+    """A word that stands out: its variants alone, and beside the leading word, best first; ranked:
+    the leading words, whose scores are families."""
+
+    engine: Engine
+    families: dict[str, list[Scored]]
+    ranked: list[str]
+    alone: list[Scored]
+    beside: list[Scored]
+
+
 def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
     """Finer shapes of the words that stand out among single effects and that a grid meets badly:
     thresholds and zones make the evidence piecewise smooth, offsets act by their squares."""
@@ -35,34 +49,63 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
     least = engine.levels[0].log_base + _WINDOW
     ranked = sorted(families, key=lambda w: -marginal(families[w]))[:_LEADING]
     beside = _beside_first(engine, families, ranked)
-    closing_in = partial(_closing_in, engine, families, ranked)
     out: list[Variant] = []
-    for word in ranked:
-        if marginal(families[word]) < least:
+    for name in ranked:
+        if name not in _FINER or marginal(families[name]) < least:
             continue
-        found = sorted(families[word], key=lambda s: -s.log_evidence)
-        second = sorted(beside.get(word, []), key=lambda s: -s.log_evidence)
-        if word in ("joint_yield", "base_slip"):
-            for s in _places(found, second, "sharp"):
-                out += joint_yield.refined(engine.bench, s.variant)
-        elif word == "joint_backlash":
-            out += closing_in(joint_backlash.refined, _places(found, second))
-        elif word == "contact_seating":
-            kinds = {contact_seating.slack_of(s.variant): s for s in reversed(found)}
-            slacks = [s for kind, s in kinds.items() if kind]
-            out += closing_in(contact_seating.refined, slacks)
-        elif word == "time_lag":
-            channels = {s.variant.info["channel"]: s for s in reversed(second or found)}
-            out += closing_in(time_lag.refined, list(channels.values()))
-        elif word == "joint_nonlinear_stiffness":
-            odd = [s for s in found if "line" in s.variant.info]
-            for s in odd[:1]:
-                out += joint_nonlinear_stiffness.refined(engine.bench, s.variant)
-        elif word == "pose_error":
-            kinds = {str(s.variant.info["kind"]): s for s in reversed(found)}
-            for s in kinds.values():
-                out += pose_error.refined(engine.bench, s.variant, partial(_estimate, engine))
+        alone, others = (
+            sorted(s, key=lambda s: -s.log_evidence) for s in (families[name], beside.get(name, []))
+        )
+        out += _FINER[name](_Word(engine, families, ranked, alone, others))
     return out
+
+
+def _knees(word: _Word) -> list[Variant]:
+    places = _places(word.alone, word.beside, joint_yield.is_sharp)
+    return [v for s in places for v in joint_yield.refined(word.engine.bench, s.variant)]
+
+
+def _backlash(word: _Word) -> list[Variant]:
+    return _closing_in(word, joint_backlash.refined, _places(word.alone, word.beside))
+
+
+def _friction(word: _Word) -> list[Variant]:
+    places = _places(word.alone, word.beside, joint_hysteresis.hangs)
+    return [v for s in places for v in joint_hysteresis.refined(word.engine.bench, s.variant)]
+
+
+def _seats(word: _Word) -> list[Variant]:
+    kinds = {contact_seating.slack_of(s.variant): s for s in reversed(word.alone)}
+    slacks = [s for kind, s in kinds.items() if kind]
+    return _closing_in(word, contact_seating.refined, slacks)
+
+
+def _lags(word: _Word) -> list[Variant]:
+    channels = {s.variant.info["channel"]: s for s in reversed(word.beside or word.alone)}
+    return _closing_in(word, time_lag.refined, list(channels.values()))
+
+
+def _curves(word: _Word) -> list[Variant]:
+    odd = [s.variant for s in word.alone if "line" in s.variant.info]
+    return [f for v in odd[:1] for f in joint_nonlinear_stiffness.refined(word.engine.bench, v)]
+
+
+def _poses(word: _Word) -> list[Variant]:
+    kinds = {str(s.variant.info["kind"]): s.variant for s in reversed(word.alone)}
+    estimate = partial(_estimate, word.engine)
+    return [f for v in kinds.values() for f in pose_error.refined(word.engine.bench, v, estimate)]
+
+
+_FINER: dict[str, Callable[[_Word], list[Variant]]] = {
+    "joint_yield": _knees,
+    "base_slip": _knees,
+    "joint_backlash": _backlash,
+    "joint_hysteresis": _friction,
+    "contact_seating": _seats,
+    "time_lag": _lags,
+    "joint_nonlinear_stiffness": _curves,
+    "pose_error": _poses,
+}
 
 
 def _beside_first(
@@ -75,18 +118,15 @@ def _beside_first(
 
 
 def _closing_in(
-    engine: Engine,
-    families: dict[str, list[Scored]],
-    ranked: list[str],
-    refined: Callable[..., list[Variant]],
-    starts: list[Scored],
+    word: _Word, refined: Callable[..., list[Variant]], starts: list[Scored]
 ) -> list[Variant]:
     """Finer shapes about those that were found, and finer ones still about the best of these."""
+    engine = word.engine
     finer = [v for s in starts for v in refined(engine.bench, s.variant)]
     engine.extend()
     if not finer:
         return []
-    best = max(_scored_beside(engine, families, ranked, finer), key=_evidence)
+    best = max(_scored_beside(engine, word.families, word.ranked, finer), key=_evidence)
     return finer + refined(engine.bench, best.variant, _CLOSE)
 
 
@@ -104,7 +144,7 @@ def _evidence(scored: Scored) -> float:
     return scored.log_evidence
 
 
-_GRIDS = ("joint_yield", "base_slip", "joint_backlash", "time_lag")
+_GRIDS = ("joint_yield", "base_slip", "joint_backlash", "joint_hysteresis", "time_lag")
 _CLOSE = 0.2  # of the first look's steps
 
 
@@ -121,15 +161,14 @@ def _estimate(engine: Engine, variant: Variant) -> tuple[Array, Array]:
     return fitted.coefficients, softer
 
 
-def _places(alone: list[Scored], beside: list[Scored], knee: str | None = None) -> list[Scored]:
+def _places(
+    alone: list[Scored], beside: list[Scored], able: Callable[[Variant], bool] = lambda _: True
+) -> list[Scored]:
     """The best of the _REFINED best joints, or axes, beside the leading word, and the best alone:
-    of two words that explain the same neither has a place beside the other. knee: of that kind."""
-
-    def able(scored: list[Scored]) -> list[Scored]:
-        return [s for s in scored if knee is None or s.variant.info["knee"] == knee]
-
+    of two words that explain the same neither has a place beside the other. able: of those."""
     places: dict[object, Scored] = {}
-    for s in able(beside or alone):
+    first = [s for s in alone if able(s.variant)][:1]
+    for s in (s for s in beside or alone if able(s.variant)):
         places.setdefault((s.variant.info.get("joint"), s.variant.info.get("axis")), s)
-    found = [*able(alone)[:1], *list(places.values())[:_REFINED]]
+    found = [*first, *list(places.values())[:_REFINED]]
     return [s for i, s in enumerate(found) if s.variant not in [f.variant for f in found[:i]]]

@@ -7,7 +7,7 @@ import pytest
 
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.faults import bursts, faults, frozen_since, goes_back
+from identification.gap.faults import bursts, faults, frozen_since, goes_back, jumps_to
 from tests.unit.test_gap_levels import creeping, one_hold
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
@@ -124,3 +124,38 @@ def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
         u = force / SPRING - 5e-4 * run
     step, branch = np.arange(20), np.ones(20, dtype=np.int64)
     assert goes_back(bench_data(force, u, step=step, branch=branch, run=run)) is None
+
+
+def dropping_out(n: int = 90, every: int = 6) -> tuple[Array, Array]:
+    """Force N, displacement m: three loads, of whose readings some are one and the same number."""
+    force = np.repeat([10.0, 20.0, 60.0], n // 3)
+    u = force / SPRING + np.random.default_rng(4).normal(0, 1e-7, n)
+    u[every // 2 :: every] = 4e-4
+    return force, u
+
+
+def test_a_number_to_which_readings_jump_again_and_again_is_no_reading() -> None:
+    force, u = dropping_out()
+    data = bench_data(force, u, step=np.repeat([1, 2, 3], 30))
+    assert jumps_to(data) == 4e-4
+    found = diagnose_gap(data)
+    assert found.verdict == "unknown"
+    assert any("jumps to one and the same number, 0.4 mm" in note for note in found.notes)
+    assert jumps_to(running(force, u)) == 4e-4
+
+
+@pytest.mark.parametrize("what", ["seldom", "cycles", "digits", "passed", "other numbers"])
+def test_a_number_that_is_met_again_for_a_reason_is_one(what: str) -> None:
+    force, u = dropping_out(every=29 if what == "seldom" else 6)
+    if what == "cycles":  # the load comes and goes, and a coarse sensor reads the same each time
+        force, u = np.where(u == 4e-4, 60.0, force), np.where(u == 4e-4, 4e-4, 1e-4)
+    elif what == "digits":  # within ten standard uncertainties, and a tenth of the range
+        u = np.where(u == 4e-4, force / SPRING + 6e-6, u)
+        u[u == force / SPRING + 6e-6] = np.round(u[u == force / SPRING + 6e-6], 5)
+    elif what == "passed":  # on the way from one side to the other
+        force = np.full(90, 10.0)
+        u = np.tile([0.0, 4e-4, 8e-4, 8.1e-4, 4e-4, 1e-5], 15)
+        u = np.where(u == 4e-4, u, u + 1e-8 * np.arange(90))
+    elif what == "other numbers":
+        u = u + np.where(u == 4e-4, 1e-9 * np.arange(90), 0.0)
+    assert jumps_to(bench_data(force, u, step=np.arange(90))) is None

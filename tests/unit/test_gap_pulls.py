@@ -14,9 +14,11 @@ from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import WORDS, library
 from identification.gap.effects.contact_seating import refined
+from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation
 from identification.gap.leftover import HELD, _judged
 from identification.gap.parts import Part, energies
+from identification.gap.penalties import _same_element
 from identification.gap.priors import prior_of
 from identification.gap.strange import strangers
 from identification.gap.verdict import BENCH_DOUBT, trusted
@@ -327,3 +329,27 @@ def test_what_stiffens_early_does_so_from_where_its_load_begins() -> None:
     first = labels["joint 1 stops 0.01"]
     early = first.root[1:4, 1] / first.root[1:, 1].sum()
     assert early[0] > 2 * early[1]
+
+
+@pytest.mark.parametrize(("lost", "verdict"), [(0.2, "joint_yield"), (0.97, "unknown")])
+def test_what_loses_nearly_all_its_force_has_not_just_yielded(lost: float, verdict: str) -> None:
+    """Metal that necks, and a shell that snaps through."""
+    u = np.linspace(0.0, STROKE, 160)
+    rise, end = np.minimum(SPRING * u, 30.0), 30.0 * (1 - lost)
+    falls = 30.0 - (30.0 - end) * np.maximum(u / STROKE - 0.35, 0.0) / 0.65
+    assert pulled(np.minimum(rise, falls), u).verdict == verdict
+
+
+def test_what_comes_late_in_a_single_pull_is_part_of_its_curve() -> None:
+    """With a hold on the way it would be seen apart."""
+    t = np.arange(150.0)
+    for hold, one in ((0, True), (60, False)):
+        u = STROKE * np.concatenate([t[:80] / 150, np.full(hold, 80 / 150), t[80:] / 150])
+        bench = make_bench(running(SPRING * u, u, imposed="displacement"))
+        engine = Engine(bench, base_columns(bench), bench.observed, np.array([0.0, 3e-6]))
+        variants = library(bench, ["time_lag", "joint_nonlinear_stiffness"])
+        lag, curve = (next(v for v in variants if v.word == w) for w in LATE_AND_BENT)
+        assert _same_element(engine, Part(lag, 1.0), Part(curve, 1.0)) == one
+
+
+LATE_AND_BENT = ("time_lag", "joint_nonlinear_stiffness")

@@ -11,10 +11,17 @@ from identification.gap.base import base_columns, prediction
 from identification.gap.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
 from identification.gap.compare import Scored, score
 from identification.gap.data import Array, Setup
-from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness, library
+from identification.gap.effects import (
+    joint_backlash,
+    joint_hysteresis,
+    joint_nonlinear_stiffness,
+    library,
+)
 from identification.gap.effects.joint_backlash import TOOLS_KG
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond
+from identification.gap.effects.joint_yield import is_sharp
 from identification.gap.evidence import Engine
+from identification.gap.forms import law_of, rows_of
 from identification.gap.history import bristles, flowing_play, play
 from identification.gap.interval import TWO_SIDED, Softer
 from identification.gap.parameters import parameters
@@ -213,6 +220,53 @@ def test_curves_and_plays_are_refined_for_tools_in_between_and_no_wider_than_a_p
     assert widest == pytest.approx(joint_backlash.ZONES[-1] * bench.reach_of(bench.load))
 
 
+def test_friction_under_weight_is_refined_for_other_tools() -> None:
+    bench = hanging(np.concatenate([UP, UP[::-1]]))
+    found = library(bench, ["joint_hysteresis"])
+    hung = next(v for v in found if v.label.endswith("under weight spectrum that slips"))
+    finer = joint_hysteresis.refined(bench, hung)
+    assert sorted({v.info["tool_kg"] for v in finer}) == [0.0, 0.5, 1.0, 2.0, 2.5, 3.0]
+    slipping = [hung, *(v for v in finer if v.info["law"] == "Prandtl")]
+    states = [np.sum([bench.columns[c] for c in v.columns], axis=0) for v in slipping]
+    assert min(np.ptp(s - states[0]) for s in states[1:]) > 1e-3 * np.ptp(states[0])
+    for v in finer:
+        law, scale = law_of(bench, v)
+        assert rows_of(bench, v.word, law) * scale == pytest.approx(
+            np.column_stack([bench.columns[c] for c in v.columns])
+        ), v.label
+    free = next(v for v in found if v.info["memory"] == "")
+    assert not joint_hysteresis.refined(bench, free)
+    weightless = [replace(s, tool_gravity=np.zeros(1)) for s in bench.data.setups]
+    assert not joint_hysteresis.refined(
+        make_bench(replace(bench.data, setups=tuple(weightless))), hung
+    )
+
+
+def test_the_search_refines_the_tool_of_friction() -> None:
+    bench = hanging(np.concatenate([UP, UP[::-1]]))
+    variants = library(bench, ["joint_hysteresis"])
+    hung = next(v for v in variants if v.label.endswith("under weight spectrum that slips"))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    loop = np.sum([bench.columns[c] for c in joint_hysteresis.refined(bench, hung)[-1].columns], 0)
+    engine = Engine(bench, base, target + 0.05 * loop, np.array([0.0, 2e-6, 5e-6]))
+    finer = refine(engine, score(engine, engine.levels, variants))
+    assert {v.info["tool_kg"] for v in finer} == set(joint_hysteresis.TOOLS_KG)
+
+
+def test_an_arm_s_stated_springs_may_be_those_of_small_loads_which_make_nothing_slip() -> None:
+    """Elements that slip add their plays then; what a specimen's spring is, its curve says."""
+    bench = hanging(np.concatenate([UP, UP[::-1]]), gravity=0.0)
+    found = {v.label: v for v in library(bench, ["joint_hysteresis"])}
+    held, slips = found["joint 1 spectrum"], found["joint 1 spectrum that slips"]
+    n, line = bench.rows.n, bench.columns[held.columns[-1]]
+    for k, c in enumerate(slips.columns):  # strength by strength: stop and play make the line
+        pair = bench.columns[c] - bench.columns[held.columns[k]]
+        assert pair[:n] == pytest.approx(-line[:n])
+    assert len(held.columns) == len(slips.columns) + 1
+    specimen = make_bench(replace(bench.data, arm=False))
+    assert not any("slips" in v.label for v in library(specimen, ["joint_hysteresis"]))
+
+
 def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> None:
     bench = hanging(np.concatenate([UP, -UP]))
     variants = library(bench, ["joint_nonlinear_stiffness", "joint_creep"])
@@ -229,9 +283,9 @@ def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> 
 
     alone = [scored(1, "round"), scored(1, "sharp"), scored(2, "sharp")]
     beside = [scored(3, "sharp"), scored(3, "sharp"), scored(4, "sharp"), scored(5, "sharp")]
-    found = _places(alone, beside, "sharp")
+    found = _places(alone, beside, is_sharp)
     assert [s.variant.info["joint"] for s in found] == [1, 3, 4]
-    assert _places(alone, [], "sharp") == alone[1:]
+    assert _places(alone, [], is_sharp) == alone[1:]
 
 
 def test_a_joint_shows_strong_friction_in_a_single_loading_a_specimen_none() -> None:

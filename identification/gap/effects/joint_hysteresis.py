@@ -27,24 +27,15 @@ from identification.gap.history import Path, bristles, play, worked_in
 from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, smooth_root, variant
 
 WORD = "joint_hysteresis"
-RADII = (
-    0.012,
-    0.03,
-    0.06,
-    0.1,
-    0.15,
-    0.2,
-    0.27,
-    0.36,
-    0.5,
-    0.7,
-    1.0,
-)  # of the joint's range of torque
+# of the joint's range of torque: near each other at small ones, which slip first, and no further
+# apart than a tenth, between which loops are chords of the smooth ones
+RADII = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2, 0.26, 0.33, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # Without unloading no loop is seen: what then bends all at once, at a large load, is a knee; what
 # bends ever more from the first load on is a spectrum of strengths. Specimens yield.
 _SMALL = 5
+TOOLS_KG = (0.0, 0.5, 1.0, 2.0, 2.5, 3.0)  # beside TOOL_KG, with which it is looked for at first
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off by more than that
 
@@ -89,49 +80,81 @@ def _with_other_springs(v: Variant, line: int) -> Variant:
                    **{**v.info, "other_springs": True})  # fmt: skip
 
 
+def hangs(v: Variant) -> bool:
+    """Whether weights have made it slip before the rig pushes."""
+    return bool(v.info["memory"] == UNDER_WEIGHT.strip())
+
+
+def refined(bench: Bench, found: Variant) -> list[Variant]:
+    """Spectra at other masses of the tool, of a joint on which weights hang: nobody states that
+    mass, and the wrist's joints feel little else."""
+    joint = int(found.info["joint"])
+    if not hangs(found) or not np.any(bench.weight_per_kg(joint)):
+        return []
+    span, out = bench.reach_of(bench.true_torque[:, joint]), []
+    for kg in TOOLS_KG:
+        name = f"joint {joint + 1}{UNDER_WEIGHT} tool {kg:g} kg"
+        weight = bench.weight(joint, kg)
+        for v in _spectra(bench, joint, name, span, bench.moved, None, weight):
+            info = {**v.info, "memory": UNDER_WEIGHT.strip(), "tool_kg": kg}
+            out.append(replace(v, prior=v.prior / len(TOOLS_KG), info=info))
+    return out
+
+
 def _laws(
     bench: Bench, joint: int, span: float, memory: str, fresh: Flags, path: Path | None,
     weight: Array | None = None,
 ) -> list[Variant]:  # fmt: skip
     """All laws of one joint and memory."""
     name = f"joint {joint + 1}{memory}"
-    found = _spectrum(bench, joint, name, span, fresh, path, weight)
+    found = _spectra(bench, joint, name, span, fresh, path, weight)
+    found += _pairs(bench, joint, name, span, found[0])
     if not bench.course.once:  # a curve that saturates would be taken for friction
         found += _exponential(bench, joint, name, span, fresh, path, weight)
     return [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
 
 
-def _spectrum(
+def _spectra(
     bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None,
     weight: Array | None,
 ) -> list[Variant]:  # fmt: skip
-    """The whole spectrum of strengths, and each strength with its neighbour."""
-    torque, c = bench.true_torque[:, joint], bench.compliance[joint]
+    """The whole spectrum of strengths, which holds back what the spring would deflect; on an arm
+    also where the stated spring is that of small loads, which make nothing slip: then every element
+    adds its play (Prandtl 1928)."""
+    torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
     radius = span * np.array(RADII if bench.course.unloads or bench.data.arm else RADII[:_SMALL])
     radius = bench.radii(torque, radius) if bench.course.unloads else radius
     radius = np.append(radius, NEVER * span)
     if path is None:
-        states = bench.plays(torque, radius, fresh, weight)
+        slips = bench.plays(torque, radius, fresh, weight)
     else:
         tiled = np.tile(path.load[:, None], (1, len(radius)))
-        states = play(tiled, radius, path.fresh, path.fresh)[path.kept]
-    columns = [
-        bench.add_joint(joint, -bench.sense * c * (torque - states[:, k]))
-        for k in range(len(radius))
-    ]
-    root = smooth_root(len(columns), 0.6, 0.3)
-    out = [variant(WORD, f"{name} spectrum", columns, SCALES, root, prior=0.25, each=True,
-                   joint=joint, radius=radius, law="Iwan")]  # fmt: skip
-    # friction acts from the first load on: one strength alone is a small one
-    alone = min(_SMALL + bench.course.unloads, len(columns) - 2)
-    if bench.imposed:
-        alone = len(columns) - 2
+        slips = play(tiled, radius, path.fresh, path.fresh)[path.kept]
+    laws = [("Iwan", radius, slips - torque[:, None])]
+    if bench.data.arm:
+        laws.append(("Prandtl", radius[:-1], slips[:, :-1]))
+    out = []
+    for law, radii, states in laws:
+        columns = [bench.add_joint(joint, unit * state) for state in states.T]
+        label = f"{name} spectrum{' that slips' if law == 'Prandtl' else ''}"
+        out.append(
+            variant(WORD, label, columns, SCALES, smooth_root(len(columns), 0.6, 0.3), prior=0.25,
+                    each=True, joint=joint, radius=radii, law=law)
+        )  # fmt: skip
+    return out
+
+
+def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) -> list[Variant]:
+    """Each strength with its neighbour. Friction acts from the first load on: one strength alone
+    is a small one."""
+    radius, columns, out = np.asarray(spectrum.info["radius"]), list(spectrum.columns), []
+    most = len(columns) - 2
+    alone = most if bench.imposed else min(_SMALL + bench.course.unloads, most)
     for k in range(alone):
         out.append(
             variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES,
-                    smooth_root(2, 0.7), each=True,
-                    prior=0.25 / alone, joint=joint, radius=radius[k : k + 2],
-                    law="Iwan")
+                    smooth_root(2, 0.7), each=True, prior=0.25 / alone, joint=joint,
+                    radius=radius[k : k + 2], law="Iwan")
         )  # fmt: skip
     return out
 

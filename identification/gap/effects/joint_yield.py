@@ -202,6 +202,11 @@ RATCHETS = 0.3  # of a cycle's path beyond that: creeps on so much slower than i
 BACK_FROM = 0.25  # of the range: a load from which on a joint may have yielded
 
 
+def is_sharp(v: Variant) -> bool:
+    """Whether the threshold is one of the grid, without rounding: about such it is refined."""
+    return bool(v.info["knee"] == "sharp")
+
+
 def refined(bench: Bench, found: Variant) -> list[Variant]:
     """Finely spaced thresholds and flow times about a variant that was found."""
     info = dict(found.info)

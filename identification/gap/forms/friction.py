@@ -14,36 +14,40 @@ from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant
 
 _MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
            SET_UP_ANEW.strip(): ANEW}  # fmt: skip
+_STRENGTHS = frozenset({"Iwan", "Prandtl"})  # laws whose elements slip at a strength
 
 
 def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: friction elements; of Iwan's law with their strength, else with their reach."""
     joint, law = int(v.info["joint"]), str(v.info["law"])
-    key = "strength" if law == "Iwan" else "reach"
+    key = "strength" if law in _STRENGTHS else "reach"
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
+    if "tool_kg" in v.info:
+        constants["tool"] = float(v.info["tool_kg"])
     terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
     terms += (Term("compliance"),) if v.info.get("other_springs") else ()
     return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
 
 
 def hysteresis(bench: Bench, law: Law) -> list[Array]:
-    """What the friction holds back: `S_r(tau)` (stop operator), or reach times bristle state; of a
-    term without a strength the line of its own spring."""
+    """What the friction holds back: `S_r(tau)` (stop operator), or reach times bristle state; what
+    slips beside it (Prandtl's law): `P_r(tau)`; of a term without a strength the line of its own
+    spring."""
     c = law.constants
-    joint, iwan = c["joint"], c["law"] == "Iwan"
+    joint, iwan = c["joint"], c["law"] in _STRENGTHS
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
     size = np.array([t.shape["strength" if iwan else "reach"] for t in law.terms if t.shape])
     load, kept = torque, np.ones(len(torque), dtype=bool)
     rest, weight = bench.rest, None
     if c["memory"] == HUNG:
-        weight = bench.weight(joint)
+        weight = bench.weight(joint, c.get("tool", TOOL_KG))
     if c["memory"] == WORKED:
         path = worked_in(torque, fresh)
         load, fresh, kept, rest = path.load, path.fresh, path.kept, path.fresh
     if iwan:
         tiled = np.tile(load[:, None], (1, len(size)))
         state = play(tiled, size, rest, fresh, 0.0 if weight is None else weight[:, None])
-        held = (load[:, None] - state)[kept]
+        held = (-state if c["law"] == "Prandtl" else load[:, None] - state)[kept]
     else:
         held = (size * bristles(load, size, fresh, c["law"] == "Bouc-Wen", weight))[kept]
     lines = [bench.joint_column(joint, torque) for t in law.terms if not t.shape]
