@@ -158,7 +158,10 @@ def arm_setup(arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Arra
         offset_lever=offset,
         turned_lever=_turned(arm, q, tool, n),
         moment=np.cross(point, n),
-        links=np.array([_link(arm, link, q, tool, n) for link in arm.links]),
+        links=np.array(
+            [[_link(arm, link, q, tool, n) for link in links]
+             for links in (arm.links, [_joint_to_joint(arm, link) for link in arm.links])]
+        ).reshape(2, -1, 2),
         gravity=-arm.gravity_torques(q),  # what the weight does, not what holds it
         tool_gravity=J.T @ np.array(STANDARD_GRAVITY),
         bent_lever=_bent(arm, q, tool, n),
@@ -181,7 +184,7 @@ def _bench_setup(dataset: Dataset, direction: str, n: Array, tangents: Array) ->
         offset_lever=np.zeros((m, 3)),
         turned_lever=np.zeros((m, m)),
         moment=np.zeros(3),
-        links=np.zeros((0, 2)),
+        links=np.zeros((2, 0, 2)),
         gravity=np.zeros(m),
     )
 
@@ -216,6 +219,16 @@ def _bent(arm: Arm, q: Array, tool: Array, n: Array) -> Array:
         _turned(arm, q + w * np.eye(6), tool, n) for w in (_WIDE_STEP_RAD, -_WIDE_STEP_RAD)
     )
     return np.asarray(np.moveaxis(above - below, 0, -1) / (2 * _WIDE_STEP_RAD))
+
+
+def _joint_to_joint(arm: Arm, link: Beam) -> Beam:
+    """The segment from the origin of the frame before its own to that of its own; as it is where
+    these are one point."""
+    before, own = (arm.frames(np.zeros(6))[max(link.frame - k, 0)] for k in (1, 0))
+    start = own[:3, :3].T @ (before[:3, 3] - own[:3, 3])
+    if not np.linalg.norm(start) > 0:
+        return link
+    return replace(link, start=tuple(start.tolist()), end=(0.0, 0.0, 0.0))
 
 
 def _link(arm: Arm, link: Beam, q: Array, tool: Array, n: Array) -> tuple[float, float]:

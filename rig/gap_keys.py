@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from identification.gap.effects import joint_backlash
+from identification.gap.effects.link_flexibility import PLACED
+from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
 from identification.gap.forms.law import ACROSS, ANEW, HUNG, KEPT, LOST, WORKED
 
 # What an entry says besides its law; kept, not interpreted.
@@ -45,7 +47,8 @@ CONSTANTS: dict[str, Key] = {
     "flow_exponent": Key("flow_exponent", "positive"),
     "axis": Key("axis", "text", options=_SIDES),
     "depth": Key("axis_below_base_mm", factor=1e3),
-    "law": Key("law", "text", options=("Iwan", "Dahl", "Bouc-Wen")),
+    "law": Key("law", "text", options=FRICTION_LAWS),
+    "placed": Key("placed", "text", options=PLACED),
     "zone": Key("zone_Nm", "positive"),
     "crossing": Key("crossing", "text", options=("weight", "load")),
     "kind": Key("kind", "text", options=joint_backlash.KINDS),
@@ -121,7 +124,7 @@ for _name, _unit in _DRIFTS.items():
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
 
 
-MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent")
+MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent", "placed")
 
 
 @dataclass(frozen=True)
@@ -150,7 +153,7 @@ GRAMMAR: dict[str, Grammar] = {
     "joint_yield": Grammar(("joint", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "joint_hysteresis": Grammar(
-        ("joint", "law", "memory"),
+        ("joint", "law", "memory", "tool"),
         (("compliance", ("strength",)), ("compliance", ("reach",)), ("compliance", ())),
     ),
     "joint_backlash": Grammar(
@@ -177,7 +180,7 @@ GRAMMAR: dict[str, Grammar] = {
         ),
     ),
     "joint_stiffness_error": Grammar((), (("compliance", ("joint",)),)),
-    "link_flexibility": Grammar((), (("over_nominal", ("segment", "strain")),)),
+    "link_flexibility": Grammar(("placed",), (("over_nominal", ("segment", "strain")),)),
     "base_compliance": Grammar(("depth",), (("compliance", ("axis",)), ("compliance_xy", ()))),
     "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
     "load_misalignment": Grammar(
@@ -221,7 +224,7 @@ def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[tuple[str,
         if constants.get("path") == "each run":
             fits = coefficient == "drift" and shape == ("run", "along")
         if shape in (("strength",), ("reach",)):
-            fits = (law == "Iwan") == (shape == ("strength",))
+            fits = (law in SLIP_AT_A_STRENGTH) == (shape == ("strength",))
         if fits:
             yield coefficient, shape
 

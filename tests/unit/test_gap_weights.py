@@ -29,7 +29,7 @@ from identification.gap.parts import Part
 from identification.gap.refine import _places, refine
 from identification.gap.rows import reduce_rows
 from identification.gap.variants import variant
-from rig.gap_data import arm_setup
+from rig.gap_data import _joint_to_joint, arm_setup
 from rig.model import load_robot
 from tests.unit.test_gap_operators import bench_data, fresh
 
@@ -180,6 +180,28 @@ def test_a_tool_pulls_at_the_point_of_load() -> None:
     more = arm.gravity_torques(q) - laden.gravity_torques(q)
     assert setup.tool_gravity == pytest.approx(more, abs=1e-9)
     assert np.abs(more).max() > 5.0
+
+
+def test_segments_run_where_the_model_has_them_or_from_joint_to_joint() -> None:
+    """A cantilever of the upper arm's length, loaded across at the elbow: F L^3 / 3 EI, and what
+    turns it beyond; nothing of it lies beside the plane of the joints."""
+    arm, q = load_robot("ur10e"), np.array([0.0, -1.2, 1.9, -0.7, 1.57, 0.0])
+    upper, fore = (_joint_to_joint(arm, link) for link in arm.links)
+    assert (upper.length, fore.length) == pytest.approx(tuple(np.abs(arm.a[1:3])))
+    frames = arm.frames(q)
+    for link in (upper, fore):
+        own, before = frames[link.frame], frames[link.frame - 1]
+        assert (own @ [*link.start, 1.0])[:3] == pytest.approx(before[:3, 3])
+        assert (own @ [*link.end, 1.0])[:3] == pytest.approx(own[:3, 3])
+        assert link.section == next(b.section for b in arm.links if b.frame == link.frame)
+    flat = replace(arm, links=(upper, fore))
+    for tcp, n in (([0.0, 0.0, 0.1], [0.0, 1.0, 0.0]), ([0.05, 0.0, 0.2], [1.0, 0.0, 0.0])):
+        as_modelled, straight = arm_setup(arm, "P1", q, np.array(tcp), "y", np.array(n)).links
+        again = arm_setup(flat, "P1", q, np.array(tcp), "y", np.array(n)).links
+        assert straight == pytest.approx(again[0])
+        assert straight == pytest.approx(again[1])
+        # beside the plane of the joints counts for pushes in that plane
+        assert np.allclose(as_modelled, straight, rtol=1e-6, atol=0) == (n[0] == 0)
 
 
 def test_a_factor_of_a_spring_knows_the_spring_no_better_than_stated() -> None:

@@ -27,9 +27,12 @@ from identification.gap.history import Path, bristles, play, worked_in
 from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, smooth_root, variant
 
 WORD = "joint_hysteresis"
-# of the joint's range of torque: near each other at small ones, which slip first, and no further
-# apart than a tenth, between which loops are chords of the smooth ones
-RADII = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2, 0.26, 0.33, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+# Strengths, of the joint's range of torque: near each other at small ones, which slip first. Of an
+# arm no further apart than a tenth, between which loops are chords of smooth ones; a specimen's
+# friction brings a spring of its own, and more strengths won nothing there.
+_WEAK = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2)
+RADII = (*_WEAK, 0.27, 0.36, 0.5, 0.7, 1.0)
+ARM_RADII = (*_WEAK, 0.26, 0.33, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # Without unloading no loop is seen: what then bends all at once, at a large load, is a knee; what
@@ -122,7 +125,8 @@ def _spectra(
     also where the stated spring is that of small loads, which make nothing slip: then every element
     adds its play (Prandtl 1928)."""
     torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
-    radius = span * np.array(RADII if bench.course.unloads or bench.data.arm else RADII[:_SMALL])
+    seen = RADII if bench.course.unloads else RADII[:_SMALL]
+    radius = span * np.array(ARM_RADII if bench.data.arm else seen)
     radius = bench.radii(torque, radius) if bench.course.unloads else radius
     radius = np.append(radius, NEVER * span)
     if path is None:

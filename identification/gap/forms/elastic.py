@@ -12,7 +12,7 @@ from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import moments
 from identification.gap.effects.contact_seating import LAWS, pressed
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
-from identification.gap.effects.link_flexibility import STRAINS
+from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.law import Law, Term, along, scaled
 from identification.gap.history import rests, retarded
 from identification.gap.variants import Variant
@@ -102,12 +102,13 @@ def describe_links(_: Bench, v: Variant) -> tuple[Law, Array]:
         for k in v.info["segments"]
         for strain in STRAINS
     )
-    return Law({}, terms), np.ones(len(terms))
+    return Law({"placed": v.info["placed"]}, terms), np.ones(len(terms))
 
 
 def links(bench: Bench, law: Law) -> list[Array]:
     """Compliance of the segment along the direction times the load."""
-    each = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]
+    place = PLACED.index(law.constants.get("placed", PLACED[0]))
+    each = np.stack([s.links[place] for s in bench.data.setups])[bench.rows.setup]
     most = max(t.shape["segment"] for t in law.terms)
     if most >= each.shape[1]:
         raise ValueError(

@@ -14,13 +14,14 @@ from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant
 
 _MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
            SET_UP_ANEW.strip(): ANEW}  # fmt: skip
-_STRENGTHS = frozenset({"Iwan", "Prandtl"})  # laws whose elements slip at a strength
+SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
+FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, "Dahl", "Bouc-Wen")
 
 
 def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: friction elements; of Iwan's law with their strength, else with their reach."""
     joint, law = int(v.info["joint"]), str(v.info["law"])
-    key = "strength" if law in _STRENGTHS else "reach"
+    key = "strength" if law in SLIP_AT_A_STRENGTH else "reach"
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
     if "tool_kg" in v.info:
         constants["tool"] = float(v.info["tool_kg"])
@@ -34,7 +35,7 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
     slips beside it (Prandtl's law): `P_r(tau)`; of a term without a strength the line of its own
     spring."""
     c = law.constants
-    joint, iwan = c["joint"], c["law"] in _STRENGTHS
+    joint, iwan = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
     size = np.array([t.shape["strength" if iwan else "reach"] for t in law.terms if t.shape])
     load, kept = torque, np.ones(len(torque), dtype=bool)
