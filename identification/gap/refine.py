@@ -87,7 +87,10 @@ def _lags(word: _Word) -> list[Variant]:
 
 def _curves(word: _Word) -> list[Variant]:
     odd = [s.variant for s in word.alone if "line" in s.variant.info]
-    return [f for v in odd[:1] for f in joint_nonlinear_stiffness.refined(word.engine.bench, v)]
+    bench = word.engine.bench
+    bends = [s for s in word.alone if " bend " in s.variant.label]
+    finer = _closing_in(word, joint_nonlinear_stiffness.corners, bends[:1])
+    return finer + [f for v in odd[:1] for f in joint_nonlinear_stiffness.refined(bench, v)]
 
 
 def _poses(word: _Word) -> list[Variant]:

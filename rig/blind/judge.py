@@ -18,6 +18,7 @@ Z90_OF_Z95 = 1.6448536 / 1.9599640  # half width of a 90 % interval over that of
 # {} stands for what the answers' own keys below it are: directions or joints.
 SHARED = {
     ("joint_yield", "threshold_Nm"): "threshold",
+    ("joint_yield", "threshold_of_load_Nm"): "threshold_of_load",
     ("base_slip", "threshold_Nm"): "threshold",
     ("joint_backlash", "width_rad"): "width",
     ("joint_creep", "creep_fraction"): "creep_fraction",
@@ -203,7 +204,9 @@ def intervals(judged: Judged) -> list[dict[str, Any]]:
     rows = zip(judged.label["truth"], judged.label.get("parameters") or [], strict=False)
     for word, answers in rows:
         for name, true in _true_values(word, answers):
-            given = found.get(word, {}).get(name)
+            read = found.get(word, {})
+            # where no weight hangs on the joint, the load is all there is
+            given = read.get(name) or read.get(name.removesuffix("_of_load"))
             if given is not None:
                 out.append({"word": word, "parameter": name, **_covers(true, given)})
     return out

@@ -75,7 +75,9 @@ def _yield(rig: Rig, random: Random) -> Hidden:
     share = float(random.uniform(0.3, 1.2))
     hinge = spring(rig, j, share * rig.springs[j], friction_Nm=threshold, reference=rig.springs[j])
     returned = bool(random.random() < 0.5)
-    facts = {"threshold_Nm": threshold, "spring_beside_over_elastic": share, "taken_back": returned}
+    # there is no gravity: what slips feels the load alone
+    facts = {"threshold_of_load_Nm": threshold, "spring_beside_over_elastic": share,
+             "taken_back": returned}  # fmt: skip
     return Hidden(
         "joint_yield", "friction_in_series", "foreign", facts, (j + 1,), (hinge,), returned=returned
     )

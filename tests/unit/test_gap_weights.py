@@ -18,7 +18,7 @@ from identification.gap.effects import (
     library,
 )
 from identification.gap.effects.joint_backlash import TOOLS_KG
-from identification.gap.effects.joint_nonlinear_stiffness import above, beyond
+from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.joint_yield import is_sharp
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
@@ -287,6 +287,31 @@ def test_an_arm_s_stated_springs_may_be_those_of_small_loads_which_make_nothing_
     assert len(held.columns) == len(slips.columns) + 1
     specimen = make_bench(replace(bench.data, arm=False))
     assert not any("slips" in v.label for v in library(specimen, ["joint_hysteresis"]))
+
+
+def test_a_second_spring_comes_to_bear_between_the_places_of_the_grid() -> None:
+    """At 0.337 of the range, all at once: found to a percent of the range, and as exact as that."""
+    bench = hanging(np.concatenate([UP, -UP]), gravity=0.0)
+    variants = library(bench, ["joint_nonlinear_stiffness"])
+    x, c = bench.load / 80.0, float(bench.compliance[0]) * 80.0
+    second = bench.joint_column(0, -0.5 * c * hinge(x, 0.337))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    engine = Engine(bench, base, target + second, np.array([0.0, 2e-6, 5e-6]))
+    singles = score(engine, engine.levels, variants)
+    finer = refine(engine, singles)
+    engine.extend()
+    best = max([*singles, *score(engine, engine.levels, finer)], key=lambda s: s.log_evidence)
+    assert best.variant.label.startswith("joint 1 corner")
+    assert best.variant.info["kinds"][1] == pytest.approx(0.337, abs=0.01)
+    law, scale = law_of(bench, best.variant)
+    assert rows_of(bench, "joint_nonlinear_stiffness", law) * scale == pytest.approx(
+        np.column_stack([bench.columns[k] for k in best.variant.columns])
+    )
+    curve = next(v for v in variants if v.label.endswith("curve"))
+    bend = next(v for v in variants if " bend " in v.label)
+    assert not joint_nonlinear_stiffness.corners(bench, curve)
+    specimen = make_bench(replace(bench.data, arm=False))
+    assert not joint_nonlinear_stiffness.corners(specimen, bend)
 
 
 def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> None:

@@ -117,6 +117,26 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
     return [_odd(bench, found.info["joint"], found.info["line"], kg, share) for kg in masses]
 
 
+def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
+    """Sharp corners about a bend, or a corner, that was found, as where a second spring comes to
+    bear. Of arms: a specimen's curve is fine as it is. close: share of the steps."""
+    places = found.info["kinds"][1:]
+    if not bench.data.arm or "hinges" not in found.info or len(places) > 2:
+        return []
+    j, top = int(found.info["joint"]), float(found.info["torque"])
+    x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
+    share, out = 0.2 / (len(PLACES) - 1) / len(_ABOUT), []
+    for b in (np.mean(places) + close * _ABOUT).tolist():
+        columns = [found.columns[0], bench.add_joint(j, c * hinge(x, b))]
+        out.append(
+            variant(WORD, f"joint {j + 1} corner {b:.3g}", columns, SCALES, np.eye(2),
+                    positive=False, prior=share, kinds=("line", b), joint=j, torque=top,
+                    hinges=(b,))
+        )  # fmt: skip
+    return out
+
+
+_ABOUT = np.linspace(-0.08, 0.08, 9)  # of the range
 _TOOL_STEPS_KG = np.array([-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4])
 
 
