@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from identification.arm import STANDARD_GRAVITY, Arm, tool_offset
 from identification.elastic import Beam
 from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
+from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.model import load_robot
@@ -161,7 +162,7 @@ def arm_setup(arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Arra
         links=np.array(
             [[_link(arm, link, q, tool, n) for link in links]
              for links in (arm.links, [_joint_to_joint(arm, link) for link in arm.links])]
-        ).reshape(2, -1, 2),
+        ).reshape(2, -1, len(STRAINS)),
         gravity=-arm.gravity_torques(q),  # what the weight does, not what holds it
         tool_gravity=J.T @ np.array(STANDARD_GRAVITY),
         bent_lever=_bent(arm, q, tool, n),
@@ -184,7 +185,7 @@ def _bench_setup(dataset: Dataset, direction: str, n: Array, tangents: Array) ->
         offset_lever=np.zeros((m, 3)),
         turned_lever=np.zeros((m, m)),
         moment=np.zeros(3),
-        links=np.zeros((2, 0, 2)),
+        links=np.zeros((2, 0, len(STRAINS))),
         gravity=np.zeros(m),
     )
 
@@ -231,12 +232,15 @@ def _joint_to_joint(arm: Arm, link: Beam) -> Beam:
     return replace(link, start=tuple(start.tolist()), end=(0.0, 0.0, 0.0))
 
 
-def _link(arm: Arm, link: Beam, q: Array, tool: Array, n: Array) -> tuple[float, float]:
-    """Compliance of one nominal link along n by bending and by twist, m/N."""
-    stiff = arm.with_stiffness(np.full(6, 1e30))
-    untwisted = replace(link, section=replace(link.section, torsion=1e3 * link.section.torsion))
-    whole, bent = (
-        float(n @ stiff.compliance(q, tool, links=[part])[:3, :3] @ n) for part in (link, untwisted)
-    )
-    twist = (whole - bent) / (1 - 1e-3)
-    return whole - twist, twist
+def _link(arm: Arm, link: Beam, q: Array, tool: Array, n: Array) -> list[float]:
+    """Compliance of one nominal link along n, m/N: what each of STRAINS adds, by the moment of a
+    newton at the tool (the little that it is stretched is left out)."""
+    T, x, section = arm.frames(q)[link.frame], arm.fk(q, tool)[:3, 3], link.section
+    start, end = (T[:3, :3] @ np.array(p) + T[:3, 3] for p in (link.start, link.end))
+    axes = T[:3, :3] @ link.axes()
+    bends = []
+    for share, weight in zip((0.0, 0.5, 1.0), BENDING.values(), strict=True):
+        torsion, about_y, about_z = np.cross(x - start - share * (end - start), n) @ axes
+        bent = about_y**2 / section.bending_y + about_z**2 / section.bending_z
+        bends.append(weight * link.length * float(bent))
+    return [*bends, link.length * float(torsion**2 / section.torsion)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from identification.gap.effects import joint_backlash
-from identification.gap.effects.link_flexibility import PLACED
+from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
 from identification.gap.forms.law import ACROSS, ANEW, HUNG, KEPT, LOST, WORKED
 
@@ -81,7 +81,7 @@ SHAPES: dict[str, Key] = {
     "retardation_time": Key("retardation_time_s", "positive"),
     "joint": Key("joint", "count"),
     "segment": Key("segment", "count"),
-    "strain": Key("strain", "text", options=("bending", "twist")),
+    "strain": Key("strain", "text", options=STRAINS),
     "run": Key("run", "count"),
     "axis": Key("axis", "text", options=_SIDES),
     "law": Key("law", "text", options=("exponential", "hyperbolic", "slack", "toe")),

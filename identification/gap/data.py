@@ -30,10 +30,10 @@ class Setup:
     tangents (2, 3): unit vectors across the direction; tangent_lever (2, m): torques of a newton
     along them. offset_lever (m, 3): change of lever per metre of tool offset in the flange frame.
     turned_lever (m, m): change of lever i per radian of joint j. moment (3,) m: moment about the
-    base origin of a newton along the direction. links (2, l, 2) m/N: compliance along the
-    direction of each nominal link by bending and by twist, placed as the model has it, and from
-    joint to joint. gravity (m,) Nm: torques of the arm's own weight;
-    tool_gravity (m,) Nm/kg: of a mass at the point of load.
+    base origin of a newton along the direction. links (2, l, 4) m/N: compliance along the
+    direction of each nominal link by bending at its start, in its middle, at its end, and by twist,
+    placed as the model has it, and from joint to joint. gravity (m,) Nm: torques of the arm's own
+    weight; tool_gravity (m,) Nm/kg: of a mass at the point of load.
     Second order, 0 where there is none: bent_lever (m, m, m), change of turned_lever per radian;
     turned_offset (m, m, 3), change of offset_lever i per radian of joint j.
     """

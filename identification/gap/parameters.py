@@ -23,7 +23,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.contact_seating import LAWS
-from identification.gap.effects.link_flexibility import STRAINS
+from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from identification.gap.history import half_sample, settling_share, standing_on
 from identification.gap.interval import NOMINAL, TWO_SIDED, Found, Parameter, Softer, normal
 from identification.gap.lags import closest_lag
@@ -134,11 +134,16 @@ def _gain(bench: Bench, _: Part, found: Found) -> dict[str, Parameter]:
 
 
 def _links(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
-    return {
-        f"{strain}_compliance_over_nominal_segment{k + 1}": found.one(2 * i + s, "1")
-        for i, k in enumerate(part.variant.info["segments"])
-        for s, strain in enumerate(STRAINS)
-    }
+    """Of bending the mean along the segment, as an even tube has it."""
+    shares = {"bending": [*BENDING.values(), 0.0], "twist": [*np.zeros(len(BENDING)), 1.0]}
+    out, segments = {}, part.variant.info["segments"]
+    for i, k in enumerate(segments):
+        for strain, share in shares.items():
+            f = np.zeros((len(segments), len(STRAINS)))
+            f[i] = share
+            key = f"{strain}_compliance_over_nominal_segment{k + 1}"
+            out[key] = found.linear(f.ravel(), "1")
+    return out
 
 
 def _base(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:

@@ -44,8 +44,10 @@ def charged(v: Variant, w: list[float], sd: float = 0.01) -> float:
     ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, 0.7], [1, 0.5, -0.2, 0.7]),
     ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, 0.7], [1, 0.5, 0.2, 0.9]),
     ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, -0.7], [1, 0.5, 0.2, -0.9]),
-    ("link_flexibility", "segment 1", [1.0, 0.3], [1.0, -0.3]),
-    ("link_flexibility", "both arms", [1.0, 0.3, 0.5, 0.1], [1.0, 0.3, -0.5, 0.1]),
+    ("link_flexibility", "segment 1", [1, 1, 1, 0.3], [1, 1, 1, -0.3]),
+    ("link_flexibility", "segment 1", [0.2, 1, 0.2, 0.3], [-0.2, 1, 0.2, 0.3]),
+    ("link_flexibility", "both arms", [1, 1, 1, 0.3, 0.5, 0.5, 0.5, 0.1],
+     [1, 1, 1, 0.3, 0.5, -0.5, 0.5, 0.1]),
 ])  # fmt: skip
 def test_what_bends_gives_way_under_load_in_every_part(
     bench: Bench, word: str, label: str, good: list[float], bad: list[float]

@@ -195,6 +195,12 @@ def test_segments_run_where_the_model_has_them_or_from_joint_to_joint() -> None:
         assert (own @ [*link.end, 1.0])[:3] == pytest.approx(own[:3, 3])
         assert link.section == next(b.section for b in arm.links if b.frame == link.frame)
     flat = replace(arm, links=(upper, fore))
+    tool, across = np.eye(4), np.array([0.3, 0.4, 0.866])
+    tool[:3, 3] = [0.05, 0.0, 0.2]
+    parts = arm_setup(arm, "P1", q, tool[:3, 3], "y", across).links
+    for k, link in enumerate(arm.links):  # the four of them are the beam, but for its stretch
+        beam = arm.compliance(q, tool, links=[link]) - arm.compliance(q, tool)
+        assert parts[0, k].sum() == pytest.approx(across @ beam[:3, :3] @ across, rel=5e-3)
     for tcp, n in (([0.0, 0.0, 0.1], [0.0, 1.0, 0.0]), ([0.05, 0.0, 0.2], [1.0, 0.0, 0.0])):
         as_modelled, straight = arm_setup(arm, "P1", q, np.array(tcp), "y", np.array(n)).links
         again = arm_setup(flat, "P1", q, np.array(tcp), "y", np.array(n)).links

@@ -1,12 +1,14 @@
 """Arm segments bend and twist: beams in series with the joints, unseen by encoders.
 
-Compliance along the direction of each nominal tube (model file of the robot), scaled by a
-coefficient: 1 is the nominal aluminium tube, 50 to 870 um at 100 N; castings are 0.2 to 3 times it.
+A load at the tool bends a segment by moments that grow in proportion along it, so that what any
+distribution of stiffness along it gives is a sum of squares of the moment at its two ends and in
+its middle; of an even tube by Simpson's rule, which is exact then. Coefficients: 1 is the nominal
+aluminium tube, 50 to 870 um at 100 N; castings are 0.2 to 3 times it.
 No data sheet says where a casting's neutral axis runs: where the model file has the tube, beside
 the plane of the joints, or from joint to joint.
 
 Size: 0.2 to 3 times the nominal tubes: 50 to 870 um at 100 N.
-Prior: factors positive, sd out of SCALES, equally likely.
+Prior: factors positive and alike in one segment, sd out of SCALES, equally likely.
 Source: beam theory for the segments in the robot's model file.
 """
 
@@ -22,14 +24,15 @@ WORD = "link_flexibility"
 SCALES = (0.15, 0.5, 1.5)
 
 
-STRAINS = ("bending", "twist")
+BENDING = {"bending at start": 1 / 6, "bending in the middle": 4 / 6, "bending at end": 1 / 6}
+STRAINS = (*BENDING, "twist")
 PLACED = ("as modelled", "joint to joint")
-ALIKE = 0.9  # correlation of the two in one segment: both go with its wall and material
+ALIKE = 0.7  # correlation of all of them in one segment: they go with its wall and material
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Each link, and both; bending and twist of one are alike, but not the same."""
-    links = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]  # (n, 2, l, 2)
+    """Each link, and both, wherever they may run."""
+    links = np.stack([s.links for s in bench.data.setups])[bench.rows.setup]  # (n, 2, l, 4)
     out = []
     for k, placed in enumerate(PLACED):
         if k and np.allclose(links[:, k], links[:, 0], rtol=1e-6, atol=0.0):
@@ -39,16 +42,17 @@ def variants(bench: Bench) -> list[Variant]:
 
 
 def _placed(bench: Bench, links: Array, placed: str) -> list[Variant]:
-    """Of links (n, l, 2) m/N."""
-    count, root = links.shape[1], np.array([[1.0, 0.0], [ALIKE, np.sqrt(1 - ALIKE**2)]])
+    """Of links (n, l, 4) m/N."""
+    count, each = links.shape[1:]
+    root = np.asarray(np.linalg.cholesky((1 - ALIKE) * np.eye(each) + ALIKE), dtype=float)
     columns = [
         bench.add(bench.outside_column(links[:, k, i] * bench.load))
         for k in range(count)
-        for i in range(2)
+        for i in range(each)
     ]
     where = "" if placed == PLACED[0] else f" {placed}"
     out = [
-        variant(WORD, f"segment {k + 1}{where}", columns[2 * k : 2 * k + 2], SCALES, root,
+        variant(WORD, f"segment {k + 1}{where}", columns[each * k : each * (k + 1)], SCALES, root,
                 each=True, segments=[k], placed=placed)
         for k in range(count)
     ]  # fmt: skip
