@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from identification.gap.effects import joint_backlash
+from identification.gap.effects import joint_backlash, time_lag
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
 from identification.gap.forms.law import ACROSS, ANEW, HUNG, KEPT, LOST, WORKED
@@ -53,7 +53,7 @@ CONSTANTS: dict[str, Key] = {
     "crossing": Key("crossing", "text", options=("weight", "load")),
     "kind": Key("kind", "text", options=joint_backlash.KINDS),
     "tool": Key("tool_kg"),
-    "way": Key("kind", "text", options=("delay", "filter", "window")),
+    "way": Key("kind", "text", options=(*time_lag.KINDS, "window")),
     "measured_to": Key("measured_to_Nm", "positive"),
     "channel": Key("channel", "text", options=("displacement", "force")),
     "lag": Key("lag_s", "positive"),

@@ -6,6 +6,7 @@ both neighbours stay far from it (one continuous recording cut into runs).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -253,9 +254,40 @@ def delayed(values: Array, delay: float, rows: Rows) -> Array:
     """`values(t - delay)` of values (n,) or (n, k), within every run, the path between rows being
     straight ramps."""
     out = np.empty_like(values)
+    for a, b, t, v in _ramps(values, rows):
+        place = np.interp(rows.time[a:b] - delay, t, np.arange(len(t), dtype=float))
+        low = place.astype(np.intp)
+        share = (place - low).reshape(-1, *[1] * (v.ndim - 1))
+        out[a:b] = v[low] + share * (v[np.minimum(low + 1, len(v) - 1)] - v[low])
+    return out
+
+
+def averaged(values: Array, window: float, rows: Rows) -> Array:
+    """Means of values (n,) or (n, k) over the last `window` s, along the same ramps; before a run
+    they are what they are at its first row."""
+    out = np.empty_like(values)
+    for a, b, t, v in _ramps(values, rows):
+        step = np.diff(t).reshape(-1, *[1] * (v.ndim - 1))
+        area = np.concatenate([0.0 * v[:1], np.cumsum(step * (v[1:] + v[:-1]) / 2, axis=0)])
+
+        def until(at: Array, t: Array = t, v: Array = v, area: Array = area) -> Array:
+            k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 1)
+            after = (at - t[k]).reshape(-1, *[1] * (v.ndim - 1))
+            high = np.minimum(k + 1, len(t) - 1)
+            length = np.maximum(t[high] - t[k], 1e-300).reshape(after.shape)
+            rise = np.where(after > 0, (v[high] - v[k]) / length, 0.0)
+            return np.asarray(area[k] + after * (v[k] + 0.5 * after * rise))
+
+        now = rows.time[a:b]
+        out[a:b] = (until(now) - until(now - window)) / window
+    return out
+
+
+def _ramps(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]:
+    """Of every run its first row and the one after its last, and corners of its path: times (m,)
+    and values (m,) or (m, k)."""
     half = half_sample(rows)
-    edges = np.append(np.flatnonzero(rows.starts), rows.n)
-    for a, b in pairwise(edges):
+    for a, b in pairwise(np.append(np.flatnonzero(rows.starts), rows.n).tolist()):
         t, v = rows.time[a:b], values[a:b]
         if not rows.continuous:
             new = rows.hold_starts[a:b]
@@ -264,8 +296,4 @@ def delayed(values: Array, delay: float, rows: Rows) -> Array:
             v = np.concatenate([v, v[new], v[:-1][new[1:]]])
             order = np.argsort(t, kind="stable")
             t, v = t[order], v[order]
-        place = np.interp(rows.time[a:b] - delay, t, np.arange(len(t), dtype=float))
-        low = place.astype(np.intp)
-        share = (place - low).reshape(-1, *[1] * (v.ndim - 1))
-        out[a:b] = v[low] + share * (v[np.minimum(low + 1, len(v) - 1)] - v[low])
-    return out
+        yield a, b, t, v

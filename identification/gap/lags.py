@@ -30,26 +30,8 @@ def closest_lag(bench: Bench, channel: str, kind: str, does: Array) -> tuple[flo
     return best[1], float(np.sqrt(best[0] / max(float(y @ y), 1e-300)))
 
 
-def _mean_up_to(longest: float, delays: Array, does: Array) -> Array:
-    """(n,) mean of what delays from 0 to `longest` s do, of delays (k,) that do (k, n)."""
-    at = (np.arange(_WINDOW) + 0.5) / _WINDOW * longest
-    place = np.searchsorted(delays, at)
-    out = np.zeros(does.shape[1])
-    for t, k in zip(at, place, strict=True):
-        low, before = (float(delays[k - 1]), does[k - 1]) if k else (0.0, 0.0 * does[0])
-        out += before + (does[k] - before) * (t - low) / (float(delays[k]) - low)
-    return out / _WINDOW
-
-
-_WINDOW = 24  # parts of a moving average
-
-
 @lru_cache(maxsize=3)
 def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
     """Lags (k,) s and what each does to the responses (k, n)."""
     lags = _LAGS * sampling_time(bench.rows)
-    if kind == "average":  # over twice the lag: the mean of what all delays up to that do
-        delays, does = _lagging(bench, channel, "delay")
-        lags = lags[: np.searchsorted(lags, lags[-1] / 2)]
-        return lags, np.array([_mean_up_to(2 * t, delays, does) for t in lags])
     return lags, np.array([late(bench, channel, kind, float(t))[: bench.rows.n] for t in lags])

@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.gap.data import GapData, Instruments, Setup
-from identification.gap.history import bristles, delayed, flowing_play, play, retarded, worked_in
+from identification.gap.history import (
+    averaged,
+    bristles,
+    delayed,
+    flowing_play,
+    play,
+    retarded,
+    worked_in,
+)
 from identification.gap.rows import Rows, reduce_rows
 
 
@@ -141,6 +149,19 @@ def test_a_delay_of_thinned_holds_is_that_of_the_load() -> None:
     found = delayed(rows.force, 1.8, rows)
     alone = rows.weight == 1
     assert found[alone] == pytest.approx(np.interp(rows.time - 1.8, grid, load)[alone], abs=1e-9)
+
+
+@pytest.mark.parametrize("window", [0.4, 3.0, 14.0])
+def test_a_mean_over_the_last_readings_is_that_of_the_load(window: float) -> None:
+    rows, grid, load = staircase()
+    area = np.concatenate([[0.0], np.cumsum((load[1:] + load[:-1]) / 2 * 1e-3)])
+    before = np.interp(rows.time - window, grid, area) + load[0] * np.minimum(rows.time - window, 0)
+    mean = (np.interp(rows.time, grid, area) - before) / window
+    alone = rows.weight == 1
+    found = averaged(rows.force, window, rows)
+    assert found[alone] == pytest.approx(mean[alone], abs=1e-6)
+    both = averaged(np.column_stack([rows.force, -2 * rows.force]), window, rows)
+    assert both == pytest.approx(np.column_stack([found, -2 * found]))
 
 
 def test_delay_shows_the_step_before_and_nothing_later_in_the_hold() -> None:

@@ -1,6 +1,7 @@
 """One channel lags the other: shows where the load changes, at the first samples of a hold.
 
-Pure delay of the laser, `u(t) = u_0(t - d)`, or of the force; or a first-order filter of either.
+Pure delay of the laser, `u(t) = u_0(t - d)`, or of the force; a first-order filter of either; or a
+mean over the last readings, which comes late by half of its window.
 Lags of filters, averaging and transmission: 0.05 to 10 s.
 
 Size: 0.05 to 10 s; 0.6 to 12 times the sampling interval here.
@@ -17,7 +18,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.history import delayed, rests, retarded, sampling_time
+from identification.gap.history import averaged, delayed, rests, retarded, sampling_time
 from identification.gap.variants import Variant, variant
 
 WORD = "time_lag"
@@ -46,6 +47,7 @@ def variants(bench: Bench) -> list[Variant]:
     return out
 
 
+KINDS = ("delay", "filter", "average")
 _STEP = 1.13
 _STEPS = np.array([-3, -2, -1, 0, 1, 2, 3])
 
@@ -69,15 +71,17 @@ def _likely(multiple: float) -> float:
 
 
 def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
-    """A lag as a delay, as a filter, and as something in between."""
+    """A lag as a delay, a filter, a mean, and as something between delay and filter."""
     out, pair = [], []
-    for kind in ("delay", "filter"):
+    known = channel != _driven(bench) or not bench.rows.continuous
+    for kind in KINDS if known else KINDS[:-1]:
         change = late(bench, channel, kind, lag)
         if not np.any(change):
             continue
-        pair.append(bench.add(change))
+        column = bench.add(change)
+        pair += [column] if kind != "average" else []
         info: dict[str, Any] = {"lag_s": lag, "kind": kind, "channel": channel}
-        out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", pair[-1:], (0.5, 1.0),
+        out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", [column], (0.5, 1.0),
                            prior=likely, least=LEAST, **info))  # fmt: skip
     if len(pair) > 1:
         info = {"lag_s": lag, "kind": "window", "channel": channel}
@@ -99,8 +103,7 @@ def _like_a_soft_start(bench: Bench) -> bool:
 def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
     """(size,) what a lag of a channel does: the one that answers shows the response to earlier
     loads; the one that is driven was in truth ahead of what was read."""
-    driven = "displacement" if bench.imposed else "force"
-    if channel != driven:
+    if channel != _driven(bench):
         line = _smooth(bench, bench.line)
         return bench.stacked(_behind(bench, line[:, None], kind, lag)[:, 0] - line)
     if bench.rows.continuous:
@@ -111,6 +114,10 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
         return bench.stacked(bench.line_slope * ahead)
     # unloaded, a force that lags still shows what is over
     return bench.force_column(ahead) + bench.stacked(zero_force=-ahead)
+
+
+def _driven(bench: Bench) -> str:
+    return "displacement" if bench.imposed else "force"
 
 
 _SIDE = 4  # rows to either side
@@ -139,14 +146,17 @@ def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
     """Values (n, k) as a channel shows them that lags."""
     if kind == "delay":
         return delayed(values, lag, bench.rows)
+    if kind == "average":
+        return averaged(values, 2 * lag, bench.rows)
     times = np.full(values.shape[1], lag)
     return retarded(values, times, bench.rows, rests(bench.rows))
 
 
 def _ahead(bench: Bench, load: Array, kind: str, lag: float) -> Array:
     """(n,) by how much the true load is ahead of a reading (n,) that lags: `x(t + d) - x(t)` of a
-    delay, `T dx/dt` of a filter. Where the reading stands, there is nothing to be ahead of."""
-    if kind == "delay":
+    delay, and about so of a mean, `T dx/dt` of a filter. Where the reading stands, there is nothing
+    to be ahead of."""
+    if kind != "filter":
         return delayed(load, -lag, bench.rows) - load
     out, edges = np.zeros_like(load), np.append(np.flatnonzero(bench.rows.starts), bench.rows.n)
     for a, b in pairwise(edges):
