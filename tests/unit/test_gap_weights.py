@@ -31,6 +31,7 @@ from identification.gap.rows import reduce_rows
 from identification.gap.variants import variant
 from rig.gap_data import _joint_to_joint, arm_setup
 from rig.model import load_robot
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data, fresh
 
 PATH = np.array([0.0, 4.0, 9.0, 15.0, 8.0, 0.0, -6.0, 3.0])
@@ -154,6 +155,21 @@ def test_plays_cross_where_some_tool_balances_the_weights() -> None:
     assert {v.info["tool_kg"] for v in found} == set(TOOLS_KG)
     too_heavy = hanging(UP, gravity=-300.0)
     assert not [v for v in library(too_heavy, ["joint_backlash"]) if v.info["crossing"] == "weight"]
+
+
+def test_a_joint_lies_in_its_play_where_the_push_before_left_it() -> None:
+    """Whichever way it is pushed next, until the arm goes to another pose."""
+    there = make_bench(arm_data())
+    x = there.true_torque[:, 0]  # of the pushes along y
+    zone = 0.02 * float(np.abs(x).max())
+    shapes = joint_backlash._shapes(there, x, zone)
+    turned = np.flatnonzero(there.rebuilt & ~there.moved)
+    for k in np.flatnonzero(there.rebuilt):
+        assert shapes["friction"][0][k] == pytest.approx(0.0, abs=0.01)
+        left = 0.0 if there.moved[k] else shapes["kept"][0][k - 1]
+        assert shapes["kept"][0][k] == pytest.approx(left, abs=0.01)  # noise of the force
+    assert len(turned) == 2
+    assert np.abs(shapes["kept"][0][turned]).max() > 0.4
 
 
 def test_thresholds_answer_to_the_load_without_the_drift_of_its_reading() -> None:

@@ -28,9 +28,9 @@ from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
-KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing")
+KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", "kept")
 PLACED = ("gap", "held")
-HELD = ("rubbing",)  # stays where it was left: no free place
+HELD = ("rubbing", "kept")  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 _TOOL_STEPS_KG = np.linspace(-0.7, 0.7, 9)
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
@@ -93,7 +93,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     zones = float(info["zone_Nm"]) * np.array([0.65, 1.0, 1.5]) ** max(close, 0.75)
     # what changes over more of the range is a curved spring
     zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
-    kinds, out = tuple(dict.fromkeys([info["kind"], "soft", "slow"])), []
+    kinds, out = tuple(dict.fromkeys([info["kind"], "soft", "slow", "kept"])), []
     share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
     for kg in masses:
@@ -169,8 +169,9 @@ def _crosses(net: Array, torque: Array) -> bool:
 
 def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
     """Per kind: the play itself, and the friction beside it; anew in every setup, as the free
-    places are."""
+    places are, or kept while the arm stands, whichever way it is pushed next."""
     state = bench.plays(x, zone * np.array([1.0, 3.0, 0.7, 0.5]), bench.rebuilt)
+    kept = bench.plays(x, np.array([zone]), bench.moved)[:, 0]
     rub = -(x - state[:, 0]) / (2 * zone)
     return {
         "free": [np.tanh(x / zone) / 2, rub],
@@ -180,6 +181,7 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
         "soft": [-np.sign(x) * np.expm1(-np.abs(x) / zone) / 2, rub],
         "slow": [x / (np.abs(x) + zone) / 2, rub],
         "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
+        "kept": [np.clip(kept / zone, -1, 1) / 2, -(x - kept) / (2 * zone)],
     }
 
 
