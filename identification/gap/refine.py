@@ -27,6 +27,7 @@ from identification.gap.variants import Variant
 
 _REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 6  # words that are refined
+_CLOSE = 0.2  # of the first look's steps
 _WINDOW = 12.0  # nats above `none` that a word must have to be refined
 
 
@@ -66,7 +67,8 @@ def _knees(word: _Word) -> list[Variant]:
 
 
 def _backlash(word: _Word) -> list[Variant]:
-    return _closing_in(word, joint_backlash.refined, _places(word.alone, word.beside))
+    places = _places(word.alone, word.beside)
+    return _closing_in(word, joint_backlash.refined, places, (_CLOSE, _CLOSE**2))
 
 
 def _friction(word: _Word) -> list[Variant]:
@@ -121,16 +123,17 @@ def _beside_first(
 
 
 def _closing_in(
-    word: _Word, refined: Callable[..., list[Variant]], starts: list[Scored]
-) -> list[Variant]:
+    word: _Word, refined: Callable[..., list[Variant]], starts: list[Scored],
+    closer: tuple[float, ...] = (_CLOSE,),
+) -> list[Variant]:  # fmt: skip
     """Finer shapes about those that were found, and finer ones still about the best of these."""
     engine = word.engine
     finer = [v for s in starts for v in refined(engine.bench, s.variant)]
-    engine.extend()
-    if not finer:
-        return []
-    best = max(_scored_beside(engine, word.families, word.ranked, finer), key=_evidence)
-    return finer + refined(engine.bench, best.variant, _CLOSE)
+    for share in closer if finer else ():
+        engine.extend()
+        best = max(_scored_beside(engine, word.families, word.ranked, finer), key=_evidence)
+        finer += refined(engine.bench, best.variant, share)
+    return finer
 
 
 def _scored_beside(
@@ -148,7 +151,6 @@ def _evidence(scored: Scored) -> float:
 
 
 _GRIDS = ("joint_yield", "base_slip", "joint_backlash", "joint_hysteresis", "time_lag")
-_CLOSE = 0.2  # of the first look's steps
 
 
 def _estimate(engine: Engine, variant: Variant) -> tuple[Array, Array]:

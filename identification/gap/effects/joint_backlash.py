@@ -32,6 +32,7 @@ KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubb
 PLACED = ("gap", "held")
 HELD = ("rubbing", "kept")  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
+_CLOSER = 0.3  # power of the share: zones need not be known as well as masses
 _TOOL_STEPS_KG = np.linspace(-0.7, 0.7, 9)
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
@@ -90,10 +91,11 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     weighty = info["crossing"] == "weight" and np.any(bench.weight_per_kg(j))
     steps = _TOOL_STEPS_KG if weighty else np.zeros(1)
     masses = float(info["tool_kg"]) + close * steps
-    zones = float(info["zone_Nm"]) * np.array([0.65, 1.0, 1.5]) ** max(close, 0.75)
+    ratios = np.array([1 / 1.5, 1.0, 1.5]) if weighty else np.geomspace(1 / 1.5, 1.5, 7)
+    zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
     # what changes over more of the range is a curved spring
     zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
-    kinds, out = tuple(dict.fromkeys([info["kind"], "soft", "slow", "kept"])), []
+    kinds, out = tuple(dict.fromkeys([info["kind"], "free", "soft", "slow", "kept"])), []
     share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
     for kg in masses:
