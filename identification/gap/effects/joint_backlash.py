@@ -30,6 +30,8 @@ from identification.gap.variants import Variant, variant
 WORD = "joint_backlash"
 KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", "kept")
 PLACED = ("gap", "held")
+# Of those that are refined beside what was found; on a bench as far as anything was won by it.
+_REFINED, _BENCH_REFINED = ("free", "soft", "slow", "kept"), ("soft", "slow")
 HELD = ("rubbing", "kept")  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 _CLOSER = 0.3  # power of the share: zones need not be known as well as masses
@@ -47,7 +49,8 @@ def variants(bench: Bench) -> list[Variant]:
     a recording that runs on from one side: what is slack there is a seat."""
     if not bench.data.arm and bench.rows.continuous and bench.course.one_sided:
         return []
-    out = []
+    # a bench is pushed along one direction after another, each on a part of its own
+    kinds, out = KINDS if bench.data.arm else KINDS[:-1], []
     for j in bench.moving_joints():
         torque = bench.true_torque[:, j]
         span = bench.reach_of(torque)
@@ -59,7 +62,7 @@ def variants(bench: Bench) -> list[Variant]:
                 info: dict[str, Any] = {"joint": j, "zone_Nm": zone * span, "crossing": name,
                                         "tool_kg": kg}  # fmt: skip
                 label = f"joint {j + 1} {name}" + (f" tool {kg:g} kg" if share < 1 else "")
-                out += _zone(bench, x, KINDS, label, f"{zone:g}", share, info, places)
+                out += _zone(bench, x, kinds, label, f"{zone:g}", share, info, places)
         if not bench.data.arm and bench.rows.continuous:
             flanks = placed(bench, torque)
             out += [] if flanks is None else _placed(bench, j, flanks)
@@ -95,7 +98,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
     # what changes over more of the range is a curved spring
     zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
-    kinds, out = tuple(dict.fromkeys([info["kind"], "free", "soft", "slow", "kept"])), []
+    kinds = tuple(dict.fromkeys([info["kind"], *(_REFINED if bench.data.arm else _BENCH_REFINED)]))
+    out: list[Variant] = []
     share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
     for kg in masses:
