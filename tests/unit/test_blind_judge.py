@@ -158,6 +158,20 @@ def test_intervals_of_shared_parameters() -> None:
     assert not one["in_90"]  # its upper end is 1 + 0.11 * 1.645 / 1.96 = 1.092
 
 
+@pytest.mark.parametrize("hung", [True, False])
+def test_a_threshold_of_the_load_is_asked_for_as_such(hung: bool) -> None:
+    """Where no weight hangs on the joint, it is all there is of the threshold."""
+    answers = label("joint_yield", parameters=[{"threshold_of_load_Nm": 50.0}])
+    found = said("joint_yield")
+    read = found["effects"][0]["parameters"]
+    load = {"value": 51.0, "ci95": [49.0, 53.0], "unit": "Nm"}
+    read["threshold"] = {"value": 80.0, "ci95": [75.0, 85.0], "unit": "Nm"} if hung else load
+    if hung:
+        read["threshold_of_load"] = load
+    (one,) = intervals(judge(outcome(answers, found)))
+    assert (one["value"], one["in_90"]) == (51.0, True)
+
+
 def campaign() -> Campaign:
     """Nine cases whose figures are counted by hand below."""
     cases = [
