@@ -264,6 +264,27 @@ def test_curves_and_plays_are_refined_for_tools_in_between_and_no_wider_than_a_p
     assert widest == pytest.approx(joint_backlash.ZONES[-1] * bench.reach_of(bench.load))
 
 
+def test_zones_of_a_play_are_closed_in_on_where_no_tool_can_be_wrong() -> None:
+    bench = hanging(np.concatenate([UP, -UP]), gravity=0.0)
+    still = [replace(s, tool_gravity=np.zeros(1)) for s in bench.data.setups]
+    bench = make_bench(replace(bench.data, setups=tuple(still)))
+    found = next(
+        v for v in library(bench, ["joint_backlash"]) if v.label.endswith("free zone 0.012")
+    )
+    spans = []
+    for close, each in ((1.0, 7), (0.2, 7), (0.04, 7)):
+        finer = joint_backlash.refined(bench, found, close)
+        zones = sorted({v.info["zone_Nm"] for v in finer})
+        assert len(zones) == each
+        assert zones[3] == pytest.approx(found.info["zone_Nm"])
+        assert {v.info["kind"] for v in finer} == {"free", "soft", "slow", "kept"}
+        spans.append(zones[-1] / zones[0])
+    assert spans[0] == pytest.approx(2.25)
+    assert 1.05 < spans[2] < spans[1] < 1.7  # nearer, and not so near as masses
+    specimen = make_bench(replace(bench.data, arm=False))
+    assert not any("kept" in v.label for v in library(specimen, ["joint_backlash"]))
+
+
 def test_friction_under_weight_is_refined_for_other_tools() -> None:
     bench = hanging(np.concatenate([UP, UP[::-1]]))
     found = library(bench, ["joint_hysteresis"])
