@@ -68,7 +68,7 @@ def _knees(word: _Word) -> list[Variant]:
 
 def _backlash(word: _Word) -> list[Variant]:
     places = _places(word.alone, word.beside)
-    return _closing_in(word, joint_backlash.refined, places, (_CLOSE, _CLOSE**2))
+    return _closing_in(word, joint_backlash.refined, places, joint_backlash.CLOSE)
 
 
 def _friction(word: _Word) -> list[Variant]:

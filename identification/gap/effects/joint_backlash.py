@@ -34,6 +34,7 @@ PLACED = ("gap", "held")
 _REFINED, _BENCH_REFINED = ("free", "soft", "slow", "kept"), ("soft", "slow")
 HELD = ("rubbing", "kept")  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
+CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
 _CLOSER = 0.3  # power of the share: zones need not be known as well as masses
 _TOOL_STEPS_KG = np.linspace(-0.7, 0.7, 9)
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
@@ -86,7 +87,8 @@ def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Arra
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Zones about one that was found; where weights decide about the crossing, at masses of the
-    tool in between: the zone is small beside what they do. close: share of the steps."""
+    tool in between: the zone is small beside what they do. close: share of the steps; the last ones
+    are of the same kind."""
     info, j = dict(found.info), int(found.info["joint"])
     if info["kind"] in PLACED:
         return []
@@ -98,7 +100,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
     # what changes over more of the range is a curved spring
     zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
-    kinds = tuple(dict.fromkeys([info["kind"], *(_REFINED if bench.data.arm else _BENCH_REFINED)]))
+    beside = _REFINED if bench.data.arm else _BENCH_REFINED
+    kinds = tuple(dict.fromkeys([info["kind"], *(beside if close >= CLOSE[0] else ())]))
     out: list[Variant] = []
     share = 4.0 / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
