@@ -119,6 +119,15 @@ def test_memory_may_end_where_the_rig_is_turned_to_another_direction(bench: Benc
     assert not any("set up anew" in v.label for v in library(one, ["joint_yield"]))
 
 
+def test_segments_run_two_ways_where_that_makes_a_difference(bench: Bench) -> None:
+    there = replace(bench, columns=[])
+    named = [v.label for v in library(there, ["link_flexibility"])]
+    assert sum("joint to joint" in name for name in named) == len(named) / 2 == 3
+    flat = tuple(replace(s, links=s.links[[1, 1]]) for s in bench.data.setups)
+    same = make_bench(replace(bench.data, setups=flat))
+    assert len(library(same, ["link_flexibility"])) == 3
+
+
 def test_slow_flow_with_the_square_of_the_overstress_is_for_arms(bench: Bench) -> None:
     """A single spring under a load that stands creeps so."""
     loose = replace(bench_data(30 * np.repeat(np.arange(9.0), 4), np.zeros(36)), timed=True)

@@ -35,6 +35,7 @@ _REFINED, _BENCH_REFINED = ("free", "soft", "slow", "kept"), ("soft", "slow")
 HELD = ("rubbing", "kept")  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
+_FINE_PRIOR = 8.0  # of all finer shapes together, however often it is looked closer
 _CLOSER = 0.3  # power of the share: zones need not be known as well as masses
 _TOOL_STEPS_KG = np.linspace(-0.7, 0.7, 9)
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
@@ -103,7 +104,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     beside = _REFINED if bench.data.arm else _BENCH_REFINED
     kinds = tuple(dict.fromkeys([info["kind"], *(beside if close >= CLOSE[0] else ())]))
     out: list[Variant] = []
-    share = 4.0 / (len(masses) * len(zones) * len(kinds))
+    share = _FINE_PRIOR / (1 + len(CLOSE)) / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
     for kg in masses:
         x = torque + bench.weight(j, kg) if info["crossing"] == "weight" else torque
