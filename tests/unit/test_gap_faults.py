@@ -144,7 +144,9 @@ def test_a_number_to_which_readings_jump_again_and_again_is_no_reading() -> None
     assert jumps_to(running(force, u)) == 4e-4
 
 
-@pytest.mark.parametrize("what", ["seldom", "cycles", "digits", "passed", "other numbers"])
+@pytest.mark.parametrize(
+    "what", ["seldom", "cycles", "digits", "passed", "other numbers", "runs", "twice"]
+)
 def test_a_number_that_is_met_again_for_a_reason_is_one(what: str) -> None:
     force, u = dropping_out(every=29 if what == "seldom" else 6)
     if what == "cycles":  # the load comes and goes, and a coarse sensor reads the same each time
@@ -158,4 +160,11 @@ def test_a_number_that_is_met_again_for_a_reason_is_one(what: str) -> None:
         u = np.where(u == 4e-4, u, u + 1e-8 * np.arange(90))
     elif what == "other numbers":
         u = u + np.where(u == 4e-4, 1e-9 * np.arange(90), 0.0)
-    assert jumps_to(bench_data(force, u, step=np.arange(90))) is None
+    elif what == "runs":  # each begins with the number that it was zeroed to
+        force, u = np.full(90, 10.0), 1e-4 + 1e-8 * np.arange(90)
+        u[::6] = 4e-4
+    elif what == "twice":  # for a while: something else, and not again and again
+        force, u = np.full(90, 10.0), 1e-4 + 1e-8 * np.arange(90)
+        u[20:30] = u[60:70] = 4e-4
+    run = np.arange(90) // 6 if what == "runs" else np.zeros(90, dtype=np.int64)
+    assert jumps_to(bench_data(force, u, step=np.arange(90), run=run)) is None
