@@ -4,9 +4,9 @@ Net torque = load and, in an upright arm, its own weight. The joint lies at one 
 or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where it was pushed until
 the torque has turned: a play of radius `zone`, or half of it, on the torque, cut at the ends of
 the play, or of 0.7 zones with soft ends; flanks that approach slowly leave `zone / |tau|` of the
-play to be taken up. Gears with play rub too: a stop operator of the zone's
-strength rides along. Without torque the joint lies anywhere in its play, a free place per setup at
-its first zero load and at later ones, or where the rubbing left it. The tool's mass is not known:
+play to be taken up. Gears with play rub too: a stop operator of the zone's strength rides along.
+Without torque the joint lies anywhere in its play, a free place per setup at its first zero load
+and at later ones, or where the rubbing, or the push before, left it. The tool's mass is not known:
 the torque at which the weights are balanced is sought among masses of 0 to 3 kg.
 Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
 force: such plays are placed by the data (flanks.py), with the springs that they bring.

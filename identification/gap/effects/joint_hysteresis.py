@@ -7,7 +7,9 @@ A friction element of strength r carries `S_r(tau) = tau - P_r(tau)` (stop opera
 spring feels so much less, and deflects less. A spectrum of strengths makes any loop that obeys
 Masing's rules (Iwan 1967). Friction that does not obey them: an asperity model whose bristles
 bend exponentially (Dahl 1968), one that lets go elastically (Bouc 1967, Wen 1976; beta = gamma).
-The coefficients are the shares of the joint's compliance that work through friction, 0 to 1.
+Where the stated spring is that of small loads, which make nothing slip, every element adds its play
+instead (Prandtl 1928). The coefficients are the shares of the joint's compliance that work through
+friction, 0 to 1, or what it has more than was stated.
 
 Size: friction of 2 to 20 % of the torque gears see; about 1 arcmin lost at ratio >= 80.
 Prior: shares positive in sum, sd out of SCALES, equally likely; spectrum and single strengths a
