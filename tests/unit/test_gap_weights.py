@@ -226,6 +226,17 @@ def test_segments_run_where_the_model_has_them_or_from_joint_to_joint() -> None:
         assert np.allclose(as_modelled, straight, rtol=1e-6, atol=0) == (n[0] == 0)
 
 
+def test_bending_of_a_segment_is_its_mean_along_it() -> None:
+    """Of an even tube all three are alike; of a hinge in the middle two thirds count."""
+    bench = make_bench(arm_data())
+    both = next(v for v in library(bench, ["link_flexibility"]) if v.label == "both arms")
+    w = np.array([0.0, 1.5, 0.0, 0.2, 2.0, 2.0, 2.0, 0.7])
+    found = parameters(bench, Part(both, 1.0), w, np.zeros((8, 8)))
+    values = {k.replace("compliance_over_nominal_segment", ""): p.value for k, p in found.items()}
+    wanted = {"bending_1": 1.0, "twist_1": 0.2, "bending_2": 2.0, "twist_2": 0.7}
+    assert values == pytest.approx(wanted)
+
+
 def test_a_factor_of_a_spring_knows_the_spring_no_better_than_stated() -> None:
     bench = hanging(UP)
     wrong = next(v for v in library(bench, ["joint_stiffness_error"]))
