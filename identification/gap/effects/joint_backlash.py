@@ -28,11 +28,12 @@ from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
-KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", "kept")
+KEPT = ("kept", "kept 1/2")  # where the push before left it
+KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", *KEPT)
 PLACED = ("gap", "held")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
-_REFINED, _BENCH_REFINED = ("free", "soft", "slow", "kept"), ("soft", "slow")
-HELD = ("rubbing", "kept")  # stays where it was left: no free place
+_REFINED, _BENCH_REFINED = ("free", "soft", "slow", *KEPT), ("soft", "slow")
+HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
 _FINE_PRIOR = 8.0  # of all finer shapes together, however often it is looked closer
@@ -52,7 +53,7 @@ def variants(bench: Bench) -> list[Variant]:
     if not bench.data.arm and bench.rows.continuous and bench.course.one_sided:
         return []
     # a bench is pushed along one direction after another, each on a part of its own
-    kinds, out = KINDS if bench.data.arm else KINDS[:-1], []
+    kinds, out = tuple(k for k in KINDS if bench.data.arm or k not in KEPT), []
     for j in bench.moving_joints():
         torque = bench.true_torque[:, j]
         span = bench.reach_of(torque)
@@ -181,7 +182,7 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
     """Per kind: the play itself, and the friction beside it; anew in every setup, as the free
     places are, or kept while the arm stands, whichever way it is pushed next."""
     state = bench.plays(x, zone * np.array([1.0, 3.0, 0.7, 0.5]), bench.rebuilt)
-    kept = bench.plays(x, np.array([zone]), bench.moved)[:, 0]
+    kept = bench.plays(x, zone * np.array([1.0, 0.5]), bench.moved)
     rub = -(x - state[:, 0]) / (2 * zone)
     return {
         "free": [np.tanh(x / zone) / 2, rub],
@@ -191,7 +192,8 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
         "soft": [-np.sign(x) * np.expm1(-np.abs(x) / zone) / 2, rub],
         "slow": [x / (np.abs(x) + zone) / 2, rub],
         "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
-        "kept": [np.clip(kept / zone, -1, 1) / 2, -(x - kept) / (2 * zone)],
+        "kept": [np.clip(kept[:, 0] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
+        "kept 1/2": [np.clip(kept[:, 1] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
     }
 
 
