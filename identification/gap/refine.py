@@ -128,11 +128,13 @@ def _closing_in(
 ) -> list[Variant]:  # fmt: skip
     """Finer shapes about those that were found, and finer ones still about the best of these."""
     engine = word.engine
-    finer = [v for s in starts for v in refined(engine.bench, s.variant)]
-    for share in closer if finer else ():
+    fresh = [v for s in starts for v in refined(engine.bench, s.variant)]
+    finer, found = list(fresh), list[Scored]()
+    for share in closer if fresh else ():
         engine.extend()
-        best = max(_scored_beside(engine, word.families, word.ranked, finer), key=_evidence)
-        finer += refined(engine.bench, best.variant, share)
+        found += _scored_beside(engine, word.families, word.ranked, fresh)
+        fresh = refined(engine.bench, max(found, key=_evidence).variant, share)
+        finer += fresh
     return finer
 
 
