@@ -91,7 +91,7 @@ class Bench:
         return Course(self.data, self.rows, self.imposed, self.load, self.response, self.slope,
                       self.stated_slope)  # fmt: skip
 
-    @property
+    @cached_property
     def line_slope(self) -> Array:
         """(n,) slope of the response over the load, m/N, as measured in each setup; what a gain or
         a lag acts on, however wrong the simulated springs are."""
@@ -105,12 +105,12 @@ class Bench:
                 out[mine] = max(float(weight @ (x * self.response[mine])) / power, 0.0)
         return out
 
-    @property
+    @cached_property
     def line(self) -> Array:
         """(n,) response that the slope measured in each setup gives for the load, m."""
         return self.line_slope * self.load
 
-    @property
+    @cached_property
     def zero_line(self) -> Array:
         """(n,) N: what the force shows at zero load before and after a run, straight in between; 0
         where it stands still within its noise, or was not read at both ends. A threshold is met
@@ -209,7 +209,7 @@ class Bench:
             return self.stacked(motion)
         return self.stacked(-motion, self._follow(-motion))
 
-    @property
+    @cached_property
     def stated_slope(self) -> Array:
         """(n,) m/N: compliance along the direction as simulated, by which a response is a force."""
         return np.asarray(self.lever**2 @ self.data.compliance)
@@ -262,17 +262,17 @@ class Bench:
         span = float(np.ptp(np.append(self.torque[:, joint], 0.0)))
         return bool(np.abs(self.weight(joint)).max() > _FELT * span)
 
-    @property
+    @cached_property
     def rest(self) -> Flags:
         """(n,) rows before which the load went back to zero."""
         return rests(self.rows)
 
-    @property
+    @cached_property
     def moved(self) -> Flags:
         """(n,) first rows after the arm went to another pose."""
         return moves(self.rows, [s.pose for s in self.data.setups])
 
-    @property
+    @cached_property
     def rebuilt(self) -> Flags:
         """(n,) first rows after the arm went to another pose, or the rig to another direction."""
         return moves(self.rows, [f"{i}" for i in range(len(self.data.setups))])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from math import log
 from typing import NamedTuple
 
@@ -48,6 +49,7 @@ def score(
 _SIZES = (1, 2, 3, 5, 7, 8, 11, 13)
 
 
+@cache
 def _size(k: int) -> int:
     return next((s for s in _SIZES if s >= k), k)
 

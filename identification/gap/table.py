@@ -17,7 +17,7 @@ import numpy as np
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import log_level
-from identification.gap.signs import Limits, log_odds
+from identification.gap.signs import Limits, log_odds, padded
 
 _COUNTS = 40.0  # nats below the best: what lies further down adds nothing; limits add four at most
 # Nats by which no variant has been seen to catch up at another level: of 90 diagnoses none changed
@@ -59,10 +59,7 @@ class Table:
         self._engine, self._levels, self._stacks, self._already = engine, levels, stacks, already
         self._columns = np.concatenate([s.columns for s in stacks])
         self._root = np.concatenate([s.root for s in stacks])
-        most = max(s.scales.shape[1] for s in stacks)
-        self._scales = np.concatenate(
-            [np.pad(s.scales, ((0, 0), (0, most - s.scales.shape[1]))) for s in stacks]
-        )
+        self._scales = padded([s.scales for s in stacks])
         self._limits = Limits.joined([s.limits for s in stacks])
         self._plain = np.concatenate([s.plain for s in stacks])
         self._edges = np.cumsum([0, *(len(s.columns) for s in stacks)]).tolist()

@@ -18,7 +18,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.history import averaged, delayed, rests, retarded, sampling_time
+from identification.gap.history import averaged, delayed, retarded, sampling_time
 from identification.gap.variants import Variant, variant
 
 WORD = "time_lag"
@@ -148,8 +148,7 @@ def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
         return delayed(values, lag, bench.rows)
     if kind == "average":
         return averaged(values, 2 * lag, bench.rows)
-    times = np.full(values.shape[1], lag)
-    return retarded(values, times, bench.rows, rests(bench.rows))
+    return retarded(values, np.array([lag]), bench.rows, bench.rest)
 
 
 def _ahead(bench: Bench, load: Array, kind: str, lag: float) -> Array:
@@ -177,12 +176,12 @@ def _true_force(bench: Bench, kind: str, lag: float) -> Array:
     for run in np.unique(rows.run):
         mine = rows.run == run
         used, number = np.unique(within[mine], return_inverse=True)
-        A, root = shown[mine][:, used], np.sqrt(rows.weight[mine])
+        A = shown[mine][:, used]
         mean = np.bincount(number, weights=bench.load[mine]) / np.bincount(number)
         left = bench.load[mine] - A @ mean
-        weighted = np.vstack([A * root[:, None], _HOLDS_BACK * np.eye(len(used))])
-        change = np.linalg.lstsq(weighted, np.append(left * root, np.zeros(len(used))), rcond=None)
-        out[mine] = (mean + change[0])[number]
+        seen = A.T * rows.weight[mine]
+        change = np.linalg.solve(seen @ A + _HOLDS_BACK**2 * np.eye(len(used)), seen @ left)
+        out[mine] = (mean + change)[number]
     return out
 
 
