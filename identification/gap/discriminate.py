@@ -35,6 +35,7 @@ from identification.gap.variants import Variant
 
 ENOUGH = 3.0  # nats: odds of 20 to 1
 _DECISIVE = 10.0  # more certainty than this is worth no further minute
+_BESIDES = 4  # further procedures that would do, for who can't do the best
 _REPETITIONS = 2  # simulated
 _SHAPES = 8  # of each word, the best on the present data
 _WITHIN = 12.0  # nats below the best that a shape may lie
@@ -104,14 +105,24 @@ def next_measurement(
         return None
     design = present_design(engine.bench)
     known = _discrimination(engine.bench, design, (first, second))
-    rated = []
-    for c in candidates(design, engine.bench.data.arm, others() if others else ()):
+    rated: list[tuple[Option, Candidate]] = []
+    every = candidates(design, engine.bench.data.arm, others() if others else ())
+    for c in sorted(every, key=lambda c: c.design.minutes):
+        if _settled([o for o, _ in rated], c.design.minutes):
+            break
         nats = _discrimination(engine.bench, c.design, (first, second)) - max(known, 0.0)
         if c.kind == "calibrate":
             nats += _calibrated(c.design, (first, second))
         rated.append((Option(c.kind, c.text, max(nats, 0.0), c.design.minutes), c))
     rated.sort(key=lambda r: -_worth(r[0]))
     return _proposal(rated, pair)
+
+
+def _settled(options: list[Option], minutes: float) -> bool:
+    """Whether nothing that takes so long can be worth more than what was looked at, of which a few
+    would do besides."""
+    do = sorted((_worth(o) for o in options if o.expected_nats >= ENOUGH), reverse=True)
+    return len(do) > _BESIDES and do[0] > _DECISIVE / max(minutes, 1e-9)
 
 
 def _worth(option: Option) -> float:
