@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING, Array
-from identification.gap.products import Some, Weights, White
+from identification.gap.growing import Growing
+from identification.gap.products import Gathered, Some, Weights, White
 from identification.gap.rows import rises
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
@@ -93,7 +94,7 @@ class Engine:
         self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
         self._bases = self._integrated(etas, self._weights)
         self._finer: dict[float, tuple[Weights, _Integrated]] = {}
-        self._white = self._whiten(self.columns([]))
+        self._gathered = Gathered(self._whiten(self.columns([])))
         none = np.zeros(0)
         self.levels = [
             Level(self, i, float(eta), none, b.log_base, b.misfit, np.zeros((0, 0)))
@@ -103,7 +104,7 @@ class Engine:
 
     def extend(self) -> None:
         """Takes in the columns that were put into the bench's pool since."""
-        added = range(len(self._white), len(self.bench.columns))
+        added = range(len(self._gathered.white), len(self.bench.columns))
         if not added:
             return
         step = max(1, _AT_ONCE // self.bench.layout.size)
@@ -113,7 +114,7 @@ class Engine:
             np.hstack(b) for b in zip(*(self._common(p, self._weights) for p in parts), strict=True)
         ]
         self.levels = [self._grown(*each) for each in zip(self.levels, beside, strict=True)]
-        self._white = White.joined([self._white, *parts])
+        self._gathered.put(parts)
         self._rows.clear()
 
     def columns(self, numbers: Iterable[int]) -> Array:
@@ -128,12 +129,12 @@ class Engine:
 
     def alike(self, columns: NDArray[np.intp]) -> Array:
         """(g, v, k, k): what `squares` of the columns (v, k) has in common at all levels."""
-        return self._white.alike(columns)
+        return self._gathered.white.alike(columns)
 
     def squares(self, columns: NDArray[np.intp], number: int, alike: Array) -> Array:
         """(v, k, k): parts of a level's Gram matrix of the columns (v, k) of every variant."""
-        shared = self._bases[number].pool[columns]
-        made = self._white.squares(columns, self._weights[number], alike)
+        shared = self._bases[number].pool.values[columns]
+        made = self._gathered.white.squares(columns, self._weights[number], alike)
         return np.asarray(made - shared @ np.swapaxes(shared, 1, 2))
 
     def square(self, columns: tuple[int, ...]) -> Array:
@@ -141,8 +142,8 @@ class Engine:
         time."""
         if columns not in self._squares:
             at = np.array(columns, dtype=np.intp)
-            white = self._white.picked(at)
-            shared = [base.pool[at] @ base.pool[at].T for base in self._bases]
+            white = self._gathered.white.picked(at)
+            shared = [base.pool.values[at] @ base.pool.values[at].T for base in self._bases]
             made = white.between(white, self._weights)
             self._squares[columns] = np.array(made) - np.array(shared)
         return self._squares[columns]
@@ -151,9 +152,9 @@ class Engine:
         """Per level (k, p): rows of the Gram matrix, kept until the pool grows."""
         if columns not in self._rows:
             at = np.array(columns, dtype=np.intp)
-            made = self._white.picked(at).between(self._white, self._weights)
+            made = self._gathered.white.picked(at).between(self._gathered.white, self._weights)
             for base, rows in zip(self._bases, made, strict=True):
-                np.subtract(rows, base.pool[at] @ base.pool.T, out=rows)
+                np.subtract(rows, base.pool.values[at] @ base.pool.values.T, out=rows)
             self._rows[columns] = made
         return self._rows[columns]
 
@@ -166,7 +167,7 @@ class Engine:
         w, base = self._finer[eta]
         if not columns:
             return np.zeros((0, 0)), np.zeros(0), base.log_base
-        white = self._white.picked(np.array(columns, dtype=np.intp))
+        white = self._gathered.white.picked(np.array(columns, dtype=np.intp))
         (beside,) = self._common(white, [w])
         shared = _forward(base.factor, base.root.T @ beside[1 : 1 + base.root.shape[0]])
         square = white.between(white, [w])[0] - shared.T @ shared
@@ -234,7 +235,7 @@ class Engine:
         log_noise -= 0.5 * share * np.log(w.contrast).sum()
         misfit = float(gram[0, 0] - left @ left)
         log_base = float(-0.5 * misfit - np.log(np.diag(factor)).sum() - log_noise)
-        none = np.zeros((0, kb + count))
+        none = Growing(np.zeros((0, kb + count)))
         return _Integrated(root, factor.astype(float), left.astype(float), log_base, misfit, none)
 
     def _grown(self, level: Level, beside: Array) -> Level:
@@ -244,7 +245,7 @@ class Engine:
         b = slice(1, 1 + base.root.shape[0])
         fresh = _forward(base.factor, base.root.T @ beside[b])
         moment = beside[0] - fresh.T @ base.left
-        self._bases[i] = replace(base, pool=np.vstack([base.pool, fresh.T]))
+        base.pool.put([fresh.T])
         both = np.concatenate([level.moment, moment])
         return replace(level, moment=both, taken=np.zeros((0, len(both))))
 
@@ -278,7 +279,7 @@ class _Integrated:
     left: Array
     log_base: float
     misfit: float
-    pool: Array
+    pool: Growing
 
 
 def eta_levels(bench: Bench, base: Base, target: Array) -> Array:

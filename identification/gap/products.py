@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.gap.data import Array
+from identification.gap.growing import Growing
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -41,8 +42,8 @@ class Weights:
 
 @dataclass(frozen=True, eq=False)
 class Some:
-    """Few of many columns: at (p,) the place of every column in `values`, the last one (a row of
-    zeros) for those that are not among them; values (k + 1, rows), a column to a row."""
+    """Few of many columns: at (p,) the place of every column in `values`, 0 (a row of zeros) for
+    those that are not among them; values (1 + k, rows), a column to a row."""
 
     at: NDArray[np.intp]
     values: Array
@@ -51,31 +52,29 @@ class Some:
     def of(cls, columns: Array) -> Some:
         """Of columns (p, rows), those that are not all zero."""
         kept = np.flatnonzero(np.any(columns != 0, axis=1))
-        at = np.full(len(columns), len(kept), dtype=np.intp)
-        at[kept] = np.arange(len(kept))
-        return cls(at, np.vstack([columns[kept], np.zeros((1, columns.shape[1]))]))
+        at = np.zeros(len(columns), dtype=np.intp)
+        at[kept] = 1 + np.arange(len(kept))
+        return cls(at, np.vstack([np.zeros((1, columns.shape[1])), columns[kept]]))
 
-    @classmethod
-    def joined(cls, parts: Sequence[Some]) -> Some:
-        """The columns of all parts, one after the other."""
-        starts = np.cumsum([0, *(part.none for part in parts)])
-        at = [np.where(p.at == p.none, starts[-1], p.at + start)
-              for p, start in zip(parts, starts[:-1], strict=True)]  # fmt: skip
-        values = [*(part.values[:-1] for part in parts), parts[0].values[-1:]]
-        return cls(np.concatenate(at), np.vstack(values))
+    def followed(self, parts: Sequence[Some], room: Growing) -> Some:
+        """With the columns of all parts after these, whose values are in `room`."""
+        starts = np.cumsum([len(self.values) - 1, *(len(p.values) - 1 for p in parts)])
+        at = [np.where(p.at == 0, 0, p.at + s) for p, s in zip(parts, starts[:-1], strict=True)]
+        room.put(p.values[1:] for p in parts)
+        return Some(np.concatenate([self.at, *at]), room.values)
 
     def picked(self, columns: NDArray[np.intp]) -> Some:
         """Some of all columns (k,)."""
         at = self.at[columns]
-        here = np.flatnonzero(at != self.none)
-        place = np.full(len(at), len(here), dtype=np.intp)
-        place[here] = np.arange(len(here))
-        return Some(place, self.values[np.append(at[here], self.none)])
+        here = np.flatnonzero(at)
+        place = np.zeros(len(at), dtype=np.intp)
+        place[here] = 1 + np.arange(len(here))
+        return Some(place, self.values[np.append(0, at[here])])
 
     @property
-    def none(self) -> int:
-        """Place of what is not there."""
-        return len(self.values) - 1
+    def any(self) -> bool:
+        """Whether any column is there."""
+        return len(self.values) > 1
 
 
 def _together(mine: Array, other: Array, weights: Sequence[Array]) -> list[Array]:
@@ -118,17 +117,6 @@ class White:
     def __len__(self) -> int:
         return len(self.even)
 
-    @classmethod
-    def joined(cls, parts: Sequence[White]) -> White:
-        """The columns of all parts, one after the other."""
-        return cls(
-            np.vstack([part.even for part in parts]),
-            tuple(Some.joined(each) for each in zip(*(part.q for part in parts), strict=True)),
-            Some.joined([part.contrast for part in parts]),
-            parts[0].holds,
-            parts[0].groups,
-        )
-
     def between(self, columns: White, weights: list[Weights]) -> list[Array]:
         """Per set of weights (k, p): products of all these columns with all those of another."""
         means, others = self.even[:, : self.holds], columns.even[:, : self.holds]
@@ -137,10 +125,10 @@ class White:
         out = [products + rest for products in out]
         qs = zip(*(self._q(w) for w in weights), strict=True)
         for mine, other, each in zip(self.q, columns.q, qs, strict=True):
-            if mine.none and other.none:
+            if mine.any and other.any:
                 _add(out, mine, other, _together(mine.values, other.values, each))
         mine, other = self.contrast, columns.contrast
-        if mine.none and other.none:
+        if mine.any and other.any:
             _add(out, mine, other, self._contrasts(mine.values, other.values, weights))
         return out
 
@@ -160,7 +148,7 @@ class White:
         even, contrast = self._thin
         out = _scaled(even, [self._even(w) for w in weights], columns.even)
         mine, other = self.contrast, columns.contrast
-        if mine.none and other.none:
+        if mine.any and other.any:
             each = _scaled(contrast, [w.contrast for w in weights], other.values)
             _add(out, mine, other, each)
         return out
@@ -204,6 +192,28 @@ class White:
         return list(w.q.reshape(len(self.q), -1)) if self.q else []
 
 
+class Gathered:
+    """White columns that more are put after; `white` are those that are there."""
+
+    def __init__(self, white: White) -> None:
+        """white: the first ones."""
+        self.white = white
+        self._even, self._contrast = Growing(white.even), Growing(white.contrast.values)
+        self._q = [Growing(some.values) for some in white.q]
+
+    def put(self, parts: Sequence[White]) -> None:
+        """Puts the columns of all parts after those that are there."""
+        self._even.put(part.even for part in parts)
+        q = zip(self.white.q, zip(*(part.q for part in parts), strict=True), self._q, strict=True)
+        self.white = White(
+            self._even.values,
+            tuple(some.followed(each, room) for some, each, room in q),
+            self.white.contrast.followed([part.contrast for part in parts], self._contrast),
+            self.white.holds,
+            self.white.groups,
+        )
+
+
 def _add(out: list[Array], mine: Some, other: Some, products: list[Array]) -> None:
     """Adds products (p, k) of what is there of two to each of those of all columns."""
     place = np.ix_(mine.at, other.at)
@@ -217,7 +227,7 @@ def _add_squares(
 ) -> None:  # fmt: skip
     """Adds weighted products over some rows, where columns (v, k) are there."""
     at = some.at[columns]
-    mine = np.flatnonzero((at != some.none).any(axis=1))
+    mine = np.flatnonzero(at.any(axis=1))
     if mine.size:
         out[mine] += squares_of(some.values[:, rows], at[mine], weight)
 
