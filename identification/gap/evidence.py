@@ -169,7 +169,7 @@ class Engine:
             return np.zeros((0, 0)), np.zeros(0), base.log_base
         white = self._gathered.white.picked(np.array(columns, dtype=np.intp))
         (beside,) = self._common(white, [w])
-        shared = _forward(base.factor, base.root.T @ beside[1 : 1 + base.root.shape[0]])
+        shared = base.turn @ beside[1 : 1 + base.turn.shape[1]]
         square = white.between(white, [w])[0] - shared.T @ shared
         return square, beside[0] - shared.T @ base.left, base.log_base
 
@@ -229,21 +229,21 @@ class Engine:
             root[kb + levels :, kb + levels :] = RUN_PART * eta * np.eye(count - levels)
         b = slice(1, 1 + kb + count)
         factor = np.asarray(np.linalg.cholesky(np.eye(kb + count) + root.T @ gram[b, b] @ root))
-        left = _forward(factor, root.T @ gram[b, 0])
+        turn = _forward(factor, root.T)
+        left = turn @ gram[b, 0]
         share = self._freedom / max(len(w.contrast), 1)
         log_noise = -0.5 * (np.log(w.hold).sum() + np.log(w.q).sum())
         log_noise -= 0.5 * share * np.log(w.contrast).sum()
         misfit = float(gram[0, 0] - left @ left)
         log_base = float(-0.5 * misfit - np.log(np.diag(factor)).sum() - log_noise)
         none = Growing(np.zeros((0, kb + count)))
-        return _Integrated(root, factor.astype(float), left.astype(float), log_base, misfit, none)
+        return _Integrated(turn, left, log_base, misfit, none)
 
     def _grown(self, level: Level, beside: Array) -> Level:
         """A level with further columns, of which the products (c, p) with its base are known."""
         i = level.number
         base = self._bases[i]
-        b = slice(1, 1 + base.root.shape[0])
-        fresh = _forward(base.factor, base.root.T @ beside[b])
+        fresh = base.turn @ beside[1 : 1 + base.turn.shape[1]]
         moment = beside[0] - fresh.T @ base.left
         base.pool.put([fresh.T])
         both = np.concatenate([level.moment, moment])
@@ -270,12 +270,11 @@ def _forward(factor: Array, values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Integrated:
-    """Prior root (k, k) of base and imperfection, Cholesky factor (k, k) of their precision, what
-    the target (k,) and the pool (p, k) share with them, evidence of the base alone, and its misfit
-    (as of a `Level`)."""
+    """Turn (k, k): the prior root of base and imperfection over the Cholesky factor of their
+    precision, `L^-1 root^T`; what the target (k,) and the pool (p, k) share with them, evidence of
+    the base alone, and its misfit (as of a `Level`)."""
 
-    root: Array
-    factor: Array
+    turn: Array
     left: Array
     log_base: float
     misfit: float
