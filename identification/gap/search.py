@@ -22,7 +22,7 @@ _SURE_SHARE, _UNSURE_SHARE = 0.05, 0.2
 _STEP = 0.6  # of the noise: between the least size of an imperfection and the next
 _SHARPENED = 8  # explanations at the most
 _PROMISING = 7  # further words of an explanation that are looked at closely
-_SEEDS = 6
+_SEEDS = 4
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 
 
