@@ -120,7 +120,8 @@ def bristles(
 
 def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
     """First-order lag `T z' = x - z` of a load (n, k) with times (k,), or one (1,) for all:
-    deflection of a Kelvin-Voigt element per unit of its compliance. Exact for a load that ramps between rows and then stands."""
+    deflection of a Kelvin-Voigt element per unit of its compliance. Exact for a load that ramps
+    between rows and then stands."""
     before = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
     before[rest] = 0.0
     step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
