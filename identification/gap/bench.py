@@ -19,6 +19,7 @@ from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
 from identification.gap.imposed import displacement_simpler, on_plateau
 from identification.gap.noise import Noise, estimate_noise, standing
+from identification.gap.pool import Pool
 from identification.gap.rows import Rows, hold_ids, is_continuous, reduce_rows
 
 
@@ -70,7 +71,7 @@ class Bench:
     reach: float
     scatter: Array
     observed: Array
-    columns: list[Array] = field(default_factory=list)
+    columns: Pool = field(default_factory=Pool)
     flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
 
     @property
@@ -166,8 +167,7 @@ class Bench:
 
     def add(self, column: Array) -> int:
         """Puts a stacked column into the pool; its index."""
-        self.columns.append(column)
-        return len(self.columns) - 1
+        return self.columns.add(column)
 
     def stacked(
         self,

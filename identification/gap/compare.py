@@ -35,14 +35,19 @@ def score(
 
     already: mean square (m^2) of that effect: it brings imperfection of its own.
     """
-    out: dict[Variant, Scored] = {}
+    out: dict[Variant, tuple[float, float, int]] = {}
     by_size: dict[int, dict[str, list[Variant]]] = {}
-    for v in variants:
+    first: dict[object, Variant] = {}
+    shapes = [first.setdefault(v.shape, v) for v in variants]
+    for v in first.values():
         words = by_size.setdefault(_size(len(v.columns)), {})
         words.setdefault(v.word, []).append(v)
     for k, words in by_size.items():
         out |= _score_batch(engine, levels, list(words.values()), k, already)
-    return [out[v] for v in variants]
+    return [
+        Scored(v, out[s][0] + log(v.prior), *out[s][1:])
+        for v, s in zip(variants, shapes, strict=True)
+    ]
 
 
 # Variants of nearby sizes are padded to the same: a few large batches take less time than many.
@@ -56,8 +61,9 @@ def _size(k: int) -> int:
 
 def _score_batch(
     engine: Engine, levels: list[Level], families: list[list[Variant]], k: int, already: float
-) -> dict[Variant, Scored]:
-    """Of variants with up to k coefficients each, word by word."""
+) -> dict[Variant, tuple[float, float, int]]:
+    """Of variants with up to k coefficients each, word by word: log evidence, scale and level that
+    contribute most."""
     table = Table(engine, levels, [_stack(engine, tuple(f), k) for f in families], already)
     table.look()
     table.limit()
@@ -66,7 +72,7 @@ def _score_batch(
     number = table.logs.shape[2]
     total = (logsumexp(flat) - np.log([len(v.scales) for v in batch])).tolist()
     return {
-        v: Scored(v, t + log(v.prior), v.scales[b % number], b // number)
+        v: (t, v.scales[b % number], b // number)
         for v, t, b in zip(batch, total, flat.argmax(axis=1).tolist(), strict=True)
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,15 @@ class Variant:
     within: Array = field(default_factory=lambda: np.zeros((0, 0)))
     info: Mapping[str, Any] = field(default_factory=dict)
     prior: float = 1.0
+
+    @cached_property
+    def shape(self) -> tuple[object, ...]:
+        """What its evidence follows from, but for the prior: of a word, variants of the same shape
+        are one under several names."""
+        positive = None if self.positive is None else self.positive.tobytes()
+        other_springs = bool(self.info.get("other_springs"))
+        return (self.word, self.columns, self.scales, self.root.tobytes(), positive, self.least,
+                self.each, self.within.tobytes(), other_springs)  # fmt: skip
 
 
 def variant(

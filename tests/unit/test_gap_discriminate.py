@@ -13,6 +13,7 @@ from identification.gap.discriminate import _discrimination, _Rival, _told
 from identification.gap.effects import library
 from identification.gap.evidence import Engine
 from identification.gap.forms import Form, law_of
+from identification.gap.pool import Pool
 from tests.unit.test_gap_forms import arm_data
 
 
@@ -31,7 +32,7 @@ def test_a_truth_in_the_pool_is_a_measurement_of_it() -> None:
 
 
 def rival(bench: Bench, word: str, size: float) -> _Rival:
-    fresh = replace(bench, columns=[])
+    fresh = replace(bench, columns=Pool())
     v = library(fresh, (word,))[0]
     law, unit = law_of(fresh, v)
     values = np.full(len(v.columns), size) * unit

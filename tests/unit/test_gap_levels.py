@@ -127,7 +127,7 @@ def test_products_are_those_of_the_columns() -> None:
         bench.add(bench.stacked(1e-5 * np.sin((k + 2) * np.arange(bench.rows.n))))
     engine.extend()
     dense = small_engine(small_bench(), (0.0, 3e-6, 1e-5))
-    for column in bench.columns[2:]:
+    for column in list(bench.columns)[2:]:
         dense.bench.add(column)
     whole = Engine(dense.bench, dense.base, dense.target, np.array([0.0, 3e-6, 1e-5]))
     for level, other in zip(engine.levels, whole.levels, strict=True):

@@ -20,7 +20,10 @@ from identification.gap.variants import Variant
 
 WORD = "base_slip"
 DEPTHS_M = (0.0, 0.35, 0.7)  # coarser than elastic ones: a knee is told by where it bends
-_NATURAL = 1 / 1.5e5  # rad/Nm, so that the scales of the knees (0.3 to 20) span 2e-6 to 1.3e-4
+# m/N at the target beyond the threshold, which the scales of the knees (0.07 to 14) multiply: 0.5e-6
+# to 1e-4 rad/Nm on a lever of 0.75 m. Said of the target, not of the moment: axes at several depths
+# whose moments run in proportion have the same knees then, and need not be told apart.
+_BEYOND = 0.75**2 / 1.5e5
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -32,10 +35,12 @@ def variants(bench: Bench) -> list[Variant]:
             if np.abs(lever).max() < 0.02:
                 continue
 
-            def column(state: Array, lever: Array = lever) -> int:
-                return bench.add(bench.outside_column(_NATURAL * lever * state))
+            natural = float(_BEYOND / np.abs(lever).max() ** 2)  # rad/Nm
+
+            def column(state: Array, lever: Array = natural * lever) -> int:
+                return bench.add(bench.outside_column(lever * state))
 
             name = f"axis {'xyz'[axis]} {depth:g} m below"
-            info = {"axis": axis, "depth_m": depth}
+            info = {"axis": axis, "depth_m": depth, "natural": natural}
             out += knee_variants(bench, lever * bench.true_load, column, WORD, name, info)
     return out

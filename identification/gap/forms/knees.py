@@ -24,7 +24,7 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
         constants["flow_exponent"] = _SQUARE
     if v.word == base_slip.WORD:
         constants |= {"axis": "xyz"[info["axis"]], "depth": float(info["depth_m"])}
-        unit = base_slip._NATURAL
+        unit = float(v.info["natural"])
     else:
         constants |= {"joint": int(info["joint"])}
         unit = float(bench.compliance[info["joint"]])

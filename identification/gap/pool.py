@@ -1,0 +1,35 @@
+"""The pool of columns that effects are built from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from hashlib import blake2b
+
+from identification.gap.data import Array
+
+
+class Pool:
+    """Stacked columns (size,), each but once: shapes often agree on the data that there are, as do
+    depths of an axis that one direction alone sees."""
+
+    def __init__(self) -> None:
+        self._columns: list[Array] = []
+        self._places: dict[bytes, int] = {}
+
+    def add(self, column: Array) -> int:
+        """Index of a column, which is put into the pool if it is not there."""
+        # in single precision: what was worked out in another order differs in the last digit
+        mark = blake2b(column.astype("f4").tobytes(), digest_size=16).digest()
+        place = self._places.setdefault(mark, len(self))
+        if place == len(self):
+            self._columns.append(column)
+        return place
+
+    def __getitem__(self, place: int) -> Array:
+        return self._columns[place]
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __iter__(self) -> Iterator[Array]:
+        return iter(self._columns)
