@@ -20,8 +20,8 @@ from identification.gap.variants import Variant
 
 WORD = "base_slip"
 DEPTHS_M = (0.0, 0.35, 0.7)  # coarser than elastic ones: a knee is told by where it bends
-# m/N at the target beyond the threshold, which the scales of the knees (0.07 to 14) multiply: on a
-# lever of 0.75 m 0.5e-6 to 1e-4 rad/Nm. Said of the target, not of the moment: axes at several
+# m/N at the target beyond the threshold, which the scales of the knees (0.07 to 56) multiply: on a
+# lever of 0.75 m 0.5e-6 to 4e-4 rad/Nm. Said of the target, not of the moment: axes at several
 # depths whose moments run in proportion have the same knees then, and need not be told apart.
 _BEYOND = 0.75**2 / 1.5e5
 

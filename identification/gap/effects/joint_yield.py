@@ -5,10 +5,10 @@ hardening, Prandtl 1928): stiff below, knee, the rest stays after unloading. Rou
 several radii from the threshold on; slow flow is the same state reached with a lag, in proportion
 to the overstress or with its square; a controller that takes the joint back resets it between
 runs. w in units of the joint's elastic compliance: 1/w is the ratio of hardening to spring, so 0.3
-(little) to 30 (clamp that hardly holds).
+(little) to 100 (a clamp that hardly holds; plastics that draw out under a weight).
 
-Size: slope beyond the knee 0.3 to 30 times the joint's compliance; thresholds anywhere in the range
-of load.
+Size: slope beyond the knee 0.3 to 100 times the joint's compliance; thresholds anywhere in the
+range of load.
 Prior: sum of coefficients positive, sd out of SCALES, equally likely; rounded, lasting and flowing
 forms weighted as below.
 Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manuals (thresholds).
@@ -38,7 +38,7 @@ _FIRST = 2  # lower ones only round off the knees above them
 # Bauschinger's effect: after a reversal metal yields earlier than at first.
 _SHARP = {0: 1.0, 1: 0.5}
 _ROUND = {-6: 0.1, -4: 0.15, -2: 0.25, -1: 0.5, 0: 1.0, 1: 0.5, 2: 0.25}
-SCALES = (0.07, 0.25, 0.9, 3.5, 14.0)
+SCALES = (0.07, 0.25, 0.9, 3.5, 14.0, 56.0)
 
 
 def variants(bench: Bench) -> list[Variant]:
