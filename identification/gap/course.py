@@ -171,7 +171,7 @@ class Course:
     @cached_property
     def always_moves(self) -> bool:
         """A running recording in which the load never stands: rate and load are one thing."""
-        if not self.rows.continuous or not np.ptp(self.load) > 0:
+        if not self.rows.continuous or self.rests:
             return False
         return self._moving_share > 1 - _STANDS
 

@@ -42,7 +42,8 @@ def times(bench: Bench) -> np.ndarray:
 def scales(bench: Bench) -> tuple[float, ...]:
     """Of the simulated spring's compliance. Tissue, gels and melts on rigs without an arm go on to
     whatever was seen, thousands of times what the spring gives at once."""
-    simulated = float(np.ptp(bench.slope * bench.load))
+    given = bench.slope * bench.load  # a load that stands came from zero before anybody looked
+    simulated = float(np.ptp(np.append(given, 0.0) if bench.course.rests else given))
     if bench.data.arm or not simulated > 0:
         return SCALES
     seen = bench.reach / simulated
