@@ -86,31 +86,55 @@ def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:
     return np.hypot(displacement, soft * force)
 
 
-_REACH = 3  # rows to either side, over which a local slope is taken
+_REACH = 3  # rows to either side, over which a local slope is taken,
+_TOLD, _MOVING, _FARTHEST = 5.0, 0.9, 16  # or more, until a tenth of them move by so many standard
+# deviations; up to a sixteenth of all
 
 
 def _steepness(rows: Rows, driven: Array, answer: Array, sd: float) -> Array:
-    """(n,) how much the answer changes per unit of what is driven, about a row within its run;
-    changes of what is driven below three standard deviations count as that much."""
-    number = np.arange(rows.n)
-    first = np.flatnonzero(rows.starts)[np.cumsum(rows.starts) - 1]
-    last = np.append(np.flatnonzero(rows.starts)[1:], rows.n)[np.cumsum(rows.starts) - 1] - 1
-    a, b = np.maximum(number - _REACH, first), np.minimum(number + _REACH, last)
+    """(n,) how much the answer changes per unit of what is driven, about a row within its run, over
+    as many rows as tell its motion from its noise; changes of what is driven below three standard
+    deviations count as that much."""
+    a, b = _about(rows, _reach(rows, driven, sd))
     way = np.maximum(np.abs(driven[b] - driven[a]), max(3 * sd, 1e-300))
     return np.asarray(np.abs(answer[b] - answer[a]) / way)
 
 
+def _reach(rows: Rows, driven: Array, sd: float) -> int:
+    """How many rows to either side tell the motion of what is driven from its noise."""
+    reach = _REACH
+    while 2 * reach * _FARTHEST <= rows.n:
+        a, b = _about(rows, reach)
+        if np.quantile(np.abs(driven[b] - driven[a]), _MOVING) >= _TOLD * sd:
+            break
+        reach *= 2
+    return reach
+
+
+def _about(rows: Rows, reach: int) -> tuple[Ints, Ints]:
+    """(n,) the rows that lie `reach` before and after every row, within its run."""
+    number, run = np.arange(rows.n), np.cumsum(rows.starts) - 1
+    starts = np.flatnonzero(rows.starts)
+    last = np.append(starts[1:], rows.n)[run] - 1
+    return np.maximum(number - reach, starts[run]), np.minimum(number + reach, last)
+
+
 _LONG = 8  # rows of a stretch in which a channel stands
 _BAND, _TREND = 3.0, 1.5  # of the rows' noise: how far it strays there, and runs
+_GOES, _SLOWLY = 20.0, 10.0  # of that: in all, and over _REACH rows to either side at the most
 
 
 def standing(rows: Rows, driven: Array, stated: float) -> Array:
     """What is driven (n,) with the mean of every stretch in which it stands still within its noise:
-    a model that is driven by noise answers with noise that the rig never showed. Of rows that rest
-    in holds `rows.force` is that already."""
+    a model that is driven by noise answers with noise that the rig never showed. Of what goes so
+    slowly all the time that a few rows hardly tell it from standing, the mean about every row. Of
+    rows that rest in holds `rows.force` is that already."""
     if not rows.continuous or rows.n <= _LONG:
         return driven
     sd = min(float(np.median(np.abs(np.diff(driven, 2)))) / 0.6745 / 6**0.5, 3 * stated)
+    a, b = _about(rows, _REACH)
+    if np.ptp(driven) > _GOES * sd and np.abs(driven[b] - driven[a]).max() < _SLOWLY * sd:
+        return _means(rows, driven, _reach(rows, driven, sd))
     out, ends = driven.copy(), np.append(np.flatnonzero(rows.starts)[1:], rows.n)
     for a, b in zip(np.flatnonzero(rows.starts), ends, strict=True):
         first = int(a)
@@ -121,6 +145,16 @@ def standing(rows: Rows, driven: Array, stated: float) -> Array:
                 out[mine] = driven[mine].mean()
             first = last
     return out
+
+
+def _means(rows: Rows, values: Array, reach: int) -> Array:
+    """(n,) means over up to `reach` rows to either side, as many to both: of a straight path they
+    lie on it."""
+    a, b = _about(rows, reach)
+    number = np.arange(rows.n)
+    side = np.minimum(number - a, b - number)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray((total[number + side + 1] - total[number - side]) / (2 * side + 1))
 
 
 def _stretch(values: Array, band: float) -> int:
