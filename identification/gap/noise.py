@@ -87,8 +87,8 @@ def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:
 
 
 _REACH = 3  # rows to either side, over which a local slope is taken,
-_TOLD, _MOVING, _FARTHEST = 5.0, 0.9, 16  # or more, until a tenth of them move by so many standard
-# deviations; up to a sixteenth of all
+# or more, where hardly a tenth of them move by so many standard deviations; up to an eighth of all
+_TOLD, _MOVING, _FARTHEST = 5.0, 0.9, 8
 
 
 def _steepness(rows: Rows, driven: Array, answer: Array, sd: float) -> Array:
@@ -101,14 +101,16 @@ def _steepness(rows: Rows, driven: Array, answer: Array, sd: float) -> Array:
 
 
 def _reach(rows: Rows, driven: Array, sd: float) -> int:
-    """How many rows to either side tell the motion of what is driven from its noise."""
-    reach = _REACH
+    """How many rows to either side tell the motion of what is driven from its noise, where it hardly
+    ever moves plainly over a few but most of the time over more; else a few."""
+    a, b = _about(rows, reach := _REACH)
+    if np.quantile(np.abs(driven[b] - driven[a]), _MOVING) >= _TOLD * sd:
+        return _REACH
     while 2 * reach * _FARTHEST <= rows.n:
-        a, b = _about(rows, reach)
-        if np.quantile(np.abs(driven[b] - driven[a]), _MOVING) >= _TOLD * sd:
-            break
-        reach *= 2
-    return reach
+        a, b = _about(rows, reach := 2 * reach)
+        if np.median(np.abs(driven[b] - driven[a])) >= _TOLD * sd:
+            return reach
+    return _REACH
 
 
 def _about(rows: Rows, reach: int) -> tuple[Ints, Ints]:
@@ -132,8 +134,9 @@ def standing(rows: Rows, driven: Array, stated: float) -> Array:
     if not rows.continuous or rows.n <= _LONG:
         return driven
     sd = min(float(np.median(np.abs(np.diff(driven, 2)))) / 0.6745 / 6**0.5, 3 * stated)
-    a, b = _about(rows, _REACH)
-    if np.ptp(driven) > _GOES * sd and np.abs(driven[b] - driven[a]).max() < _SLOWLY * sd:
+    before, after = _about(rows, _REACH)
+    way = np.abs(driven[after] - driven[before])
+    if np.ptp(driven) > _GOES * sd and way.max() < _SLOWLY * sd:
         return _means(rows, driven, _reach(rows, driven, sd))
     out, ends = driven.copy(), np.append(np.flatnonzero(rows.starts)[1:], rows.n)
     for a, b in zip(np.flatnonzero(rows.starts), ends, strict=True):

@@ -105,8 +105,31 @@ def test_what_is_driven_stands_where_it_stands_and_moves_where_it_moves() -> Non
     assert out[held].mean() == pytest.approx(1.0, abs=1e-3)
     assert np.array_equal(out[:55], noisy[:55])
     assert np.array_equal(out[150:], noisy[150:])
-    slow = np.linspace(0, 0.05, 200) + rng.normal(0, 1e-3, 200)  # a quarter of the noise a row
-    assert np.mean(standing(rows, slow, 1e-3) != slow) < 0.2
+
+
+def test_a_path_that_goes_slowly_against_its_noise_is_read_from_its_means() -> None:
+    rng = np.random.default_rng(3)
+    path = np.linspace(0, 0.05, 200)  # a quarter of the noise a row
+    noisy = path + rng.normal(0, 1e-3, 200)
+    rows = reduce_rows(running(noisy, noisy))
+    out = standing(rows, noisy, 1e-3)
+    assert np.std(out - path) < 0.5e-3
+    assert np.diff(out)[10:-10].min() > -0.6e-3  # no steps, and no way back as in the readings
+    jump = np.where(path > 0.025, path + 0.1, path) + (noisy - path)
+    assert np.mean(standing(rows, jump, 1e-3) != jump) < 0.2  # which means would smear
+
+
+def test_a_dense_pull_is_as_uncertain_as_its_displacement_makes_it() -> None:
+    """Readings so dense that a few of them hardly tell the motion from its noise: the slope of the
+    pull says what that noise does to the force, not how far it throws neighbours apart."""
+    rng = np.random.default_rng(4)
+    path = np.linspace(0, 50e-6, 200)
+    force, moved = SPRING * path, path + rng.normal(0, 1e-6, 200)
+    meter = Instruments(0.001, 1e-6, 0.005, 0.003)
+    data = running(force, moved, imposed="displacement", instruments=meter)
+    assert np.median(make_bench(data).noise.response) == pytest.approx(1e-6, rel=0.15)
+    found = diagnose_gap(data)
+    assert found.verdict == "none"
 
 
 def test_rows_that_rest_in_holds_are_left_as_they_are() -> None:
@@ -157,6 +180,24 @@ def test_under_a_load_that_stands_what_runs_is_creep_and_no_free_drift() -> None
     bench = make_bench(running(force, creeping, imposed="force"))
     assert words_with(bench, "thermal_drift") == []
     assert words_with(bench, "joint_creep")
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1])
+def test_under_a_load_that_stands_creep_may_be_as_slow_and_large_as_was_seen(jitter: float) -> None:
+    rng = np.random.default_rng(8)
+    t = np.arange(300.0)
+    force = 100 + rng.normal(0, 1.0, 300) * jitter
+    force[[100, 120]] += 5 * jitter  # a jerk of the machine is no motion of the load
+    flowing = 0.05 * t / 300 + 0.01 * (1 - np.exp(-t / 20)) + rng.normal(0, 1e-6, 300)
+    bench = make_bench(data := running(force, flowing, imposed="force"))
+    assert bench.course.stands
+    assert not bench.course.always_moves
+    creep = library(bench, ["joint_creep"])
+    assert max(v.info["times_s"].max() for v in creep) > 300
+    assert max(v.scales[-1] for v in creep) > 0.06 / (100 / SPRING)
+    found = diagnose_gap(data)
+    assert found.verdict == "joint_creep"
+    assert found.after < 0.05 * found.before
 
 
 def test_a_record_that_rests_all_the_time_runs_on() -> None:

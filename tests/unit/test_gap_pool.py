@@ -1,0 +1,92 @@
+"""The pool of columns, arrays that grow, and variants that are one shape under several names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap import compare
+from identification.gap.bench import make_bench
+from identification.gap.compare import score
+from identification.gap.discriminate import _BESIDES, _DECISIVE, ENOUGH, Option, _settled
+from identification.gap.effects import library
+from identification.gap.growing import Growing
+from identification.gap.pool import Pool
+from identification.gap.table import Table
+from tests.unit.test_gap_evidence import small_bench, small_engine
+from tests.unit.test_gap_forms import arm_data
+
+
+def test_a_column_is_in_the_pool_once() -> None:
+    pool, column = Pool(), np.array([1.0, -2.0, 1 / 3])
+    first = pool.add(column)
+    assert pool.add(column * (1 + 1e-15)) == first  # another order of the same sums
+    others = [pool.add(c) for c in (-column, 2 * column, column + 1e-6, np.zeros(3))]
+    assert len({first, *others}) == len(pool) == 5
+    assert pool[first] is column
+    assert next(iter(pool)) is column
+
+
+def test_what_grows_holds_all_rows_and_leaves_what_was_there() -> None:
+    rng = np.random.default_rng(0)
+    parts = [rng.normal(size=(k, 3)) for k in (0, 4, 1, 1, 7, 2)]
+    grown, before = Growing(parts[0]), []
+    for part in parts[1:]:
+        before.append(grown.values.copy())
+        was = grown.values
+        grown.put([part[:1], part[1:]])
+        assert np.array_equal(was, before[-1])
+    assert np.array_equal(grown.values, np.vstack(parts))
+
+
+def test_one_shape_under_several_names_is_scored_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = small_bench()
+    shapes = library(bench, ["joint_creep", "joint_stiffness_error"])
+    twins = [replace(v, label=f"{v.label} again", prior=0.1 * v.prior) for v in shapes]
+    other = replace(shapes[0], root=2 * shapes[0].root)
+    engine, looked = small_engine(bench), []
+
+    class Counted(Table):
+        def look(self) -> None:
+            looked.append(len(self._columns))
+            super().look()
+
+    plain = score(engine, engine.levels, shapes)
+    monkeypatch.setattr(compare, "Table", Counted)
+    engine.stacks.clear()
+    both = score(engine, engine.levels, [*shapes, *twins, other])
+    assert [s.variant for s in both] == [*shapes, *twins, other]
+    for one, again, known in zip(both, both[len(shapes) :], plain, strict=False):
+        assert one.log_evidence == pytest.approx(known.log_evidence, rel=1e-9)
+        assert again.log_evidence == pytest.approx(known.log_evidence + np.log(0.1), rel=1e-9)
+        assert (again.scale, again.level) == (known.scale, known.level)
+    assert both[-1].log_evidence != pytest.approx(plain[0].log_evidence, abs=1e-3)
+    assert max(looked) < len(both)
+
+
+def test_a_slip_at_another_depth_is_the_same_shape_where_moments_run_in_proportion() -> None:
+    """One pose: a direction turns the base about an axis at any depth by a lever of its own."""
+    data = arm_data()
+    bench = make_bench(replace(data, setups=data.setups[:2] * 2))
+    slips = library(bench, ["base_slip"])
+    depths: dict[object, dict[object, set[float]]] = {}
+    for v in slips:
+        key = v.info["axis"], v.info["memory"], v.label.split(" at ")[-1]
+        depths.setdefault(key, {}).setdefault(v.shape, set()).add(v.info["depth_m"])
+    assert depths
+    assert max(map(len, depths.values())) == 1  # one shape
+    assert {len(d) for shapes in depths.values() for d in shapes.values()} == {1, 3}  # yaw, tilt
+    natural = {v.info["depth_m"]: v.info["natural"] for v in slips if v.info["axis"] == 0}
+    assert natural[0.7] < natural[0.35] < natural[0.0]  # a longer lever does more
+
+
+def test_procedures_that_take_too_long_to_be_worth_more_are_left_out() -> None:
+    quick = Option("steps", "", 2 * _DECISIVE, 10.0)
+    some = [Option(f"{i}", "", ENOUGH + 1, 20.0) for i in range(_BESIDES)]
+    assert _settled([quick, *some], 10.5)
+    assert not _settled([quick, *some], 9.5)  # would be worth more, if it decides
+    assert not _settled([quick, *some[1:]], 1000.0)  # too few to choose from
+    poor = [Option(f"{i}", "", ENOUGH - 1, 20.0) for i in range(9)]
+    assert not _settled([quick, *poor], 1000.0)
