@@ -24,7 +24,7 @@ from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import _apart, _on_its_own
 from identification.gap.products import White
 from identification.gap.rows import reduce_rows
-from identification.gap.search import _sharpened, search
+from identification.gap.search import _seeds, _sharpened, search
 from identification.gap.variants import Variant, variant
 from identification.gap.verdict import BENCH_DOUBT, DOUBT, EXPLAINED, THREE, _heir, _main, weighed
 from rig.dataset import load
@@ -333,6 +333,33 @@ def test_a_sure_verdict_gives_a_little_away_on_a_bench_more_of_it(arm: bool, mos
     one = replace(found, engine=engine, explanations=(nothing,), unknown=-800.0, alone=alone)
     none = weighed(one, {}).probabilities["none"]
     assert none == pytest.approx(1.0 if arm else 1 - most + each)
+
+
+@pytest.mark.parametrize(("arm", "around"), [(True, 4), (False, 6)])
+def test_pairs_are_looked_for_around_the_best_words(
+    arm: bool, around: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a bench around more of them: two words that belong together may look poor alone there."""
+    bench = small_bench()
+    bench = replace(bench, data=replace(bench.data, arm=arm))
+    words = ["joint_creep", "joint_stiffness_error", "force_scale", "time_lag",
+             "displacement_scale", "zero_shift"]  # fmt: skip
+    engine = small_engine(bench)
+    asked: list[int] = []
+
+    def spy(pool: dict[frozenset[str], Explanation], most: int) -> list[Explanation]:
+        asked.append(most)
+        return []
+
+    monkeypatch.setattr("identification.gap.search._seeds", spy)
+    variants = library(bench, words)
+    engine.extend()
+    search(engine, variants)
+    assert asked == [around]
+    ranked = [replace(said((part(w, [0]),), (3e-5,)), log_weight=-float(i), eta=1e-6)
+              for i, w in enumerate(words)]  # fmt: skip
+    monkeypatch.undo()
+    assert _seeds({e.words: e for e in ranked}, 4) == ranked[:4]
 
 
 def test_what_levels_without_an_arm_really_leave_is_looked_up() -> None:

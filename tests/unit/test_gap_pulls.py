@@ -54,6 +54,16 @@ def test_what_only_gets_stiffer_is_a_curve_however_late() -> None:
     assert found.after < 0.06 * found.before
 
 
+def test_what_draws_out_under_a_weight_yields_however_far() -> None:
+    """Plastics under one weight after the other: the last of a few readings is a hundred times as
+    far as the spring would go."""
+    force = 10.0 * np.arange(8)
+    u = force / SPRING + np.array([0, 0, 0, 0, 0, 1e-5, 3e-5, 0.02])
+    found = pulled(force, u, imposed="force")
+    assert found.verdict == "joint_yield"
+    assert found.after < 0.05 * found.before
+
+
 def test_metal_that_flows_far_beyond_its_knee_yields() -> None:
     """A hundred times as far as it was elastic: how far a law is off is no matter of that."""
     u = np.concatenate([np.linspace(0, 6e-4, 20), np.linspace(1e-3, 3e-2, 40)])
