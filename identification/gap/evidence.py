@@ -73,6 +73,7 @@ class Engine:
         self.sigma = row_noise(bench)
         self.cache: dict[object, Array] = {}
         self.stacks: dict[object, Any] = {}  # of variants that are compared again and again
+        self.limits: dict[object, Any] = {}
         self.structural = structural_rms(bench, base, target)
         self.most = _variance(bench)
         n = bench.rows.n

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -105,7 +104,7 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
         if p.variant.positive is not None:
-            limits = _limits(p.variant)
+            limits = _limits(level.engine, p.variant)
             before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)
             rows = limits.rows
             odds = log_odds(limits, _ONE, before, rows @ w[s], rows @ roots[:, s].T)
@@ -116,10 +115,13 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
 _ONE = np.zeros(1, dtype=np.intp)
 
 
-@lru_cache(maxsize=256)
-def _limits(v: Variant) -> Limits:
-    """Of one variant; the same few come again in many explanations."""
-    return Limits.of([v])
+def _limits(engine: Engine, v: Variant) -> Limits:
+    """Of one variant; the same few come again in many explanations. Kept with the engine: a cache
+    of the module would keep the benches of many diagnoses alive."""
+    if v not in engine.limits:
+        engine.limits[v] = Limits.of([v])
+    found: Limits = engine.limits[v]
+    return found
 
 
 def log_joints(engine: Engine, parts: tuple[Part, ...]) -> Array:

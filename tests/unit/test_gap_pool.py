@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from gc import collect
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from identification.gap import compare
 from identification.gap.bench import make_bench
 from identification.gap.compare import score
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.discriminate import _BESIDES, _DECISIVE, ENOUGH, Option, _settled
 from identification.gap.effects import library
 from identification.gap.growing import Growing
@@ -90,3 +93,12 @@ def test_procedures_that_take_too_long_to_be_worth_more_are_left_out() -> None:
     assert not _settled([quick, *some[1:]], 1000.0)  # too few to choose from
     poor = [Option(f"{i}", "", ENOUGH - 1, 20.0) for i in range(9)]
     assert not _settled([quick, *poor], 1000.0)
+
+
+def test_nothing_keeps_a_diagnosis_alive() -> None:
+    """A campaign makes hundreds of them in one process, of a hundred megabytes each."""
+    found = diagnose_gap(arm_data())
+    bench = ref(found.bench)
+    del found
+    collect()
+    assert bench() is None
