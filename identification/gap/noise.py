@@ -101,8 +101,8 @@ def _steepness(rows: Rows, driven: Array, answer: Array, sd: float) -> Array:
 
 
 def _reach(rows: Rows, driven: Array, sd: float) -> int:
-    """How many rows to either side tell the motion of what is driven from its noise, where it hardly
-    ever moves plainly over a few but most of the time over more; else a few."""
+    """How many rows to either side tell the motion of what is driven from its noise, where it
+    hardly ever moves plainly over a few but most of the time over more; else a few."""
     a, b = _about(rows, reach := _REACH)
     if np.quantile(np.abs(driven[b] - driven[a]), _MOVING) >= _TOLD * sd:
         return _REACH
