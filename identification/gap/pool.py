@@ -18,8 +18,9 @@ class Pool:
 
     def add(self, column: Array) -> int:
         """Index of a column, which is put into the pool if it is not there."""
-        # in single precision: what was worked out in another order differs in the last digit
-        mark = blake2b(column.astype("f4").tobytes(), digest_size=16).digest()
+        # in single precision: what was worked out in another order differs in the last digit; there
+        # are two zeros
+        mark = blake2b((column.astype("f4") + 0.0).tobytes(), digest_size=16).digest()
         place = self._places.setdefault(mark, len(self))
         if place == len(self):
             self._columns.append(column)

@@ -73,7 +73,6 @@ def test_variants_are_well_formed(word: str, design: str) -> None:
     for v in variants:
         k = len(v.columns)
         assert v.word == word
-        assert len(set(v.columns)) == k
         assert all(0 <= c < len(bench.columns) for c in v.columns)
         assert v.root.shape == (k, k)
         assert np.linalg.cond(v.root) < 1e6

@@ -16,6 +16,7 @@ from identification.gap.effects import WORDS, library
 from identification.gap.fit import Fit
 from identification.gap.forms import SESSION, law_of
 from identification.gap.parts import Part
+from identification.gap.pool import Pool
 from identification.gap.variants import Variant
 from rig.dataset import Dataset, write
 from rig.diagnose import Diagnosis, diagnose
@@ -79,7 +80,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Dataset, Di
 
 def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.ndarray]:
     """The result as if one shape of the word had been found; its contribution (n,)."""
-    bench = replace(result.bench, columns=[])
+    bench = replace(result.bench, columns=Pool())
     variants = library(bench, (word,))
     if word == "time_lag":  # a lag of the force is undone from its readings; a plan has none
         variants = [v for v in variants if v.info["channel"] == "displacement"]

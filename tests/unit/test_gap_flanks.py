@@ -13,6 +13,7 @@ from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
 from identification.gap.flanks import placed
 from identification.gap.forms import law_of, rows_of
+from identification.gap.pool import Pool
 from tests.unit.test_gap_operators import bench_data
 
 N, K = 480, 1e5  # samples, each a row; N/m of the simulated spring
@@ -122,7 +123,7 @@ def test_no_play_is_placed_where_there_is_none(bench: Bench) -> None:
 
 @pytest.mark.parametrize("bench", [gap(0.2, 0.1, rub=0.02), teeth(0.05, 0.1)], ids=["gap", "teeth"])
 def test_placed_plays_are_their_laws_and_explain_the_data(bench: Bench) -> None:
-    fresh = replace(bench, columns=[])
+    fresh = replace(bench, columns=Pool())
     made = [v for v in joint_backlash.variants(fresh) if v.info["kind"] in joint_backlash.PLACED]
     assert len(made) == 2
     pool = np.column_stack(fresh.columns)
@@ -141,14 +142,14 @@ def test_placed_plays_are_their_laws_and_explain_the_data(bench: Bench) -> None:
 def test_friction_beside_a_play_is_the_lesser_part() -> None:
     """More of it is hysteresis: such coefficients count as of the wrong sign. Inside an imposed
     gap there is no such bound."""
-    for v in joint_backlash.variants(replace(teeth(0.05), columns=[])):
+    for v in joint_backlash.variants(replace(teeth(0.05), columns=Pool())):
         assert v.positive is not None
         share = np.zeros(len(v.columns))
         share[:2] = 1.0, 0.9 * joint_backlash.MOST_RUB
         assert v.positive @ share > 0
         share[1] = 1.1 * joint_backlash.MOST_RUB
         assert v.positive @ share < 0
-    inside = [v for v in joint_backlash.variants(replace(gap(0.2), columns=[]))
+    inside = [v for v in joint_backlash.variants(replace(gap(0.2), columns=Pool()))
               if v.info["kind"] == "gap"]  # fmt: skip
     assert inside
     assert all(v.positive is not None and v.positive[1] == 0 for v in inside)
@@ -162,7 +163,7 @@ def foam(u: Array) -> Array:
 @pytest.mark.parametrize("start", [0.0, 0.2])
 def test_a_fine_curve_carries_foam_that_is_squeezed_flat(start: float) -> None:
     u = start + (1 - start) * to_and_fro(low=0.0)
-    bench = replace(a_bench(foam(u - start), u, "displacement"), columns=[])
+    bench = replace(a_bench(foam(u - start), u, "displacement"), columns=Pool())
     made = joint_nonlinear_stiffness.variants(bench)
     fine = [v for v in made if v.label.endswith("fine curve")]
     assert len(fine) == 1
@@ -185,5 +186,5 @@ def test_a_fine_curve_carries_foam_that_is_squeezed_flat(start: float) -> None:
 def test_a_pull_without_a_way_back_has_no_fine_curve() -> None:
     """What is not unloaded may be yield as well; the finer curve must not win by its freedom."""
     u = np.linspace(0, 1, N)
-    bench = replace(a_bench(foam(u), u, "displacement"), columns=[])
+    bench = replace(a_bench(foam(u), u, "displacement"), columns=Pool())
     assert not [v for v in joint_nonlinear_stiffness.variants(bench) if "fine" in v.label]

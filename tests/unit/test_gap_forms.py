@@ -17,6 +17,7 @@ from identification.gap.forms import SESSION, Form, describe, law_of, lawful, re
 from identification.gap.forms.known import less_known
 from identification.gap.forms.law import HUNG, KEPT, Law, Term
 from identification.gap.parts import Part
+from identification.gap.pool import Pool
 from identification.gap.twins import twin_of
 from tests.unit.test_gap_operators import bench_data
 
@@ -105,14 +106,14 @@ def assert_same(bench: Bench, words: tuple[str, ...]) -> int:
 
 @pytest.mark.parametrize("word", WORDS)
 def test_every_shape_of_the_library_is_its_law_on_an_arm(bench: Bench, word: str) -> None:
-    assert assert_same(replace(bench, columns=[]), (word,)) > 0
+    assert assert_same(replace(bench, columns=Pool()), (word,)) > 0
 
 
 def test_memory_may_end_where_the_rig_is_turned_to_another_direction(bench: Bench) -> None:
     """Two directions in each of two poses: four setups, of which two are in a new pose."""
     assert (bench.moved.sum(), bench.rebuilt.sum()) == (2, 4)
     for word in ("joint_yield", "base_slip", "joint_hysteresis"):
-        there = replace(bench, columns=[])
+        there = replace(bench, columns=Pool())
         labels = [v.label for v in library(there, [word])]
         assert any("set up anew" in label for label in labels), word
     one = make_bench(arm_data(directions="x"))
@@ -120,7 +121,7 @@ def test_memory_may_end_where_the_rig_is_turned_to_another_direction(bench: Benc
 
 
 def test_segments_run_two_ways_where_that_makes_a_difference(bench: Bench) -> None:
-    there = replace(bench, columns=[])
+    there = replace(bench, columns=Pool())
     named = [v.label for v in library(there, ["link_flexibility"])]
     assert sum("joint to joint" in name for name in named) == len(named) / 2 == 3
     flat = tuple(replace(s, links=s.links[[1, 1]]) for s in bench.data.setups)
@@ -131,7 +132,7 @@ def test_segments_run_two_ways_where_that_makes_a_difference(bench: Bench) -> No
 def test_slow_flow_with_the_square_of_the_overstress_is_for_arms(bench: Bench) -> None:
     """A single spring under a load that stands creeps so."""
     loose = replace(bench_data(30 * np.repeat(np.arange(9.0), 4), np.zeros(36)), timed=True)
-    for there, squared in ((replace(bench, columns=[]), True), (make_bench(loose), False)):
+    for there, squared in ((replace(bench, columns=Pool()), True), (make_bench(loose), False)):
         knee = next(v for v in library(there, ["joint_yield"]) if v.label.endswith("sharp"))
         assert any("flow" in v.label for v in refined(there, knee))
         assert any("squared" in v.label for v in refined(there, knee)) == squared
@@ -208,7 +209,7 @@ def test_what_belongs_to_a_session_is_left_behind(bench: Bench) -> None:
 
 
 def test_a_fitted_part_becomes_its_contribution(bench: Bench) -> None:
-    fresh = replace(bench, columns=[])
+    fresh = replace(bench, columns=Pool())
     v = library(fresh, ("joint_creep",))[3]
     w = np.linspace(0.1, 0.3, len(v.columns))
     form = describe(fresh, Part(v, 1.0), w, np.diag(w**2))
@@ -219,7 +220,7 @@ def test_a_fitted_part_becomes_its_contribution(bench: Bench) -> None:
 
 
 def test_a_variant_that_says_too_little_is_named(bench: Bench) -> None:
-    v = library(replace(bench, columns=[]), ("contact_seating",))[0]
+    v = library(replace(bench, columns=Pool()), ("contact_seating",))[0]
     with pytest.raises(ValueError, match=r"contact_seating, exponential .*: the library does not"):
         law_of(bench, replace(v, info={}))
 
@@ -270,8 +271,9 @@ def test_yield_of_joint_1_and_slip_about_the_vertical_are_twins_without_readings
     data = arm_data()
     there = make_bench(data if readings else replace(data, q=None))
     v = next(v for v in library(there, ("joint_yield",)) if v.label.startswith("joint 1 at 0.6 sh"))
-    there.columns[:] = [there.columns[c] for c in v.columns]
-    part = Part(replace(v, columns=tuple(range(len(v.columns)))), 1.0)
+    own_columns = [there.columns[c] for c in v.columns]
+    there = replace(there, columns=Pool())
+    part = Part(replace(v, columns=tuple(there.add(c) for c in own_columns)), 1.0)
     target = there.observed - prediction(there)
     engine = Engine(there, base_columns(there), target, np.array([0.0, 1e-6]))
     w = np.full(len(v.columns), 4.0)

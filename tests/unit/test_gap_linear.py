@@ -15,6 +15,7 @@ from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, Sizes, _beyond_springs
 from identification.gap.penalties import straight, trifle, within_stated
+from identification.gap.pool import Pool
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
@@ -26,7 +27,7 @@ def bench() -> Bench:
 
 
 def of(bench: Bench, word: str) -> tuple[Bench, dict[str, Variant]]:
-    fresh = replace(bench, columns=[])
+    fresh = replace(bench, columns=Pool())
     return fresh, {v.label: v for v in library(fresh, (word,))}
 
 

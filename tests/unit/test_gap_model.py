@@ -18,6 +18,7 @@ from identification.gap.bench import Bench, make_bench
 from identification.gap.effects import WORDS, library
 from identification.gap.forms import Form, Law, Term, describe, realise
 from identification.gap.parts import Part
+from identification.gap.pool import Pool
 from rig.errors import InputError
 from rig.gap_forms import FormError, effects_of, from_entry, to_entry
 from rig.gap_path import planned_data
@@ -68,7 +69,7 @@ def test_shapes_of_a_bench_that_is_pulled_survive_the_file() -> None:
 
 
 def assert_survives(bench: Bench, word: str) -> None:
-    fresh = replace(bench, columns=[])
+    fresh = replace(bench, columns=Pool())
     variants = library(fresh, (word,))
     # one of every kind
     kinds = {end: v for v in variants for end in (v.label.split()[0], v.label.split()[-1])}
@@ -167,7 +168,7 @@ JUNK = st.one_of(
 def test_damaged_entries_are_refused_or_work(word: str, pick: int, junk: Any, deep: bool) -> None:
     """One value of a good entry replaced by anything: a message, or an effect that can be used."""
     there = small_bench()
-    fresh = replace(there, columns=[])
+    fresh = replace(there, columns=Pool())
     v = library(fresh, (word,))[0]
     form = describe(fresh, Part(v, 1.0), np.full(len(v.columns), 0.01), np.eye(len(v.columns)))
     entry = to_entry(form, {"name": word})

@@ -130,7 +130,8 @@ def test_creep_is_counted_against_the_spring_as_it_is() -> None:
 def test_a_lag_is_read_by_what_it_does(true: float) -> None:
     bench = up_and_down()
     column = of(bench, "time_lag", "displacement delay 1.6 s")
-    bench.columns[column.columns[0]] = late(bench, "displacement", "delay", true)
+    place = bench.add(late(bench, "displacement", "delay", true))
+    column = replace(column, columns=(place,))
     found = parameters(bench, Part(column, 1.0), np.ones(1), np.zeros((1, 1)))["lag"]
     assert found.value == pytest.approx(true, rel=0.02)
     assert found.low < true < found.high
@@ -334,8 +335,8 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
                    info={"joints": [0], "joint": 0})  # fmt: skip
     rival = Variant("joint_creep", "T 3", (1,), (1.0,), np.eye(1),
                     info={"joint": 0, "times_s": [3.0]})  # fmt: skip
-    bench.columns.append(bench.columns[1] + 0.2 * bench.columns[0])
-    twice = replace(rival, label="T 4", columns=(len(bench.columns) - 1,))
+    place = bench.add(bench.columns[1] + 0.2 * bench.columns[0])
+    twice = replace(rival, label="T 4", columns=(place,))
     engine.target = engine.target + 4.0 * bench.columns[0] + 2.0 * bench.columns[1]
     engine = Engine(bench, engine.base, engine.target, engine.etas)
     chosen = Explanation((Part(mine, 10.0), Part(rival, 1.0)), 0.0, 0.0, (1.0, 0.5), 0.0)

@@ -26,6 +26,7 @@ def test_a_column_is_in_the_pool_once() -> None:
     pool, column = Pool(), np.array([1.0, -2.0, 1 / 3])
     first = pool.add(column)
     assert pool.add(column * (1 + 1e-15)) == first  # another order of the same sums
+    assert pool.add(np.zeros(3)) == pool.add(-np.zeros(3))
     others = [pool.add(c) for c in (-column, 2 * column, column + 1e-6, np.zeros(3))]
     assert len({first, *others}) == len(pool) == 5
     assert pool[first] is column
