@@ -103,3 +103,17 @@ def test_nothing_keeps_a_diagnosis_alive() -> None:
     del found
     collect()
     assert bench() is None
+
+
+def test_a_shape_is_all_that_evidence_follows_from() -> None:
+    one = library(small_bench(), ["joint_creep"])[0]
+    others = [
+        replace(one, least=0.5),
+        replace(one, scales=(9.0,)),
+        replace(one, positive=None),
+        replace(one, info={**one.info, "other_springs": True}),
+        replace(one, within=np.ones((1, len(one.columns)))),
+        replace(one, each=tuple(not e for e in one.each)),
+    ]
+    assert len({one.shape, *(v.shape for v in others)}) == 1 + len(others)
+    assert replace(one, label="again", prior=0.1).shape == one.shape
