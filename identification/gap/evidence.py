@@ -144,9 +144,11 @@ class Engine:
         if columns not in self._squares:
             at = np.array(columns, dtype=np.intp)
             white = self._gathered.white.picked(at)
-            shared = [base.pool.values[at] @ base.pool.values[at].T for base in self._bases]
-            made = white.between(white, self._weights)
-            self._squares[columns] = np.array(made) - np.array(shared)
+            made = np.array(white.between(white, self._weights))
+            for k, base in enumerate(self._bases):
+                shared = base.pool.values[at]
+                made[k] -= shared @ shared.T
+            self._squares[columns] = made
         return self._squares[columns]
 
     def beside(self, columns: tuple[int, ...]) -> list[Array]:
@@ -219,6 +221,8 @@ class Engine:
 
     def _integrate(self, eta: float, w: Weights, gram: Array) -> _Integrated:
         """gram: products of target, base and imperfection with each other."""
+        from scipy.linalg import solve_triangular
+
         kb = self.base.columns.shape[1]
         covariance = level_covariance(self.bench)
         levels = covariance.shape[0]
@@ -230,7 +234,7 @@ class Engine:
             root[kb + levels :, kb + levels :] = RUN_PART * eta * np.eye(count - levels)
         b = slice(1, 1 + kb + count)
         factor = np.asarray(np.linalg.cholesky(np.eye(kb + count) + root.T @ gram[b, b] @ root))
-        turn = _forward(factor, root.T)
+        turn = np.asarray(solve_triangular(factor, root.T, lower=True, check_finite=False))
         left = turn @ gram[b, 0]
         share = self._freedom / max(len(w.contrast), 1)
         log_noise = -0.5 * (np.log(w.hold).sum() + np.log(w.q).sum())
@@ -260,13 +264,6 @@ def _groups(noise: Array) -> tuple[slice, ...]:
     if len(edges) >= _FEW:
         return ()
     return tuple(slice(a, b) for a, b in pairwise([0, *edges.tolist(), len(noise)]) if a < b)
-
-
-def _forward(factor: Array, values: Array) -> Array:
-    """`L^-1 values` of a lower triangle L."""
-    from scipy.linalg import solve_triangular
-
-    return np.asarray(solve_triangular(factor, values, lower=True, check_finite=False))
 
 
 @dataclass(frozen=True, eq=False)

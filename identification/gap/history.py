@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -118,26 +119,46 @@ def bristles(
     return np.asarray(np.array(states)[np.cumsum(changes) - 1] - hung)
 
 
+@dataclass(frozen=True, eq=False)
+class _Phases:
+    """Seconds (n,) from a row to the next: the old load stands on, the load ramps, it stands."""
+
+    pause: Array
+    ramp: Array
+    stands: Array
+
+
+def _phases(rows: Rows, rest: Flags) -> _Phases:
+    step = _between(rows)
+    ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
+    stands = np.minimum(settling_share(rows), ease)
+    pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
+    return _Phases(pause, np.maximum(ease - stands - pause, 0.0), stands)
+
+
+def _between(rows: Rows) -> Array:
+    """(n,) s on the session clock since the row before."""
+    return np.asarray(np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0))
+
+
 def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
     """First-order lag `T z' = x - z` of a load (n, k) with times (k,), or one (1,) for all:
     deflection of a Kelvin-Voigt element per unit of its compliance. Exact for a load that ramps
     between rows and then stands."""
     before = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
     before[rest] = 0.0
-    step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
-    stands = settling_share(rows)
+    phases = _phases(rows, rest)
     # z_i = keep_i z_{i-1} + gain_i: decay in a rest, or the old load standing on; a ramp to the new
     # load, then standing there
-    ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
-    pause = np.where(rest, 0.0, np.minimum(standing_on(rows), np.maximum(ease - stands, 0.0)))
-    paused = np.exp(-pause[:, None] / times)
-    ramp = np.maximum(ease - stands - pause, 0.0)[:, None] / times
-    held = np.exp(-np.minimum(ease, stands)[:, None] / times)
+    paused = np.exp(-phases.pause[:, None] / times)
+    ramp = phases.ramp[:, None] / times
+    held = np.exp(-phases.stands[:, None] / times)
     during = np.exp(-ramp)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(ramp > 0, -np.expm1(-ramp) / ramp, 1.0)
     ramped = load * (1 - share) + before * (share - during)  # of a ramp, z = 0 before it
-    keep = held * during * np.where(rest[:, None], np.exp(-step[:, None] / times), paused)
+    decayed = np.exp(-_between(rows)[:, None] / times)
+    keep = held * during * np.where(rest[:, None], decayed, paused)
     stood = during * before * (1 - paused)
     return _prefix(keep, held * (ramped + stood) + load * (1 - held))
 
@@ -171,55 +192,55 @@ def flowing_play(
     in `play`.
     """
     out = np.empty((len(load), len(radius)))
-    hung = np.zeros(out.shape)
-    below, above = np.broadcast_arrays(-radius, hung)[0], np.broadcast_arrays(radius, hung)[0]
-    if weight is not None:
-        below, above = weight[:, None] - radius, weight[:, None] + radius
-        hung = np.clip(0.0, below, above)
-    state, before = hung[0], 0.0
+    centre = np.zeros((len(load), 1)) if weight is None else weight[:, None]
+    below, above = centre - radius, centre + radius
+    hung = _clipped(0.0, below, above)
+    low, high = load[:, None] + below, load[:, None] + above
     rest = rests(rows)
-    step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
-    ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
-    stands = np.minimum(settling_share(rows), ease)
-    pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
+    phases = _phases(rows, rest)
     parts = np.where(rows.hold_starts | rest | rows.continuous, _PARTS, 1)
     share = {m: ((np.arange(m) + 0.5) / m)[:, None] for m in (1, _PARTS)}
-    # shares (n, k) of what is beyond that flow off: before the load moves, in every part, after it;
-    # of what flows with the square, times over its time constant
-    waits, moves, ends = pause > 0, ease > stands + pause, stands > 0
-    ramp = np.maximum(ease - stands - pause, 0.0) / parts
-
-    def much(seconds: Array) -> Array:
-        over = seconds[:, None] / times
-        return np.where(square, over, -np.expm1(-over))
-
-    paused, during, stood = much(pause), much(ramp), much(stands)
-    low, high = load[:, None] + below, load[:, None] + above
-
-    some = bool(np.any(square))
-
-    def flown(state: Array, share: Array, least: Array, most: Array) -> Array:
-        over = np.minimum(np.maximum(state, least), most) - state
-        if not some:
-            return state + share * over
-        way = share * np.abs(over) / radius
-        return state + np.where(square, way / (1 + way), share) * over
-
+    # (n, k): before the load moves, in every part of its way, after it
+    paused, during, stood = (
+        _flowing(seconds[:, None] / times, square)
+        for seconds in (phases.pause, phases.ramp / parts, phases.stands)
+    )
+    flown = partial(_flown, radius=radius, square=square, some=bool(np.any(square)))
+    state, before = hung[0], 0.0
     for i, x in enumerate(load):
         if fresh[i]:
             state, before = hung[i], 0.0
         elif rest[i]:  # minutes without load
-            state, before = np.clip(state, below[i], above[i]), 0.0
-        if waits[i]:
+            state, before = _clipped(state, below[i], above[i]), 0.0
+        if phases.pause[i] > 0:
             state = flown(state, paused[i], before + below[i], before + above[i])
-        if moves[i]:
+        if phases.ramp[i] > 0:
             at = before + share[parts[i]] * (x - before)
             for least, most in zip(at + below[i], at + above[i], strict=True):
                 state = flown(state, during[i], least, most)
-        if ends[i]:
+        if phases.stands[i] > 0:
             state = flown(state, stood[i], low[i], high[i])
         out[i], before = state, x
     return out - hung
+
+
+def _flowing(over: Array, square: Flags | bool) -> Array:
+    """Share of what is beyond that flows off in times over its time constant (n, k); of what flows
+    with the square, that ratio itself."""
+    return np.where(square, over, -np.expm1(-over))
+
+
+def _flown(
+    state: Array, share: Array, least: Array, most: Array,
+    radius: Array, square: Flags | bool, some: bool,
+) -> Array:  # fmt: skip
+    """States (k,) after a while in which [least, most] held still. some: any flows with the
+    square."""
+    over = _clipped(state, least, most) - state
+    if not some:
+        return state + share * over
+    way = share * np.abs(over) / radius
+    return state + np.where(square, way / (1 + way), share) * over
 
 
 _PARTS = 4

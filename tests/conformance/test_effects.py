@@ -13,16 +13,19 @@ import numpy as np
 import pytest
 
 from identification.gap import effects
+from identification.gap.bench import make_bench
 from identification.gap.data import GapData
 from identification.gap.effects import WORDS
 from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
 from identification.gap.parts import Part
+from identification.gap.pool import Pool
 from tests.conformance.effect_benches import (
     IN_JOINTS,
     OUTSIDE,
     PAIRS,
     WITHOUT_ARM,
+    Array,
     built,
     module,
     of,
@@ -81,6 +84,23 @@ def test_variants_are_well_formed(word: str, design: str) -> None:
         assert 0 < v.prior < np.inf
         assert v.positive is None or (v.positive.shape == (k,) and np.any(v.positive))
         assert np.any(columns[:, list(v.columns)]), v.label
+
+
+class _Apart(Pool):
+    """A pool in which columns that are alike stand apart."""
+
+    def add(self, column: Array) -> int:
+        self._columns.append(column)
+        return len(self._columns) - 1
+
+
+@pytest.mark.parametrize(("word", "design"), PAIRS)
+def test_no_variant_takes_a_column_twice(word: str, design: str) -> None:
+    """Columns that are alike on these data are one in the pool; of a variant they must be
+    different ones, or its prior counts one of them twice."""
+    bench = replace(make_bench(linear(design)), columns=_Apart())
+    for v in module(word).variants(bench):
+        assert len(set(v.columns)) == len(v.columns), v.label
 
 
 @pytest.mark.parametrize(("word", "design"), PAIRS)

@@ -5,15 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from identification.gap import discriminate
 from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
-from identification.gap.designs import present_design
-from identification.gap.discriminate import _discrimination, _Rival, _told
+from identification.gap.designs import Design, candidates, present_design
+from identification.gap.discriminate import (
+    ENOUGH,
+    _discrimination,
+    _Rival,
+    _told,
+    next_measurement,
+)
 from identification.gap.effects import library
 from identification.gap.evidence import Engine
 from identification.gap.forms import Form, law_of
 from identification.gap.pool import Pool
+from identification.gap.search import search
+from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
 
 
@@ -52,3 +62,29 @@ def test_an_effect_too_small_to_be_seen_is_told_from_nothing() -> None:
     assert both_seen > 20
     assert one_hidden < 12
     assert one_hidden == _discrimination(bench, design, (small, large))
+
+
+def test_procedures_are_looked_at_from_the_quickest_until_none_can_be_worth_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where all decide, the quickest few are enough; where none does, all are looked at."""
+    bench = small_bench()
+    variants = library(bench, ["joint_creep", "joint_stiffness_error"])
+    found = search(small_engine(bench), variants)
+    chosen = next(e for e in found.explanations if e.words == {"joint_creep"})
+    every = candidates(present_design(bench), bench.data.arm, ())
+    looked: list[float] = []
+
+    def proposal(nats: float) -> int:
+        def given(_: Bench, design: Design, __: object) -> float:
+            looked.append(design.minutes)
+            return 0.0 if len(looked) == 1 else nats  # the present procedure comes first
+
+        looked.clear()
+        monkeypatch.setattr(discriminate, "_discrimination", given)
+        pair = ("joint_creep", "joint_stiffness_error")
+        assert next_measurement(found, variants, chosen, pair) is not None
+        assert looked[1:] == sorted(looked[1:])
+        return len(looked) - 1
+
+    assert proposal(100.0) < proposal(ENOUGH - 1) == len(every)

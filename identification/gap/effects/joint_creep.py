@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.history import half_sample, rests, retarded
+from identification.gap.history import half_sample, retarded
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_creep"
@@ -55,11 +55,11 @@ def variants(bench: Bench) -> list[Variant]:
     never stood: how fast it went and how far are one thing there, and a curve is simpler."""
     if bench.course.never_held or bench.course.timeless:
         return []
-    rest, spectrum = rests(bench.rows), times(bench)
+    spectrum = times(bench)
     out, sizes = [], scales(bench)
     for j in bench.moving_joints():
         load = np.tile(bench.true_torque[:, j][:, None], (1, len(spectrum)))
-        z = retarded(load, spectrum, bench.rows, rest)
+        z = retarded(load, spectrum, bench.rows, bench.rest)
         c = bench.compliance[j]
         columns = [bench.add_joint(j, bench.sense * c * z[:, k]) for k in range(len(spectrum))]
         out.append(
@@ -68,7 +68,7 @@ def variants(bench: Bench) -> list[Variant]:
         )  # fmt: skip
         out += _pairs(j, "", columns, spectrum, sizes, 0.3 if bench.data.arm else 0.5)
         if bench.data.arm:
-            states = retarded(bent(load), spectrum, bench.rows, rest)
+            states = retarded(bent(load), spectrum, bench.rows, bench.rest)
             more = [bench.add_joint(j, bench.sense * c * y) for y in states.T]
             out += _pairs(j, BENT, more, spectrum, sizes, 0.2)
     return out

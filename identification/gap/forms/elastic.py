@@ -14,7 +14,7 @@ from identification.gap.effects.contact_seating import LAWS, pressed
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.law import Law, Term, along, scaled
-from identification.gap.history import rests, retarded
+from identification.gap.history import retarded
 from identification.gap.variants import Variant
 
 _POWERS = {"quadratic": 2, "cubic": 3, "even": 2}
@@ -78,7 +78,7 @@ def creep(bench: Bench, law: Law) -> list[Array]:
     bent = np.array([t.coefficient == "compliance_quadratic" for t in law.terms])
     torque = bench.true_torque[:, joint][:, None]
     load = np.where(bent, torque * np.abs(torque), torque)
-    z = retarded(load, times, bench.rows, rests(bench.rows))
+    z = retarded(load, times, bench.rows, bench.rest)
     return [bench.joint_column(joint, bench.sense * column) for column in z.T]
 
 
