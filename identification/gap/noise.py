@@ -80,9 +80,9 @@ def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:
     force = max(meter.force, white_noise(data.force))
     displacement = max(meter.displacement, white_noise(data.displacement))
     if imposed:
-        stiff = _steepness(rows, rows.displacement, rows.measured_force, displacement)
+        stiff = _steepness(rows, rows.displacement, rows.measured_force, displacement, 1 / slope)
         return np.asarray(slope * np.hypot(force, stiff * displacement))
-    soft = _steepness(rows, rows.measured_force, rows.displacement, force)
+    soft = _steepness(rows, rows.measured_force, rows.displacement, force, slope)
     return np.hypot(displacement, soft * force)
 
 
@@ -91,18 +91,21 @@ _REACH = 3  # rows to either side, over which a local slope is taken,
 _TOLD, _MOVING, _FARTHEST = 5.0, 0.9, 8
 
 
-def _steepness(rows: Rows, driven: Array, answer: Array, sd: float) -> Array:
+def _steepness(rows: Rows, driven: Array, answer: Array, sd: float, simulated: Array) -> Array:
     """(n,) how much the answer changes per unit of what is driven, about a row within its run, over
     as many rows as tell its motion from its noise; changes of what is driven below three standard
-    deviations count as that much."""
-    a, b = _about(rows, _reach(rows, driven, sd))
+    deviations count as that much. Where its motion drowns, at least what is simulated (n,)."""
+    reach = _reach(rows, driven, sd)
+    a, b = _about(rows, reach or _REACH)
     way = np.maximum(np.abs(driven[b] - driven[a]), max(3 * sd, 1e-300))
-    return np.asarray(np.abs(answer[b] - answer[a]) / way)
+    steep = np.abs(answer[b] - answer[a]) / way
+    return np.asarray(steep if reach else np.maximum(steep, simulated))
 
 
 def _reach(rows: Rows, driven: Array, sd: float) -> int:
-    """How many rows to either side tell the motion of what is driven from its noise, where it
-    hardly ever moves plainly over a few but most of the time over more; else a few."""
+    """How many rows to either side tell the motion of what is driven from its noise: a few where it
+    moves plainly over them or stands, more where it does most of the time over more; 0 where it
+    moves, but never plainly."""
     a, b = _about(rows, reach := _REACH)
     if np.quantile(np.abs(driven[b] - driven[a]), _MOVING) >= _TOLD * sd:
         return _REACH
@@ -110,7 +113,7 @@ def _reach(rows: Rows, driven: Array, sd: float) -> int:
         a, b = _about(rows, reach := 2 * reach)
         if np.median(np.abs(driven[b] - driven[a])) >= _TOLD * sd:
             return reach
-    return _REACH
+    return _REACH if np.ptp(driven) > _GOES * sd else 0
 
 
 def _about(rows: Rows, reach: int) -> tuple[Ints, Ints]:

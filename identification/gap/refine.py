@@ -22,11 +22,13 @@ from identification.gap.effects import (
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import fit
+from identification.gap.forms import about_springs
 from identification.gap.parts import Part
 from identification.gap.variants import Variant
 
 _REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 6  # words that are refined
+_STEPS = 2  # to the springs beside what goes through them
 _CLOSE = 0.2  # of the first look's steps
 _WINDOW = 12.0  # nats above `none` that a word must have to be refined
 
@@ -101,6 +103,18 @@ def _poses(word: _Word) -> list[Variant]:
     return [f for v in kinds.values() for f in pose_error.refined(word.engine.bench, v, estimate)]
 
 
+def _about_springs(word: _Word) -> list[Variant]:
+    """What goes through the springs, with the springs as they are found to be beside it."""
+    bench, out = word.engine.bench, []
+    for found in dict.fromkeys(s[0].variant for s in (word.alone, word.beside) if s):
+        v = found
+        for _ in range(_STEPS):
+            _, softer = _estimate(word.engine, v)
+            v = about_springs(bench, found, bench.compliance * np.maximum(1 + softer, 0.1))
+        out.append(v)
+    return out
+
+
 _FINER: dict[str, Callable[[_Word], list[Variant]]] = {
     "joint_yield": _knees,
     "base_slip": _knees,
@@ -110,6 +124,8 @@ _FINER: dict[str, Callable[[_Word], list[Variant]]] = {
     "time_lag": _lags,
     "joint_nonlinear_stiffness": _curves,
     "pose_error": _poses,
+    "load_misalignment": _about_springs,
+    "force_drift": _about_springs,
 }
 
 

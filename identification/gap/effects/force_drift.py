@@ -87,8 +87,7 @@ def _each_run(bench: Bench, scales: tuple[float, ...]) -> list[Variant]:
     runs = np.unique(bench.rows.run)
     if bench.data.tare != "run" or len(runs) < 2:
         return []
-    axes = AXES if bench.rows.tangential is not None else _axes(bench)
-    places = [(int(r), name) for r in runs for name in axes]
+    places = [(int(r), name) for r in runs for name in _axes(bench)]
     columns = [bench.add(component(bench, AXES[name], since(bench, r))) for r, name in places]
     names = tuple(f"{name}_run{r + 1}" for r, name in places)
     return [variant(WORD, "each run", columns, scales, positive=False, path="each run",
@@ -108,7 +107,9 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def _axes(bench: Bench) -> dict[str, tuple[float, float, float]]:
-    """Components of the force that some direction loads."""
+    """Components of the force that are recorded, or that some direction loads."""
+    if bench.rows.tangential is not None:
+        return AXES
     units = np.stack([s.unit_vector for s in bench.data.setups])
     return {name: a for name, a in AXES.items() if np.any(np.abs(units @ np.array(a)) > 0.1)}
 

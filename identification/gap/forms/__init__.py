@@ -19,7 +19,18 @@ from identification.gap.forms.law import Columns, Describe, Law, Term
 from identification.gap.parts import Part
 from identification.gap.variants import Variant
 
-__all__ = ["SESSION", "Form", "Law", "Term", "describe", "law_of", "lawful", "realise", "rows_of"]
+__all__ = [
+    "SESSION",
+    "Form",
+    "Law",
+    "Term",
+    "about_springs",
+    "describe",
+    "law_of",
+    "lawful",
+    "realise",
+    "rows_of",
+]
 
 _TABLE: dict[str, tuple[Describe, Columns]] = {
     "joint_yield": (knees.describe, knees.columns),
@@ -75,6 +86,21 @@ def law_of(bench: Bench, variant: Variant) -> tuple[Law, Array]:
         about = tuple(float(c) for c in variant.info.get("compliance", bench.compliance))
         law = replace(law, constants={**law.constants, "about": about})
     return law, scale
+
+
+def about_springs(bench: Bench, variant: Variant, compliance: Array) -> Variant:
+    """The variant of a word whose effect goes through the springs, with these springs (m,) instead
+    of the simulated ones; its columns are put into the pool."""
+    law, scale = law_of(bench, variant)
+    law = replace(law, constants={**law.constants, "about": tuple(compliance.tolist())})
+    columns = (rows_of(bench, variant.word, law) * scale).T
+    return replace(
+        variant, label=f"{variant.label}, {AS_THEY_ARE}", columns=tuple(map(bench.add, columns)),
+        info={**variant.info, "compliance": compliance},
+    )  # fmt: skip
+
+
+AS_THEY_ARE = "springs as they are"
 
 
 def describe(bench: Bench, part: Part, w: Array, covariance: Array) -> Form:
