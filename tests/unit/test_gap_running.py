@@ -495,3 +495,30 @@ def test_a_stroke_that_runs_on_while_the_force_stands_is_no_hold(
     assert make_bench(running(force, u, imposed=imposed)).course.always_moves != holds
     slow = np.where(t > 80, 1e-4 * (1 - np.exp(-(t - 80) / 20)), 0.0)  # creep slows down
     assert not make_bench(running(force, 10 * force / SPRING + slow)).course.always_moves
+
+
+def test_a_long_table_of_numbered_readings_runs() -> None:
+    """Sixty levels and more, each read once, are no levels; fewer are a table of them, and what is
+    read several times rests."""
+
+    def held(n: int, each: int = 1) -> bool:
+        data = bench_data(
+            np.linspace(1, 100, n), np.linspace(1, 100, n) / SPRING, step=np.arange(n) // each
+        )
+        return not reduce_rows(data).continuous
+
+    assert not held(60)
+    assert held(59)
+    assert held(240, each=4)
+
+
+def test_noise_of_a_force_that_drowns_in_it_counts_by_the_simulated_slope() -> None:
+    """Its motion over a few rows says nothing of the slope: far less than there is."""
+    rng = np.random.default_rng(5)
+    n, noise = 120, 0.4
+    true = np.linspace(15.0, 17.0, n)
+    force = true + rng.normal(0, noise, n)
+    data = running(force, true / SPRING)
+    data = replace(data, instruments=replace(data.instruments, force=noise))
+    bench = make_bench(data)
+    assert np.median(bench.noise.response) == pytest.approx(noise * bench.slope[0], rel=0.2)

@@ -1,0 +1,89 @@
+"""What acts through the joints' springs, laid about the springs as they are found to be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import Bench, make_bench
+from identification.gap.compare import score
+from identification.gap.data import GapData
+from identification.gap.effects import library
+from identification.gap.evidence import Engine
+from identification.gap.forms import about_springs, law_of, rows_of
+from identification.gap.pool import Pool
+from identification.gap.refine import refine
+from identification.gap.variants import Variant
+from tests.unit.test_gap_forms import arm_data
+
+SOFTER = np.array([1.25, 0.8, 1.2, 0.85, 1.1, 1.0])
+
+
+def misaligned(bench: Bench) -> Variant:
+    found = library(bench, ["load_misalignment"])
+    return next(v for v in found if v.label == "all directions")
+
+
+def test_columns_about_other_springs_are_those_of_a_rig_with_these_springs() -> None:
+    data = arm_data()
+    bench = make_bench(data)
+    v = misaligned(bench)
+    about = about_springs(bench, v, bench.compliance * SOFTER)
+    there = make_bench(data, compliance=bench.compliance * SOFTER)
+    wanted = misaligned(there)
+    assert about.label != v.label
+    for mine, other in zip(about.columns, wanted.columns, strict=True):
+        np.testing.assert_allclose(bench.columns[mine], there.columns[other], rtol=1e-9, atol=1e-18)
+    # and its law, on any bench, counts from them
+    law, unit = law_of(bench, about)
+    made = rows_of(make_bench(data), about.word, law) * unit
+    for mine, column in zip(about.columns, made.T, strict=True):
+        np.testing.assert_allclose(bench.columns[mine], column, rtol=1e-9, atol=1e-18)
+
+
+def slanted(data: GapData, tangent: float) -> GapData:
+    """Springs that are off and a load that is askew: what was measured is linear in neither."""
+    there = make_bench(data, compliance=data.compliance * SOFTER)
+    v = misaligned(there)
+    effect = tangent * sum(there.columns[c] for c in v.columns)
+    total = prediction(there) + effect
+    rows, layout = there.rows, there.layout
+    count = rows.weight.astype(int)
+    noise = data.displacement - 1.1e-5 * data.force
+    assert data.q is not None
+    assert data.tangential is not None
+    holds = np.add.reduceat(count, np.flatnonzero(rows.hold_starts))
+    q = np.repeat(total[layout.q].reshape(data.joints, -1).T, holds, axis=0)
+    across = np.repeat(total[layout.tangential].reshape(2, -1).T, holds, axis=0)
+    return replace(
+        data, displacement=np.repeat(total[: rows.n], count) + noise,
+        q=data.q + q, tangential=data.tangential + across,
+    )  # fmt: skip
+
+
+def test_a_load_askew_on_springs_that_are_off_is_met_by_a_finer_shape() -> None:
+    data = slanted(arm_data(), 0.25)
+    bench = make_bench(data)
+    variants = library(bench, ["load_misalignment"])
+    target = bench.observed - prediction(bench)
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 4e-6, 2e-5]))
+    singles = score(engine, engine.levels, variants)
+    finer = refine(engine, singles)
+    engine.extend()
+    before = max(s.log_evidence for s in singles)
+    after = max(s.log_evidence for s in score(engine, engine.levels, finer))
+    assert after > before + 20
+
+
+def test_every_component_of_the_force_that_is_recorded_drifts() -> None:
+    """Also those that no direction loads: their amplifiers drift as well, and show it."""
+    data = arm_data(directions="x")
+
+    def names(seen: GapData) -> set[tuple[str, ...]]:
+        bench = replace(make_bench(seen), columns=Pool())
+        return {tuple(v.info["names"]) for v in library(bench, ["force_drift"])}
+
+    assert names(data) == {("",), ("x", "y", "z")}
+    assert names(replace(data, tangential=None)) == {("",)}
