@@ -54,10 +54,16 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
 
 def cancelling(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
     """Penalty in nats for effects that are larger than the gap and take each other back; what is
-    linear the springs of the base take back from it, and it is left alone."""
-    bent = max((s for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR), default=0.0)
-    share = max(float(bent) / max(engine.structural, 1e-300), 1e-6)
+    linear the springs of the base take back from it, and it is left alone, as is one effect beside
+    it, which may well be larger than what the springs leave of it."""
+    bent = [float(s) for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR]
+    if len(bent) < _TWO:
+        return 0.0
+    share = max(max(bent) / max(engine.structural, 1e-300), 1e-6)
     return _wall(share / CANCELLING)
+
+
+_TWO = 2  # to take each other back
 
 
 def _wall(beyond: float) -> float:

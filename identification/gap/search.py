@@ -10,8 +10,9 @@ from identification.gap.compare import Scored, by_word, closest, log_mean, margi
 from identification.gap.evidence import Engine, Level
 from identification.gap.explanation import Explanation, Found, conditioned, explain
 from identification.gap.finer import gained
+from identification.gap.imperfection import level_prior
 from identification.gap.noise import UNSURE
-from identification.gap.parts import Part, log_joints, part_sizes
+from identification.gap.parts import Part, energies, log_joints, part_sizes
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
 from identification.gap.variants import Variant
 from identification.gap.verdict import weighed
@@ -181,7 +182,9 @@ def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Expl
 def _no_worse(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
     """The same as `conditioned`, at levels up to the likeliest: with an effect more, no more
     imperfection is needed."""
-    likeliest = int(np.argmax(log_joints(engine, parts)))
+    energy = energies(engine, parts)
+    prior = [level_prior(engine.etas, i, float(e)) for i, e in enumerate(energy)]
+    likeliest = int(np.argmax(log_joints(engine, parts) + np.array(prior)))
     return conditioned(engine, parts, engine.levels[: likeliest + 1])
 
 
