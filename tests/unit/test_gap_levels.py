@@ -20,11 +20,11 @@ from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, _counted
 from identification.gap.leftover import looked_up
-from identification.gap.parts import Part, Sizes
+from identification.gap.parts import Part, Sizes, log_joints
 from identification.gap.penalties import _apart, _on_its_own
 from identification.gap.products import White
 from identification.gap.rows import reduce_rows
-from identification.gap.search import _seeds, _sharpened, search
+from identification.gap.search import _no_worse, _seeds, _sharpened, search
 from identification.gap.variants import Variant, variant
 from identification.gap.verdict import BENCH_DOUBT, DOUBT, EXPLAINED, THREE, _heir, _main, weighed
 from rig.dataset import load
@@ -431,3 +431,17 @@ def test_explanations_that_matter_are_taken_between_the_levels(
     more = {"joint_creep": 20.0, "joint_yield": 26.0}  # the first one's gain shuts out nobody
     found = _sharpened(engine, [*ranked, said((), (), -60.0)])
     assert [e.log_weight for e in found] == [22.0, 20.0, -50.0, -60.0]
+
+
+def test_another_effect_is_looked_for_at_sizes_that_the_first_one_may_have() -> None:
+    """No law meets a rig to the noise of these data, however well it fits: what is weighed beside
+    it must not be held to less imperfection than it has itself."""
+    bench = small_bench()
+    v = library(bench, ["joint_creep"])[0]
+    effect = bench.columns[v.columns[0]]
+    target = bench.observed - prediction(bench) + 5e-4 * effect / np.abs(effect).max()
+    e = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 2.5e-6, 6e-6, 1.5e-5]))
+    law = (Part(v, 0.6),)
+    assert int(log_joints(e, law).argmax()) == 0
+    levels, _ = _no_worse(e, law)
+    assert [lv.eta for lv in levels] == [0.0, 1e-6]
