@@ -52,8 +52,11 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
         good *= kept.get(e.words, 1.0)
         if not e.parts and found.engine.bench.noise.raised > NOISY:
             good *= STATED
-        many = THREE if len(e.parts) > 2 and e.sizes[2] > TELLING * e.sizes[0] else 1.0
-        for word, share in _main(e, found.engine.bench.data.arm).items():
+        said = _simpler(e, ranked, kept) or e
+        many = (
+            THREE if len(said.parts) >= _MANY and said.sizes[2] > TELLING * said.sizes[0] else 1.0
+        )
+        for word, share in _main(said, found.engine.bench.data.arm).items():
             mass[word] += many * share * good
         mass["unknown"] += (1 - many) * good
         mass[_heir(e, ranked, kept, found.engine.bench.noise.stated)] += whole - good
@@ -96,6 +99,29 @@ NOISY, STATED = 3.0, 0.1
 # 7 were met down to the noise by three others: 0.0009 against 0.05 * 7 / 32.
 THREE = 0.1
 TELLING = 0.1  # of the largest: a smaller one is no trouble beside it
+# Nats that a third effect has to bring: what it does to some channel may be how far the other
+# two's laws are off.
+WORTH_OF_THIRD = 10.0
+
+
+def _simpler(
+    explanation: Explanation, ranked: Sequence[Explanation], kept: Mapping[frozenset[str], float]
+) -> Explanation | None:
+    """Of three effects the two that explain nearly as much, if any do."""
+    e = explanation
+    near = (
+        f
+        for f in ranked
+        if len(f.parts) == len(e.parts) - 1
+        and f.words < e.words
+        and f.log_weight > e.log_weight - WORTH_OF_THIRD
+        and f.good
+        and kept.get(f.words, 1.0) > 0.5
+    )
+    return next(near, None) if len(e.parts) >= _MANY else None
+
+
+_MANY = 3
 
 
 def _main(explanation: Explanation, arm: bool) -> dict[str, float]:

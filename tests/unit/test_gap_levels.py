@@ -26,7 +26,16 @@ from identification.gap.products import White
 from identification.gap.rows import reduce_rows
 from identification.gap.search import _no_worse, _seeds, _sharpened, search
 from identification.gap.variants import Variant, variant
-from identification.gap.verdict import BENCH_DOUBT, DOUBT, EXPLAINED, THREE, _heir, _main, weighed
+from identification.gap.verdict import (
+    BENCH_DOUBT,
+    DOUBT,
+    EXPLAINED,
+    THREE,
+    WORTH_OF_THIRD,
+    _heir,
+    _main,
+    weighed,
+)
 from rig.dataset import load
 from rig.gap_data import gap_data
 from rig.tables import import_table
@@ -257,6 +266,14 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         doubted = BENCH_DOUBT * share * max(0.0, 2 * share - 1) / 2  # the other half is `none`'s
         found_out = weighed(one, {}).probabilities["unknown"]
         assert found_out == pytest.approx(share - doubted)
+    # two of them explain nearly as much: then they are meant, whatever the third does
+    third = said(three, (1e-5, 1e-5, 5e-6), 0.0)
+    for worth, unknown in ((WORTH_OF_THIRD - 1, 0.0), (WORTH_OF_THIRD + 1, 0.9)):
+        two = said(three[1:], (2e-5, 1e-6), -worth)
+        both = replace(found, explanations=(third, two), unknown=-800.0, alone={})
+        p = weighed(both, {}).probabilities
+        assert p["unknown"] == pytest.approx(unknown, abs=0.1)
+        assert (p["thermal_drift"] > 0.9) == (unknown == 0)
 
 
 def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
