@@ -51,7 +51,8 @@ class Bench:
     compliance along the direction. sense: +1 where the force is imposed and the effect adds
     displacement; -1 where the displacement is imposed and the same effect takes force away.
     reach m: largest simulated or measured response, the natural unit of what has no other.
-    scatter (n,) m^2: mean square of the samples about their row.
+    scatter (n,) m^2: mean square of the samples about their row; trend (n,) m s: mean product of
+    time and response about it.
     columns: the pool, filled by the effects.
     """
 
@@ -70,6 +71,7 @@ class Bench:
     slope: Array
     reach: float
     scatter: Array
+    trend: Array
     observed: Array
     columns: Pool = field(default_factory=Pool)
     flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
@@ -262,6 +264,13 @@ class Bench:
         span = float(np.ptp(np.append(self.torque[:, joint], 0.0)))
         return bool(np.abs(self.weight(joint)).max() > _FELT * span)
 
+    def scatter_about(self, predicted: Array) -> Array:
+        """(n,) m^2: mean square of the samples about what was predicted of their row (n,), which
+        goes on in time within it."""
+        speed = self.rows.speed(predicted)
+        square = self.scatter - 2 * speed * self.trend + speed**2 * self.rows.spread
+        return np.asarray(np.maximum(square, 0.0))
+
     @cached_property
     def rest(self) -> Flags:
         """(n,) rows before which the load went back to zero."""
@@ -296,10 +305,10 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     if imposed:
         driven = standing(rows, rows.displacement, meter.displacement)
         load, response = driven / stated, rows.measured_force * stated
-        scatter = rows.force_scatter * stated**2
+        scatter, trend = rows.force_scatter * stated**2, rows.force_trend * stated
     else:
         load, response = standing(rows, rows.force, meter.force), rows.displacement
-        scatter = rows.displacement_scatter
+        scatter, trend = rows.displacement_scatter, rows.displacement_trend
     torque = lever * load[:, None]
     layout = _layout(data, rows, imposed)
     observed = np.zeros(layout.size)
@@ -315,7 +324,7 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         data=data, rows=rows, layout=layout, noise=estimate_noise(data, rows, stated, imposed),
         imposed=imposed, sense=-1.0 if imposed else 1.0, compliance=c, load=load, response=response,
         torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, scatter=scatter,
-        observed=observed,
+        trend=trend, observed=observed,
     )  # fmt: skip
 
 

@@ -204,8 +204,7 @@ def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explana
     engine, bench = found.engine, found.engine.bench
     n = bench.rows.n
     fitted = fit(engine, chosen)
-    gap = bench.response - stated_prediction(engine)
-    left = engine.target[:n] - fitted.response
+    predicted = bench.response - engine.target[:n] + fitted.response
     ways = folds(engine)
     held = tuple(held_out(engine, chosen, name, number) for name, number in ways.items())
     springs = fit(engine, next(e for e in found.explanations if not e.parts))
@@ -216,8 +215,8 @@ def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explana
         effects=_effects(found, variants, chosen),
         where=locate(engine, fitted, structural),
         noise=noise_of(bench),
-        before=sample_rms(bench, gap),
-        after=sample_rms(bench, left),
+        before=sample_rms(bench, stated_prediction(engine)),
+        after=sample_rms(bench, predicted),
         held_out=held,
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,

@@ -90,7 +90,8 @@ def noise_of(bench: Bench) -> float:
     return float(np.sqrt(weight @ square / weight.sum()))
 
 
-def sample_rms(bench: Bench, values: Array) -> float:
-    """rms over samples: that of the rows, and the scatter of the samples within rows."""
-    weight = bench.rows.weight
-    return float(np.sqrt(weight @ (values**2 + bench.scatter) / weight.sum()))
+def sample_rms(bench: Bench, predicted: Array) -> float:
+    """rms (m) over samples by which the response misses what was predicted of the rows (n,): that
+    of the rows, and of the samples within them."""
+    weight, left = bench.rows.weight, bench.response - predicted
+    return float(np.sqrt(weight @ (left**2 + bench.scatter_about(predicted)) / weight.sum()))

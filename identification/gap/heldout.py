@@ -78,13 +78,14 @@ def held_out(
     """Judges an explanation on every fold in turn. loose: words that no fold foretells of another:
     what they may do within a fold is told by that fold itself."""
     bench, n = engine.bench, engine.bench.rows.n
-    before, after = np.zeros(n), np.zeros(n)
+    before, after, scatter = np.zeros(n), np.zeros(n), np.zeros(n)
     judged = ~bench.rows.zero & (fold != ALWAYS_IN)
     within = judged & _within(bench)
     if name == "repetition" and within.any():
         judged = within
     group = _own_datum(bench)
-    gap = bench.response - stated_prediction(engine)
+    stated = stated_prediction(engine)
+    gap = bench.response - stated
     for f in np.unique(fold[fold != ALWAYS_IN]):
         test = (fold == f) & judged
         if not test.any():
@@ -94,10 +95,11 @@ def held_out(
         left = engine.target[:n] - fitted.response
         left[out] -= _told(engine, [p for p in explanation.parts if p.word in loose], left, out)
         whole = _whole(group, out)
+        scatter[test] = bench.scatter_about(bench.response - left)[test]
         after[test] = _less_datum(group, left, whole & test)[test]
         before[test] = _less_datum(group, gap, whole & test)[test]
-    scatter = bench.scatter
-    before, after = np.sqrt(before**2 + scatter), np.sqrt(after**2 + scatter)
+    before = np.sqrt(before**2 + bench.scatter_about(stated))
+    after = np.sqrt(after**2 + scatter)
     blocks = bench.rows.run if len(np.unique(bench.rows.run)) > 2 else fold
     return HeldOut(
         name,

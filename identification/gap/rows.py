@@ -30,7 +30,8 @@ class Rows:
     of the hold in all its rows (its noise would else pass for a small friction or a lag);
     measured_force: as it is. steady (n,): such holds. hold_weight (n,): samples of the
     row's hold; force_scatter, displacement_scatter (n,): mean squares of the samples about their
-    row, N^2 and m^2.
+    row, N^2 and m^2; of rows of holds also spread (n,) s^2: of their times; force_trend,
+    displacement_trend (n,): mean products of time and channel about the row, N s and m s.
     """
 
     time: Array
@@ -56,6 +57,9 @@ class Rows:
     hold_weight: Array
     force_scatter: Array
     displacement_scatter: Array
+    spread: Array
+    force_trend: Array
+    displacement_trend: Array
     continuous: bool
     starts: Flags  # first row of a run
     hold_starts: Flags
@@ -72,6 +76,22 @@ class Rows:
             np.equal.outer(self.setup, np.arange(int(self.setup.max()) + 1)) * self.weight[:, None]
         )
         return np.asarray(weight / np.maximum(weight.sum(axis=0), 1e-300))
+
+    def speed(self, values: Array) -> Array:
+        """(n,) by how much values (n,) change per second at every row, by the parabola through it
+        and its neighbours in the hold; 0 where there are none."""
+        edges = np.flatnonzero(self.hold_starts)
+        first = edges[self.hold]
+        last = np.append(edges[1:], self.n)[self.hold] - 1
+        inner = np.clip(np.arange(self.n), first + 1, np.maximum(last - 1, first + 1))
+        a, b, c = inner - 1, np.minimum(inner, last), np.minimum(inner + 1, last)
+        t, v = self.time, values
+        with np.errstate(divide="ignore", invalid="ignore"):
+            before = (v[b] - v[a]) / (t[b] - t[a])
+            after = (v[c] - v[b]) / (t[c] - t[b])
+            bend = np.where(c > b, (after - before) / (t[c] - t[a]), 0.0)
+            out = before + bend * (2 * t - t[a] - t[b])
+        return np.where(np.isfinite(out), out, 0.0)
 
     def moved(self, values: Array) -> Array:
         """Values (n, k) less their mean per setup: the datum says nothing."""
@@ -102,6 +122,11 @@ def reduce_rows(data: GapData) -> Rows:
         slope = np.where(var > 0, (mean(x * u) - mean(x) * mean(u)) / np.maximum(var, 1e-300), 0.0)
         return np.maximum(square - slope**2 * var, 0.0)
 
+    def trend(values: Array) -> Array:
+        """Mean product of time and values about the row."""
+        t, u = data.time - data.time.mean(), values - values.mean()
+        return np.zeros(len(edges)) if continuous else mean(t * u) - mean(t) * mean(u)
+
     def first(values: Ints) -> Ints:
         return values[edges]
 
@@ -124,6 +149,8 @@ def reduce_rows(data: GapData) -> Rows:
         steady=steady,
         hold_weight=hold_weight, force_scatter=scatter(data.force),
         displacement_scatter=scatter(data.displacement), displacement=mean(data.displacement),
+        spread=trend(data.time), force_trend=trend(data.force),
+        displacement_trend=trend(data.displacement),
         tangential=None if data.tangential is None else mean(data.tangential),
         q=None if data.q is None else mean(data.q),
         temperature=None if data.temperature is None else mean(data.temperature),

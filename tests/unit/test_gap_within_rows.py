@@ -1,0 +1,68 @@
+"""Samples of one row: what an effect goes on within it is no scatter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import Bench, make_bench
+from identification.gap.data import Array
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.rows import reduce_rows
+from tests.unit.test_gap_operators import bench_data
+
+SPRING, HOLD, LEVELS = 1e-5, 16, 12
+
+
+def settling(size: float = 2e-5, noise: float = 0.0) -> tuple[Bench, Array]:
+    """Levels of 16 samples each, at which the displacement settles; samples of it."""
+    step = np.repeat(np.arange(1, LEVELS + 1), HOLD)
+    within = np.tile(np.arange(HOLD), LEVELS) + 1.0
+    force = 10.0 * step
+    rng = np.random.default_rng(2)
+    u = SPRING * force - size * np.exp(-within / 5.0) + rng.normal(0, 1.0, len(step)) * noise
+    return make_bench(bench_data(force, u, step=step)), u
+
+
+def row_of(bench: Bench, values: Array) -> Array:
+    count = bench.rows.weight.astype(int)
+    edges = np.cumsum(count) - count
+    return np.asarray(np.add.reduceat(values, edges) / count)
+
+
+def test_the_speed_of_a_parabola_is_exact_in_every_row_of_a_hold() -> None:
+    bench, _ = settling()
+    rows = bench.rows
+    speed = rows.speed(3.0 + 2.0 * rows.time - 0.5 * rows.time**2 + 100.0 * rows.hold)
+    np.testing.assert_allclose(speed, 2.0 - rows.time, rtol=1e-9, atol=1e-9)
+
+
+def test_a_row_alone_in_its_hold_has_no_speed_and_two_have_one() -> None:
+    single = reduce_rows(bench_data(np.arange(5.0), np.arange(5.0), step=np.arange(5)))
+    assert single.speed(single.time**2).tolist() == [0.0] * 5
+    two = reduce_rows(bench_data(np.arange(6.0), np.arange(6.0), step=np.arange(6) // 2))
+    assert two.hold_starts.tolist() == [True, False] * 3
+    np.testing.assert_allclose(two.speed(4.0 * two.time), 4.0)
+
+
+def test_what_is_foreseen_within_rows_is_not_left() -> None:
+    bench, u = settling()
+    seen = bench.scatter_about(row_of(bench, u))
+    assert np.sqrt(bench.scatter.max()) > 1e-6  # rows of many samples: they move on
+    assert seen.sum() < 0.2 * bench.scatter.sum()
+    assert bench.scatter_about(np.zeros(bench.rows.n)) == pytest.approx(bench.scatter)
+
+
+def test_noise_within_rows_is_left_whatever_is_foreseen() -> None:
+    bench, _ = settling(size=0.0, noise=1e-6)
+    smooth = SPRING * bench.load
+    np.testing.assert_allclose(bench.scatter_about(smooth), bench.scatter, rtol=1e-9)
+
+
+def test_after_of_a_rig_that_settles_does_not_count_its_settling() -> None:
+    bench, _ = settling(size=6e-5, noise=5e-7)
+    found = diagnose_gap(bench.data)
+    assert found.verdict in ("joint_creep", "time_lag")
+    moves = np.sqrt(bench.rows.weight @ bench.scatter / bench.rows.weight.sum())
+    assert found.after < 0.7 * moves
+    assert found.held_out[0].after < 0.7 * moves
