@@ -105,7 +105,7 @@ def _steepness(rows: Rows, driven: Array, answer: Array, sd: float, simulated: A
 def _reach(rows: Rows, driven: Array, sd: float) -> int:
     """How many rows to either side tell the motion of what is driven from its noise: a few where it
     moves plainly over them or stands, more where it does most of the time over more; 0 where it
-    moves, but never plainly."""
+    goes one way, but never plainly."""
     a, b = _about(rows, reach := _REACH)
     if np.quantile(np.abs(driven[b] - driven[a]), _MOVING) >= _TOLD * sd:
         return _REACH
@@ -113,7 +113,7 @@ def _reach(rows: Rows, driven: Array, sd: float) -> int:
         a, b = _about(rows, reach := 2 * reach)
         if np.median(np.abs(driven[b] - driven[a])) >= _TOLD * sd:
             return reach
-    return _REACH if np.ptp(driven) > _GOES * sd else 0
+    return _REACH if np.ptp(driven) > _GOES * sd or _run(driven) <= _TREND * sd else 0
 
 
 def _about(rows: Rows, reach: int) -> tuple[Ints, Ints]:

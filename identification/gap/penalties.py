@@ -54,12 +54,12 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
 
 def cancelling(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
     """Penalty in nats for effects that are larger than the gap and take each other back; what is
-    linear the springs of the base take back from it, and it is left alone, as is one effect beside
-    it, which may well be larger than what the springs leave of it."""
+    linear the springs of the base take back from it, and it is left alone; as is a single effect
+    beside it on an arm, whose springs may hide most of either."""
     bent = [float(s) for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR]
-    if len(bent) < _TWO:
+    if engine.bench.data.arm and len(bent) < _TWO:
         return 0.0
-    share = max(max(bent) / max(engine.structural, 1e-300), 1e-6)
+    share = max(max(bent, default=0.0) / max(engine.structural, 1e-300), 1e-6)
     return _wall(share / CANCELLING)
 
 

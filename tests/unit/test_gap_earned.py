@@ -135,8 +135,11 @@ def test_effects_that_take_each_other_back_are_charged_and_springs_are_not() -> 
     assert cancelling(e, mine + other, both) == 0.0
     assert cancelling(e, mine + other, np.array([big, e.structural])) > 50
     assert cancelling(e, mine + other + spring, np.array([e.structural, big, big])) > 50
-    # one effect alone may be larger than what the springs leave of it, also beside a linear one
+    # a bench's one spring hides little; an arm's may hide most of a single effect
+    assert cancelling(e, mine + spring, np.array([big, big])) > 50
+    e.bench = replace(e.bench, data=replace(e.bench.data, arm=True))
     assert cancelling(e, mine + spring, np.array([big, big])) == 0.0
+    assert cancelling(e, mine + other, np.array([big, big])) > 50
 
 
 def test_a_drift_alone_need_not_foresee_what_another_run_brings() -> None:

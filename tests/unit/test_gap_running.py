@@ -522,3 +522,6 @@ def test_noise_of_a_force_that_drowns_in_it_counts_by_the_simulated_slope() -> N
     data = replace(data, instruments=replace(data.instruments, force=noise))
     bench = make_bench(data)
     assert np.median(bench.noise.response) == pytest.approx(noise * bench.slope[0], rel=0.2)
+    standing_still = running(force - true + 16.0, true / SPRING)
+    standing_still = replace(standing_still, instruments=data.instruments)
+    assert np.median(make_bench(standing_still).noise.response) < 0.5 * noise * bench.slope[0]
