@@ -74,8 +74,12 @@ def _backlash(word: _Word) -> list[Variant]:
 
 
 def _friction(word: _Word) -> list[Variant]:
-    places = _places(word.alone, word.beside, joint_hysteresis.hangs)
-    return [v for s in places for v in joint_hysteresis.refined(word.engine.bench, s.variant)]
+    bench, out = word.engine.bench, []
+    for s in _places(word.alone, word.beside):
+        out += joint_hysteresis.closer(bench, s.variant)
+    for s in _places(word.alone, word.beside, joint_hysteresis.hangs):
+        out += joint_hysteresis.refined(bench, s.variant)
+    return out
 
 
 def _seats(word: _Word) -> list[Variant]:

@@ -41,6 +41,7 @@ NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # bends ever more from the first load on is a spectrum of strengths. Specimens yield.
 _SMALL = 5
 TOOLS_KG = (0.0, 0.5, 1.0, 2.0, 2.5, 3.0)  # beside TOOL_KG, with which it is looked for at first
+EXPONENTIAL, _CLOSER = ("Dahl", "Bouc-Wen"), 6  # laws; reaches of a closer look
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off by more than that
 
@@ -51,38 +52,51 @@ def variants(bench: Bench) -> list[Variant]:
     from the beginning, of loads like those measured (rigs are cycled before they are measured)."""
     if not bench.data.arm and not bench.course.returns:  # pulls show a curve, and no loop
         return []
-    memories = {"": (bench.moved, False)}
-    if not bench.course.once:
-        memories[" worked in"] = (bench.moved, True)
-    if np.sum(bench.rebuilt) > np.sum(bench.moved):
-        memories[SET_UP_ANEW] = (bench.rebuilt, False)
-    if np.sum(bench.rest) > np.sum(bench.moved):
-        memories[" rested"] = (bench.moved | bench.rest, False)
     out = []
     for j in bench.moving_joints():
         span = bench.reach_of(bench.true_torque[:, j])
         if not span > 0:
             continue
-        for memory, (fresh, worked) in memories.items():
-            path = worked_in(bench.true_torque[:, j], fresh) if worked else None
-            out += _laws(bench, j, span, memory, fresh, path)
-        if bench.feels_weight(j):
-            out += _laws(bench, j, span, UNDER_WEIGHT, bench.moved, None, bench.weight(j))
-    if not bench.data.arm:
-        lines = {j: bench.add_joint(j, bench.elastic[:, j]) for j in bench.moving_joints()}
-        out += [_with_other_springs(v, lines[int(v.info["joint"])]) for v in out]
+        for memory, how in _memories(bench, j).items():
+            out += _laws(bench, j, span, memory, *how)
+    return out + _with_other_springs(bench, out)
+
+
+_How = tuple[Flags, Path | None, Array | None]  # where it is fresh, a path worked in, weights
+
+
+def _memories(bench: Bench, joint: int) -> dict[str, _How]:
+    """What a joint's friction may remember."""
+    out: dict[str, _How] = {"": (bench.moved, None, None)}
+    if not bench.course.once:
+        out[WORKED_IN] = (bench.moved, worked_in(bench.true_torque[:, joint], bench.moved), None)
+    if np.sum(bench.rebuilt) > np.sum(bench.moved):
+        out[SET_UP_ANEW] = (bench.rebuilt, None, None)
+    if np.sum(bench.rest) > np.sum(bench.moved):
+        out[" rested"] = (bench.moved | bench.rest, None, None)
+    if bench.feels_weight(joint):
+        out[UNDER_WEIGHT] = (bench.moved, None, bench.weight(joint))
     return out
 
 
-def _with_other_springs(v: Variant, line: int) -> Variant:
+WORKED_IN = " worked in"
+
+
+def _with_other_springs(bench: Bench, found: list[Variant]) -> list[Variant]:
     """A specimen's friction brings its own mean stiffness: what was simulated may be its first
     slope, or the mean one."""
-    k = len(v.columns)
-    root = np.zeros((k + 1, k + 1))
-    root[:k, :k], root[k, k] = v.root, _MORE
-    return variant(WORD, f"{v.label}, other springs", [*v.columns, line], OTHER_SCALES, root,
-                   np.append(np.ones(k), 0.0), 0.5 * v.prior, each=(True,) * k,
-                   **{**v.info, "other_springs": True})  # fmt: skip
+    out = []
+    for v in found if not bench.data.arm else ():
+        joint, k = int(v.info["joint"]), len(v.columns)
+        line = bench.add_joint(joint, bench.elastic[:, joint])
+        root = np.zeros((k + 1, k + 1))
+        root[:k, :k], root[k, k] = v.root, _MORE
+        out.append(
+            variant(WORD, f"{v.label}, other springs", [*v.columns, line], OTHER_SCALES, root,
+                    np.append(np.ones(k), 0.0), 0.5 * v.prior, each=(True,) * k,
+                    **{**v.info, "other_springs": True})
+        )  # fmt: skip
+    return out
 
 
 def hangs(v: Variant) -> bool:
@@ -106,16 +120,34 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
     return out
 
 
+def closer(bench: Bench, found: Variant) -> list[Variant]:
+    """Exponential laws of the same joint and memory whose reaches lie nearer to each other."""
+    if found.info["law"] not in EXPONENTIAL:
+        return []
+    joint, memory = int(found.info["joint"]), str(found.info["memory"])
+    span = bench.reach_of(bench.true_torque[:, joint])
+    how = next(h for m, h in _memories(bench, joint).items() if m.strip() == memory)
+    low, high = found.info["radius"]
+    reach = np.geomspace(0.9 * float(low), 1.1 * float(high), _CLOSER)
+    name = f"joint {joint + 1}{' ' * bool(memory)}{memory}"
+    out = [
+        replace(v, label=f"{v.label} fine", info={**v.info, "memory": memory})
+        for v in _exponential(bench, joint, name, reach / span, *how)
+    ]
+    return out + _with_other_springs(bench, out)
+
+
 def _laws(
     bench: Bench, joint: int, span: float, memory: str, fresh: Flags, path: Path | None,
-    weight: Array | None = None,
+    weight: Array | None,
 ) -> list[Variant]:  # fmt: skip
     """All laws of one joint and memory."""
     name = f"joint {joint + 1}{memory}"
     found = _spectra(bench, joint, name, span, fresh, path, weight)
     found += _pairs(bench, joint, name, span, found[0])
     if not bench.course.once:  # a curve that saturates would be taken for friction
-        found += _exponential(bench, joint, name, span, fresh, path, weight)
+        reaches = np.array(REACHES if bench.course.unloads else REACHES[:2])
+        found += _exponential(bench, joint, name, reaches, fresh, path, weight)
     return [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
 
 
@@ -166,14 +198,13 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
 
 
 def _exponential(
-    bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None,
+    bench: Bench, joint: int, name: str, reaches: Array, fresh: Flags, path: Path | None,
     weight: Array | None,
 ) -> list[Variant]:  # fmt: skip
-    """Dahl's and Bouc and Wen's laws, with neighbouring reaches."""
+    """Dahl's and Bouc and Wen's laws, with neighbouring reaches (k,) of the range of torque."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
-    reach = span * np.array(REACHES if bench.course.unloads else REACHES[:2])
-    out = []
-    for law in ("Dahl", "Bouc-Wen"):
+    reach, out = bench.reach_of(torque) * reaches, []
+    for law in EXPONENTIAL:
         if path is None:
             z = bristles(torque, reach, fresh, elastic=law == "Bouc-Wen", weight=weight)
         else:
@@ -183,7 +214,7 @@ def _exponential(
         ]
         for k in range(len(reach) - 1):
             out.append(
-                variant(WORD, f"{name} {law} {REACHES[k]}", columns[k : k + 2], SCALES,
+                variant(WORD, f"{name} {law} {reaches[k]:.3g}", columns[k : k + 2], SCALES,
                         smooth_root(2, 0.5), prior=0.25 / (len(reach) - 1), each=True, joint=joint,
                         radius=reach[k : k + 2], law=law)
             )  # fmt: skip
