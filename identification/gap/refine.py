@@ -65,7 +65,7 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
 
 def _knees(word: _Word) -> list[Variant]:
     places = _places(word.alone, word.beside, joint_yield.is_sharp)
-    return [v for s in places for v in joint_yield.refined(word.engine.bench, s.variant)]
+    return _closing_in(word, joint_yield.refined, places, joint_yield.CLOSE)
 
 
 def _backlash(word: _Word) -> list[Variant]:

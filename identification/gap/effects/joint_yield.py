@@ -16,7 +16,7 @@ Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manu
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -207,18 +207,22 @@ def is_sharp(v: Variant) -> bool:
     return bool(v.info["knee"] == "sharp")
 
 
-def refined(bench: Bench, found: Variant) -> list[Variant]:
-    """Finely spaced thresholds and flow times about a variant that was found."""
-    info = dict(found.info)
+def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
+    """Finely spaced thresholds and flow times about a variant that was found. close: share of the
+    steps; below 1 only of what flows, between the times that were looked at."""
+    info, ways = dict(found.info), _ways(bench)
+    if close < 1:
+        flow, square = float(info["flow_s"]), bool(info.get("square"))
+        ways = [(flow * 2.0**step, square) for step in _BETWEEN if flow > 0]
     weight = info.get("weight")
     alone = 0.0 if weight is None else float(np.abs(weight).max())
-    radius = alone + (float(info["centre"]) - alone) * np.linspace(0.84, 1.2, FINE)
+    radius = alone + (float(info["centre"]) - alone) * (1 + close * np.linspace(-0.16, 0.2, FINE))
     fresh = _memories(bench).get(info["memory"], bench.moved)
     name, out = found.label.split(" at ")[0].split(" flow")[0], []
-    for (flow, square), states in _flowing(bench, info["load"], radius, fresh, weight).items():
+    for (flow, square), states in _flowing(bench, ways, info["load"], radius, fresh, weight):
         columns = [info["column"](s) for s in states.T]
         share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S) + len(SQUARE_S))
-        how = f" flow {flow:g} s{' squared' if square else ''}" if flow else ""
+        how = f" flow {flow:.3g} s{' squared' if square else ''}" if flow else ""
         for k in range(FINE):
             exact = {**info, "centre": radius[k], "flow_s": flow, "square": square}
             label = f"{name}{how} at {radius[k]:.4g} fine"
@@ -292,19 +296,32 @@ def states(
     return bench.flows[key]
 
 
-def _flowing(
-    bench: Bench, load: Array, radius: Array, fresh: Flags, weight: Array | None
-) -> dict[tuple[float, bool], Array]:
-    """(flow time s, whether squared) -> play states (n, k), for no flow and all in one go."""
-    out = {(0.0, False): bench.plays(load, radius, fresh, weight)}
+_Way = tuple[float, bool]  # flow time s, 0 for none; whether it flows with the square
+CLOSE = (0.4,)  # of a closer look
+_BETWEEN = (-0.5, -0.25, 0.25, 0.5)  # powers of two of a flow time
+
+
+def _ways(bench: Bench) -> list[_Way]:
+    """What flows at once, and in all times that are looked for."""
     if bench.rows.continuous or bench.course.timeless:
-        return out
+        return [(0.0, False)]
     # what slows down so under a load that stands, a single spring can't tell from creep
     squared = SQUARE_S if bench.data.arm else ()
-    ways = [*((t, False) for t in FLOWS_S), *((t, True) for t in squared)]
-    times, square = (np.repeat(v, len(radius)) for v in zip(*ways, strict=True))
-    every = flowing_play(load, np.tile(radius, len(ways)), times, bench.rows, fresh, weight, square)
-    return out | dict(zip(ways, np.split(every, len(ways), axis=1), strict=True))
+    return [(0.0, False), *((t, False) for t in FLOWS_S), *((t, True) for t in squared)]
+
+
+def _flowing(
+    bench: Bench, ways: list[_Way], load: Array, radius: Array, fresh: Flags, weight: Array | None
+) -> Iterator[tuple[_Way, Array]]:
+    """Play states (n, k) of every way; all that takes time in one go."""
+    slow = [way for way in ways if way[0] > 0]
+    if len(slow) < len(ways):
+        yield (0.0, False), bench.plays(load, radius, fresh, weight)
+    if slow:
+        times, square = (np.repeat(v, len(radius)) for v in zip(*slow, strict=True))
+        every = flowing_play(load, np.tile(radius, len(slow)), times, bench.rows, fresh, weight,
+                             square)  # fmt: skip
+        yield from zip(slow, np.split(every, len(slow), axis=1), strict=True)
 
 
 def ratchet(load: Array, threshold: float, fresh: Flags) -> Array:
