@@ -40,7 +40,7 @@ def variants(bench: Bench) -> list[Variant]:
         lag = multiple * sample
         if bench.rows.continuous and lag > _OF_STROKE * bench.course.stroke_s:
             break  # the load would have come before anybody turned a screw
-        if bench.rows.hold_starts.all() and multiple > _USUAL:
+        if not bench.data.arm and bench.rows.hold_starts.all() and multiple > _USUAL:
             break  # one reading a step, and that of a step long past
         for channel in ("displacement", "force"):
             out += _of(bench, channel, lag, _likely(multiple))
@@ -91,10 +91,11 @@ def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
 
 
 def _like_a_soft_start(bench: Bench) -> bool:
-    """One reading a step, and every run goes one way: a lag would be but a step's worth of datum,
-    and what the first reading lacks."""
+    """Without an arm one reading a step, and every run goes one way: a lag would be but a step's
+    worth of datum, and what the first reading lacks. Of an arm, a hand on the screw takes another
+    time for every step, and that shows."""
     rows = bench.rows
-    if rows.continuous or not rows.hold_starts.all():
+    if bench.data.arm or rows.continuous or not rows.hold_starts.all():
         return False
     way = np.diff(bench.load)[~rows.starts[1:]]
     return bool(np.all(way >= 0) or np.all(way <= 0))
