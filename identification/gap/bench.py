@@ -53,7 +53,8 @@ class Bench:
     reach m: largest simulated or measured response, the natural unit of what has no other.
     scatter (n,) m^2: mean square of the samples about their row; trend (n,) m s: mean product of
     time and response about it.
-    columns: the pool, filled by the effects.
+    columns: the pool, filled by the effects. moves (n,) m: what instruments of the response read,
+    where more is known of it than a straight line.
     """
 
     data: GapData
@@ -75,6 +76,7 @@ class Bench:
     observed: Array
     columns: Pool = field(default_factory=Pool)
     flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
+    moves: Array | None = None
 
     @property
     def has_q(self) -> bool:
@@ -110,8 +112,9 @@ class Bench:
 
     @cached_property
     def line(self) -> Array:
-        """(n,) response that the slope measured in each setup gives for the load, m."""
-        return self.line_slope * self.load
+        """(n,) response that the slope measured in each setup gives for the load, m; or what is
+        known of it."""
+        return self.line_slope * self.load if self.moves is None else self.moves
 
     @cached_property
     def zero_line(self) -> Array:

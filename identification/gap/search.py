@@ -14,6 +14,7 @@ from identification.gap.imperfection import level_prior
 from identification.gap.noise import UNSURE
 from identification.gap.parts import Part, energies, log_joints, part_sizes
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
+from identification.gap.readings import reading_all
 from identification.gap.variants import Variant
 from identification.gap.verdict import weighed
 
@@ -27,13 +28,14 @@ _PROMISING = 7  # further words of an explanation that are looked at closely
 # the time and change no verdict in 300 cases; on a bench the two that belong together may both look
 # poor alone, where the spring is wrong as well.
 _SEEDS, _BENCH_SEEDS = 4, 6
+_READING = 6  # explanations whose instruments are looked at beside what else moves
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 
 
 def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None = None) -> Found:
     """All single effects, then sets around the best ones, each re-fitted jointly. Where no levels
-    repeat from run to run, a third effect is but freedom of the other two's laws. singles: scores
-    of the variants one by one, where they are known."""
+    repeat from run to run, a third effect is but freedom of the other two's laws. variants: grow by
+    what is looked at beside others; singles: their scores one by one, where they are known."""
     deepest = 2 if engine.bench.rows.continuous else 3
     levels = engine.levels
     families = by_word(singles or score(engine, levels, variants))
@@ -133,9 +135,10 @@ def _deepen(
     for words, explanation in grown.items():
         if words not in pool or pool[words].log_weight < explanation.log_weight:
             pool[words] = explanation
-    top = sorted(grown.values(), key=lambda e: -e.log_weight)[:kept]
-    polished = [_polish(engine, variants, e) for e in top]
-    for explanation in polished:
+    ranked = sorted(grown.values(), key=lambda e: -e.log_weight)
+    polished = [_reading_all(engine, variants, _polish(engine, variants, e)) for e in ranked[:kept]]
+    others = [_reading_all(engine, variants, e) for e in ranked[kept:_READING]]
+    for explanation in [*polished, *others]:
         if pool[explanation.words].log_weight < explanation.log_weight:
             pool[explanation.words] = explanation
     return [e for e in polished if e.log_weight > best - 2.0]
@@ -177,6 +180,17 @@ def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Expl
         if found.log_weight > best.log_weight:
             best = found
     return best
+
+
+def _reading_all(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+    """With instruments that read what its other effects do, if that is better; the variants then
+    hold these as well."""
+    fresh = reading_all(engine, start)
+    if not fresh:
+        return start
+    variants += fresh
+    engine.extend()
+    return _polish(engine, variants, start)
 
 
 def _no_worse(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:

@@ -1,0 +1,50 @@
+"""Instruments read all that moves: beside another effect, a gain or a lag of the displacement acts
+on what that effect does as well as on the springs. By a fifth too much of a slip of 30 um are 6."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identification.gap.bench import Bench
+from identification.gap.effects import displacement_scale, time_lag
+from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation
+from identification.gap.fit import fit
+from identification.gap.variants import Variant
+
+_CLOSE = 0.5  # of the steps between lags
+
+
+def reading_all(engine: Engine, explanation: Explanation) -> list[Variant]:
+    """Variants of an arm's instruments in an explanation that read its other effects as well; the
+    pool of the bench holds their columns afterwards. None where nothing else moves, or where the
+    displacement is imposed."""
+    bench, n = engine.bench, engine.bench.rows.n
+    mine = [i for i, p in enumerate(explanation.parts) if _reads(p.variant)]
+    if not bench.data.arm or bench.imposed or not mine or len(explanation.parts) == len(mine):
+        return []
+    fitted = fit(engine, explanation)
+    shown = bench.response - engine.target[:n] + fitted.response
+    out = []
+    for i in mine:
+        found = explanation.parts[i].variant
+        moves = shown
+        if found.word == time_lag.WORD:  # acts on what there was, a gain is a share of what it read
+            moves = shown - fitted.contribution(engine, i)[:n]
+        out += [
+            replace(v, label=f"{v.label}, of all that moves")
+            for v in _about(replace(bench, moves=moves), found)
+        ]
+    return out
+
+
+def _reads(variant: Variant) -> bool:
+    if variant.word == time_lag.WORD:
+        return bool(variant.info["channel"] == "displacement")
+    return variant.word == displacement_scale.WORD
+
+
+def _about(bench: Bench, found: Variant) -> list[Variant]:
+    if found.word == time_lag.WORD:
+        return time_lag.refined(bench, found, _CLOSE)
+    return displacement_scale.variants(bench)
