@@ -1,5 +1,5 @@
 """Instruments read all that moves: beside another effect, a gain or a lag of the displacement acts
-on what that effect does as well as on the springs. By a fifth too much of a slip of 30 um are 6."""
+on what that effect does as well as on the springs. A fifth too much of a slip of 30 µm is 6 µm."""
 
 from __future__ import annotations
 
