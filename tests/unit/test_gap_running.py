@@ -499,17 +499,18 @@ def test_a_stroke_that_runs_on_while_the_force_stands_is_no_hold(
 
 def test_a_long_table_of_numbered_readings_runs() -> None:
     """Sixty levels and more, each read once, are no levels; fewer are a table of them, and what is
-    read several times rests."""
+    read several times rests, or is met again on the way back."""
 
-    def held(n: int, each: int = 1) -> bool:
-        data = bench_data(
-            np.linspace(1, 100, n), np.linspace(1, 100, n) / SPRING, step=np.arange(n) // each
-        )
-        return not reduce_rows(data).continuous
+    def held(n: int, each: int = 1, back: bool = False) -> bool:
+        step = np.arange(n) // each
+        step = np.minimum(step, n - 1 - step) if back else step
+        force = 1.0 + step
+        return not reduce_rows(bench_data(force, force / SPRING, step=step)).continuous
 
     assert not held(60)
     assert held(59)
     assert held(240, each=4)
+    assert held(240, back=True)
 
 
 def test_noise_of_a_force_that_drowns_in_it_counts_by_the_simulated_slope() -> None:
