@@ -18,9 +18,10 @@ _CLOSE = 0.5  # of the steps between lags
 def reading_all(engine: Engine, explanation: Explanation) -> list[Variant]:
     """Variants of an arm's instruments in an explanation that read its other effects as well; the
     pool of the bench holds their columns afterwards. None where nothing else moves, or where the
-    displacement is imposed."""
+    displacement is imposed; no gain without joint readings, which see the other effects as they
+    are: without, what an effect does by so much more is its own coefficient."""
     bench, n = engine.bench, engine.bench.rows.n
-    mine = [i for i, p in enumerate(explanation.parts) if _reads(p.variant)]
+    mine = [i for i, p in enumerate(explanation.parts) if _reads(bench, p.variant)]
     if not bench.data.arm or bench.imposed or not mine or len(explanation.parts) == len(mine):
         return []
     fitted = fit(engine, explanation)
@@ -38,10 +39,10 @@ def reading_all(engine: Engine, explanation: Explanation) -> list[Variant]:
     return out
 
 
-def _reads(variant: Variant) -> bool:
+def _reads(bench: Bench, variant: Variant) -> bool:
     if variant.word == time_lag.WORD:
         return bool(variant.info["channel"] == "displacement")
-    return variant.word == displacement_scale.WORD
+    return bench.has_q and variant.word == displacement_scale.WORD
 
 
 def _about(bench: Bench, found: Variant) -> list[Variant]:

@@ -75,6 +75,8 @@ def test_only_instruments_of_the_response_beside_what_moves_are_looked_at() -> N
     both = explanation(engine)
     assert reading_all(engine, replace(both, parts=both.parts[:1])) == []
     assert reading_all(engine, replace(both, parts=both.parts[1:])) == []
+    blind = engine_of(replace(read_low(), q=None))
+    assert reading_all(blind, explanation(blind)) == []
     force = one(engine.bench, "time_lag", "force delay 1 s")
     laser = one(engine.bench, "time_lag", "displacement delay 1 s")
     engine.extend()
