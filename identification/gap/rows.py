@@ -78,20 +78,21 @@ class Rows:
         return np.asarray(weight / np.maximum(weight.sum(axis=0), 1e-300))
 
     def speed(self, values: Array) -> Array:
-        """(n,) by how much values (n,) change per second at every row, by the parabola through it
-        and its neighbours in the hold; 0 where there are none."""
+        """(n,) by how much values (n,) change per second at every row: between the slopes before
+        and after it, and beyond the last of a hold, as an exponential goes on; 0 where there are no
+        two slopes of one sense, as after a step."""
         edges = np.flatnonzero(self.hold_starts)
         first = edges[self.hold]
         last = np.append(edges[1:], self.n)[self.hold] - 1
-        inner = np.clip(np.arange(self.n), first + 1, np.maximum(last - 1, first + 1))
-        a, b, c = inner - 1, np.minimum(inner, last), np.minimum(inner + 1, last)
+        b = np.clip(np.arange(self.n), first + 1, np.maximum(last - 1, first + 1))
+        a, b, c = b - 1, np.minimum(b, last), np.minimum(b + 1, last)
         t, v = self.time, values
         with np.errstate(divide="ignore", invalid="ignore"):
             before = (v[b] - v[a]) / (t[b] - t[a])
             after = (v[c] - v[b]) / (t[c] - t[b])
-            bend = np.where(c > b, (after - before) / (t[c] - t[a]), 0.0)
-            out = before + bend * (2 * t - t[a] - t[b])
-        return np.where(np.isfinite(out), out, 0.0)
+            ratio, way = after / before, (2 * t - t[a] - t[b]) / (t[c] - t[a])
+            out = before * ratio ** np.where(ratio > 1, np.clip(way, 0.0, 1.0), way)
+        return np.where((c > b) & (ratio > 0) & np.isfinite(out), out, 0.0)
 
     def moved(self, values: Array) -> Array:
         """Values (n, k) less their mean per setup: the datum says nothing."""

@@ -30,19 +30,32 @@ def row_of(bench: Bench, values: Array) -> Array:
     return np.asarray(np.add.reduceat(values, edges) / count)
 
 
-def test_the_speed_of_a_parabola_is_exact_in_every_row_of_a_hold() -> None:
+def test_the_speed_of_what_settles_is_followed_and_that_of_a_line_exact() -> None:
     bench, _ = settling()
     rows = bench.rows
-    speed = rows.speed(3.0 + 2.0 * rows.time - 0.5 * rows.time**2 + 100.0 * rows.hold)
-    np.testing.assert_allclose(speed, 2.0 - rows.time, rtol=1e-9, atol=1e-9)
+    line = rows.speed(3.0 + 2.0 * rows.time + 100.0 * rows.hold)
+    np.testing.assert_allclose(line, 2.0, rtol=1e-9)
+    within = rows.time - rows.time[rows.hold_starts][rows.hold]
+    many = rows.weight > 1
+    settles = rows.speed(-np.exp(-within / 5.0))
+    np.testing.assert_allclose(settles[many], 0.2 * np.exp(-within / 5.0)[many], rtol=0.35)
 
 
-def test_a_row_alone_in_its_hold_has_no_speed_and_two_have_one() -> None:
+def test_after_a_step_nothing_goes_on() -> None:
+    """A reading that is late jumps to where it was going: a parabola through it would overshoot."""
+    bench, _ = settling()
+    first = bench.rows.hold_starts.astype(float)
+    assert not bench.rows.speed(-first).any()
+    up = bench.rows.speed(np.cumsum(np.ones(bench.rows.n)) ** 3.0)  # faster and faster
+    assert up.max() < 3.0 * np.diff(np.cumsum(np.ones(bench.rows.n)) ** 3.0).max()
+
+
+def test_rows_that_are_few_in_their_hold_have_no_speed() -> None:
     single = reduce_rows(bench_data(np.arange(5.0), np.arange(5.0), step=np.arange(5)))
     assert single.speed(single.time**2).tolist() == [0.0] * 5
     two = reduce_rows(bench_data(np.arange(6.0), np.arange(6.0), step=np.arange(6) // 2))
     assert two.hold_starts.tolist() == [True, False] * 3
-    np.testing.assert_allclose(two.speed(4.0 * two.time), 4.0)
+    assert two.speed(4.0 * two.time).tolist() == [0.0] * 6
 
 
 def test_what_is_foreseen_within_rows_is_not_left() -> None:
