@@ -1,0 +1,66 @@
+"""Closer looks at what grids meet badly: the reach of bristles, flow times."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import Bench, make_bench
+from identification.gap.effects import joint_hysteresis, joint_yield, library
+from identification.gap.effects.joint_hysteresis import EXPONENTIAL, REACHES
+from identification.gap.forms import law_of, rows_of
+from identification.gap.variants import Variant
+from tests.unit.test_gap_forms import arm_data, bench_without_arm
+
+
+def assert_lawful(bench: Bench, variants: list[Variant]) -> None:
+    for v in variants:
+        law, unit = law_of(bench, v)
+        made = rows_of(bench, v.word, law) * unit
+        for column, place in zip(made.T, v.columns, strict=True):
+            wanted = bench.columns[place]
+            assert np.abs(column - wanted).max() <= 1e-9 * np.abs(wanted).max(), v.label
+
+
+@pytest.mark.parametrize("memory", ["", "worked in", "under weight", "rested"])
+def test_reaches_of_bristles_close_in(memory: str) -> None:
+    """Same joint, law's family and memory; neighbours nearer than on the grid, about what was."""
+    bench = make_bench(arm_data())
+    grid = [v for v in library(bench, ["joint_hysteresis"]) if v.info["memory"] == memory]
+    found = next(v for v in grid if v.info["law"] == "Dahl")
+    finer = joint_hysteresis.closer(bench, found)
+    assert {v.info["law"] for v in finer} == set(EXPONENTIAL)
+    assert {(v.info["joint"], v.info["memory"]) for v in finer} == {(found.info["joint"], memory)}
+    low, high = (float(r) for r in found.info["radius"])
+    assert min(v.info["radius"][0] for v in finer) == pytest.approx(0.9 * low)
+    assert max(v.info["radius"][1] for v in finer) == pytest.approx(1.1 * high)
+    steps = [v.info["radius"][1] / v.info["radius"][0] for v in finer]
+    assert max(steps) < 0.7 * REACHES[1] / REACHES[0]
+    assert len({v.label for v in finer} | {v.label for v in grid}) == len(finer) + len(grid)
+    assert_lawful(bench, finer)
+
+
+def test_spectra_have_no_reach_and_a_specimen_keeps_its_other_springs() -> None:
+    bench = make_bench(arm_data())
+    spectrum = next(v for v in library(bench, ["joint_hysteresis"]) if v.info["law"] == "Iwan")
+    assert joint_hysteresis.closer(bench, spectrum) == []
+    plain = bench_without_arm()
+    dahl = next(v for v in library(plain, ["joint_hysteresis"]) if v.info["law"] == "Dahl")
+    finer = joint_hysteresis.closer(plain, dahl)
+    assert sum(v.label.endswith("other springs") for v in finer) == len(finer) / 2
+
+
+def test_flow_times_close_in_between_those_of_the_grid() -> None:
+    bench = make_bench(arm_data())
+    sharp = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")
+    first = joint_yield.refined(bench, sharp)
+    slow = next(v for v in first if v.info["flow_s"] == 5.0 and not v.info["square"])
+    finer = joint_yield.refined(bench, slow, joint_yield.CLOSE[0])
+    times = sorted({v.info["flow_s"] for v in finer})
+    assert times == pytest.approx([5 / 2**0.5, 5 / 2**0.25, 5 * 2**0.25, 5 * 2**0.5])
+    assert not any(v.info["square"] for v in finer)
+    centres = [v.info["centre"] / slow.info["centre"] for v in finer]
+    assert (min(centres), max(centres)) == pytest.approx((1 - 0.4 * 0.16, 1 + 0.4 * 0.2))
+    assert_lawful(bench, finer[::7])
+    sudden = next(v for v in first if v.info["flow_s"] == 0)
+    assert joint_yield.refined(bench, sudden, joint_yield.CLOSE[0]) == []
