@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
+from identification.gap.compare import score
+from identification.gap.data import Array
 from identification.gap.effects import joint_hysteresis, joint_yield, library
 from identification.gap.effects.joint_hysteresis import EXPONENTIAL, REACHES
+from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
+from identification.gap.refine import refine
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data, bench_without_arm
 
@@ -64,3 +69,29 @@ def test_flow_times_close_in_between_those_of_the_grid() -> None:
     assert_lawful(bench, finer[::7])
     sudden = next(v for v in first if v.info["flow_s"] == 0)
     assert joint_yield.refined(bench, sudden, joint_yield.CLOSE[0]) == []
+
+
+def engine_with(bench: Bench, effect: Array) -> Engine:
+    """Nothing but an effect of half a millimetre at the most, and the noise that is stated."""
+    rng = np.random.default_rng(4)
+    target = 5e-4 * effect / np.abs(effect[: bench.rows.n]).max()
+    target[: bench.rows.n] += rng.normal(0, 1e-6, bench.rows.n)
+    return Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 4e-6, 2e-5]))
+
+
+def test_what_stands_out_is_looked_at_closer() -> None:
+    """A reach, and a flow time, between those of the grids."""
+    bench = make_bench(arm_data())
+    dahl = next(v for v in library(bench, ["joint_hysteresis"]) if v.info["law"] == "Dahl")
+    truth = next(v for v in joint_hysteresis.closer(bench, dahl) if v.info["law"] == "Dahl")
+    engine = engine_with(bench, bench.columns[truth.columns[1]])
+    singles = score(engine, engine.levels, library(bench, ["joint_hysteresis"]))
+    assert any(v.label.endswith("fine") for v in refine(engine, singles))
+
+    sharp = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")
+    slow = next(v for v in joint_yield.refined(bench, sharp) if v.info["flow_s"] == 5.0)
+    truth = joint_yield.refined(bench, slow, joint_yield.CLOSE[0])[0]
+    engine = engine_with(bench, bench.columns[truth.columns[0]])
+    singles = score(engine, engine.levels, library(bench, ["joint_yield"]))
+    times = {v.info["flow_s"] for v in refine(engine, singles)}
+    assert times - {0.0, *joint_yield.FLOWS_S, *joint_yield.SQUARE_S}

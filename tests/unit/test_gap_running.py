@@ -22,7 +22,7 @@ from identification.gap.noise import standing, white_noise
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.priors import prior_of
-from identification.gap.rows import passes, reduce_rows, turns
+from identification.gap.rows import hold_ids, is_continuous, passes, reduce_rows, turns
 from tests.unit.test_gap_operators import bench_data
 
 SPRING = 1e5  # N/m
@@ -511,6 +511,9 @@ def test_a_long_table_of_numbered_readings_runs() -> None:
     assert held(59)
     assert held(240, each=4)
     assert held(240, back=True)
+    arm = bench_data(np.arange(80.0), np.arange(80.0) / SPRING, step=np.arange(80))
+    assert is_continuous(arm, hold_ids(arm))
+    assert not is_continuous(replace(arm, arm=True), hold_ids(arm))  # is read as it was planned
 
 
 def test_noise_of_a_force_that_drowns_in_it_counts_by_the_simulated_slope() -> None:
