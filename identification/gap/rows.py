@@ -92,7 +92,7 @@ class Rows:
             after = (v[c] - v[b]) / (t[c] - t[b])
             ratio, way = after / before, (2 * t - t[a] - t[b]) / (t[c] - t[a])
             out = before * ratio ** np.where(ratio > 1, np.clip(way, 0.0, 1.0), way)
-        return np.where((ratio > 0) & np.isfinite(out), out, 0.0)
+        return np.where(np.isfinite(out), out, 0.0)  # no power of what is below zero
 
     def moved(self, values: Array) -> Array:
         """Values (n, k) less their mean per setup: the datum says nothing."""
