@@ -30,8 +30,8 @@ from identification.gap.verdict import (
     BENCH_DOUBT,
     DOUBT,
     EXPLAINED,
+    TAKES_THREE,
     THREE,
-    WORTH_OF_THIRD,
     _heir,
     _main,
     weighed,
@@ -268,7 +268,7 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         assert found_out == pytest.approx(share - doubted)
     # two of them explain nearly as much: then they are meant, whatever the third does
     third = said(three, (1e-5, 1e-5, 5e-6), 0.0)
-    for worth, unknown in ((WORTH_OF_THIRD - 1, 0.0), (WORTH_OF_THIRD + 1, 0.9)):
+    for worth, unknown in ((TAKES_THREE - 1, 0.0), (TAKES_THREE + 1, 0.9)):
         two = said(three[1:], (2e-5, 1e-6), -worth)
         both = replace(found, explanations=(third, two), unknown=-800.0, alone={})
         p = weighed(both, {}).probabilities
