@@ -121,24 +121,21 @@ def bristles(
 
 @dataclass(frozen=True, eq=False)
 class _Phases:
-    """Seconds (n,) from a row to the next: the old load stands on, the load ramps, it stands."""
+    """Seconds (n,) since the row before, in all, and of these: the old load stands on, the load
+    ramps, it stands. After a rest only the last of it is ramp."""
 
+    step: Array
     pause: Array
     ramp: Array
     stands: Array
 
 
 def _phases(rows: Rows, rest: Flags) -> _Phases:
-    step = _between(rows)
+    step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
     stands = np.minimum(settling_share(rows), ease)
     pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
-    return _Phases(pause, np.maximum(ease - stands - pause, 0.0), stands)
-
-
-def _between(rows: Rows) -> Array:
-    """(n,) s on the session clock since the row before."""
-    return np.asarray(np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0))
+    return _Phases(step, pause, np.maximum(ease - stands - pause, 0.0), stands)
 
 
 def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
@@ -157,7 +154,7 @@ def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(ramp > 0, -np.expm1(-ramp) / ramp, 1.0)
     ramped = load * (1 - share) + before * (share - during)  # of a ramp, z = 0 before it
-    decayed = np.exp(-_between(rows)[:, None] / times)
+    decayed = np.exp(-phases.step[:, None] / times)
     keep = held * during * np.where(rest[:, None], decayed, paused)
     stood = during * before * (1 - paused)
     return _prefix(keep, held * (ramped + stood) + load * (1 - held))

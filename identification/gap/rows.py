@@ -185,14 +185,20 @@ def hold_ids(data: GapData) -> Ints:
 _NUMBERED, _ONCE = 60, 0.9  # levels a run; readings that are alone on theirs, as a share
 
 
+def _numbered(data: GapData, hold: Ints) -> bool:
+    """Whether steps count readings. Levels are looked up only where there are as many holds."""
+    least = max(_NUMBERED * len(np.unique(data.run)), _ONCE * len(hold))
+    if hold[-1] + 1 < least:
+        return False
+    return len(np.unique(np.column_stack([data.run, data.step]), axis=0)) >= least
+
+
 def is_continuous(data: GapData, hold: Ints) -> bool:
     """Whether the force runs instead of resting at levels; or rests at one all the time. Without an
     arm so many levels, each read once and never met again, are no levels, but numbered readings."""
     if np.any(data.step < 0) or (hold[-1] == 0 and not data.arm):
         return True
-    least = max(_NUMBERED * len(np.unique(data.run)), _ONCE * len(hold))
-    met = np.unique(np.column_stack([data.run, data.step]), axis=0)
-    if not data.arm and min(hold[-1] + 1, len(met)) >= least:
+    if not data.arm and _numbered(data, hold):
         return True
     edges = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
     count = np.diff(np.append(edges, len(hold)))
