@@ -31,7 +31,7 @@ from identification.gap.search import force, search
 from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
-from identification.gap.verdict import NOISY, WORTH_OF_THIRD
+from identification.gap.verdict import NOISY
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
 # laws themselves are only families.
@@ -153,7 +153,9 @@ def check_words(words: set[str] | frozenset[str]) -> None:
 
 
 FAR_WORSE = 12.0  # nats
-WORTH = 3.0  # nats that one effect more has to bring before it is named; a third one more
+WORTH = 3.0  # nats that one effect more has to bring before it is named;
+# a third one more: what it does to some channel may be how far the other two's laws are off.
+WORTH_OF_THIRD = 10.0
 # A third effect that moves less than this of the noise, and a small share of what the largest does,
 # is how far the other two's laws are off, however plainly a channel without noise shows it; but a
 # drift, or a jump of the datum, shows without load, where no law is off.

@@ -99,10 +99,9 @@ NOISY, STATED = 3.0, 0.1
 # 7 were met down to the noise by three others: 0.0009 against 0.05 * 7 / 32.
 THREE = 0.1
 TELLING = 0.1  # of the largest: a smaller one is no trouble beside it
-# Nats that a third effect has to bring to be named: what it does to some channel may be how far the
-# other two's laws are off. And beyond which it takes all three: of 300 hidden cases, known effects
-# had asked for a third by 13 to 19 nats, what stood in for a missing word by 91 and 613.
-WORTH_OF_THIRD, TAKES_THREE = 10.0, 30.0
+# Nats that a third effect has to bring beyond which it takes all three: of 300 hidden cases, known
+# effects had asked for a third by 13 to 19 nats, what stood in for a missing word by 91 and 613.
+TAKES_THREE = 30.0
 
 
 def _simpler(

@@ -10,8 +10,8 @@ import pytest
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, Instruments
+from identification.gap.diagnose import WORTH_OF_THIRD, diagnose_gap
 from identification.gap.diagnose import _chosen as chosen_of
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.earned import DRIFTS, earned
 from identification.gap.effects.drift import free_path, path_root
 from identification.gap.evidence import Engine
@@ -22,7 +22,7 @@ from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import cancelling, pettiness, trifle
 from identification.gap.variants import variant
-from identification.gap.verdict import WORTH_OF_THIRD, weighed
+from identification.gap.verdict import weighed
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, REPETITIONS, SAMPLES = 8, 3, 4
