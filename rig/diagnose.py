@@ -211,6 +211,7 @@ def _effect(e: Effect) -> dict[str, Any]:
         "name": e.name,
         "probability": e.probability,
         "parameters": {name: _parameter(p) for name, p in e.parameters.items()},
+        "places": dict(e.places),
         "indistinguishable_from": list(e.indistinguishable_from),
         "share_of_gap": e.share_of_gap,
         "rms_mm": e.size * MM,

@@ -143,6 +143,9 @@ def _effects(r: GapResult) -> str:
 
 def _one_effect(e: Effect) -> list[str]:
     lines = [f"  {e.name}: present with {e.probability:.0%}, {e.share_of_gap:.0%} of the gap"]
+    if len(e.places) > 1:
+        each = ", ".join(f"{place} ({p:.0%})" for place, p in e.places.items())
+        lines.append(f"    these data leave open where it sits: {each}")
     lines += _parameters(e.parameters)
     if e.indistinguishable_from:
         lines.append(f"    can't be told apart from {', '.join(e.indistinguishable_from)} here")

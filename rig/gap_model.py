@@ -141,6 +141,8 @@ def _about(effect: Effect, dataset: Dataset) -> dict[str, Any]:
 
 def _comment(effect: Effect, meaning: str) -> str:
     text = f"{meaning}; {effect.share_of_gap:.0%} of the gap"
+    if len(effect.places) > 1:
+        text += f"; it may sit at {', '.join(effect.places)}"
     if effect.indistinguishable_from:
         text += f"; not told apart from {', '.join(effect.indistinguishable_from)}"
     return text

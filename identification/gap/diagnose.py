@@ -41,12 +41,14 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One effect of the chosen explanation; probability: that it is present at all."""
+    """One effect of the chosen explanation; probability: that it is present at all. places:
+    "joint 3" or "axis y" -> probability that it sits there, the likeliest first."""
 
     name: str
     label: str
     probability: float
     parameters: dict[str, Parameter]
+    places: dict[str, float]
     indistinguishable_from: tuple[str, ...]
     share_of_gap: float
     size: float  # rms, m
@@ -249,7 +251,8 @@ def _effects(found: Found, variants: list[Variant], chosen: Explanation) -> tupl
                 name=part.word,
                 label=part.variant.label,
                 probability=min(1.0, present / total),
-                parameters=read[i],
+                parameters=read[i].parameters,
+                places=read[i].places if found.engine.bench.data.arm else {},
                 indistinguishable_from=_alike(found, chosen, part.word),
                 share_of_gap=float(squares[i] / power) if power > 0 else 1.0 / len(squares),
                 size=float(chosen.sizes[i]),

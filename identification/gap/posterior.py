@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from identification.gap.compare import score
+from identification.gap.compare import Scored, logsumexp, score
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
@@ -18,9 +19,19 @@ from identification.gap.interval import TWO_SIDED, Parameter, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part, energies, log_joints, signs_kept
 from identification.gap.penalties import SAME_JOINT
-from identification.gap.variants import Variant
+from identification.gap.variants import Variant, place_of
 
 Parameters = dict[str, Parameter]
+
+
+class Known(NamedTuple):
+    """What the data say of an effect. places: "joint 3" or "axis y" -> probability that it sits
+    there, given that it is that effect; empty for what sits at no single joint or axis."""
+
+    parameters: Parameters
+    places: dict[str, float]
+
+
 _MOST, _LEAST_SHARE = 10, 0.01  # shapes that count, and their least share of the posterior
 
 
@@ -29,12 +40,12 @@ def parameters_of(
     variants: list[Variant],
     chosen: Explanation,
     rivals: Iterable[Explanation] = (),
-) -> list[Parameters]:
-    """Parameters of every effect of the explanation: 95 % intervals of the mixture of its likeliest
-    shapes, wherever they sit, under every size of imperfection; value: of those that sit where the
-    explanation says. What names its joint or axis is mixed over the shapes that have it. By how
-    much a value moves with the shapes of the effects beside it, and with which effects these are
-    (rivals: other explanations, by their weights), adds to its variance."""
+) -> list[Known]:
+    """Parameters and places of every effect of the explanation: 95 % intervals of the mixture of
+    its likeliest shapes, wherever they sit, under every size of imperfection; value: of those that
+    sit where the explanation says. What names its joint or axis is mixed over the shapes that have
+    it. By how much a value moves with the shapes of the effects beside it, and with which effects
+    these are (rivals: other explanations, by their weights), adds to its variance."""
     each = [_Shapes(engine, variants, chosen, i) for i in range(len(chosen.parts))]
     likely = _likely(rivals, chosen)
     others = [(_by_word(e, _read(engine, e)), weight) for e, weight in likely]
@@ -44,7 +55,8 @@ def parameters_of(
         beside = [e for e in each if e.index != i]
         of_rivals = [(r[word], w) for r, w in others if word in r]
         wide = {n: _wider(p, _moves(n, p.value, i, beside, of_rivals)) for n, p in own.items()}
-        out.append({n: _stretched(p) for n, p in wide.items()} if beside else wide)
+        found = {n: _stretched(p) for n, p in wide.items()} if beside else wide
+        out.append(Known(found, shapes.places()))
     return out
 
 
@@ -81,8 +93,8 @@ class _Shapes:
     def own(self) -> Parameters:
         """Parameters of the effect, the others as they are."""
         found, index, word = [r[self.index] for r in self.read], self.index, self._part.word
-        place = _place(self._part.variant)
-        here = np.array([_place(e.parts[index].variant) == place for e, _ in self.open])
+        place = place_of(self._part.variant)
+        here = np.array([place_of(e.parts[index].variant) == place for e, _ in self.open])
         beside = _beside(self.every, self.open, index)
         step = _read(self.engine, beside)[index] if beside is not None else {}
         out = {}
@@ -98,9 +110,28 @@ class _Shapes:
             out[name] = _wider(replace(mixed, value=value), grid**2 + meant**2)
         return out
 
+    def places(self) -> dict[str, float]:
+        """As of `Known`, the likeliest first."""
+        weights = np.array([weight for _, weight in self.every])
+        out: dict[str, float] = {}
+        for (e, _), share in zip(self.every, np.exp(weights - logsumexp(weights)), strict=True):
+            name = _named(e.parts[self.index].variant)
+            if name:
+                out[name] = out.get(name, 0.0) + float(share)
+        ranked = sorted(out.items(), key=lambda item: -item[1])
+        return {name: share for name, share in ranked if share > _LEAST_SHARE}
+
     @property
     def _part(self) -> Part:
         return self.chosen.parts[self.index]
+
+
+def _named(variant: Variant) -> str:
+    """The joint or axis that a variant sits at."""
+    info = variant.info
+    if "joint" in info:
+        return f"joint {info['joint'] + 1}"
+    return f"axis {'xyz'[info['axis']]}" if "axis" in info else ""
 
 
 def _moves(
@@ -166,13 +197,13 @@ def _beside(every: _Weighed, open_: _Weighed, index: int) -> Explanation | None:
     where the data left none of them but that one: what is true lies between such shapes, and a
     shape stands for half the way to the next."""
     top = max(open_, key=lambda e: e[1])[0].parts[index].variant
-    kind, place = _NUMBER.sub("#", top.label), _place(top)
+    kind, place = _NUMBER.sub("#", top.label), place_of(top)
     others = [
         (e, w)
         for e, w in every
         if (v := e.parts[index].variant) is not top
         and _NUMBER.sub("#", v.label) == kind
-        and _place(v) == place
+        and place_of(v) == place
     ]
     left = {id(e.parts[index].variant) for e, _ in open_}
     if not others or any(id(e.parts[index].variant) in left for e, _ in others):
@@ -190,15 +221,37 @@ def _open(engine: Engine, variants: list[Variant], chosen: Explanation, index: i
     rest = tuple(p for i, p in enumerate(chosen.parts) if i != index)
     levels, energy = conditioned(engine, rest)
     family = [v for v in variants if v.word == part.word]
-    ranked = sorted(score(engine, levels, family, energy), key=lambda s: -s.log_evidence)
-    shapes = [part, *(Part(s.variant, s.scale) for s in ranked[:_MOST])]
+    stand = _representatives(score(engine, levels, family, energy))
+    first = next((more for s, more in stand if s.variant is part.variant), 0.0)
+    shapes = [(part, first)]
+    shapes += [(Part(s.variant, s.scale), m) for s, m in stand if s.variant is not part.variant]
     out = []
-    for shape in [shapes[0], *(s for s in shapes[1:] if s.variant is not part.variant)]:
+    for shape, more in shapes:
         parts = (*chosen.parts[:index], shape, *chosen.parts[index + 1 :])
-        prior = np.log(shape.variant.prior) - SAME_JOINT * _crowds(shape, rest)
+        prior = np.log(shape.variant.prior) + more - SAME_JOINT * _crowds(shape, rest)
         each = _levels(engine, replace(chosen, parts=parts), prior)
         out += sorted(each, key=lambda e: -e[1])
     return out
+
+
+def _representatives(scored: list[Scored]) -> list[tuple[Scored, float]]:
+    """The likeliest shapes of every place that counts, as many as its share of the posterior, and
+    by how many nats each stands for more of its place than itself: that a joint has been looked at
+    more closely than another does not speak for it."""
+    places: dict[tuple[str, ...], list[Scored]] = {}
+    for s in sorted(scored, key=lambda s: -s.log_evidence):
+        places.setdefault(place_of(s.variant), []).append(s)
+    logs = {p: logsumexp(np.array([s.log_evidence for s in each])) for p, each in places.items()}
+    whole = logsumexp(np.array(list(logs.values())))
+    out = []
+    for place, each in places.items():
+        share = float(np.exp(logs[place] - whole))
+        if share < _LEAST_SHARE:
+            continue
+        kept = each[: max(1, round(_MOST * share))]
+        more = float(logs[place] - logsumexp(np.array([s.log_evidence for s in kept])))
+        out += [(s, more) for s in kept]
+    return sorted(out, key=lambda e: -e[0].log_evidence)
 
 
 def _crowds(shape: Part, rest: tuple[Part, ...]) -> bool:
@@ -240,12 +293,6 @@ def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:
         {j: float(covariance[i, i]) for j, i in at.items()},
         {j: covariance[i, mine] for j, i in at.items()},
     )
-
-
-def _place(variant: Variant) -> tuple[str, ...]:
-    """Where a variant acts."""
-    info = variant.info
-    return tuple(str(info.get(key)) for key in ("joint", "joints", "axis", "axes"))
 
 
 def _mixture(each: list[Parameter], share: Array) -> Parameter:

@@ -24,7 +24,7 @@ from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import fit
 from identification.gap.forms import about_springs
 from identification.gap.parts import Part
-from identification.gap.variants import Variant
+from identification.gap.variants import Variant, place_of
 
 _REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 6  # words that are refined
@@ -65,7 +65,39 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
 
 def _knees(word: _Word) -> list[Variant]:
     places = _places(word.alone, word.beside, joint_yield.is_sharp)
-    return _closing_in(word, joint_yield.refined, places, joint_yield.CLOSE)
+    finer = _closing_in(word, joint_yield.refined, places, joint_yield.CLOSE)
+    return finer + _elsewhere(word, finer)
+
+
+def _elsewhere(word: _Word, finer: list[Variant]) -> list[Variant]:
+    """The best of the finer knees at the other places of the word: without joint readings one may
+    be as good as another, and that none was looked for there as closely is no evidence."""
+    bench = word.engine.bench
+    others: dict[tuple[str, tuple[object, ...]], Variant] = {}
+    for v in (s.variant for s in word.alone):
+        if "weight" not in v.info:
+            others.setdefault((v.info["memory"], _axle(v)), v)
+    able = [v for v in finer if "weight" not in v.info]
+    if not able or len({place for _, place in others}) < 2:
+        return []
+    word.engine.extend()
+    found = sorted(_scored_beside(word.engine, word.families, word.ranked, able), key=_evidence)
+    out = []
+    for v in (s.variant for s in found[-_ELSEWHERE:]):
+        out += [
+            joint_yield.elsewhere(bench, v, there)
+            for (memory, place), there in others.items()
+            if memory == v.info["memory"] and place != _axle(v)
+        ]
+    return [v for v in out if v is not None]
+
+
+def _axle(variant: Variant) -> tuple[object, ...]:
+    """Joint, or axis and its depth."""
+    return (*place_of(variant), variant.info.get("depth_m"))
+
+
+_ELSEWHERE = 3  # shapes that are looked at elsewhere
 
 
 def _backlash(word: _Word) -> list[Variant]:
@@ -196,6 +228,6 @@ def _places(
     places: dict[object, Scored] = {}
     first = [s for s in alone if able(s.variant)][:1]
     for s in (s for s in beside or alone if able(s.variant)):
-        places.setdefault((s.variant.info.get("joint"), s.variant.info.get("axis")), s)
+        places.setdefault(place_of(s.variant), s)
     found = [*first, *list(places.values())[:_REFINED]]
     return [s for i, s in enumerate(found) if s.variant not in [f.variant for f in found[:i]]]

@@ -83,6 +83,12 @@ def _all(each: bool | tuple[bool, ...], k: int) -> tuple[bool, ...]:
     return (*each, *(False,) * (k - len(each)))
 
 
+def place_of(variant: Variant) -> tuple[str, ...]:
+    """Where a variant acts."""
+    info = variant.info
+    return tuple(str(info.get(key)) for key in ("joint", "joints", "axis", "axes"))
+
+
 def smooth_root(k: int, alike: float = 0.7, common: float = 0.0) -> Array:
     """Root (k, k) of a covariance in which neighbours correlate by `alike`, all by `common`."""
     distance = np.abs(np.arange(k)[:, None] - np.arange(k))

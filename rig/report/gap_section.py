@@ -98,6 +98,8 @@ def _effects(found: Node) -> list[Block]:
         for i, (key, unit, *numbers) in enumerate(parameters):
             lead = head if i == 0 else ("", "", "")
             rows.append((lead[0], key, "" if unit == "1" else unit, *numbers, *lead[1:]))
+        if len(list(e["places"].items())) > 1:
+            alike.append(_places(name, e["places"]))
         others = e["indistinguishable_from"].value
         if others:
             alike.append(f"{name} can't be told apart from {', '.join(others)} in these data.")
@@ -106,6 +108,13 @@ def _effects(found: Node) -> list[Block]:
     header = ("effect", "parameter", "unit", "value", "95 % from", "to", "present", "of the gap")
     blocks: list[Block] = [Table("Effects of the chosen explanation", header, tuple(rows), 3)]
     return [*blocks, Bullets(tuple(alike))] if alike else blocks
+
+
+def _places(name: str, places: Node) -> Rich:
+    """Where an effect may sit, where the data leave that open."""
+    each: list[Rich] = [(f"{place} (", *p.percent(), ")") for place, p in places.items()]
+    listed = [part for one in each for part in (*one, ", ")]
+    return (f"Where {name} sits, these data leave open: ", *listed[:-1], ".")
 
 
 def _probabilities(found: Node) -> Table:

@@ -97,7 +97,7 @@ def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.
         result.fit, parts=(Part(v, 1.0),), coefficients=w, covariance=np.diag(w**2) * 1e-4,
         joint_covariance=np.diag(np.append(np.full(b, 1e-6), w**2 * 1e-4)),
     )  # fmt: skip
-    effect = Effect(word, v.label, 1.0, {}, (), 1.0, 1e-4)
+    effect = Effect(word, v.label, 1.0, {}, {}, (), 1.0, 1e-4)
     found = replace(result, verdict=word, effects=(effect,), fit=fitted)
     changes = np.zeros(bench.layout.size)
     for name, beta in zip(result.engine.base.names, base, strict=True):

@@ -102,11 +102,11 @@ def explained() -> Diagnosis:
         "joint_yield", "joint 1", 0.994,
         {"threshold_Nm": Parameter(67.31, 66.82, 67.9, "Nm"),
          "stiffness_ratio_above": Parameter(0.0213, 0.0185, 0.0241, "1")},
-        ("base_slip",), 0.93, 1.2e-4,
+        {"joint 1": 0.62, "joint 5": 0.38}, ("base_slip",), 0.93, 1.2e-4,
     )  # fmt: skip
     drifts = Effect(
-        "force_drift", "", 0.871, {"rate": Parameter(-0.002, -0.0031, -0.0009, "N/s")}, (), 0.05,
-        4e-6,
+        "force_drift", "", 0.871, {"rate": Parameter(-0.002, -0.0031, -0.0009, "N/s")}, {}, (),
+        0.05, 4e-6,
     )  # fmt: skip
     options = (
         Option("poses", "the same in another pose", 12.4, 31.0),

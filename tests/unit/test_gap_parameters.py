@@ -261,10 +261,29 @@ def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
         for c, j in ((30.0, 0), (60.0, 1))
     )  # fmt: skip
     chosen = Explanation((Part(low, 1.0),), 0.0, 0.0, (0.0,), 0.0)
-    found = parameters_of(engine, [low, high], chosen)[0]["threshold"]
+    found = parameters_of(engine, [low, high], chosen)[0].parameters["threshold"]
     assert found.value == pytest.approx(30.0, rel=0.01)  # where the explanation says
     assert found.low < 30.0
     assert found.high > 60.0
+
+
+def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> None:
+    """One column in two joints: of one there are forty shapes, of the other a single one."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    common = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
+    many = [
+        Variant("joint_yield", f"at {k}", (0,), (1.0,), np.eye(1), info={**common, "joint": 0},
+                prior=0.5 / 40)
+        for k in range(40)
+    ]  # fmt: skip
+    one = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**common, "joint": 4},
+                  prior=0.5)  # fmt: skip
+    chosen = Explanation((Part(many[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
+    found = parameters_of(engine, [*many, one], chosen)[0].places
+    assert found == {"joint 1": pytest.approx(0.5), "joint 5": pytest.approx(0.5)}
+    far = replace(one, columns=(1,), prior=1e-6)
+    assert parameters_of(engine, [*many, far], chosen)[0].places == {"joint 1": pytest.approx(1)}
 
 
 def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> None:
@@ -279,8 +298,8 @@ def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> Non
         for k, c, prior in ((0, 30.0, 1.0), (1, 36.0, 1e-12))
     ]  # fmt: skip
     chosen = Explanation((Part(family[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
-    alone = parameters_of(engine, family[:1], chosen)[0]["threshold"]
-    found = parameters_of(engine, family, chosen)[0]["threshold"]
+    alone = parameters_of(engine, family[:1], chosen)[0].parameters["threshold"]
+    found = parameters_of(engine, family, chosen)[0].parameters["threshold"]
     assert found.value == pytest.approx(30.0, rel=0.01)
     assert sd(found) == pytest.approx(np.hypot(sd(alone), 6.0 / 12**0.5), rel=0.01)
     assert found.high - 30.0 == pytest.approx(30.0 - found.low)
@@ -316,10 +335,10 @@ def test_beside_another_effect_intervals_are_wider(monkeypatch: pytest.MonkeyPat
     ]
     parts = tuple(Part(v, 1.0) for v in family)
     both = Explanation(parts, 0.0, 0.0, (1.0, 0.5), 0.0)
-    wide = parameters_of(engine, family, both)[1]["factor"]
+    wide = parameters_of(engine, family, both)[1].parameters["factor"]
     alone = parameters_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,)))
     monkeypatch.setattr(posterior, "SHARING", 1.0)
-    narrow = parameters_of(engine, family, both)[1]["factor"]
+    narrow = parameters_of(engine, family, both)[1].parameters["factor"]
     assert SHARING > 1.2
     assert np.log(wide.high / wide.value) == pytest.approx(
         SHARING * np.log(narrow.high / narrow.value)
@@ -340,8 +359,8 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
     engine.target = engine.target + 4.0 * bench.columns[0] + 2.0 * bench.columns[1]
     engine = Engine(bench, engine.base, engine.target, engine.etas)
     chosen = Explanation((Part(mine, 10.0), Part(rival, 1.0)), 0.0, 0.0, (1.0, 0.5), 0.0)
-    alone = parameters_of(engine, [mine, rival], chosen)[0]["factor_joint1"]
-    both = parameters_of(engine, [mine, rival, twice], chosen)[0]["factor_joint1"]
+    alone = parameters_of(engine, [mine, rival], chosen)[0].parameters["factor_joint1"]
+    both = parameters_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_joint1"]
     assert both.value == pytest.approx(alone.value)
     assert both.high - both.low > 1.02 * (alone.high - alone.low)
 
@@ -369,8 +388,8 @@ def test_explanations_by_other_words_move_parameters_as_far_as_they_are_likely()
 
     def width(rival_weight: float) -> float:
         rival = Explanation((Part(mine, 0.3), Part(other, 1.0)), rival_weight, 0.0, (1.0, 0.5), 0.0)
-        found = parameters_of(engine, [mine, other], chosen, [chosen, rival])[0]["factor_joint1"]
-        return found.high - found.low
+        found = parameters_of(engine, [mine, other], chosen, [chosen, rival])[0].parameters
+        return found["factor_joint1"].high - found["factor_joint1"].low
 
     assert width(0.0) > width(-2.0) > width(-9.0)
     assert width(-9.0) == width(-20.0)  # what hardly counts does not

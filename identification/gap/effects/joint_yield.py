@@ -16,7 +16,9 @@ Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manu
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -218,7 +220,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     alone = 0.0 if weight is None else float(np.abs(weight).max())
     radius = alone + (float(info["centre"]) - alone) * (1 + close * np.linspace(-0.16, 0.2, FINE))
     fresh = _memories(bench).get(info["memory"], bench.moved)
-    name, out = found.label.split(" at ")[0].split(" flow")[0], []
+    name, out = _place_in(found.label), []
     for (flow, square), states in _flowing(bench, ways, info["load"], radius, fresh, weight):
         columns = [info["column"](s) for s in states.T]
         share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S) + len(SQUARE_S))
@@ -232,6 +234,34 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
                 ones = [1.0] * len(radius[place])
                 out += _with_back(found.word, label + kind, columns[place], ones, share, exact)
     return out
+
+
+def elsewhere(bench: Bench, found: Variant, there: Variant) -> Variant | None:
+    """A knee that was found, at the place (joint, or axis) of another variant of the same memory,
+    where it begins at the same load of the rig: its thresholds in proportion to what loads the two
+    places. None where nothing loads the other one then."""
+    info, other = found.info, there.info
+    most = int(np.abs(info["load"]).argmax())
+    factor = float(np.abs(other["load"][most]) / np.abs(info["load"][most]))
+    if not factor > 0:
+        return None
+    radius, flow = factor * np.asarray(info["radius"]), float(info["flow_s"])
+    fresh = _memories(bench).get(info["memory"], bench.moved)
+    moved = states(bench, other["load"], radius, flow, fresh, square=bool(info.get("square")))
+    columns = [other["column"](s) for s in moved.T]
+    if len(found.columns) > len(radius):
+        columns += other["back"]
+    exact = {**other, "radius": radius, "centre": factor * float(info["centre"]), "flow_s": flow,
+             "square": bool(info.get("square")), "knee": info["knee"]}  # fmt: skip
+    start, end = found.label.rsplit(" at ", 1)
+    how = start.removeprefix(_place_in(found.label)) + f" at {exact['centre']:.4g}"
+    label = " ".join([_place_in(there.label) + how, *end.split(" ")[1:]])
+    return replace(found, label=label, columns=tuple(columns), info=exact)
+
+
+def _place_in(label: str) -> str:
+    """Joint or axis, and memory, with which a knee's label begins."""
+    return re.split(" at | flow", label, maxsplit=1)[0]
 
 
 _RETURNS = 0.4  # coefficients of what flows back, against those of the knee

@@ -1,0 +1,88 @@
+"""Knees at other joints and axes than those at which they were found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import make_bench
+from identification.gap.compare import score
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects import joint_yield, library
+from identification.gap.refine import refine
+from identification.gap.variants import place_of
+from tests.unit.test_gap_closer import assert_lawful, engine_with
+from tests.unit.test_gap_forms import arm_data
+
+# Where joints 1 and 5 are loaded in one direction alone, the other joints in the other one.
+ALIKE = {"joint 1", "joint 5"}
+
+
+@pytest.mark.parametrize("word", ["joint_yield", "base_slip"])
+@pytest.mark.parametrize("flow_s", [0.0, 5.0])
+def test_a_knee_elsewhere_begins_at_the_same_load_of_the_rig(word: str, flow_s: float) -> None:
+    bench = make_bench(arm_data())
+    sharp = [v for v in library(bench, [word]) if v.info["knee"] == "sharp" and v.label[-1] == "k"]
+    sharp = [v for v in sharp if "weight" not in v.info and v.info["memory"] == ""]
+    found = next(
+        v for v in joint_yield.refined(bench, sharp[0])
+        if v.info["flow_s"] == flow_s and v.label.endswith("flows back")
+    )  # fmt: skip
+    others = {place_of(v): v for v in reversed(sharp)}
+    moved = {k: joint_yield.elsewhere(bench, found, v) for k, v in others.items()}
+    made = {k: v for k, v in moved.items() if v is not None}
+    assert len(made) > 1
+    most = int(np.abs(found.info["load"]).argmax())
+    for k, v in made.items():
+        there = others[k]
+        assert place_of(v) == place_of(there)
+        assert v.label.startswith(there.label.split(" at ")[0])
+        assert f" at {v.info['centre']:.4g} fine" in v.label
+        ratio = abs(there.info["load"][most]) / abs(found.info["load"][most])
+        assert v.info["centre"] == pytest.approx(ratio * found.info["centre"])
+    assert_lawful(bench, list(made.values()))
+
+
+def test_a_place_without_load_has_no_knee() -> None:
+    bench = make_bench(arm_data(directions="x"))
+    sharp = [v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp"]
+    idle = replace(sharp[-1], info={**sharp[-1].info, "load": np.zeros(bench.rows.n)})
+    assert joint_yield.elsewhere(bench, sharp[0], idle) is None
+
+
+def test_without_readings_a_joint_is_not_named_for_having_been_looked_at_closely() -> None:
+    """Flow that lies between the times of the grid: only one joint was looked at that closely."""
+    data = replace(arm_data(directions="xy"), q=None)
+    data = replace(data, setups=data.setups[:2], **_first_pose(data))
+    bench = make_bench(data)
+    five = next(v for v in library(bench, ["joint_yield"]) if v.label.startswith("joint 5 at 0.68"))
+    slow = next(v for v in joint_yield.refined(bench, five) if v.info["flow_s"] == 10.0)
+    truth = next(v for v in joint_yield.refined(bench, slow, 0.4) if v.info["flow_s"] > 11)
+    effect = bench.columns[truth.columns[0]]
+    engine = engine_with(bench, effect)
+    singles = score(engine, engine.levels, library(bench, ["joint_yield"]))
+    finer = refine(engine, singles)
+    engine.extend()
+    best: dict[tuple[str, ...], float] = {}
+    for s in score(engine, engine.levels, finer):
+        best[place_of(s.variant)] = max(best.get(place_of(s.variant), -np.inf), s.log_evidence)
+    first, second, *_ = sorted(best.values(), reverse=True)
+    assert second > first - 2.5
+
+    size = 5e-5 / np.abs(effect[: bench.rows.n]).max()
+    moved = bench.slope * bench.load + size * effect[: bench.rows.n]
+    noise = np.random.default_rng(5).normal(0, 1e-6, len(data.force))
+    moved = np.repeat(moved, bench.rows.weight.astype(int)) + noise
+    found = diagnose_gap(replace(data, displacement=moved))
+    assert found.verdict in {"joint_yield", "base_slip"}
+    places = next(e.places for e in found.effects if e.name == found.verdict)
+    assert set(places) >= ALIKE or set(places) <= {"axis x", "axis z"}
+
+
+def _first_pose(data: object) -> dict[str, np.ndarray]:
+    keep = np.asarray(data.setup) < 2  # type: ignore[attr-defined]
+    names = ("time", "session", "run", "setup", "repetition", "branch", "step", "force",
+             "displacement", "tangential", "temperature")  # fmt: skip
+    return {n: getattr(data, n)[keep] for n in names}
