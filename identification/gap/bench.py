@@ -35,7 +35,7 @@ class Layout:
     size: int
 
 
-_FURTHER = 6  # radii
+_FURTHER, _CLEAR, _ONE_WAY = 6, 1.1, 0.9  # radii; beyond the inner ones; of the range
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
 _BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
 _FELT = 0.03  # of the range of the load's torque
@@ -164,11 +164,13 @@ class Bench:
 
     def radii(self, load: Array, inner: Array) -> Array:
         """Radii of plays: `inner`, and on an imposed path, which runs far beyond what yields,
-        _FURTHER more up to half of its range: what has yielded hardens over all of it."""
+        _FURTHER more: what has yielded hardens over all of it, or softens. Up to half of its
+        range, since it is gone both ways; a single pull goes but one."""
         full = float(np.ptp(np.append(load, 0.0)))
-        if not self.imposed or full < 2 * inner[-1]:
+        far = (_ONE_WAY if self.course.once else 0.5) * full
+        if not self.imposed or far < _CLEAR * inner[-1]:
             return inner
-        return np.concatenate([inner, np.geomspace(1.4 * inner[-1], 0.5 * full, _FURTHER)])
+        return np.concatenate([inner, np.geomspace(inner[-1], far, _FURTHER + 1)[1:]])
 
     def add(self, column: Array) -> int:
         """Puts a stacked column into the pool; its index."""

@@ -24,6 +24,7 @@ _AS_FAST = 4.0  # times: passes that differ by less go at one rate
 _IDLE = 0.02  # of the response: what the springs make of a load that has no bearing on it
 _STRETCHES, _LAST = 20, 3  # of a pull; so many of them are its end,
 _FLOWS = 0.03  # whose stiffness is less than that of the steepest
+_FALLS = 0.025  # of its range
 _WANDERS = 0.05  # of the way: a displacement that goes back by more wanders
 _PULLED = 0.3  # of the largest force: by less of the other sign metal does not flow back
 _ENCLOSES, _AGAIN = 0.05, 0.1  # of its box, by a loop; of that, by the next ones
@@ -227,6 +228,24 @@ class Course:
         order = np.argsort(path, kind="stable")
         stiffness = np.diff(np.interp(edges, path[order], force[order]))
         return bool(stiffness[-_LAST:].mean() < _FLOWS * stiffness.max())
+
+    @cached_property
+    def fall(self) -> float:
+        """By what share of its range the response goes back in a single pull whose load goes on;
+        one reading that jumps off does not."""
+        if not (self.once and self.always_moves) or not np.ptp(self.response) > 0:
+            return 0.0
+        size = np.abs(self.response - self.response[0])
+        fall = way_back(np.median([size[:-2], size[1:-1], size[2:]], axis=0))
+        return float(fall / np.ptp(self.response))
+
+    @property
+    def gives_in(self) -> bool:
+        """The force falls plainly in a single pull whose stroke goes on."""
+        if not self.imposed or self.data.arm:
+            return False
+        noise = self.data.instruments.force * float(np.abs(self.slope).max())
+        return self.fall > max(_FALLS, _CLEARLY * noise / float(np.ptp(self.response) or 1.0))
 
     @cached_property
     def approaches(self) -> bool:

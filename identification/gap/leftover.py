@@ -18,7 +18,6 @@ from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.noise import UNSURE
 from identification.gap.penalties import CURVES, FRICTION
-from identification.gap.rows import way_back
 from identification.gap.verdict import weighed
 
 # An elastic curve that falls while it is pushed on, or a force that is nearly lost, as none is that
@@ -108,7 +107,7 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
     left = _left(engine, fit(engine, explanation))
     share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
-    fall = _fall(engine)
+    fall = engine.bench.course.fall
     snaps = (fall > _FALL and explanation.words & CURVES) or (
         fall > _LOST and explanation.words & FRICTION
     )
@@ -119,14 +118,3 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     else:
         share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
     return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))
-
-
-def _fall(engine: Engine) -> float:
-    """By what share of its range the response goes back in a single pull whose load goes on; one
-    reading that jumps off does not."""
-    bench = engine.bench
-    if not bench.course.once or not bench.course.always_moves or not np.ptp(bench.response) > 0:
-        return 0.0
-    size = np.abs(bench.response - bench.response[0])
-    fall = way_back(np.median([size[:-2], size[1:-1], size[2:]], axis=0))
-    return float(fall / np.ptp(bench.response))

@@ -75,6 +75,17 @@ def test_metal_that_flows_far_beyond_its_knee_yields() -> None:
     assert "): it gives way above a threshold load." in render(found)  # no joint there
 
 
+def test_a_polymer_that_softens_beyond_its_knee_and_then_flows_has_yielded() -> None:
+    """Up to a maximum halfway, and down to a level: intrinsic softening. No elastic curve falls."""
+    u = np.linspace(0.0, STROKE, 220)
+    knee = 0.55 * STROKE
+    rises = SPRING * u / (1 + (u / knee) ** 8) ** (1 / 8)
+    softens = 0.17 * rises.max() / (1 + np.exp(-(u - 0.68 * STROKE) / (0.04 * STROKE)))
+    found = pulled(rises - softens, u)
+    assert found.verdict == "joint_yield"
+    assert found.after < 0.1 * found.before
+
+
 def test_every_word_is_said_in_words() -> None:
     assert set(meanings(arm=True)) == set(meanings(arm=False)) == set(WORDS)
     assert "torque" in meanings(arm=True)["joint_yield"]

@@ -8,16 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import STANDING, library
 from identification.gap.effects.drift import free_paths, shares
 from identification.gap.effects.joint_yield import grown
-from identification.gap.evidence import Engine
 from identification.gap.history import sampling_time
-from identification.gap.leftover import _FALL, _fall
+from identification.gap.leftover import _FALL
 from identification.gap.noise import standing, white_noise
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
@@ -251,8 +249,7 @@ def test_one_reading_that_jumps_is_no_fall_of_the_force() -> None:
         force = 40 * (u / 1e-3) ** 3 + 20 * u / 1e-3
         force[30 : 30 + many] += 20.0
         bench = make_bench(running(force, u, imposed="displacement"))
-        engine = Engine(bench, base_columns(bench), bench.observed, np.array([0.0, 3e-6]))
-        assert (_fall(engine) > _FALL) == falls
+        assert (bench.course.fall > _FALL) == falls
 
 
 def test_a_curve_off_its_zero_that_comes_again_is_elastic() -> None:
