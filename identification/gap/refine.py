@@ -75,7 +75,7 @@ def _elsewhere(word: _Word, finer: list[Variant]) -> list[Variant]:
     bench = word.engine.bench
     others: dict[tuple[str, tuple[object, ...]], Variant] = {}
     for v in (s.variant for s in word.alone):
-        if "weight" not in v.info:
+        if joint_yield.is_sharp(v) and "weight" not in v.info:
             others.setdefault((v.info["memory"], _axle(v)), v)
     able = [v for v in finer if "weight" not in v.info]
     if not able or len({place for _, place in others}) < 2:
