@@ -61,7 +61,7 @@ class Level:
 
     def beside(self, columns: Sequence[int]) -> Array:
         """(k, p) rows of the pool's Gram matrix of columns (k,), but for what was taken."""
-        return self.engine.beside(tuple(columns))[self.number]
+        return self.engine.beside(tuple(columns), self.number + 1)[self.number]
 
 
 class Engine:
@@ -151,15 +151,18 @@ class Engine:
             self._squares[columns] = made
         return self._squares[columns]
 
-    def beside(self, columns: tuple[int, ...]) -> list[Array]:
-        """Per level (k, p): rows of the Gram matrix, kept until the pool grows."""
-        if columns not in self._rows:
-            at = np.array(columns, dtype=np.intp)
-            made = self._gathered.white.picked(at).between(self._gathered.white, self._weights)
-            for base, rows in zip(self._bases, made, strict=True):
+    def beside(self, columns: tuple[int, ...], number: int) -> list[Array]:
+        """Per level, of the first `number` at least, (k, p): rows of the Gram matrix, kept until
+        the pool grows. Those of many levels at once take little longer than of one."""
+        known = self._rows.setdefault(columns, [])
+        if len(known) < number:
+            at, missing = np.array(columns, dtype=np.intp), slice(len(known), number)
+            white = self._gathered.white
+            made = white.picked(at).between(white, self._weights[missing])
+            for base, rows in zip(self._bases[missing], made, strict=True):
                 np.subtract(rows, base.pool.values[at] @ base.pool.values.T, out=rows)
-            self._rows[columns] = made
-        return self._rows[columns]
+            known += made
+        return known
 
     def between(self, eta: float, columns: Sequence[int]) -> tuple[Array, Array, float]:
         """For an imperfection that is none of the levels: Gram matrix (k, k) and moment (k,) of

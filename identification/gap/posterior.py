@@ -264,11 +264,17 @@ def _levels(engine: Engine, explanation: Explanation, prior: float) -> _Weighed:
     """The explanation at every size of imperfection, with its log weight."""
     out = []
     joint, energy = log_joints(engine, explanation.parts), energies(engine, explanation.parts)
-    for i, level in enumerate(engine.levels):
-        weight = prior + joint[i] + level_prior(engine.etas, i, energy[i])
-        weight += signs_kept(level, explanation.parts)
-        out.append((replace(explanation, eta=_size(engine, i, energy[i])), float(weight)))
+    weights = [
+        prior + joint[i] + level_prior(engine.etas, i, energy[i]) for i in range(len(engine.levels))
+    ]
+    for i, (level, weight) in enumerate(zip(engine.levels, weights, strict=True)):
+        counts = weight > max(weights) - _COUNTS
+        signs = signs_kept(level, explanation.parts) if counts else 0.0
+        out.append((replace(explanation, eta=_size(engine, i, energy[i])), float(weight + signs)))
     return out
+
+
+_COUNTS = 40.0  # nats
 
 
 def _size(engine: Engine, i: int, energy: float) -> float:
