@@ -21,10 +21,12 @@ from identification.gap.parts import Part
 from identification.gap.pool import Pool
 from rig.errors import InputError
 from rig.gap_forms import FormError, effects_of, from_entry, to_entry
+from rig.gap_model import _comment
 from rig.gap_path import planned_data
 from rig.model import MODELS, load_model
 from rig.protocol import load_protocol
 from rig.simulate import Simulation, simulate
+from tests.unit.shown_results import explained
 from tests.unit.test_gap_forms import arm_data, pulled
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -305,3 +307,9 @@ def test_the_planned_clock_holds_rests_and_plateaus(tmp_path: Path) -> None:
     assert second[0] - first[-1] == pytest.approx(10 + 4 + 2 + 1)  # rest, reset, tare, one sample
     assert data.time[data.repetition == 2][0] == pytest.approx(1.0)
     assert data.tare == "run"
+
+
+def test_the_comment_of_an_effect_says_where_it_may_sit() -> None:
+    both = explained().result.effects[0]
+    assert "; it may sit at joint 1, joint 5; not told apart from base_slip" in _comment(both, "")
+    assert "sit at" not in _comment(replace(both, places={"joint 1": 1.0}), "")

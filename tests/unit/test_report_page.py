@@ -30,10 +30,12 @@ from rig.report.document import (
     figures,
 )
 from rig.report.drawing import alone, style, svg_of
+from rig.report.gap_section import _effects
 from rig.report.gather import gather
 from rig.report.html import escape, render
 from rig.report.pdf import pdf
 from rig.report.report import Report, checked, make, write_figures, write_html
+from rig.report.results import Node
 from rig.report.wishes import Wishes, named
 from tests.unit.example_data import write_journal
 from tests.unit.report_sets import META, SIMULATION, Page, bench, rewritten
@@ -170,6 +172,17 @@ def test_an_unknown_gap_is_said_what_it_looks_like(tmp_path: Path) -> None:
     assert found["verdict"] == "unknown"
     assert found["looks_like"]["kind"] == "rough"
     assert f"It looks like this: {found['looks_like']['text']}." in Page(report.to_html()).text
+
+
+@pytest.mark.parametrize("places", [{"joint 1": 0.62, "joint 5": 0.38}, {"joint 3": 1.0}])
+def test_where_an_effect_may_sit_is_said_with_the_numbers_of_the_json(
+    places: dict[str, float],
+) -> None:
+    one = {"name": "joint_yield", "probability": 1.0, "share_of_gap": 1.0, "parameters": {},
+           "indistinguishable_from": [], "places": places}  # fmt: skip
+    blocks = tuple(_effects(Node({"effects": [one]}, "/gap")))
+    text = Page(render(Document("", "", (), (Section("s", "", blocks),), ""))).text
+    assert ("these data leave open: joint 1 (62 %), joint 5 (38 %)." in text) == (len(places) > 1)
 
 
 def test_without_the_gap(tmp_path: Path) -> None:

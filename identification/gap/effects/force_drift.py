@@ -118,8 +118,8 @@ def component(bench: Bench, axis: tuple[float, ...], path: Array) -> Array:
     """(size,): one component of the force drifts along a path (n,): every component has a charge
     amplifier of its own, and shows in what is recorded across as well."""
     setups = bench.data.setups
-    unit = np.stack([s.unit_vector for s in setups])[bench.rows.setup] @ np.array(axis)
-    across = np.stack([s.tangents for s in setups])[bench.rows.setup] @ np.array(axis)
+    unit = np.array([s.unit_vector @ np.array(axis) for s in setups])[bench.rows.setup]
+    across = np.array([s.tangents @ np.array(axis) for s in setups])[bench.rows.setup]
     tared = _tared(bench, path)
     return drifting(bench, unit * tared) + bench.stacked(tangential=across * tared[:, None])
 
