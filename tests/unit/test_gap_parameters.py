@@ -282,6 +282,9 @@ def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> No
     chosen = Explanation((Part(many[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
     found = parameters_of(engine, [*many, one], chosen)[0].places
     assert found == {"joint 1": pytest.approx(0.5), "joint 5": pytest.approx(0.5)}
+    seldom = replace(one, prior=0.02)
+    found = parameters_of(engine, [*many, seldom], chosen)[0].places
+    assert found == {"joint 1": pytest.approx(0.5 / 0.52), "joint 5": pytest.approx(0.02 / 0.52)}
     far = replace(one, columns=(1,), prior=1e-6)
     assert parameters_of(engine, [*many, far], chosen)[0].places == {"joint 1": pytest.approx(1)}
 
