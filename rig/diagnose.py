@@ -220,7 +220,7 @@ def _effect(e: Effect) -> dict[str, Any]:
 
 
 def _parameter(p: Parameter) -> dict[str, Any]:
-    return {"value": p.value, "ci95": [p.low, p.high], "unit": p.unit}
+    return {"value": p.value, "ci95": [p.low, p.high], "ci90": list(p.ci90), "unit": p.unit}
 
 
 def _where(r: GapResult) -> dict[str, Any]:

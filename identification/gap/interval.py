@@ -8,17 +8,30 @@ import numpy as np
 
 from identification.gap.data import Array
 
-TWO_SIDED = 1.959964  # standard deviations of a normal 95 % interval
+# Standard deviations of a normal 95 % interval, and of a 90 % one.
+TWO_SIDED, TWO_SIDED_90 = 1.959964, 1.644854
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """value with its 95 % interval."""
+    """value with its 95 % interval; inner: the 90 % one, where no normal law gives it: a threshold
+    that may be one joint's or another's has two places, and nothing between."""
 
     value: float
     low: float
     high: float
     unit: str
+    inner: tuple[float, float] | None = None
+
+    @property
+    def ci90(self) -> tuple[float, float]:
+        """The 90 % interval."""
+        if self.inner is not None:
+            return self.inner
+        low, high = (
+            self.value + TWO_SIDED_90 / TWO_SIDED * (v - self.value) for v in (self.low, self.high)
+        )
+        return low, high
 
 
 @dataclass(frozen=True, eq=False)

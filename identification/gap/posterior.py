@@ -15,7 +15,7 @@ from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
 from identification.gap.imperfection import IMPERFECTION, LINEAR, level_prior
-from identification.gap.interval import TWO_SIDED, Parameter, Softer
+from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part, energies, log_joints, signs_kept
 from identification.gap.penalties import SAME_JOINT
@@ -68,11 +68,13 @@ SHARING = 1.25
 
 def _stretched(p: Parameter) -> Parameter:
     """Its interval so much wider; what is above zero stays there."""
+    ends = np.array([p.low, p.high, *p.ci90])
     if p.low > 0:
-        low, high = (p.value * (v / p.value) ** SHARING for v in (p.low, p.high))
+        ends = p.value * (ends / p.value) ** SHARING
     else:
-        low, high = (p.value + SHARING * (v - p.value) for v in (p.low, p.high))
-    return replace(p, low=low, high=high)
+        ends = p.value + SHARING * (ends - p.value)
+    low, high, *inner = ends.tolist()
+    return replace(p, low=low, high=high, inner=None if p.inner is None else tuple(inner))
 
 
 class _Shapes:
@@ -169,10 +171,16 @@ def _wider(p: Parameter, variance: float) -> Parameter:
     """With so much more variance, where it has an interval at all."""
     if not p.low < p.high:
         return p
-    more = TWO_SIDED * variance**0.5
-    low, high = min(p.low - p.value, 0.0), max(p.high - p.value, 0.0)
-    low, high = p.value - float(np.hypot(low, more)), p.value + float(np.hypot(high, more))
-    return replace(p, low=low, high=high)
+    sd = variance**0.5
+
+    def ends(low: float, high: float, deviations: float) -> tuple[float, float]:
+        below, above = max(p.value - low, 0.0), max(high - p.value, 0.0)
+        more = deviations * sd
+        return p.value - float(np.hypot(below, more)), p.value + float(np.hypot(above, more))
+
+    low, high = ends(p.low, p.high, TWO_SIDED)
+    inner = None if p.inner is None else ends(*p.inner, TWO_SIDED_90)
+    return replace(p, low=low, high=high, inner=inner)
 
 
 # Standard uncertainty of what a mechanism's parameter means, as its share (VIM 2.27): where a knee
@@ -314,9 +322,9 @@ def _mixture(each: list[Parameter], share: Array) -> Parameter:
     )
     mean, low, high = (np.log(ends) if skewed else ends).T
     sd = np.maximum(high - low, 0.0) / (2 * TWO_SIDED) + 1e-300
-    out = _quantiles(mean, sd, share, (0.5, 0.025, 0.975))
-    value, least, most = (float(np.exp(v)) for v in out) if skewed else out
-    return Parameter(value, least, most, each[0].unit)
+    out = _quantiles(mean, sd, share, (0.5, 0.025, 0.975, 0.05, 0.95))
+    value, least, most, *inner = (float(np.exp(v)) for v in out) if skewed else out
+    return Parameter(value, least, most, each[0].unit, (inner[0], inner[1]))
 
 
 def _quantiles(mean: Array, sd: Array, share: Array, of: Sequence[float]) -> list[float]:

@@ -12,7 +12,6 @@ from rig.blind.campaign import Outcome
 from rig.blind.case import plain
 
 Kind = Literal["none", "unknown", "single", "mixture", "partial"]
-Z90_OF_Z95 = 1.6448536 / 1.9599640  # half width of a 90 % interval over that of a 95 % one
 
 # Parameters that answers and diagnosis define alike: (word, key of the answers) -> key found.
 # {} stands for what the answers' own keys below it are: directions or joints.
@@ -194,8 +193,7 @@ def encoders_right(judged: Judged) -> bool | None:
 def intervals(judged: Judged) -> list[dict[str, Any]]:
     """Parameters that answers and diagnosis share, of effects that were found under their word.
 
-    Of each: word, parameter, true, value, ci95, and whether the 95 % interval, and the 90 % one
-    that the same normal law gives, hold the truth.
+    Of each: word, parameter, true, value, ci95, ci90, and whether the intervals hold the truth.
     """
     if judged.kind not in ("single", "mixture") or judged.outcome.withheld in judged.label["truth"]:
         return []
@@ -225,11 +223,12 @@ def _true_values(word: str, answers: dict[str, Any]) -> list[tuple[str, float]]:
 
 def _covers(true: float, given: dict[str, Any]) -> dict[str, Any]:
     value, (low, high) = given["value"], given["ci95"]
-    low90, high90 = (value + Z90_OF_Z95 * (edge - value) for edge in (low, high))
+    low90, high90 = given["ci90"]
     return {
         "true": true,
         "value": value,
         "ci95": [low, high],
+        "ci90": [low90, high90],
         "in_95": low <= true <= high,
         "in_90": low90 <= true <= high90,
     }

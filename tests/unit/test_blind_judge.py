@@ -152,10 +152,11 @@ def test_where() -> None:
 def test_intervals_of_shared_parameters() -> None:
     answers = label("force_scale", parameters=[{"factor": 1.10}])
     found = said("force_scale")
-    found["effects"][0]["parameters"]["factor"] = {"value": 1.0, "ci95": [0.9, 1.11], "unit": "1"}
+    factor = {"value": 1.0, "ci95": [0.9, 1.11], "ci90": [0.92, 1.092], "unit": "1"}
+    found["effects"][0]["parameters"]["factor"] = factor
     (one,) = intervals(judge(outcome(answers, found)))
     assert one["in_95"]
-    assert not one["in_90"]  # its upper end is 1 + 0.11 * 1.645 / 1.96 = 1.092
+    assert not one["in_90"]
 
 
 @pytest.mark.parametrize("hung", [True, False])
@@ -164,8 +165,9 @@ def test_a_threshold_of_the_load_is_asked_for_as_such(hung: bool) -> None:
     answers = label("joint_yield", parameters=[{"threshold_of_load_Nm": 50.0}])
     found = said("joint_yield")
     read = found["effects"][0]["parameters"]
-    load = {"value": 51.0, "ci95": [49.0, 53.0], "unit": "Nm"}
-    read["threshold"] = {"value": 80.0, "ci95": [75.0, 85.0], "unit": "Nm"} if hung else load
+    load = {"value": 51.0, "ci95": [49.0, 53.0], "ci90": [49.3, 52.7], "unit": "Nm"}
+    net = {"value": 80.0, "ci95": [75.0, 85.0], "ci90": [76.0, 84.0], "unit": "Nm"}
+    read["threshold"] = net if hung else load
     if hung:
         read["threshold_of_load"] = load
     (one,) = intervals(judge(outcome(answers, found)))

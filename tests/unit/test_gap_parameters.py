@@ -23,7 +23,7 @@ from identification.gap.fit import fit
 from identification.gap.interval import Parameter, Softer
 from identification.gap.parameters import parameters, run_seconds
 from identification.gap.parts import Part
-from identification.gap.posterior import SHARING, _mixture, _stretched, parameters_of
+from identification.gap.posterior import SHARING, _mixture, _stretched, _wider, parameters_of
 from identification.gap.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_operators import bench_data
@@ -246,6 +246,14 @@ def test_a_mixture_spans_what_its_parts_span() -> None:
     both = _mixture(each, np.array([0.5, 0.5]))
     assert both.low == pytest.approx(8.36, abs=0.05)  # 5 % of the lower one lie below
     assert both.high == pytest.approx(21.64, abs=0.05)
+    assert both.ci90 == pytest.approx((8.72, 21.28), abs=0.02)
+    seldom = _mixture(each, np.array([0.06, 0.94]))
+    assert seldom.ci90[0] == pytest.approx(10.97, abs=0.02)  # by the normal law of its 95 %: 11.4
+    more = (15 - np.hypot(6.28, 1.645 * 2), 15 + np.hypot(6.28, 1.645 * 2))
+    assert _wider(both, 4.0).ci90 == pytest.approx(more, abs=0.02)
+    assert _stretched(both).ci90[0] == pytest.approx(15 * (8.72 / 15) ** SHARING, abs=0.02)
+    plain = Parameter(10.0, 8.04, 11.96, "Nm")
+    assert plain.ci90 == pytest.approx((10 - 1.645, 10 + 1.645), abs=1e-3)
     almost = _mixture(each, np.array([0.999, 0.001]))
     assert (almost.value, almost.high) == pytest.approx((10.0, 11.96), abs=0.02)
 
