@@ -15,6 +15,7 @@ from identification.gap.refine import refine
 from identification.gap.variants import place_of
 from tests.unit.test_gap_closer import assert_lawful, engine_with
 from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_running import SPRING, running
 
 
 @pytest.mark.parametrize("word", ["joint_yield", "base_slip"])
@@ -79,6 +80,17 @@ def test_without_readings_a_joint_is_not_named_for_having_been_looked_at_closely
     assert told.verdict == "joint_yield"
     assert set(told.effects[0].places) == {"joint 2", "joint 3", "joint 4"}
     assert sum(told.effects[0].places.values()) == pytest.approx(1.0, abs=0.03)
+
+
+def test_on_an_arm_what_gives_way_bit_by_bit_does_not_flow_back() -> None:
+    """That is friction; a knee with a threshold may (Bauschinger), and so may any metal."""
+    knees = library(make_bench(arm_data()), ["joint_yield", "base_slip"])
+    back = {v.info["knee"] for v in knees if v.label.endswith("flows back")}
+    assert back == {"sharp"}
+    load = 100 * np.sin(np.arange(300) / 15)
+    knees = library(make_bench(running(load, load / SPRING)), ["joint_yield"])
+    back = {v.info["knee"] for v in knees if v.label.endswith("flows back")}
+    assert back == {"sharp", "round"}
 
 
 def _first_pose(data: object) -> dict[str, np.ndarray]:

@@ -76,7 +76,7 @@ def _under_weight(
     back = [column(s) for s in after_yield(bench, load, top, bench.moved)]
     states = bench.plays(load, radius, bench.moved, weight)
     label = f"joint {joint + 1}{UNDER_WEIGHT}"
-    return _knees(WORD, label, [column(s) for s in states.T], radius, back, info)
+    return _knees(WORD, label, [column(s) for s in states.T], radius, back, info, True)
 
 
 _PUSHED = 0.2  # of the joint's largest torque: so far beyond its weight some push must go
@@ -103,14 +103,17 @@ def knee_variants(
         back = [column(s) for s in after_yield(bench, load, top, fresh)]
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
         exact = {**info, "memory": memory, "flow_s": 0.0, "load": load, "column": column}
-        out += _knees(word, f"{name}{memory}", columns, radius, back, exact)
+        out += _knees(word, f"{name}{memory}", columns, radius, back, exact,
+                      bench.data.arm)  # fmt: skip
     return out
 
 
 def _knees(
-    word: str, label: str, columns: list[int], radius: Array, back: list[int], info: dict[str, Any]
-) -> list[Variant]:
-    """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them."""
+    word: str, label: str, columns: list[int], radius: Array, back: list[int], info: dict[str, Any],
+    arm: bool,
+) -> list[Variant]:  # fmt: skip
+    """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them. What
+    begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`."""
     share = 0.7 / len(radius) * _LIKELY[info["memory"]]
     extra, out = list(range(len(THRESHOLDS), len(radius))), []
     for k in range(_FIRST, len(THRESHOLDS)):
@@ -118,8 +121,8 @@ def _knees(
             inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
             place = [*inside, *extra]
             kept = [*inside.values(), *[_HARDENS] * len(extra)]
-            exact = {**info, "radius": radius[place], "centre": radius[k], "back": back,
-                     "knee": knee}  # fmt: skip
+            exact = {**info, "radius": radius[place], "centre": radius[k],
+                     "back": [] if knee == "round" and arm else back, "knee": knee}  # fmt: skip
             at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
             out += _with_back(word, at, chosen, kept, share / 4, exact)
     return out
