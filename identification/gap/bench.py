@@ -35,7 +35,7 @@ class Layout:
     size: int
 
 
-_FURTHER, _CLEAR, _ONE_WAY = 6, 1.1, 0.9  # radii; beyond the inner ones; of the range
+_FURTHER, _ONE_WAY = 6, 0.9  # radii; of the range
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
 _BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
 _FELT = 0.03  # of the range of the load's torque
@@ -166,11 +166,12 @@ class Bench:
         """Radii of plays: `inner`, and on an imposed path, which runs far beyond what yields,
         _FURTHER more: what has yielded hardens over all of it, or softens. Up to half of its
         range, since it is gone both ways; a single pull goes but one."""
-        full = float(np.ptp(np.append(load, 0.0)))
+        full, last = float(np.ptp(np.append(load, 0.0))), float(inner[-1])
         far = (_ONE_WAY if self.course.once else 0.5) * full
-        if not self.imposed or far < _CLEAR * inner[-1]:
+        if not self.imposed or far < last:
             return inner
-        return np.concatenate([inner, np.geomspace(inner[-1], far, _FURTHER + 1)[1:]])
+        start = min(1.4, (far / last) ** (1 / _FURTHER)) if self.course.once else 1.4
+        return np.concatenate([inner, np.geomspace(start * last, far, _FURTHER)])
 
     def add(self, column: Array) -> int:
         """Puts a stacked column into the pool; its index."""
