@@ -9,7 +9,7 @@ from typing import Any
 from identification.gap.effects import joint_backlash, time_lag
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
-from identification.gap.forms.law import ACROSS, ANEW, HUNG, KEPT, LOST, WORKED
+from identification.gap.forms.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
 
 # What an entry says besides its law; kept, not interpreted.
 ABOUT = (
@@ -38,7 +38,7 @@ class Key:
     options: tuple[str, ...] = ()
 
 
-_MEMORY = Key("memory", "text", options=(KEPT, ACROSS, LOST, WORKED, HUNG, ANEW))
+_MEMORY = Key("memory", "text", options=(KEPT, ACROSS, LOST, WORKED, HUNG, HUNG_LOST, ANEW))
 _SIDES = ("x", "y", "z")
 CONSTANTS: dict[str, Key] = {
     "joint": Key("joint", "count"),

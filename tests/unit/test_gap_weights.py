@@ -15,6 +15,7 @@ from identification.gap.effects import (
     joint_backlash,
     joint_hysteresis,
     joint_nonlinear_stiffness,
+    joint_yield,
     library,
 )
 from identification.gap.effects.joint_backlash import TOOLS_KG
@@ -31,6 +32,7 @@ from identification.gap.rows import reduce_rows
 from identification.gap.variants import variant
 from rig.gap_data import _joint_to_joint, arm_setup
 from rig.model import load_robot
+from tests.unit.test_gap_closer import assert_lawful
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data, fresh
 
@@ -134,6 +136,26 @@ def test_thresholds_on_the_net_torque_are_others_between_poses_and_senses() -> N
     assert under(hanging(np.concatenate([UP, -UP]), gravity=30.0))
     relieved = hanging(UP, gravity=-300.0, poses=(1.0, 1.3))  # every push takes load off
     assert not under(relieved)
+
+
+def test_a_controller_may_take_a_joint_back_that_carries_weight() -> None:
+    """Then every run begins anew, and still it yields at the net torque."""
+    bench = make_bench(arm_data())
+    knees = [v for v in library(bench, ["joint_yield"]) if " under weight" in v.label]
+    taken = [v for v in knees if v.label.startswith("joint 2 under weight, taken back at")]
+    kept = {v.label.replace(", taken back", ""): v for v in taken}
+    assert taken
+    assert {v.label for v in knees} >= set(kept)
+    sharp = next(v for v in taken if v.label.endswith("at 0.75 sharp"))
+    finer = joint_yield.refined(bench, sharp)
+    assert_lawful(bench, [*taken[:8], *finer[::25]])
+    lasting = next(v for v in knees if v.label == "joint 2 under weight at 0.75 sharp")
+    state, other = (bench.columns[v.columns[0]][: bench.rows.n] for v in (sharp, lasting))
+    first = {r: state[bench.rows.run == r][0] for r in np.unique(bench.rows.run)}
+    assert np.abs(state).max() > 0
+    assert not any(first.values())
+    assert any(other[bench.rows.run == r][0] for r in first)
+    assert not any("taken back" in v for v in labels(hanging(UP, poses=(1.0, 1.3)), "joint_yield"))
 
 
 def test_a_threshold_is_the_net_torque_and_knows_no_more_of_it_than_of_the_tool() -> None:

@@ -28,12 +28,19 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.history import flowing_play
 from identification.gap.rows import way_back
-from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, variant
+from identification.gap.variants import (
+    BACK_UNDER_WEIGHT,
+    SET_UP_ANEW,
+    UNDER_WEIGHT,
+    Variant,
+    variant,
+)
 
 WORD = "joint_yield"
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 # A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
-_LIKELY = {"": 1.0, " lasting": 0.5, SET_UP_ANEW: 0.5, " taken back": 0.3, UNDER_WEIGHT: 1.0}
+_LIKELY = {"": 1.0, " lasting": 0.5, SET_UP_ANEW: 0.5, " taken back": 0.3, UNDER_WEIGHT: 1.0,
+           BACK_UNDER_WEIGHT: 0.3}  # fmt: skip
 _HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 _FIRST = 2  # lower ones only round off the knees above them
 # Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
@@ -70,13 +77,18 @@ def _under_weight(
     most = float(np.abs(load + weight).max())
     if most - alone < _PUSHED * top or not bench.meets_weight_unlike(joint):
         return []
-    radius = alone + (most - alone) * np.array(THRESHOLDS)
-    info = {"joint": joint, "memory": UNDER_WEIGHT, "flow_s": 0.0, "load": load,
-            "column": column, "weight": weight}  # fmt: skip
-    back = [column(s) for s in after_yield(bench, load, top, bench.moved)]
-    states = bench.plays(load, radius, bench.moved, weight)
-    label = f"joint {joint + 1}{UNDER_WEIGHT}"
-    return _knees(WORD, label, [column(s) for s in states.T], radius, back, info, True)
+    radius, out = alone + (most - alone) * np.array(THRESHOLDS), []
+    for memory in (UNDER_WEIGHT, BACK_UNDER_WEIGHT):
+        fresh = _fresh(bench, memory)
+        if memory == BACK_UNDER_WEIGHT and np.sum(fresh) == np.sum(bench.moved):
+            continue
+        info = {"joint": joint, "memory": memory, "flow_s": 0.0, "load": load, "column": column,
+                "weight": weight}  # fmt: skip
+        back = [column(s) for s in after_yield(bench, load, top, fresh)]
+        states = bench.plays(load, radius, fresh, weight)
+        label = f"joint {joint + 1}{memory}"
+        out += _knees(WORD, label, [column(s) for s in states.T], radius, back, info, True)
+    return out
 
 
 _PUSHED = 0.2  # of the joint's largest torque: so far beyond its weight some push must go
@@ -222,7 +234,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     weight = info.get("weight")
     alone = 0.0 if weight is None else float(np.abs(weight).max())
     radius = alone + (float(info["centre"]) - alone) * (1 + close * np.linspace(-0.16, 0.2, FINE))
-    fresh = _memories(bench).get(info["memory"], bench.moved)
+    fresh = _fresh(bench, info["memory"])
     name, out = _place_in(found.label), []
     for (flow, square), states in _flowing(bench, ways, info["load"], radius, fresh, weight):
         columns = [info["column"](s) for s in states.T]
@@ -249,7 +261,7 @@ def elsewhere(bench: Bench, found: Variant, there: Variant) -> Variant | None:
     if not factor > 0:
         return None
     radius, flow = factor * np.asarray(info["radius"]), float(info["flow_s"])
-    fresh = _memories(bench).get(info["memory"], bench.moved)
+    fresh = _fresh(bench, info["memory"])
     moved = states(bench, other["load"], radius, flow, fresh, square=bool(info.get("square")))
     columns = [other["column"](s) for s in moved.T]
     if len(found.columns) > len(radius):
@@ -312,6 +324,13 @@ def _memories(bench: Bench) -> dict[str, Flags]:
     if np.sum(bench.rest) > np.sum(moved):
         out[" taken back"] = moved | bench.rest
     return out
+
+
+def _fresh(bench: Bench, memory: str) -> Flags:
+    """(n,) rows before which a joint of that memory is where it was."""
+    if memory == BACK_UNDER_WEIGHT:
+        return np.asarray(bench.moved | bench.rest)
+    return _memories(bench).get(memory, bench.moved)
 
 
 def states(

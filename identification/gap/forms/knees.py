@@ -8,11 +8,21 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects import base_slip, joint_yield
 from identification.gap.effects.base_compliance import moments
-from identification.gap.forms.law import ACROSS, ANEW, HUNG, KEPT, LOST, Law, Term, fresh_after
-from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant
+from identification.gap.forms.law import (
+    ACROSS,
+    ANEW,
+    HUNG,
+    HUNG_LOST,
+    KEPT,
+    LOST,
+    Law,
+    Term,
+    fresh_after,
+)
+from identification.gap.variants import BACK_UNDER_WEIGHT, SET_UP_ANEW, UNDER_WEIGHT, Variant
 
 _MEMORY = {"": KEPT, " lasting": ACROSS, " taken back": LOST, joint_yield.HARDENED: KEPT,
-           UNDER_WEIGHT: HUNG, SET_UP_ANEW: ANEW}  # fmt: skip
+           UNDER_WEIGHT: HUNG, BACK_UNDER_WEIGHT: HUNG_LOST, SET_UP_ANEW: ANEW}  # fmt: skip
 _SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
 
@@ -69,7 +79,8 @@ def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     fresh = fresh_after(bench, law.constants["memory"])
     radius = np.array([t.shape["threshold"] for t in law.terms if "threshold" in t.shape])
     weight = None
-    if law.constants["memory"] == HUNG and "joint" in law.constants:  # its twin may sit elsewhere
+    hung = law.constants["memory"] in (HUNG, HUNG_LOST)
+    if hung and "joint" in law.constants:  # its twin may sit elsewhere
         weight = bench.weight(law.constants["joint"])
     flow, square = law.constants["flow_time"], law.constants.get("flow_exponent") == _SQUARE
     out = list(joint_yield.states(bench, load, radius, flow, fresh, weight, square).T)

@@ -38,6 +38,7 @@ Columns = Callable[[Bench, Law], list[Array]]
 
 KEPT, ACROSS, LOST, WORKED = "kept", "kept across poses", "lost between runs", "worked in"
 HUNG, ANEW = "under weight", "lost between setups"
+HUNG_LOST = "under weight, lost between runs"
 
 
 def fresh_after(bench: Bench, memory: str) -> Flags:
@@ -46,7 +47,7 @@ def fresh_after(bench: Bench, memory: str) -> Flags:
         return np.zeros(bench.rows.n, dtype=bool)
     if memory == ANEW:
         return bench.rebuilt
-    if memory == LOST:
+    if memory in (LOST, HUNG_LOST):
         return np.asarray(bench.moved | bench.rest)
     return bench.moved
 
