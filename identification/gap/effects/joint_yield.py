@@ -84,7 +84,9 @@ def _under_weight(
             continue
         info = {"joint": joint, "memory": memory, "flow_s": 0.0, "load": load, "column": column,
                 "weight": weight}  # fmt: skip
-        back = [column(s) for s in after_yield(bench, load, top, fresh)]
+        # what a controller takes back it had clamped: no metal that flows back
+        kept = after_yield(bench, load, top, fresh) if memory == UNDER_WEIGHT else []
+        back = [column(s) for s in kept]
         states = bench.plays(load, radius, fresh, weight)
         label = f"joint {joint + 1}{memory}"
         out += _knees(WORD, label, [column(s) for s in states.T], radius, back, info, True)
