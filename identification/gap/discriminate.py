@@ -242,7 +242,7 @@ def _discrimination(bench: Bench, design: Design, rivals: tuple[_Rival, _Rival])
     words = np.array([v.word for v in variants])
     won = []
     for k, place in enumerate(places):
-        engine.beside((place,), len(engine.levels))
+        engine.beside((place,), len(engine.levels))  # of all levels at once, for `_told`
         levels = [_told(level, place) for level in engine.levels]
         found = {id(s.variant): s.log_evidence for s in score(engine, levels, variants)}
         logs = np.array([found[id(v)] - log(v.prior) for v in variants])

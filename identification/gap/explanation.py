@@ -149,7 +149,7 @@ def conditioned(
     the parts at the likeliest of these."""
     levels = engine.levels if among is None else among
     for p in parts:
-        engine.beside(p.variant.columns, 1 + max(lv.number for lv in levels))
+        engine.beside(p.variant.columns, 1 + max(lv.number for lv in levels))  # all at once
         levels = [condition(lv, p.variant.columns, p.variant.root, p.scale) for lv in levels]
     if not parts:
         return levels, 0.0

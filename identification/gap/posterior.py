@@ -244,8 +244,8 @@ def _open(engine: Engine, variants: list[Variant], chosen: Explanation, index: i
 
 def _representatives(scored: list[Scored]) -> list[tuple[Scored, float]]:
     """The likeliest shapes of every place that counts, as many as its share of the posterior, and
-    by how many nats each stands for more of its place than itself: that a joint has been looked at
-    more closely than another does not speak for it."""
+    by how many nats each stands for more of its place than itself: the many shapes of a joint that
+    was looked at closely push no other joint out."""
     places: dict[tuple[str, ...], list[Scored]] = {}
     for s in sorted(scored, key=lambda s: -s.log_evidence):
         places.setdefault(place_of(s.variant), []).append(s)
@@ -275,9 +275,9 @@ def _levels(engine: Engine, explanation: Explanation, prior: float) -> _Weighed:
     weights = [
         prior + joint[i] + level_prior(engine.etas, i, energy[i]) for i in range(len(engine.levels))
     ]
+    least = max(weights) - _COUNTS
     for i, (level, weight) in enumerate(zip(engine.levels, weights, strict=True)):
-        counts = weight > max(weights) - _COUNTS
-        signs = signs_kept(level, explanation.parts) if counts else 0.0
+        signs = signs_kept(level, explanation.parts) if weight > least else 0.0
         out.append((replace(explanation, eta=_size(engine, i, energy[i])), float(weight + signs)))
     return out
 

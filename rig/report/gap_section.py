@@ -98,7 +98,7 @@ def _effects(found: Node) -> list[Block]:
         for i, (key, unit, *numbers) in enumerate(parameters):
             lead = head if i == 0 else ("", "", "")
             rows.append((lead[0], key, "" if unit == "1" else unit, *numbers, *lead[1:]))
-        if len(list(e["places"].items())) > 1:
+        if len(e["places"].value) > 1:
             alike.append(_places(name, e["places"]))
         others = e["indistinguishable_from"].value
         if others:

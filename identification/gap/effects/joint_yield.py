@@ -31,6 +31,7 @@ from identification.gap.rows import way_back
 from identification.gap.variants import (
     BACK_UNDER_WEIGHT,
     SET_UP_ANEW,
+    TAKEN_BACK,
     UNDER_WEIGHT,
     Variant,
     variant,
@@ -39,7 +40,7 @@ from identification.gap.variants import (
 WORD = "joint_yield"
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 # A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
-_LIKELY = {"": 1.0, " lasting": 0.5, SET_UP_ANEW: 0.5, " taken back": 0.3, UNDER_WEIGHT: 1.0,
+_LIKELY = {"": 1.0, " lasting": 0.5, SET_UP_ANEW: 0.5, TAKEN_BACK: 0.3, UNDER_WEIGHT: 1.0,
            BACK_UNDER_WEIGHT: 0.3}  # fmt: skip
 _HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 _FIRST = 2  # lower ones only round off the knees above them
@@ -78,10 +79,9 @@ def _under_weight(
     if most - alone < _PUSHED * top or not bench.meets_weight_unlike(joint):
         return []
     radius, out = alone + (most - alone) * np.array(THRESHOLDS), []
-    for memory in (UNDER_WEIGHT, BACK_UNDER_WEIGHT):
+    taken_back = [BACK_UNDER_WEIGHT] if TAKEN_BACK in _memories(bench) else []
+    for memory in (UNDER_WEIGHT, *taken_back):
         fresh = _fresh(bench, memory)
-        if memory == BACK_UNDER_WEIGHT and np.sum(fresh) == np.sum(bench.moved):
-            continue
         info = {"joint": joint, "memory": memory, "flow_s": 0.0, "load": load, "column": column,
                 "weight": weight}  # fmt: skip
         # what a controller takes back it had clamped: no metal that flows back
@@ -324,15 +324,14 @@ def _memories(bench: Bench) -> dict[str, Flags]:
     if np.sum(bench.rebuilt) > np.sum(moved):
         out[SET_UP_ANEW] = bench.rebuilt
     if np.sum(bench.rest) > np.sum(moved):
-        out[" taken back"] = moved | bench.rest
+        out[TAKEN_BACK] = moved | bench.rest
     return out
 
 
 def _fresh(bench: Bench, memory: str) -> Flags:
     """(n,) rows before which a joint of that memory is where it was."""
-    if memory == BACK_UNDER_WEIGHT:
-        return np.asarray(bench.moved | bench.rest)
-    return _memories(bench).get(memory, bench.moved)
+    lost = TAKEN_BACK if memory == BACK_UNDER_WEIGHT else memory
+    return _memories(bench).get(lost, bench.moved)
 
 
 def states(
