@@ -65,6 +65,7 @@ CONSTANTS: dict[str, Key] = {
     "about": Key("about_joint_stiffness_Nm_per_rad", "springs"),
     "about_offset": Key("about_offset_m", "vector"),
     "about_angles": Key("about_angles_rad", "six"),
+    "reads": Key("displacement_read_over_true", "positive"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
 }
 SHAPES: dict[str, Key] = {
@@ -188,7 +189,7 @@ GRAMMAR: dict[str, Grammar] = {
         (("tangent", ("along", "across")), ("tangent", ("along", "across", "at_load"))),
     ),
     "pose_error": Grammar(
-        ("about", "about_offset", "about_angles"),
+        ("about", "about_offset", "about_angles", "reads"),
         (("offset", ("axis",)), ("angle", ("joint",))),
     ),
     "force_scale": Grammar(("about",), (("gain", ()), ("gain", ("at_load",)))),

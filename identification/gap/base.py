@@ -82,7 +82,7 @@ def _gains(bench: Bench) -> list[tuple[str, Array, float]]:
     force = bench.force_column(-bench.load)
     return [
         ("gain force", force, meter.force_gain),
-        ("gain displacement", bench.stacked(line), meter.displacement_gain),
+        ("gain displacement", bench.stacked(bench.line), meter.displacement_gain),
     ]
 
 

@@ -29,11 +29,13 @@ class Fit:
     """effects: coefficients (k,) and covariance (k, k) of the parts' columns, one after the other.
 
     base (b,): of the base's columns; joint_covariance (b + k, b + k): of base and effects together.
+    pulls (b + k,): all of them in the coordinates in which their prior is standard normal.
     response (n,): fitted response beyond the prior simulation; effect (n,): the effects' part.
     """
 
     parts: tuple[Part, ...]
     base: Array
+    pulls: Array
     joint_covariance: Array
     coefficients: Array
     covariance: Array
@@ -70,9 +72,11 @@ def fit(
     root = block([np.diag(engine.base.sd), effects])
     X = np.hstack([engine.base.columns * engine.base.sd, E @ effects])
     weighed = _weighed(engine, X, explanation.eta, keep)
-    solved = np.linalg.solve(weighed.T @ X + np.eye(len(root)), root.T)  # H^-1 root'
+    moment = weighed.T @ engine.target
+    both = np.linalg.solve(weighed.T @ X + np.eye(len(root)), np.column_stack([root.T, moment]))
+    solved, pulls = both[:, :-1], both[:, -1]  # H^-1 root'
     covariance = root @ solved
-    beta = solved.T @ (weighed.T @ engine.target)
+    beta = root @ pulls
     kb = engine.base.columns.shape[1]
     w = beta[kb:]
     if alike and explanation.eta > 0:
@@ -83,6 +87,7 @@ def fit(
     return Fit(
         parts=explanation.parts,
         base=beta[:kb],
+        pulls=np.asarray(pulls),
         joint_covariance=covariance,
         coefficients=w,
         covariance=covariance[kb:, kb:],

@@ -18,6 +18,7 @@ from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.noise import UNSURE
 from identification.gap.penalties import CURVES, FRICTION
+from identification.gap.strain import LIMIT, strain
 from identification.gap.verdict import weighed
 
 # An elastic curve that falls while it is pushed on, or a force that is nearly lost, as none is that
@@ -44,6 +45,8 @@ def looked_up(found: Found) -> Found:
     first = [e for e in found.explanations[:_LOOKED_AT] if e.log_weight > best - _WITHIN]
     done = {e.words: judge(engine, e) for e in first if e.parts}
     if engine.bench.data.arm:  # what these lose goes to those with fewer of their effects
+        none = next(e for e in found.explanations if not e.parts)
+        done[none.words] = _unstrained(none, strain(engine, fit(engine, none), none.eta))
         lost = [e.words for e in done.values() if not e.good]
         heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
         done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
@@ -63,7 +66,14 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
     if explanation.eta > _STEP * allowed:
         good = min(good, explanation.log_good)
-    return replace(explanation, log_good=good)
+    asked = strain(engine, fitted, explanation.eta)
+    return _unstrained(replace(explanation, log_good=good), asked)
+
+
+def _unstrained(explanation: Explanation, asked: float) -> Explanation:
+    """With as much of its weight as what it asks of its priors allows it."""
+    kept = float(np.log(max(_share(asked, LIMIT), 1e-300)))
+    return replace(explanation, log_good=explanation.log_good + kept)
 
 
 def _swings(fitted: Fit) -> bool:
@@ -99,7 +109,7 @@ def _allowed(engine: Engine, explanation: Explanation, unseen: float, words: int
 
 
 def _share(left: float, allowed: float) -> float:
-    """Of the weight that is kept by what is left (m)."""
+    """Of the weight that is kept by what is left, or asked for, against what is allowed."""
     return float(1 / (1 + (left / allowed) ** SOFT))
 
 

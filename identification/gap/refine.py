@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from identification.gap.compare import Scored, by_word, closest, marginal, score
-from identification.gap.data import Array
 from identification.gap.effects import (
     contact_seating,
     joint_backlash,
@@ -23,6 +22,7 @@ from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import fit
 from identification.gap.forms import about_springs
+from identification.gap.imperfection import LINEAR
 from identification.gap.parts import Part
 from identification.gap.variants import Variant, place_of
 
@@ -134,9 +134,31 @@ def _curves(word: _Word) -> list[Variant]:
 
 
 def _poses(word: _Word) -> list[Variant]:
-    kinds = {str(s.variant.info["kind"]): s.variant for s in reversed(word.alone)}
-    estimate = partial(_estimate, word.engine)
-    return [f for v in kinds.values() for f in pose_error.refined(word.engine.bench, v, estimate)]
+    """Where arm and tool are, by what is found alone and beside the words that explain most of
+    what that leaves: a second effect must not decide it."""
+    engine, kinds = word.engine, {str(s.variant.info["kind"]): s for s in reversed(word.alone)}
+    finer = [
+        f
+        for s in kinds.values()
+        for f in pose_error.refined(engine.bench, s.variant, partial(_estimate, engine))
+    ]
+    engine.extend()
+    best = max(score(engine, engine.levels, finer), key=_evidence)
+    levels, energy = conditioned(engine, (Part(best.variant, best.scale),))
+    names = ({*word.ranked} | LINEAR) & word.families.keys() - {best.variant.word}
+    others = [s.variant for w in sorted(names) for s in word.families[w]]
+    found = by_word(score(engine, levels, others, energy))
+    for name in sorted(found, key=lambda w: -marginal(found[w]))[:_BESIDE]:
+        other = closest(found[name])
+        estimate = partial(_estimate, engine, beside=(Part(other.variant, other.scale),))
+        again = pose_error.refined(engine.bench, kinds[best.variant.info["kind"]].variant, estimate)
+        finer += [replace(v, label=f"{v.label} beside {name}") for v in again]
+    same = [v for v in finer if v.info["kind"] == best.variant.info["kind"]]
+    share = best.variant.prior / len(same)  # they are one place, looked at more than once
+    return [replace(v, prior=share) if v in same else v for v in finer]
+
+
+_BESIDE = 2  # words
 
 
 def _about_springs(word: _Word) -> list[Variant]:
@@ -145,7 +167,7 @@ def _about_springs(word: _Word) -> list[Variant]:
     for found in dict.fromkeys(s[0].variant for s in (word.alone, word.beside) if s):
         v = found
         for _ in range(_STEPS):
-            _, softer = _estimate(word.engine, v)
+            softer = _estimate(word.engine, v).softer
             v = about_springs(bench, found, bench.compliance * np.maximum(1 + softer, 0.1))
         out.append(v)
     return out
@@ -207,17 +229,19 @@ def _evidence(scored: Scored) -> float:
 _GRIDS = ("joint_yield", "base_slip", "joint_backlash", "joint_hysteresis", "time_lag")
 
 
-def _estimate(engine: Engine, variant: Variant) -> tuple[Array, Array]:
-    """Most probable coefficients of a variant whose columns the engine may not know yet, and
-    relative changes of the springs' compliance with it."""
+def _estimate(
+    engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()
+) -> pose_error.Estimate:
+    """What is most probable with a variant whose columns the engine may not know yet, beside other
+    parts; a force that is read wrong acts like springs that are all off."""
     engine.extend()
-    eta = engine.levels[score(engine, engine.levels, [variant])[0].level].eta
-    alone = Explanation((Part(variant, 1.0),), 0.0, eta, (0.0,), 0.0)
-    fitted = fit(engine, alone)
-    softer = np.zeros(engine.bench.data.joints)
-    for i in engine.base.index("spring"):
-        softer[int(engine.base.names[i].removeprefix("spring")) - 1] = fitted.base[i]
-    return fitted.coefficients, softer
+    levels, energy = conditioned(engine, beside)
+    eta = engine.levels[score(engine, levels, [variant], energy)[0].level].eta
+    fitted = fit(engine, Explanation((Part(variant, 1.0), *beside), 0.0, eta, (0.0,), 0.0))
+    found = dict(zip(engine.base.names, fitted.base.tolist(), strict=True))
+    softer = np.array([found.get(f"spring{j + 1}", 0.0) for j in range(engine.bench.data.joints)])
+    gain, reads = (found.get(f"gain {name}", 0.0) for name in ("force", "displacement"))
+    return pose_error.Estimate(fitted.of(0)[0], (1 + softer) * (1 - gain) - 1, 1 + reads)
 
 
 def _places(

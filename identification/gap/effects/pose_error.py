@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,31 +47,40 @@ BOTH = ((0.04, 0.02), (0.15, 0.05))
 _STEPS = 5
 
 
-def refined(
-    bench: Bench, found: Variant, estimate: Callable[[Variant], tuple[Array, Array]]
-) -> list[Variant]:
-    """The same with secants through where arm and tool are found to be, and with the springs that
-    go with it, in a few steps. estimate: most probable coefficients of a variant, and relative
-    changes (m,) of the springs' compliance."""
+def refined(bench: Bench, found: Variant, estimate: Callable[[Variant], Estimate]) -> list[Variant]:
+    """The same with secants through where arm and tool are found to be, and with the springs and
+    the gain of the displacement that go with it, in a few steps. estimate: what is most probable
+    with a variant."""
     kind, out = str(found.info["kind"]), found
     offset, angles = np.zeros(3), np.zeros(bench.data.joints)
     for _ in range(_STEPS):
-        w, softer = estimate(out)
+        w, softer, reads = estimate(out)
         offset = w[:3] if kind != "joints" else offset
         angles = w[-len(angles) :] if kind != "tool" else angles
         compliance = bench.compliance * np.maximum(1 + softer, 0.1)
-        columns = secants(bench, offset, angles, compliance)
+        columns = secants(bench, offset, angles, compliance, reads)
         used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
         out = replace(
             found, label=f"{found.label}, as they are", prior=3.0,
             columns=tuple(bench.add(c) for c in used),
             info={**found.info, "offset_m": offset, "angles_rad": angles,
-                  "compliance": compliance},
+                  "compliance": compliance, "reads": reads},
         )  # fmt: skip
     return [out]
 
 
-def secants(bench: Bench, offset: Array, angles: Array, compliance: Array) -> list[Array]:
+class Estimate(NamedTuple):
+    """Most probable coefficients (k,) of a variant, relative changes (m,) of the springs'
+    compliance, and what the displacement reads, over what it is."""
+
+    coefficients: Array
+    softer: Array
+    reads: float
+
+
+def secants(
+    bench: Bench, offset: Array, angles: Array, compliance: Array, reads: float = 1.0
+) -> list[Array]:
     """Stacked columns per metre of tool offset (3) and radian of each joint that stands elsewhere.
 
     With levers l + dl the target moves by `c ((l + dl)^2 - l^2) F = 2 c (l + dl/2) dl F`: linear in
@@ -86,7 +96,7 @@ def secants(bench: Bench, offset: Array, angles: Array, compliance: Array) -> li
         shifts.append(s.offset_lever + 0.5 * np.einsum("ijk,j->ik", across, angles))
         turns.append(s.turned_lever + 0.5 * (bent @ angles + across @ offset))
     moved, turned = np.stack(shifts)[bench.rows.setup], np.stack(turns)[bench.rows.setup]
-    middle = bench.lever + 0.5 * (moved @ offset + turned @ angles)
+    middle = reads * (bench.lever + 0.5 * (moved @ offset + turned @ angles))
     elastic = compliance * bench.load[:, None]
     out = []
     for change in [moved[:, :, k] for k in range(3)]:
@@ -104,5 +114,5 @@ def _variant(
 ) -> Variant:
     return variant(
         WORD, label, columns, (1.0,), np.diag(sizes), positive=False, prior=prior, kind=kind,
-        offset_m=np.zeros(3), angles_rad=np.zeros(6),
+        offset_m=np.zeros(3), angles_rad=np.zeros(6), reads=1.0,
     )  # fmt: skip

@@ -197,6 +197,7 @@ def describe_pose(bench: Bench, v: Variant) -> tuple[Law, Array]:
     about = {
         "about_offset": _triple(v.info["offset_m"]),
         "about_angles": tuple(float(a) for a in v.info["angles_rad"]),
+        "reads": float(v.info["reads"]),
     }
     return Law(about, tuple(terms)), np.ones(len(terms))
 
@@ -204,7 +205,8 @@ def describe_pose(bench: Bench, v: Variant) -> tuple[Law, Array]:
 def pose(bench: Bench, law: Law) -> list[Array]:
     """Change of the levers, by the secants of the library."""
     at = np.array(law.constants["about_offset"]), np.array(law.constants["about_angles"])
-    columns = pose_error.secants(bench, *at, bench.compliance)
+    reads = float(law.constants["reads"])
+    columns = pose_error.secants(bench, *at, bench.compliance, reads)
     return [
         columns["xyz".index(t.shape["axis"]) if t.coefficient == "offset" else 3 + t.shape["joint"]]
         for t in law.terms

@@ -1,0 +1,103 @@
+"""Explanations that ask for what their own priors exclude."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.data import GapData
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation
+from identification.gap.fit import Fit, fit
+from identification.gap.parts import Part
+from identification.gap.strain import LIMIT, strain
+from tests.conformance.effect_benches import of, quick_engine
+from tests.conformance.gap_designs import linear
+from tests.conformance.test_effect_recovery import strength, typical, with_effect
+
+FAR = 7.0  # standard deviations
+
+
+def nothing() -> Explanation:
+    return Explanation((), 0.0, 0.0, (), 0.0)
+
+
+def pulled(engine: Engine, name: str, fitted: Fit | None = None) -> Fit:
+    """A fit in which one of the base's coefficients is FAR off, and all others are as expected."""
+    fitted = fitted or fit(engine, nothing())
+    pulls = np.zeros(len(fitted.pulls))
+    pulls[engine.base.index(name)[0]] = FAR
+    return replace(fitted, pulls=pulls, base=pulls[: len(fitted.base)] * engine.base.sd)
+
+
+def test_pulls_are_coefficients_in_units_of_their_priors() -> None:
+    bench, variants, _ = of("base_compliance", "rich")
+    engine, v = quick_engine(bench), typical(variants)
+    found = fit(engine, Explanation((Part(v, 2e-6),), 0.0, 0.0, (0.0,), 0.0))
+    base = len(found.base)
+    np.testing.assert_allclose(found.pulls[:base] * engine.base.sd, found.base)
+    np.testing.assert_allclose(2e-6 * v.root @ found.pulls[base:], found.coefficients)
+
+
+@pytest.mark.parametrize("name", ["spring2", "gain displacement", "crosstalk", "offset"])
+def test_what_was_stated_may_not_be_far_off(name: str) -> None:
+    engine = quick_engine(of("base_compliance", "rich")[0])
+    assert strain(engine, pulled(engine, name), 0.0) == pytest.approx(FAR)
+
+
+def test_many_that_are_a_little_off_count_together() -> None:
+    engine = quick_engine(of("base_compliance", "rich")[0])
+    few = pulled(engine, "crosstalk")
+    few.pulls[engine.base.index("crosstalk")] = 3.5
+    assert len(engine.base.index("crosstalk")) < len(few.pulls) / 4
+    assert strain(engine, few, 0.0) > LIMIT
+
+
+def test_springs_that_are_said_to_be_off_may_be() -> None:
+    bench, variants, _ = of("joint_stiffness_error", "rich")
+    engine = quick_engine(bench)
+    said = fit(engine, Explanation((Part(variants[0], 0.1),), 0.0, 0.0, (0.0,), 0.0))
+    assert strain(engine, pulled(engine, "spring2", said), 0.0) == 0.0
+    assert strain(engine, pulled(engine, "gain force", said), 0.0) == pytest.approx(FAR)
+
+
+def test_runs_may_be_off_by_the_imperfection_of_the_law_too() -> None:
+    engine = quick_engine(of("base_compliance", "rich")[0])
+    scatter = pulled(engine, "scatter run")
+    assert strain(engine, scatter, 0.0) == pytest.approx(FAR)
+    assert strain(engine, scatter, engine.bench.noise.stated) < LIMIT
+
+
+def test_a_tare_that_moves_little_of_the_gap_does_not_decide_it() -> None:
+    engine = quick_engine(of("base_compliance", "rich")[0])
+    tare = pulled(engine, "tare")
+    engine.structural = 1e-9
+    assert strain(engine, tare, 0.0) == pytest.approx(FAR)
+    engine.structural = 1e-3
+    assert strain(engine, tare, 0.0) < 1.0
+
+
+def askew() -> GapData:
+    """A load askew, seen by the components of the force."""
+    bench, variants, columns = of("load_misalignment", "rich")
+    v = typical(variants)
+    w = strength(bench, v, columns, 10.0)
+    return with_effect("rich", v, columns[:, list(v.columns)] @ w, bench)
+
+
+def test_what_no_word_may_name_is_not_put_down_to_the_instruments() -> None:
+    """A force across that only cross-talk of many standard deviations would make."""
+    assert diagnose_gap(askew()).verdict == "load_misalignment"
+    assert diagnose_gap(askew(), withhold=["load_misalignment"]).verdict == "unknown"
+
+
+def test_springs_far_beyond_what_was_stated_are_not_nothing() -> None:
+    """`none` has priors, too."""
+    data = linear("rich")
+    stated = replace(data, compliance_relative_sd=np.full(6, 0.004))
+    assert diagnose_gap(data).verdict == "none"
+    found = diagnose_gap(stated, withhold=["joint_stiffness_error"])
+    assert found.probabilities["none"] < 0.1
