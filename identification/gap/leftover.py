@@ -45,8 +45,8 @@ def looked_up(found: Found) -> Found:
     first = [e for e in found.explanations[:_LOOKED_AT] if e.log_weight > best - _WITHIN]
     done = {e.words: judge(engine, e) for e in first if e.parts}
     if engine.bench.data.arm:  # what these lose goes to those with fewer of their effects
-        none = next(e for e in found.explanations if not e.parts)
-        done[none.words] = _unstrained(none, strain(engine, fit(engine, none), none.eta))
+        for none in (e for e in first if not e.parts):
+            done[none.words] = _unstrained(none, strain(engine, fit(engine, none), none.eta))
         lost = [e.words for e in done.values() if not e.good]
         heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
         done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
