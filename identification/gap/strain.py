@@ -33,8 +33,8 @@ def strain(engine: Engine, fitted: Fit, eta: float) -> float:
 
 
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
-    """(b,) Springs that are said to be off may be off; a tare counts as far as it moves a share of
-    the gap that an explanation may not leave."""
+    """(b,) Springs that are said to be off may be off; tares, and offsets of the joint readings,
+    count as far as they move a share of the gap that an explanation may not leave."""
     base, n, weight = engine.base, engine.bench.rows.n, engine.bench.rows.weight
     columns = base.columns[:n]
     where = np.maximum(weight @ (columns != 0), 1e-300)
@@ -44,9 +44,9 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     pulls = np.abs(fitted.base) / np.hypot(base.sd, loose)
     if any(p.word == "joint_stiffness_error" for p in fitted.parts):
         pulls[base.index("spring")] = 0.0
-    tares = base.index("tare")
-    size = moves[tares] * np.abs(fitted.base[tares])
-    pulls[tares] *= np.minimum(size / (REMAINDER * engine.structural), 1.0)
+    constant = base.index("tare") + base.index("offset")
+    size = moves[constant] * np.abs(fitted.base[constant])
+    pulls[constant] *= np.minimum(size / (REMAINDER * engine.structural), 1.0)
     return np.asarray(pulls)
 
 

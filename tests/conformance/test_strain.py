@@ -42,7 +42,7 @@ def test_pulls_are_coefficients_in_units_of_their_priors() -> None:
     np.testing.assert_allclose(2e-6 * v.root @ found.pulls[base:], found.coefficients)
 
 
-@pytest.mark.parametrize("name", ["spring2", "gain displacement", "crosstalk", "offset"])
+@pytest.mark.parametrize("name", ["spring2", "gain displacement", "crosstalk"])
 def test_what_was_stated_may_not_be_far_off(name: str) -> None:
     engine = quick_engine(of("base_compliance", "rich")[0])
     assert strain(engine, pulled(engine, name), 0.0) == pytest.approx(FAR)
@@ -71,13 +71,14 @@ def test_runs_may_be_off_by_the_imperfection_of_the_law_too() -> None:
     assert strain(engine, scatter, engine.bench.noise.stated) < LIMIT
 
 
-def test_a_tare_that_moves_little_of_the_gap_does_not_decide_it() -> None:
+@pytest.mark.parametrize("name", ["tare", "offset"])
+def test_what_stands_all_the_time_and_moves_little_of_the_gap_does_not_decide_it(name: str) -> None:
     engine = quick_engine(of("base_compliance", "rich")[0])
-    tare = pulled(engine, "tare")
+    off = pulled(engine, name)
     engine.structural = 1e-9
-    assert strain(engine, tare, 0.0) == pytest.approx(FAR)
-    engine.structural = 1e-3
-    assert strain(engine, tare, 0.0) < 1.0
+    assert strain(engine, off, 0.0) == pytest.approx(FAR)
+    engine.structural = 1e-2
+    assert strain(engine, off, 0.0) < 1.0
 
 
 def askew() -> GapData:
