@@ -233,15 +233,15 @@ def _estimate(
     engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()
 ) -> pose_error.Estimate:
     """What is most probable with a variant whose columns the engine may not know yet, beside other
-    parts; a force that is read wrong acts like springs that are all off."""
+    parts."""
     engine.extend()
     levels, energy = conditioned(engine, beside)
     eta = engine.levels[score(engine, levels, [variant], energy)[0].level].eta
     fitted = fit(engine, Explanation((Part(variant, 1.0), *beside), 0.0, eta, (0.0,), 0.0))
     found = dict(zip(engine.base.names, fitted.base.tolist(), strict=True))
     softer = np.array([found.get(f"spring{j + 1}", 0.0) for j in range(engine.bench.data.joints)])
-    gain, reads = (found.get(f"gain {name}", 0.0) for name in ("force", "displacement"))
-    return pose_error.Estimate(fitted.of(0)[0], (1 + softer) * (1 - gain) - 1, 1 + reads)
+    reads = 1 + found.get("gain displacement", 0.0)
+    return pose_error.Estimate(fitted.of(0)[0], softer, reads)
 
 
 def _places(

@@ -9,6 +9,7 @@ import pytest
 
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects import WORDS
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation
 from identification.gap.fit import Fit, fit
@@ -64,6 +65,17 @@ def test_springs_that_are_said_to_be_off_may_be() -> None:
     assert strain(engine, pulled(engine, "gain force", said), 0.0) == pytest.approx(FAR)
 
 
+@pytest.mark.parametrize(("word", "counts"), [("thermal_drift", True), ("joint_yield", False)])
+def test_a_drift_may_not_jump_and_laws_are_families(word: str, counts: bool) -> None:
+    bench, variants, _ = of(word, "rich")
+    engine = quick_engine(bench)
+    found = fit(engine, Explanation((Part(variants[0], 1e-5),), 0.0, 0.0, (0.0,), 0.0))
+    pulls = np.zeros(len(found.pulls))
+    pulls[len(found.base)] = FAR
+    odd = replace(found, pulls=pulls, base=np.zeros(len(found.base)))
+    assert strain(engine, odd, 0.0) == pytest.approx(FAR if counts else 0.0)
+
+
 def test_runs_may_be_off_by_the_imperfection_of_the_law_too() -> None:
     engine = quick_engine(of("base_compliance", "rich")[0])
     scatter = pulled(engine, "scatter run")
@@ -98,7 +110,9 @@ def test_what_no_word_may_name_is_not_put_down_to_the_instruments() -> None:
 def test_springs_far_beyond_what_was_stated_are_not_nothing() -> None:
     """`none` has priors, too."""
     data = linear("rich")
-    stated = replace(data, compliance_relative_sd=np.full(6, 0.004))
     assert diagnose_gap(data).verdict == "none"
-    found = diagnose_gap(stated, withhold=["joint_stiffness_error"])
-    assert found.probabilities["none"] < 0.1
+    others = [w for w in WORDS if w != "time_lag"]
+    for sd, nothing_at_all in ((0.01, True), (0.005, False)):
+        stated = replace(data, compliance_relative_sd=np.full(6, sd))
+        found = diagnose_gap(stated, withhold=others)
+        assert found.verdict == ("none" if nothing_at_all else "unknown")
