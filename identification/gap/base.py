@@ -80,11 +80,9 @@ def _gains(bench: Bench) -> list[tuple[str, Array, float]]:
         both = float(np.hypot(meter.force_gain, meter.displacement_gain))
         return [("gain force", bench.stacked(line), both)]
     force = bench.force_column(-bench.load)
-    # An arm's laser reads all that moves; of one spring's line nobody can tell how much that is.
-    reads = bench.line if bench.data.arm else line
     return [
         ("gain force", force, meter.force_gain),
-        ("gain displacement", bench.stacked(reads), meter.displacement_gain),
+        ("gain displacement", bench.stacked(line), meter.displacement_gain),
     ]
 
 

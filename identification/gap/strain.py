@@ -46,7 +46,7 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
         pulls[base.index("spring")] = 0.0
     constant = base.index("tare") + base.index("offset")
     size = moves[constant] * np.abs(fitted.base[constant])
-    pulls[constant] *= np.minimum(size / (REMAINDER * engine.structural), 1.0)
+    pulls[constant] *= np.minimum(size / max(REMAINDER * engine.structural, 1e-300), 1.0)
     return np.asarray(pulls)
 
 
