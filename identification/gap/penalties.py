@@ -30,7 +30,6 @@ MECHANISMS = frozenset(
 CURVES = frozenset({"contact_seating", "joint_nonlinear_stiffness"})
 TOE_AND_KNEE = frozenset({"contact_seating", "joint_yield"})
 FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
-DRIFTS = frozenset({"force_drift", "thermal_drift"})
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 
 

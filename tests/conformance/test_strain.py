@@ -65,8 +65,10 @@ def test_springs_that_are_said_to_be_off_may_be() -> None:
     assert strain(engine, pulled(engine, "gain force", said), 0.0) == pytest.approx(FAR)
 
 
-@pytest.mark.parametrize(("word", "counts"), [("thermal_drift", True), ("joint_yield", False)])
-def test_a_drift_may_not_jump_and_laws_are_families(word: str, counts: bool) -> None:
+@pytest.mark.parametrize(
+    ("word", "counts"), [("thermal_drift", True), ("force_drift", False), ("joint_yield", False)]
+)
+def test_heat_does_not_jump_and_laws_are_families(word: str, counts: bool) -> None:
     bench, variants, _ = of(word, "rich")
     engine = quick_engine(bench)
     found = fit(engine, Explanation((Part(variants[0], 1e-5),), 0.0, 0.0, (0.0,), 0.0))
