@@ -8,7 +8,6 @@ that matter that is looked up in the data.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from math import log
 
 import numpy as np
@@ -32,7 +31,6 @@ SWINGS = 0.03  # share that is kept by a drift that comes and goes,
 _SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
 _STEP = 2.5  # of the grid of imperfections: so much it may be off
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
-_NEAR = 12.0  # nats
 
 
 def looked_up(found: Found) -> Found:
@@ -42,25 +40,24 @@ def looked_up(found: Found) -> Found:
     if faults(engine.bench.data):
         doubted = [replace(e, log_good=e.log_good + log(FAULTY)) for e in found.explanations]
         return weighed(replace(found, explanations=tuple(doubted)), found.kept)
-    judge = partial(_still_good, found) if engine.bench.data.arm else partial(_judged, engine)
+    judge = _still_good if engine.bench.data.arm else _judged
     best = found.explanations[0].log_weight
     first = [e for e in found.explanations[:_LOOKED_AT] if e.log_weight > best - _WITHIN]
-    done = {e.words: judge(e) for e in first if e.parts}
+    done = {e.words: judge(engine, e) for e in first if e.parts}
     if engine.bench.data.arm:  # what these lose goes to those with fewer of their effects
         for none in (e for e in first if not e.parts):
-            done[none.words] = _unstrained(found, none, fit(engine, none))
+            done[none.words] = _unstrained(none, strain(engine, fit(engine, none), none.eta))
         lost = [e.words for e in done.values() if not e.good]
         heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
-        done |= {e.words: judge(e) for e in heirs if e.words not in done}
+        done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
     out = tuple(done.get(e.words, e) for e in found.explanations)
     return weighed(replace(found, explanations=out), found.kept)
 
 
-def _still_good(found: Found, explanation: Explanation) -> Explanation:
+def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     """Of an arm: with as much of its weight as what it leaves allows it, the less the more words
     are spent; with no more than what the sizes of the imperfection allow where these are far
     beyond: another channel, which the rows of the response do not show, asks for them."""
-    engine = found.engine
     allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.parts))
     fitted = fit(engine, explanation)
     share = _share(_left(engine, fitted), allowed)
@@ -69,16 +66,12 @@ def _still_good(found: Found, explanation: Explanation) -> Explanation:
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
     if explanation.eta > _STEP * allowed:
         good = min(good, explanation.log_good)
-    return _unstrained(found, replace(explanation, log_good=good), fitted)
+    asked = strain(engine, fitted, explanation.eta)
+    return _unstrained(replace(explanation, log_good=good), asked)
 
 
-def _unstrained(found: Found, explanation: Explanation, fitted: Fit) -> Explanation:
-    """With as much of its weight as what it asks of its priors allows it. What one word more says
-    that explains about as well, these may be."""
-    words, least = explanation.words, explanation.log_weight - _NEAR
-    more = (e.words - words for e in found.explanations if e.log_weight > least and words < e.words)
-    said = words.union(*(m for m in more if len(m) == 1))
-    asked = strain(found.engine, fitted, explanation.eta, said)
+def _unstrained(explanation: Explanation, asked: float) -> Explanation:
+    """With as much of its weight as what it asks of its priors allows it."""
     kept = float(np.log(max(_share(asked, LIMIT), 1e-300)))
     return replace(explanation, log_good=explanation.log_good + kept)
 
