@@ -18,8 +18,8 @@ from identification.gap.evidence import LEVER_M, Engine
 from identification.gap.explanation import REMAINDER
 from identification.gap.fit import Fit
 
-# Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and two
-# beyond 5.5, of 16 stand-ins that were strained at all three between 5 and 6 and all others beyond.
+# Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and
+# two beyond 5.5; of 16 stand-ins that were strained at all 13 beyond 6, the others between 5 and 6.
 LIMIT = 5.5
 
 
