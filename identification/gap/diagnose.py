@@ -28,6 +28,7 @@ from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
 from identification.gap.refine import refine
 from identification.gap.search import force, search
+from identification.gap.strain import what_is_strained
 from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
@@ -226,7 +227,7 @@ def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explana
         next_measurement=None,
         remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
         looks_like=found.looks_like if verdict == "unknown" else None,
-        notes=_notes(bench),
+        notes=(*_notes(bench), *_disbelieved(found, verdict)),
         bench=bench,
         engine=engine,
         fit=fitted,
@@ -319,6 +320,22 @@ def _next(
     if verdict in WORDS and len(words) == 2:
         return next_measurement(found, variants, chosen, (words[0], words[1]), others)
     return None
+
+
+def _disbelieved(found: Found, verdict: str) -> tuple[str, ...]:
+    """Why an arm's best explanation was not believed, where that is what it asks for: META may
+    state too little, and only its author can tell."""
+    best = found.explanations[0]
+    if verdict != "unknown" or not found.engine.bench.data.arm:
+        return ()
+    asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
+    if not asks:
+        return ()
+    words = " and ".join(p.word for p in best.parts) or "nothing"
+    return (
+        f"What explains the gap best ({words}) asks for {asks}: it was not believed. "
+        "See whether META states too small an uncertainty.",
+    )
 
 
 def _notes(bench: Bench) -> tuple[str, ...]:

@@ -33,6 +33,31 @@ def strain(engine: Engine, fitted: Fit, eta: float) -> float:
     return max(float(pulls.max(initial=0.0)), together)
 
 
+_CALLED = {
+    "spring": "the stiffness of a joint",
+    "gain": "the gain of an instrument",
+    "tare": "the zero of the force",
+    "crosstalk": "the cross-talk of the force",
+    "offset": "a joint reading at rest",
+    "scatter": "the datum of a run",
+    "geometry": "the turn of the levers under load",
+}
+
+
+def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
+    """What an explanation asks most of, and how much, for people; empty where that is allowed."""
+    base, heat = _of_base(engine, fitted, eta), _of_heat(fitted)
+    if strain(engine, fitted, eta) <= LIMIT:
+        return ""
+    if heat.max(initial=0.0) > LIMIT and heat.max() > base.max(initial=0.0):
+        return "heat that jumps"
+    worst = int(base.argmax())
+    if base[worst] <= LIMIT:
+        return "many things a little off what META states"
+    name = next(v for k, v in _CALLED.items() if engine.base.names[worst].startswith(k))
+    return f"{name} {base[worst]:.0f} standard deviations off what META states"
+
+
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     """(b,) Springs that are said to be off may be off; tares, and offsets of the joint readings,
     count as far as they move a share of the gap that an explanation may not leave."""

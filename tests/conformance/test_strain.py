@@ -14,7 +14,7 @@ from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation
 from identification.gap.fit import Fit, fit
 from identification.gap.parts import Part
-from identification.gap.strain import LIMIT, strain
+from identification.gap.strain import LIMIT, strain, what_is_strained
 from tests.conformance.effect_benches import of, quick_engine
 from tests.conformance.gap_designs import linear
 from tests.conformance.test_effect_recovery import strength, typical, with_effect
@@ -106,7 +106,40 @@ def askew() -> GapData:
 def test_what_no_word_may_name_is_not_put_down_to_the_instruments() -> None:
     """A force across that only cross-talk of many standard deviations would make."""
     assert diagnose_gap(askew()).verdict == "load_misalignment"
-    assert diagnose_gap(askew(), withhold=["load_misalignment"]).verdict == "unknown"
+    assert not any("believed" in note for note in diagnose_gap(askew()).notes)
+    found = diagnose_gap(askew(), withhold=["load_misalignment"])
+    assert found.verdict == "unknown"
+    assert "META" in found.notes[-1]
+    assert "it was not believed" in found.notes[-1]
+
+
+def test_it_is_said_what_an_explanation_asks_for() -> None:
+    engine = quick_engine(of("base_compliance", "rich")[0])
+    said = {name: what_is_strained(engine, pulled(engine, name), 0.0) for name in NAMED}
+    assert said == NAMED
+    few = pulled(engine, "crosstalk")
+    few.base[:] = 0.0
+    few.base[engine.base.index("crosstalk")] = 3.5 * engine.base.sd[engine.base.index("crosstalk")]
+    assert what_is_strained(engine, few, 0.0) == "many things a little off what META states"
+    few.base[:] = 0.0
+    assert what_is_strained(engine, few, 0.0) == ""
+    bench, variants, _ = of("thermal_drift", "rich")
+    engine = quick_engine(bench)
+    found = fit(engine, Explanation((Part(variants[0], 1e-5),), 0.0, 0.0, (0.0,), 0.0))
+    pulls = np.zeros(len(found.pulls))
+    pulls[len(found.base)] = FAR
+    jumps = replace(found, pulls=pulls, base=np.zeros(len(found.base)))
+    assert what_is_strained(engine, jumps, 0.0) == "heat that jumps"
+
+
+_OFF = "7 standard deviations off what META states"
+NAMED = {
+    "spring2": f"the stiffness of a joint {_OFF}",
+    "gain force": f"the gain of an instrument {_OFF}",
+    "crosstalk": f"the cross-talk of the force {_OFF}",
+    "geometry": f"the turn of the levers under load {_OFF}",
+    "scatter run": f"the datum of a run {_OFF}",
+}
 
 
 def test_springs_far_beyond_what_was_stated_are_not_nothing() -> None:
