@@ -44,7 +44,7 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
             if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
                 continue
             akin = p.word in MECHANISMS and other.word in MECHANISMS
-            if akin and _joints(p) & _joints(other):
+            if akin and joints_of(p) & joints_of(other):
                 penalty += SAME_JOINT
             share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
             least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
@@ -149,7 +149,7 @@ def _counted(parts: tuple[Part, ...], found: Sizes) -> Array:
 def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     """Both are friction of one joint, or would be, for all that the data show; or one is the
     linear part of the other: a mechanism's law brings its own mean stiffness."""
-    same = bool(_joints(one) & _joints(other))
+    same = bool(joints_of(one) & joints_of(other))
     words = {one.word, other.word}
     holds = "joint_creep" in words and not engine.bench.course.always_moves
     bench = engine.bench  # without any return all memory is hidden; arms are let go between runs
@@ -199,7 +199,7 @@ def _by_direction(engine: Engine, part: Part) -> Array:
 _SHARED = 0.2
 
 
-def _joints(part: Part) -> set[int]:
+def joints_of(part: Part) -> set[int]:
     """Joints that the part sits in."""
     info = part.variant.info
     return set(info["joints"]) if "joints" in info else {info.get("joint", -1)}

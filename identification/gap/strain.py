@@ -17,6 +17,7 @@ from identification.gap.data import Array
 from identification.gap.evidence import LEVER_M, Engine
 from identification.gap.explanation import REMAINDER
 from identification.gap.fit import Fit
+from identification.gap.penalties import MECHANISMS, joints_of
 
 # Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and
 # two beyond 5.5; of 16 stand-ins that were strained at all 13 beyond 6, the others between 5 and 6.
@@ -59,8 +60,9 @@ def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
 
 
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
-    """(b,) Springs that are said to be off may be off; tares, and offsets of the joint readings,
-    count as far as they move a share of the gap that an explanation may not leave."""
+    """(b,) Springs that are said to be off may be off, and so may that of a joint whose mechanism
+    brings its own mean stiffness; tares, and offsets of the joint readings, count as far as they
+    move a share of the gap that an explanation may not leave."""
     base, n, weight = engine.base, engine.bench.rows.n, engine.bench.rows.weight
     columns = base.columns[:n]
     where = np.maximum(weight @ (columns != 0), 1e-300)
@@ -68,8 +70,11 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     moves[base.index("offset")] = LEVER_M
     loose = np.divide(eta, moves, out=np.zeros(len(moves)), where=moves > 0)
     pulls = np.abs(fitted.base) / np.hypot(base.sd, loose)
-    if any(p.word == "joint_stiffness_error" for p in fitted.parts):
-        pulls[base.index("spring")] = 0.0
+    loose_joints = {j for p in fitted.parts if p.word in MECHANISMS for j in joints_of(p)}
+    said = any(p.word == "joint_stiffness_error" for p in fitted.parts)
+    for i in base.index("spring"):
+        if said or int(base.names[i].removeprefix("spring")) - 1 in loose_joints:
+            pulls[i] = 0.0
     constant = base.index("tare") + base.index("offset")
     size = moves[constant] * np.abs(fitted.base[constant])
     pulls[constant] *= np.minimum(size / max(REMAINDER * engine.structural, 1e-300), 1.0)

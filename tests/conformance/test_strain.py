@@ -57,6 +57,15 @@ def test_many_that_are_a_little_off_count_together() -> None:
     assert strain(engine, few, 0.0) > LIMIT
 
 
+def test_a_mechanism_brings_the_mean_stiffness_of_its_joint() -> None:
+    bench, variants, _ = of("joint_nonlinear_stiffness", "rich")
+    engine = quick_engine(bench)
+    v = next(v for v in variants if v.info.get("joint") == 1)
+    bent = fit(engine, Explanation((Part(v, 1e-5),), 0.0, 0.0, (0.0,), 0.0))
+    assert strain(engine, pulled(engine, "spring2", bent), 0.0) == 0.0
+    assert strain(engine, pulled(engine, "spring3", bent), 0.0) == pytest.approx(FAR)
+
+
 def test_springs_that_are_said_to_be_off_may_be() -> None:
     bench, variants, _ = of("joint_stiffness_error", "rich")
     engine = quick_engine(bench)
