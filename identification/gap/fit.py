@@ -44,9 +44,16 @@ class Fit:
 
     def of(self, index: int) -> tuple[Array, Array]:
         """Coefficients and covariance of one part."""
-        start = sum(len(p.variant.columns) for p in self.parts[:index])
-        s = slice(start, start + len(self.parts[index].variant.columns))
+        s = self._where(index)
         return self.coefficients[s], self.covariance[s, s]
+
+    def pulls_of(self, index: int) -> Array:
+        """`pulls` of one part."""
+        return self.pulls[len(self.base) :][self._where(index)]
+
+    def _where(self, index: int) -> slice:
+        start = sum(len(p.variant.columns) for p in self.parts[:index])
+        return slice(start, start + len(self.parts[index].variant.columns))
 
     def contribution(self, engine: Engine, index: int) -> Array:
         """(size,) stacked contribution of one part."""

@@ -28,7 +28,10 @@ def strain(engine: Engine, fitted: Fit, eta: float) -> float:
     """The largest coordinate of base and thermal drift, or the sum of all squares against what is
     expected of it, in standard deviations; eta m: the imperfection of the laws, which may pull
     everything by as much as moves that."""
-    pulls = np.concatenate([_of_base(engine, fitted, eta), _of_heat(fitted)])
+    return _most(np.concatenate([_of_base(engine, fitted, eta), _of_heat(fitted)]))
+
+
+def _most(pulls: Array) -> float:
     count = len(pulls)  # a chi square of so many degrees of freedom, at most
     together = float(pulls @ pulls - count) / float(np.sqrt(2 * count))
     return max(float(pulls.max(initial=0.0)), together)
@@ -41,6 +44,7 @@ _CALLED = {
     "crosstalk": "the cross-talk of the force",
     "offset": "a joint reading at rest",
     "scatter": "the datum of a run",
+    "datum": "the datum of the displacement",
     "geometry": "the turn of the levers under load",
 }
 
@@ -48,7 +52,7 @@ _CALLED = {
 def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
     """What an explanation asks most of, and how much, for people; empty where that is allowed."""
     base, heat = _of_base(engine, fitted, eta), _of_heat(fitted)
-    if strain(engine, fitted, eta) <= LIMIT:
+    if _most(np.concatenate([base, heat])) <= LIMIT:
         return ""
     if heat.max(initial=0.0) > LIMIT and heat.max() > base.max(initial=0.0):
         return "heat that jumps"
@@ -70,11 +74,10 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     moves[base.index("offset")] = LEVER_M
     loose = np.divide(eta, moves, out=np.zeros(len(moves)), where=moves > 0)
     pulls = np.abs(fitted.base) / np.hypot(base.sd, loose)
-    loose_joints = {j for p in fitted.parts if p.word in MECHANISMS for j in joints_of(p)}
     said = any(p.word == "joint_stiffness_error" for p in fitted.parts)
-    for i in base.index("spring"):
-        if said or int(base.names[i].removeprefix("spring")) - 1 in loose_joints:
-            pulls[i] = 0.0
+    own = {j for p in fitted.parts if p.word in MECHANISMS for j in joints_of(p)}
+    for j in range(engine.bench.data.joints) if said else own:
+        pulls[base.index(f"spring{j + 1}")] = 0.0
     constant = base.index("tare") + base.index("offset")
     size = moves[constant] * np.abs(fitted.base[constant])
     pulls[constant] *= np.minimum(size / max(REMAINDER * engine.structural, 1e-300), 1.0)
@@ -83,10 +86,6 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
 
 def _of_heat(fitted: Fit) -> Array:
     """Heat has inertia: its path does not jump. What the force drifts is read at zero load."""
-    start, out = len(fitted.base), [np.zeros(0)]
-    for p in fitted.parts:
-        end = start + len(p.variant.columns)
-        if p.word == "thermal_drift":
-            out.append(np.abs(fitted.pulls[start:end]))
-        start = end
-    return np.concatenate(out)
+    words = [p.word for p in fitted.parts]
+    heat = [fitted.pulls_of(i) for i, w in enumerate(words) if w == "thermal_drift"]
+    return np.asarray(np.abs(np.concatenate([np.zeros(0), *heat])))
