@@ -40,7 +40,7 @@ class Dense:
 
 def dense(bench: Bench, drop: tuple[str, ...] = ()) -> Dense:
     """All nuisances but those dropped, marginalised."""
-    size, sigma = bench.layout.size, evidence.row_noise(bench)
+    size, sigma = bench.layout.size, bench.sigma
     A, B = np.diag(sigma**2), np.zeros((size, size))
     n, rows = bench.rows.n, bench.rows
     for h in np.unique(rows.hold):

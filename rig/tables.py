@@ -181,8 +181,9 @@ class _Table:
     def _counts(self, file: CsvFile, block: Block, column: Column, values: Values) -> Values:
         lowest, wanted = 1, "wanted: a whole number, 1, 2, 3 ..."
         if column.name == "step":
-            values = np.where(np.isnan(values), NO_STEP, values)
-            lowest, wanted = NO_STEP, "wanted: a whole number from 0, or nothing (continuous)"
+            # below NO_STEP is room for numbers below 0 until all rows are there
+            values = np.where(np.isnan(values), NO_STEP, np.where(values < 0, values - 1, values))
+            lowest, wanted = -_BIGGEST_COUNT, "wanted: a whole number, or nothing (continuous)"
         with np.errstate(invalid="ignore"):
             good = (values >= lowest) & (values < _BIGGEST_COUNT) & (values == np.floor(values))
         bad = np.flatnonzero(~good)
@@ -243,8 +244,27 @@ class _Table:
                 columns[name] = defaults[name]()
                 if name == "time_s":
                     self.stand_ins[name] = SAMPLE_NUMBER
+        columns["step"] = self._steps(columns["step"])
         self._note_order(columns)
         return columns | given
+
+    def _steps(self, steps: Values) -> Values:
+        """Steps of a load the other way, numbered -1, -2 ..., go on behind the others; nothing but
+        0 and -1 is a continuous measurement, as data sets and their Parquet tables hold it."""
+        below = steps < NO_STEP
+        if not below.any():
+            return steps
+        if steps.max() <= 0 and steps.min() == NO_STEP - 1:
+            return np.where(below, NO_STEP, steps)
+        last, other = max(int(steps.max()), 0), NO_STEP - steps[below]
+        kept = steps.copy()
+        kept[below] = last + other
+        low, high = int(other.min()), int(other.max())
+        self.notes.append(
+            f"steps below 0 are numbered on: -{low} is {last + low}"
+            + (f" ... -{high} is {last + high}" if high > low else "")
+        )
+        return kept
 
     def _only(self, what: str, names: list[str], rows: int) -> Values:
         if what == "pose" and self._meta.robot == "none":

@@ -36,13 +36,20 @@ def prediction(bench: Bench) -> Array:
 
 def base_columns(bench: Bench) -> Base:
     """The columns common to all hypotheses."""
-    parts: list[tuple[str, Array, float]] = []
+    parts: list[_Part] = []
     parts += _springs(bench)
     parts.append(("geometry", _geometry(bench), HALF))
     parts += _gains(bench)
     parts += _datums(bench)
     parts += _offsets(bench)
     parts += _crosstalk(bench)
+    return _of(parts)
+
+
+_Part = tuple[str, Array, float]
+
+
+def _of(parts: list[_Part]) -> Base:
     kept = [(n, c, s) for n, c, s in parts if s > 0 and np.any(c)]
     return Base(
         np.column_stack([c for _, c, _ in kept]),
@@ -51,7 +58,7 @@ def base_columns(bench: Bench) -> Base:
     )
 
 
-def _springs(bench: Bench) -> list[tuple[str, Array, float]]:
+def _springs(bench: Bench) -> list[_Part]:
     """Relative change of a joint's compliance; the prior stays that of the simulation."""
     data = bench.data
     scale = data.compliance / bench.compliance
@@ -66,27 +73,49 @@ def _geometry(bench: Bench) -> Array:
     """What the levers change as the joints give way, `1.5 F^2 d' T d` with d the deflection per
     newton and T the change of levers per deflection: some micrometres. Coefficient 1 for stiff
     links and a load that keeps its direction; a rig that is simulated linearly has none."""
+    compliance = _compliance_found(bench)
     turned = np.stack([s.turned_lever for s in bench.data.setups])[bench.rows.setup]
-    bends = np.einsum("nij,nj->ni", turned, bench.lever * bench.compliance)
-    response = 1.5 * bench.load**2 * np.sum(bench.lever * bench.compliance * bends, axis=1)
-    q = bends * bench.compliance * bench.load[:, None] ** 2
+    bends = np.einsum("nij,nj->ni", turned, bench.lever * compliance)
+    response = 1.5 * bench.load**2 * np.sum(bench.lever * compliance * bends, axis=1)
+    q = bends * compliance * bench.load[:, None] ** 2
     return bench.stacked(bench.sense * response, q)
 
 
-def _gains(bench: Bench) -> list[tuple[str, Array, float]]:
+def _compliance_found(bench: Bench) -> Array:
+    """(m,) rad/Nm (m/N for a bench): of springs alone, as far as the data tell: levers turn by what
+    the joints really give, and that counts twice, however far off the simulated springs are."""
+    if not bench.data.arm or bench.imposed:
+        return bench.compliance
+    springs = [(name, column, _WIDE) for name, column, _ in _springs(bench)]
+    base = _of([*springs, *_gains(bench), *_datums(bench), *_offsets(bench)])
+    root = base.columns * (base.sd / bench.sigma[:, None])
+    seen = (bench.observed - bench.stacked(bench.slope * bench.load, bench.elastic)) / bench.sigma
+    found = base.sd * np.linalg.solve(root.T @ root + np.eye(len(base.sd)), root.T @ seen)
+    softer = dict(zip(base.names, found.tolist(), strict=True))
+    change = [softer.get(f"spring{j + 1}", 0.0) for j in range(bench.data.joints)]
+    return np.asarray(bench.compliance * np.clip(1 + np.array(change), *_SOFTER))
+
+
+_WIDE = 0.5  # a joint may be half or twice as stiff
+_SOFTER = (0.2, 5.0)  # times
+
+
+def _gains(bench: Bench) -> list[_Part]:
     meter = bench.data.instruments
     line = bench.slope * bench.load
     if bench.imposed:  # only the ratio of the two gains shows
         both = float(np.hypot(meter.force_gain, meter.displacement_gain))
         return [("gain force", bench.stacked(line), both)]
     force = bench.force_column(-bench.load)
+    # the laser's acts on what it read, however far off the simulated springs are
+    read = bench.line if bench.data.arm else line
     return [
         ("gain force", force, meter.force_gain),
-        ("gain displacement", bench.stacked(line), meter.displacement_gain),
+        ("gain displacement", bench.stacked(read), meter.displacement_gain),
     ]
 
 
-def _datums(bench: Bench) -> list[tuple[str, Array, float]]:
+def _datums(bench: Bench) -> list[_Part]:
     """Laser datum of a setup (free) and scatter of whole runs within it; tare of the force."""
     rows = bench.rows
     per_run = bench.data.datum == "repetition"
@@ -108,7 +137,7 @@ def _datums(bench: Bench) -> list[tuple[str, Array, float]]:
     return out
 
 
-def _tares(bench: Bench) -> list[tuple[str, Array, float]]:
+def _tares(bench: Bench) -> list[_Part]:
     """The zero of each force component, taken from a few samples: acts on every force after."""
     rows, setups = bench.rows, bench.data.setups
     unit = np.stack([s.unit_vector for s in setups])[rows.setup]
@@ -125,7 +154,7 @@ def _tares(bench: Bench) -> list[tuple[str, Array, float]]:
     return out
 
 
-def _offsets(bench: Bench) -> list[tuple[str, Array, float]]:
+def _offsets(bench: Bench) -> list[_Part]:
     """Joint readings against the commanded pose, per pose and joint."""
     if not bench.has_q:
         return []
@@ -140,7 +169,7 @@ def _offsets(bench: Bench) -> list[tuple[str, Array, float]]:
     return out
 
 
-def _crosstalk(bench: Bench) -> list[tuple[str, Array, float]]:
+def _crosstalk(bench: Bench) -> list[_Part]:
     rows = bench.rows
     if rows.tangential is None:
         return []

@@ -218,6 +218,22 @@ class Bench:
         return self.stacked(-motion, self._follow(-motion))
 
     @cached_property
+    def sigma(self) -> Array:
+        """(size,) standard deviation of every stacked row."""
+        noise, rows, layout = self.noise, self.rows, self.layout
+        out = np.empty(layout.size)
+        root = np.sqrt(rows.weight) if not rows.continuous else np.ones(rows.n)
+        out[: layout.n] = noise.response
+        total = np.sqrt(np.add.reduceat(rows.weight, np.flatnonzero(rows.hold_starts)))
+        if layout.q.stop > layout.q.start:
+            out[layout.q] = np.concatenate([s / total for s in noise.q])
+        if rows.tangential is not None:
+            out[layout.tangential] = np.tile(noise.force / total, 2)
+        if self.has_zero_force:
+            out[layout.zero_force] = noise.force / root[rows.zero]
+        return out
+
+    @cached_property
     def stated_slope(self) -> Array:
         """(n,) m/N: compliance along the direction as simulated, by which a response is a force."""
         return np.asarray(self.lever**2 @ self.data.compliance)

@@ -70,7 +70,7 @@ class Engine:
     def __init__(self, bench: Bench, base: Base, target: Array, etas: Array) -> None:
         """target: stacked observation minus the simulation's prediction."""
         self.bench, self.base, self.target, self.etas = bench, base, target, etas
-        self.sigma = row_noise(bench)
+        self.sigma = bench.sigma
         self.cache: dict[object, Array] = {}
         self.stacks: dict[object, Any] = {}  # of variants that are compared again and again
         self.limits: dict[object, Any] = {}
@@ -293,7 +293,7 @@ def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
 
 def structural_rms(bench: Bench, base: Base, target: Array) -> float:
     """rms (m) of the response that the base alone leaves at its best."""
-    n, sigma = bench.rows.n, row_noise(bench)
+    n, sigma = bench.rows.n, bench.sigma
     A = base.columns * base.sd / sigma[:, None]
     beta = base.sd * np.linalg.solve(A.T @ A + np.eye(len(base.sd)), A.T @ (target / sigma))
     weight = bench.rows.weight
@@ -306,22 +306,6 @@ def _variance(bench: Bench) -> float:
     yields far beyond its threshold on an imposed path, is no further off for that."""
     weight, moved = bench.rows.weight, bench.rows.moved(bench.response[:, None])[:, 0]
     return float(weight @ moved**2 / weight.sum())
-
-
-def row_noise(bench: Bench) -> Array:
-    """Standard deviation of every stacked row."""
-    noise, rows, layout = bench.noise, bench.rows, bench.layout
-    out = np.empty(layout.size)
-    root = np.sqrt(rows.weight) if not rows.continuous else np.ones(rows.n)
-    out[: layout.n] = noise.response
-    total = np.sqrt(np.add.reduceat(rows.weight, np.flatnonzero(rows.hold_starts)))
-    if layout.q.stop > layout.q.start:
-        out[layout.q] = np.concatenate([s / total for s in noise.q])
-    if rows.tangential is not None:
-        out[layout.tangential] = np.tile(noise.force / total, 2)
-    if bench.has_zero_force:
-        out[layout.zero_force] = noise.force / root[rows.zero]
-    return out
 
 
 def level_columns(bench: Bench) -> Array:

@@ -14,7 +14,7 @@ from identification.gap.data import Array
 IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a real mechanism
 # Elasticity, gains and leverage are laws, not families, and as exact as the springs of the base,
 # which count as exact: to a thousandth of their size.
-LAW_IMPERFECTION = 0.005
+LAW_IMPERFECTION = 0.002
 LINEAR = frozenset(
     [
         "link_flexibility",

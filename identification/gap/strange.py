@@ -23,7 +23,7 @@ from identification.gap.bench import Bench
 from identification.gap.compare import by_word, log_mean, marginal, score
 from identification.gap.data import Array
 from identification.gap.effects.drift import by_direction, free_path, path_root
-from identification.gap.evidence import Engine, row_noise
+from identification.gap.evidence import Engine
 from identification.gap.explanation import Found, Likeness
 from identification.gap.parts import Part, part_sizes
 from identification.gap.priors import LOG_UNKNOWN
@@ -180,7 +180,7 @@ def _periodic(
     of the gap."""
     if not len(count):
         return []
-    white = 1 / row_noise(bench)[: bench.rows.n]
+    white = 1 / bench.sigma[: bench.rows.n]
     known = np.linalg.qr(base.columns[: bench.rows.n] * white[:, None])[0]
     left = white * target[: bench.rows.n]
     taken = partial(square_of, known, left - known @ (known.T @ left), white, phase, masks)

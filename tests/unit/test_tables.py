@@ -154,6 +154,26 @@ def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("steps", "kept", "note"),
+    [
+        (["0", "1", "2", "1", "0", "-1", "-2", ""], [0, 1, 2, 1, 0, 3, 4, -1],
+         "steps below 0 are numbered on: -1 is 3 ... -2 is 4"),
+        (["0", "-1", "1"], [0, 2, 1], "steps below 0 are numbered on: -1 is 2"),
+        (["-2", "-1"], [2, 1], "steps below 0 are numbered on: -1 is 1 ... -2 is 2"),
+        (["0", "-1", "-1", ""], [0, -1, -1, -1], ""),
+    ],
+)  # fmt: skip
+def test_steps_of_a_load_the_other_way(
+    tmp_path: Path, steps: list[str], kept: list[int], note: str
+) -> None:
+    rows = "".join(f"x,{s},5,0\n" for s in steps)
+    rows = "direction,step,force_N,displacement_mm\n" + rows
+    dataset = bring(tmp_path, rows, example.META_SPECIMEN)
+    assert dataset.columns["step"].tolist() == kept
+    assert [e["text"] for e in dataset.events if e["kind"] == "note"] == ([note] if note else [])
+
+
 def test_progress_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(csvblocks, "BLOCK_BYTES", 100)
     seen: list[tuple[str, float]] = []
@@ -232,10 +252,12 @@ REFUSED: list[tuple[str | bytes, str]] = [
      "whole number, 1, 2, 3 ...."),
     (HEAD + GOOD + "1,x,1.5,loading,1,5,0\n", ':3: column repetition: "1.5" is not allowed; '
      "wanted: a whole number, 1, 2, 3 ...."),
-    (HEAD + GOOD + "1,x,1,loading,-2,5,0\n", ':3: column step: "-2" is not allowed; wanted: a '
-     "whole number from 0, or nothing (continuous)."),
+    (HEAD + GOOD + "1,x,1,loading,2.5,5,0\n", ':3: column step: "2.5" is not allowed; wanted: a '
+     "whole number, or nothing (continuous)."),
     (HEAD + GOOD + "1,x,1,loading,1e40,5,0\n", ':3: column step: "1e40" is not allowed; wanted: a '
-     "whole number from 0, or nothing (continuous)."),
+     "whole number, or nothing (continuous)."),
+    (HEAD + GOOD + "1,x,1,loading,-1e40,5,0\n", ':3: column step: "-1e40" is not allowed; wanted: '
+     "a whole number, or nothing (continuous)."),
     (HEAD + GOOD + '1,x,"1,loading,1,5,0\n', ":3: quotes that do not match (unexpected end of "
      "data); a cell in quotes must end in its line."),
     (HEAD.replace("step", "pose") + "1,x,1,zero,P1,5,0\n1,x,1,zero,P2,5,0\n", ':3: column pose: '

@@ -40,7 +40,7 @@ def variants(bench: Bench) -> list[Variant]:
                     joints=[j])
         )  # fmt: skip
     if len(columns) > 1:
-        scales = (max(2 * float(relative.max()), 0.2),)
+        scales = tuple(max(2 * float(relative.max()), 0.2) * f for f in SCALES)
         out.append(
             variant(WORD, "all joints", columns, scales, positive=False,
                     joints=bench.moving_joints())

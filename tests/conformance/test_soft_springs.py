@@ -1,0 +1,88 @@
+"""An arm whose springs are far softer than simulated: what gains and turning levers do then."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from identification.gap.base import HALF
+from identification.gap.bench import make_bench
+from identification.gap.data import GapData
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects import library
+from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation
+from identification.gap.fit import Fit, fit
+from identification.gap.parts import Part
+from rig.gap_data import gap_data
+from rig.worlds.arm import place
+from tests.conformance.effect_benches import quick_engine
+from tests.conformance.gap_designs import DESIGNS, TCP_MM, TRUE, Array, Q, imported, meta, noisy
+
+SOFTER = np.array([1.9, 2.1, 1.8, 2.2, 1.7, 1.0])  # times as simulated
+GAIN = 0.012  # four standard deviations
+DIRECTIONS = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0])}
+
+
+def turning(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+    """What hinges that turn by finite angles under a load of fixed direction do beyond the linear
+    rig, in a kinematics that the identification does not share."""
+    moved, angles = np.zeros(len(rows)), np.zeros((len(rows), 6))
+    tcp = np.array(TCP_MM) * 1e-3
+    for (pose, direction, force), at in rows.groupby(["pose", "direction", "force_N"]).groups.items():
+        q0, unit = np.array(Q[str(pose)]), DIRECTIONS[str(direction)]
+        q = q0
+        for _ in range(20):
+            there = place(q)
+            torque = there.levers(there.tool(tcp)) @ unit * float(force)
+            q = q0 + torque * SOFTER / TRUE
+        index = np.asarray(at, dtype=int)
+        moved[index] = unit @ (place(q).tool(tcp) - place(q0).tool(tcp))
+        angles[index] = q - q0
+    linear = lever * rows["force_N"].to_numpy()[:, None] / TRUE
+    beyond = angles - linear
+    return moved - np.sum(lever * linear, axis=1) - np.sum(lever * beyond, axis=1), beyond
+
+
+def soft(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+    """Linear, and read by a laser whose gain is off."""
+    force = rows["force_N"].to_numpy()[:, None]
+    moved = np.sum(lever**2 * force * SOFTER / TRUE, axis=1)
+    return GAIN * moved, lever * force * (SOFTER - 1) / TRUE
+
+
+@cache
+def data(law: str) -> GapData:
+    design = DESIGNS["rich"]
+    rows = noisy(design, {"turning": turning, "soft": soft}[law], noise=0.2)
+    return gap_data(imported(rows, meta(design)))
+
+
+def with_springs(law: str) -> tuple[Engine, Fit]:
+    """The springs are said to be off, nothing else."""
+    bench = make_bench(data(law))
+    variants = library(bench, ["joint_stiffness_error"])
+    v = next(v for v in variants if v.label == "all joints")
+    engine = quick_engine(bench)
+    return engine, fit(engine, Explanation((Part(v, v.scales[-1]),), 0.0, 0.0, (0.0,), 0.0))
+
+
+def test_levers_turn_by_what_the_joints_really_give() -> None:
+    engine, found = with_springs("turning")
+    geometry = HALF + found.base[engine.base.index("geometry")[0]]
+    assert geometry == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_gain_of_the_laser_acts_on_what_it_read() -> None:
+    engine, found = with_springs("soft")
+    assert found.base[engine.base.index("gain displacement")[0]] == pytest.approx(GAIN, abs=0.001)
+
+
+@pytest.mark.parametrize("law", ["turning", "soft"])
+def test_wrong_springs_alone_are_named(law: str) -> None:
+    result = diagnose_gap(data(law))
+    assert result.verdict == "joint_stiffness_error"
+    assert [e.name for e in result.effects] == ["joint_stiffness_error"]
