@@ -178,18 +178,21 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]
     best = _worthwhile(best, simpler)
-    if len(best.parts) < 3:
+    if len(best.words) < 3:
         return best
-    least = min(LEAST_SHARE * max(best.sizes), BELOW_NOISE * noise_of(found.engine.bench))
-    petty = {p.word for p, s in zip(best.parts, best.sizes, strict=True) if s < least} - FREE
+    troubles = best.troubles
+    least = min(
+        LEAST_SHARE * max(troubles.values()), BELOW_NOISE * noise_of(found.engine.bench)
+    )
+    petty = {w for w, size in troubles.items() if size < least} - FREE
     return next((e for e in simpler if best.words - e.words <= petty), best)
 
 
 def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:
     """With no effect that brings less than it has to."""
     while True:
-        worth = WORTH if len(best.parts) < 3 else WORTH_OF_THIRD
-        fewer = [e for e in simpler if e.words < best.words and len(e.parts) == len(best.parts) - 1]
+        worth = WORTH if len(best.words) < 3 else WORTH_OF_THIRD
+        fewer = [e for e in simpler if e.words < best.words and len(e.words) == len(best.words) - 1]
         near = [e for e in fewer if e.log_weight > best.log_weight - worth]
         if not near:
             return best
@@ -297,7 +300,7 @@ def _runners_up(
     if not ways or verdict == "none":
         return {}
     name, number = next(iter(ways.items()))
-    others = [e for e in found.explanations if len(e.parts) == 1 and verdict not in e.words]
+    others = [e for e in found.explanations if len(e.words) == 1 and verdict not in e.words]
     return {e.parts[0].word: held_out(engine, e, name, number).after for e in others[:3]}
 
 

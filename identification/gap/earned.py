@@ -66,7 +66,7 @@ def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
     if explanation.words & DRIFTS and explanation.words <= FREE:
         return 1.0
     engine = found.engine
-    loose = DRIFTS if len(explanation.parts) <= 2 else frozenset[str]()  # three have to earn it all
+    loose = DRIFTS if len(explanation.words) <= 2 else frozenset[str]()  # three have to earn it all
     after = held_out(engine, explanation, "repetition", fold, loose).after
     limit = max(FAILS * noise_of(engine.bench), CLOSED * _moved(engine, explanation))
     return float(1 / (1 + (after / limit) ** SHARP))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import log
@@ -13,7 +13,14 @@ from identification.gap.compare import condition
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import LINEAR, level_prior
-from identification.gap.parts import Part, Sizes, log_joints, part_sizes, signs_kept
+from identification.gap.parts import (
+    Part,
+    Sizes,
+    energies,
+    log_joints,
+    part_sizes,
+    signs_kept,
+)
 from identification.gap.penalties import (
     FRICTION,
     TOE_AND_KNEE,
@@ -55,6 +62,18 @@ class Explanation:
         """Names of its effects."""
         return frozenset(p.word for p in self.parts)
 
+    @cached_property
+    def troubles(self) -> dict[str, float]:
+        """Word -> rms m of what it does in all its joints together, the largest first."""
+        return _together(self.parts, self.sizes)
+
+
+def _together(parts: tuple[Part, ...], sizes: Iterable[float]) -> dict[str, float]:
+    squares: dict[str, float] = {}
+    for p, size in zip(parts, sizes, strict=True):
+        squares[p.word] = squares.get(p.word, 0.0) + float(size) ** 2
+    return {w: s**0.5 for w, s in sorted(squares.items(), key=lambda i: -i[1])}
+
 
 @dataclass(frozen=True)
 class Likeness:
@@ -93,17 +112,18 @@ def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Exp
     bases = log_joints(engine, parts)
     sizes = part_sizes(engine, parts, int(bases.argmax()))
     each, energy = _counted(engine, parts, sizes), sizes.energy
+    together = _together(parts, each)
     logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
     least = max(
         0.6 * engine.bench.noise.stated,
-        REMAINDER * engine.structural / max(len(parts), 1),
+        REMAINDER * engine.structural / max(len(together), 1),
         min(LAW_REMAINDER * float(each.max(initial=0.0)), REMAINDER * engine.structural),
     )
     good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
     share = np.exp(logs - logs.max())
     fraction = float(share @ good / share.sum())
-    order = np.argsort(-each, kind="stable")
+    order = sorted(range(len(parts)), key=lambda i: (-together[parts[i].word], -each[i]))
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
     weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
     weight -= within_stated(engine, parts, sizes)
@@ -155,3 +175,12 @@ def conditioned(
         return levels, 0.0
     weights = np.array([lv.log_base for lv in levels])
     return levels, part_sizes(engine, parts, int(weights.argmax())).energy
+
+
+def up_to_likeliest(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
+    """The same as `conditioned`, at levels up to the likeliest: with an effect more, no more
+    imperfection is needed."""
+    energy = energies(engine, parts)
+    prior = [level_prior(engine.etas, i, float(e)) for i, e in enumerate(energy)]
+    likeliest = int(np.argmax(log_joints(engine, parts) + np.array(prior)))
+    return conditioned(engine, parts, engine.levels[: likeliest + 1])

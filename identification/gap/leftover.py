@@ -58,7 +58,7 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     """Of an arm: with as much of its weight as what it leaves allows it, the less the more words
     are spent; with no more than what the sizes of the imperfection allow where these are far
     beyond: another channel, which the rows of the response do not show, asks for them."""
-    allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.parts))
+    allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.words))
     fitted = fit(engine, explanation)
     share = _share(_left(engine, fitted), allowed)
     if _swings(fitted):

@@ -43,7 +43,7 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
             # a small knee beside a large error of the springs is no freedom of the latter
             if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
                 continue
-            akin = p.word in MECHANISMS and other.word in MECHANISMS
+            akin = p.word != other.word and {p.word, other.word} <= MECHANISMS
             if akin and joints_of(p) & joints_of(other):
                 penalty += SAME_JOINT
             share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)

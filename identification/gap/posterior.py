@@ -19,6 +19,7 @@ from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Soft
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part, energies, log_joints, signs_kept
 from identification.gap.penalties import SAME_JOINT
+from identification.gap.several import family_of
 from identification.gap.variants import Variant, place_of
 
 Parameters = dict[str, Parameter]
@@ -228,7 +229,7 @@ def _open(engine: Engine, variants: list[Variant], chosen: Explanation, index: i
     part = chosen.parts[index]
     rest = tuple(p for i, p in enumerate(chosen.parts) if i != index)
     levels, energy = conditioned(engine, rest)
-    family = [v for v in variants if v.word == part.word]
+    family = family_of(variants, part.word, rest)
     stand = _representatives(score(engine, levels, family, energy))
     first = next((more for s, more in stand if s.variant is part.variant), 0.0)
     shapes = [(part, first)]

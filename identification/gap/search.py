@@ -7,14 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from identification.gap.compare import Scored, by_word, closest, log_mean, marginal, score
-from identification.gap.evidence import Engine, Level
-from identification.gap.explanation import Explanation, Found, conditioned, explain
+from identification.gap.evidence import Engine
+from identification.gap.explanation import (
+    Explanation,
+    Found,
+    conditioned,
+    explain,
+    up_to_likeliest,
+)
 from identification.gap.finer import gained
-from identification.gap.imperfection import level_prior
 from identification.gap.noise import UNSURE
-from identification.gap.parts import Part, energies, log_joints, part_sizes
+from identification.gap.parts import Part, part_sizes
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
 from identification.gap.readings import reading_all
+from identification.gap.several import in_more_joints, polished
 from identification.gap.variants import Variant
 from identification.gap.verdict import weighed
 
@@ -49,7 +55,7 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
     empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
     seeds = _SEEDS if engine.bench.data.arm else _BENCH_SEEDS
-    front = _seeds(pool, seeds)
+    front = _in_more_joints(engine, variants, pool, _seeds(pool, seeds))
     for depth in range(2, deepest + 1):
         front = _deepen(engine, variants, pool, front, depth, max(2, seeds // depth))
         if not front:
@@ -101,7 +107,7 @@ def force(
         parts = (*parts, Part(top.variant, top.scale))
         left.discard(top.variant.word)
         evidence = marginal([s for s in scored if s.variant.word == top.variant.word])
-    return _polish(engine, variants, explain(engine, parts, evidence))
+    return polished(engine, variants, explain(engine, parts, evidence))
 
 
 def _seeds(pool: dict[frozenset[str], Explanation], most: int) -> list[Explanation]:
@@ -127,7 +133,7 @@ def _deepen(
     best = max(e.log_weight for e in pool.values())
     grown: dict[frozenset[str], Explanation] = {}
     for start in front:
-        if len(start.parts) != depth - 1:
+        if len(start.words) != depth - 1:
             continue
         if depth > 2 and start.log_weight < best - _WINDOW:
             continue
@@ -136,12 +142,27 @@ def _deepen(
         if words not in pool or pool[words].log_weight < explanation.log_weight:
             pool[words] = explanation
     ranked = sorted(grown.values(), key=lambda e: -e.log_weight)
-    polished = [_reading_all(engine, variants, _polish(engine, variants, e)) for e in ranked[:kept]]
+    first = [_reading_all(engine, variants, polished(engine, variants, e)) for e in ranked[:kept]]
     others = [_reading_all(engine, variants, e) for e in ranked[kept:_READING]]
-    for explanation in [*polished, *others]:
+    for explanation in [*first, *others]:
         if pool[explanation.words].log_weight < explanation.log_weight:
             pool[explanation.words] = explanation
-    return [e for e in polished if e.log_weight > best - 2.0]
+    good = _in_more_joints(engine, variants, pool, first)
+    return [e for e in good if e.log_weight > best - 2.0]
+
+
+def _in_more_joints(
+    engine: Engine,
+    variants: list[Variant],
+    pool: dict[frozenset[str], Explanation],
+    front: list[Explanation],
+) -> list[Explanation]:
+    """The front with its mechanisms in as many joints as it takes; so does the pool hold them."""
+    out = [in_more_joints(engine, variants, e) for e in front]
+    for e in out:
+        if pool[e.words].log_weight < e.log_weight:
+            pool[e.words] = e
+    return out
 
 
 def _with_one_more(
@@ -151,7 +172,7 @@ def _with_one_more(
     known: dict[frozenset[str], Explanation],
 ) -> dict[frozenset[str], Explanation]:
     others = [v for v in variants if v.word not in start.words]
-    levels, energy = _no_worse(engine, start.parts)
+    levels, energy = up_to_likeliest(engine, start.parts)
     out: dict[frozenset[str], Explanation] = {}
     found_words = by_word(score(engine, levels, others, energy))
     promising = sorted(found_words, key=lambda w: -marginal(found_words[w]))[:_PROMISING]
@@ -166,22 +187,6 @@ def _with_one_more(
     return out
 
 
-def _polish(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
-    """Lets every effect choose its variant anew, the others given."""
-    best = start
-    for index in range(len(start.parts)):
-        rest = tuple(p for i, p in enumerate(best.parts) if i != index)
-        word = best.parts[index].word
-        levels, energy = _no_worse(engine, rest)
-        family = [v for v in variants if v.word == word]
-        scored = score(engine, levels, family, energy)
-        top = closest(scored)
-        found = explain(engine, (*rest, Part(top.variant, top.scale)), marginal(scored))
-        if found.log_weight > best.log_weight:
-            best = found
-    return best
-
-
 def _reading_all(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
     """With instruments that read what its other effects do, if that is better; the variants then
     hold these as well."""
@@ -190,16 +195,7 @@ def _reading_all(engine: Engine, variants: list[Variant], start: Explanation) ->
         return start
     variants += fresh
     engine.extend()
-    return _polish(engine, variants, start)
-
-
-def _no_worse(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
-    """The same as `conditioned`, at levels up to the likeliest: with an effect more, no more
-    imperfection is needed."""
-    energy = energies(engine, parts)
-    prior = [level_prior(engine.etas, i, float(e)) for i, e in enumerate(energy)]
-    likeliest = int(np.argmax(log_joints(engine, parts) + np.array(prior)))
-    return conditioned(engine, parts, engine.levels[: likeliest + 1])
+    return polished(engine, variants, start)
 
 
 def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:

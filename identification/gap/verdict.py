@@ -53,9 +53,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
         if not e.parts and found.engine.bench.noise.raised > NOISY:
             good *= STATED
         said = _simpler(e, ranked, kept) or e
-        many = (
-            THREE if len(said.parts) >= _MANY and said.sizes[2] > TELLING * said.sizes[0] else 1.0
-        )
+        many = THREE if _tells_of_three(said) else 1.0
         for word, share in _main(said, found.engine.bench.data.arm).items():
             mass[word] += many * share * good
         mass["unknown"] += (1 - many) * good
@@ -112,16 +110,21 @@ def _simpler(
     near = (
         f
         for f in ranked
-        if len(f.parts) == len(e.parts) - 1
+        if len(f.words) == len(e.words) - 1
         and f.words < e.words
         and f.log_weight > e.log_weight - TAKES_THREE
         and f.good
         and kept.get(f.words, 1.0) > 0.5
     )
-    return next(near, None) if len(e.parts) >= _MANY else None
+    return next(near, None) if len(e.words) >= _MANY else None
 
 
 _MANY = 3
+
+
+def _tells_of_three(explanation: Explanation) -> bool:
+    sizes = list(explanation.troubles.values())
+    return len(sizes) >= _MANY and sizes[2] > TELLING * sizes[0]
 
 
 def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
@@ -134,10 +137,8 @@ def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
         return {"none": 1.0}
     if not arm:
         return {explanation.parts[0].word: 1.0}
-    size = np.maximum(np.array(explanation.sizes), 0.0)
-    size[0] = max(float(size[0]), 1e-300)
-    share = size / size.sum()
-    return {p.word: float(s) for p, s in zip(explanation.parts, share, strict=True)}
+    sizes = {w: max(size, 1e-300) for w, size in explanation.troubles.items()}
+    return {w: size / sum(sizes.values()) for w, size in sizes.items()}
 
 
 def _heir(

@@ -1,0 +1,74 @@
+"""The same trouble in several joints: all gears of an arm rub, creep and bend, one more than others.
+
+A joint mechanism sits in one joint of a variant. Where that leaves what the same mechanism in
+another joint would do, the explanation takes both, as one word: one trouble, seen twice. Only the
+joint readings can tell that from a second mechanism, so nothing is looked for without them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identification.gap.compare import closest, marginal, score
+from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation, conditioned, explain, up_to_likeliest
+from identification.gap.parts import Part
+from identification.gap.variants import Variant
+
+IN_JOINTS = frozenset(
+    ["joint_yield", "joint_backlash", "joint_nonlinear_stiffness", "joint_hysteresis",
+     "joint_creep"]
+)  # fmt: skip
+MOST = 3  # joints of one word
+# Nats that a joint more has to bring: the choice among the first one's shapes is not counted again.
+WORTH = 6.0
+
+
+def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> list[Variant]:
+    """Variants of a word that may stand beside other parts: not in a joint where it is already."""
+    taken = {p.variant.info.get("joint") for p in beside if p.word == word}
+    return [v for v in variants if v.word == word and v.info.get("joint", -1) not in taken]
+
+
+def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+    """With its joint mechanisms in further joints, as far as that is worth it."""
+    bench = engine.bench
+    if not (bench.data.arm and bench.has_q) or bench.imposed or not start.eta > 0:
+        return start
+    best = start
+    for word in sorted(start.words & IN_JOINTS):
+        for _ in range(MOST - 1):
+            found = _in_one_more(engine, variants, best, word)
+            if found is None or found.log_weight < best.log_weight:
+                break
+            best = found
+    return best
+
+
+def _in_one_more(
+    engine: Engine, variants: list[Variant], start: Explanation, word: str
+) -> Explanation | None:
+    others = [v for v in family_of(variants, word, start.parts) if "joint" in v.info]
+    if not others or any(p.word == word and "joint" not in p.variant.info for p in start.parts):
+        return None
+    levels, energy = up_to_likeliest(engine, start.parts)
+    scored = score(engine, levels, others, energy)
+    top = closest(scored)
+    parts = (*start.parts, Part(top.variant, top.scale))
+    return polished(engine, variants, explain(engine, parts, marginal(scored) - WORTH))
+
+
+def polished(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+    """Lets every part choose its variant anew, the others given."""
+    best = start
+    for index in range(len(start.parts)):
+        rest = tuple(p for i, p in enumerate(best.parts) if i != index)
+        word = best.parts[index].word
+        levels, energy = up_to_likeliest(engine, rest)
+        scored = score(engine, levels, family_of(variants, word, rest), energy)
+        top = closest(scored)
+        again = WORTH * sum(p.word == word for p in rest)
+        found = explain(engine, (*rest, Part(top.variant, top.scale)), marginal(scored) - again)
+        if found.log_weight > best.log_weight:
+            best = found
+    return best
