@@ -13,7 +13,8 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array, Ints
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
-from identification.gap.fit import fit
+from identification.gap.fit import Fit, fit
+from identification.gap.hands import open_to_hands
 from identification.gap.heldout import folds, held_out
 from identification.gap.imperfection import LINEAR
 from identification.gap.verdict import weighed
@@ -68,14 +69,17 @@ def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
     engine = found.engine
     loose = DRIFTS if len(explanation.words) <= 2 else frozenset[str]()  # three have to earn it all
     after = held_out(engine, explanation, "repetition", fold, loose).after
-    limit = max(FAILS * noise_of(engine.bench), CLOSED * _moved(engine, explanation))
+    fitted, weight = fit(engine, explanation), engine.bench.rows.weight
+    seen = CLOSED * _moved(engine, fitted)
+    unseen = float(np.sqrt(weight @ open_to_hands(engine, fitted) ** 2 / weight.sum()))
+    limit = max(FAILS * noise_of(engine.bench), float(np.hypot(seen, unseen)))
     return float(1 / (1 + (after / limit) ** SHARP))
 
 
-def _moved(engine: Engine, explanation: Explanation) -> float:
+def _moved(engine: Engine, fitted: Fit) -> float:
     """rms (m) of what the effects that are no linear laws move, at least the gap's structure."""
-    fitted, n = fit(engine, explanation), engine.bench.rows.n
-    bent = [i for i, p in enumerate(explanation.parts) if p.word not in LINEAR]
+    n = engine.bench.rows.n
+    bent = [i for i, p in enumerate(fitted.parts) if p.word not in LINEAR]
     moved = sum((fitted.contribution(engine, i)[:n] for i in bent), np.zeros(n))
     square = engine.bench.rows.moved(moved[:, None])[:, 0] ** 2
     weight = engine.bench.rows.weight

@@ -59,12 +59,14 @@ def faults(data: GapData) -> tuple[str, ...]:
 _SETTLED = 2  # samples of a hold at least: a lag, or a joint that still creeps
 _BEYOND, _BURSTS = 4.5, 0.03  # robust standard deviations, and the share that is too much
 _FEWEST_STEPS = 50
+_ONE_WAY = 0.7  # of 20 spells by chance once in 400 times
 
 
 def bursts(data: GapData) -> bool:
     """Whether readings at rest scatter in spells, far beyond what they scatter mostly: vibration,
     glitches. Samples of the later half of a hold, where no effect jumps and lags have caught up,
-    against the straight line between their neighbours, which creep follows closely."""
+    against the straight line between their neighbours, which creep follows closely. What comes late
+    is off the way the load last went; spells know no way."""
     hold = hold_ids(data)
     if is_continuous(data, hold):
         return False
@@ -74,9 +76,14 @@ def bursts(data: GapData) -> bool:
     late = (hold[2:] == hold[:-2]) & (within >= settled)[1:-1]
     u, t = data.displacement, data.time
     share = np.clip((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-300), 0.0, 1.0)
-    away = np.abs(u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]
-    usual = max(1.4826 * float(np.median(away)), data.instruments.displacement) if away.size else 0
-    return bool(away.size >= _FEWEST_STEPS and np.mean(away > _BEYOND * usual) > _BURSTS)
+    away = (u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]
+    if away.size < _FEWEST_STEPS:
+        return False
+    usual = max(1.4826 * float(np.median(np.abs(away))), data.instruments.displacement)
+    far = np.abs(away) > _BEYOND * usual
+    came = np.diff(data.force[starts], prepend=0.0)[hold][1:-1][late]
+    ways = np.sign(away * came)[far]
+    return bool(np.mean(far) > _BURSTS and abs(ways.mean()) < _ONE_WAY)
 
 
 _MORE, _BACK = 0.02, 0.1  # of the ranges of force and displacement in a run

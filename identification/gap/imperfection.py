@@ -27,6 +27,9 @@ LINEAR = frozenset(
     ]
 )
 LEAST_IMPERFECTION = 0.01
+# Of what a lag does at a reading of a hold: it repeats a path between levels that hands took and
+# nobody saw. Who turns a third of a step in a fifth of the time, in several strokes, is so far off.
+PATH = 0.4
 _SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
 
 

@@ -16,6 +16,7 @@ from identification.gap.evidence import Engine
 from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found
 from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
+from identification.gap.hands import open_to_hands
 from identification.gap.noise import UNSURE
 from identification.gap.penalties import CURVES, FRICTION
 from identification.gap.strain import LIMIT, strain
@@ -98,7 +99,8 @@ def _left(engine: Engine, fitted: Fit) -> float:
     bench, n = engine.bench, engine.bench.rows.n
     weight, noise = bench.rows.weight / bench.rows.weight.sum(), bench.noise
     left = engine.target[:n] - fitted.response
-    square = weight @ (left**2 - noise.response**2 - noise.hold**2 - noise.run**2)
+    known = noise.response**2 + noise.hold**2 + noise.run**2 + open_to_hands(engine, fitted) ** 2
+    square = weight @ (left**2 - known)
     return float(np.sqrt(max(float(square), 0.0)))
 
 

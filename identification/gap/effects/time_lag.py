@@ -180,10 +180,13 @@ def _true_force(bench: Bench, kind: str, lag: float) -> Array:
         A = shown[mine][:, used]
         mean = np.bincount(number, weights=bench.load[mine]) / np.bincount(number)
         left = bench.load[mine] - A @ mean
-        seen = A.T * rows.weight[mine]
+        settled = np.abs(A[np.arange(len(A)), number] - 1) < _SETTLED
+        seen = A.T * (rows.weight[mine] * np.where(settled, 1.0, _ON_THE_WAY))
         change = np.linalg.solve(seen @ A + _HOLDS_BACK**2 * np.eye(len(used)), seen @ left)
         out[mine] = (mean + change)[number]
     return out
 
 
+# Of a sample's weight: what is read while the load is still seen coming depends on a hand's path.
+_SETTLED, _ON_THE_WAY = 0.02, 0.02
 _HOLDS_BACK = 0.05  # of a sample's weight: keeps what nobody saw from running away
