@@ -47,6 +47,8 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
             if akin and joints_of(p) & joints_of(other):
                 penalty += SAME_JOINT
             share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
+            if p.word == other.word and share < LEAST_SHARE:
+                penalty += 1e4  # what a joint that does next to nothing explains is another's law
             least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
             penalty += _wall(least / share)
     return penalty

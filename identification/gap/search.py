@@ -157,12 +157,14 @@ def _in_more_joints(
     pool: dict[frozenset[str], Explanation],
     front: list[Explanation],
 ) -> list[Explanation]:
-    """The front with its mechanisms in as many joints as it takes; so does the pool hold them."""
-    out = [in_more_joints(engine, variants, e) for e in front]
-    for e in out:
+    """The front, and what of it is better with its mechanisms in more joints, as the pool then
+    holds it: beside a second effect one joint may do."""
+    more = [in_more_joints(engine, variants, e) for e in front]
+    better = [m for m, e in zip(more, front, strict=True) if m is not e]
+    for e in better:
         if pool[e.words].log_weight < e.log_weight:
             pool[e.words] = e
-    return out
+    return [*front, *better]
 
 
 def _with_one_more(

@@ -7,8 +7,6 @@ joint readings can tell that from a second mechanism, so nothing is looked for w
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from identification.gap.compare import closest, marginal, score
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned, explain, up_to_likeliest

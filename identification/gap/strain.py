@@ -69,7 +69,8 @@ def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
 
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     """(b,) Springs that are said to be off may be off, and so may that of a joint whose mechanism
-    brings its own mean stiffness; tares, and offsets of the joint readings, count as far as they
+    brings its own mean stiffness; a joint with play rests anywhere in it, and is sent to where its
+    reading should be; tares, and offsets of the joint readings, count as far as they
     move a share of the gap that an explanation may not leave."""
     base, n, weight = engine.base, engine.bench.rows.n, engine.bench.rows.weight
     columns = base.columns[:n]
@@ -82,6 +83,10 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     own = {j for p in fitted.parts if p.word in MECHANISMS for j in joints_of(p)}
     for j in range(engine.bench.data.joints) if said else own:
         pulls[base.index(f"spring{j + 1}")] = 0.0
+    played = {j for p in fitted.parts if p.word == "joint_backlash" for j in joints_of(p)}
+    for i in base.index("offset"):
+        if int(base.names[i].split()[-1]) - 1 in played:
+            pulls[i] = 0.0
     constant = base.index("tare") + base.index("offset")
     size = moves[constant] * np.abs(fitted.base[constant])
     pulls[constant] *= np.minimum(size / max(REMAINDER * engine.structural, 1e-300), 1.0)

@@ -28,7 +28,7 @@ from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
-KEPT = ("kept", "kept 1/2")  # where the push before left it
+KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
 KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", *KEPT)
 PLACED = ("gap", "held")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
@@ -194,7 +194,17 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
         "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
         "kept": [np.clip(kept[:, 0] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
         "kept 1/2": [np.clip(kept[:, 1] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
+        "jumps": [_side(x, zone, bench.moved) / 2, -(x - kept[:, 0]) / (2 * zone)],
     }
+
+
+def _side(x: Array, zone: float, fresh: Flags) -> Array:
+    """(n,) -1 or 1: the side of its play to which the net torque x (n,) last pushed a joint that
+    friction of the zone's strength holds there; at first, fresh (n,), that to which it is pushed."""
+    knows = (np.abs(x) > zone) | fresh
+    knows[0] = True
+    last = np.maximum.accumulate(np.where(knows, np.arange(len(x)), 0))
+    return np.where(x[last] < 0, -1.0, 1.0)
 
 
 def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[int]]) -> list[int]:
