@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from identification.gap import evidence
-from identification.gap.base import HALF, prediction
+from identification.gap.base import HALF, compliance_found, prediction
 from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING
 from identification.gap.noise import ENCODER_OFFSET_RAD
@@ -105,7 +105,7 @@ def nuisances(bench: Bench) -> list[tuple[str, Array, float]]:
         out.append((f"spring {j}", stacked(bench, lever[:, j] * only[:, j], only), sd))
     less = stacked(bench, -slope * force, -pull * force[:, None])
     out.append(("gain of force", less, meter.force_gain))
-    out.append(("gain of laser", stacked(bench, slope * force), meter.displacement_gain))
+    out.append(("gain of laser", stacked(bench, _read(bench)), meter.displacement_gain))
     ends = [np.ptp(slope * force), np.ptp(rows.displacement), np.abs(rows.displacement).max()]
     wide = float(max(*ends, np.abs(slope * force).max()))
     for s in range(len(data.setups)):
@@ -118,20 +118,33 @@ def nuisances(bench: Bench) -> list[tuple[str, Array, float]]:
         zero[bench.layout.zero_force] = share[rows.zero]
         if np.any(share):
             out.append((f"tare {'xyz'[axis]}", zero, bench.noise.force))
-    out.append(("geometry", stacked(bench, *_turning(bench, pull)), HALF))
+    out.append(("geometry", stacked(bench, *_turning(bench, lever)), HALF))
     for j in range(m if bench.has_q else 0):
         off = stacked(bench, None, np.tile(np.eye(m)[j], (rows.n, 1)))
         out.append((f"offset {j}", off, ENCODER_OFFSET_RAD))
     return out
 
 
-def _turning(bench: Bench, pull: Array) -> tuple[Array, Array]:
-    """Response and joints when the levers turn with the joints: second order in the force."""
+def _read(bench: Bench) -> Array:
+    """The straight line of what the laser read over the force, in every setup."""
+    rows, out = bench.rows, np.zeros(bench.rows.n)
+    for k in range(len(bench.data.setups)):
+        mine = rows.setup == k
+        slope = np.polyfit(rows.force[mine], rows.displacement[mine], 1, w=rows.weight[mine] ** 0.5)
+        out[mine] = slope[0] * rows.force[mine]
+    return out
+
+
+def _turning(bench: Bench, lever: Array) -> tuple[Array, Array]:
+    """Response and joints when the levers turn with the joints, by what these were found to give:
+    second order in the force."""
     rows, data = bench.rows, bench.data
+    compliance = compliance_found(bench)
+    pull = lever * compliance
     response, joints = np.zeros(rows.n), np.zeros((rows.n, data.joints))
     for i in range(rows.n):
         turned = data.setups[rows.setup[i]].turned_lever @ pull[i]
-        joints[i] = turned * data.compliance * rows.force[i] ** 2
+        joints[i] = turned * compliance * rows.force[i] ** 2
         response[i] = 1.5 * rows.force[i] ** 2 * float(pull[i] @ turned)
     return response, joints
 

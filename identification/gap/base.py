@@ -73,7 +73,7 @@ def _geometry(bench: Bench) -> Array:
     """What the levers change as the joints give way, `1.5 F^2 d' T d` with d the deflection per
     newton and T the change of levers per deflection: some micrometres. Coefficient 1 for stiff
     links and a load that keeps its direction; a rig that is simulated linearly has none."""
-    compliance = _compliance_found(bench)
+    compliance = compliance_found(bench)
     turned = np.stack([s.turned_lever for s in bench.data.setups])[bench.rows.setup]
     bends = np.einsum("nij,nj->ni", turned, bench.lever * compliance)
     response = 1.5 * bench.load**2 * np.sum(bench.lever * compliance * bends, axis=1)
@@ -81,7 +81,7 @@ def _geometry(bench: Bench) -> Array:
     return bench.stacked(bench.sense * response, q)
 
 
-def _compliance_found(bench: Bench) -> Array:
+def compliance_found(bench: Bench) -> Array:
     """(m,) rad/Nm (m/N for a bench): of springs alone, as far as the data tell: levers turn by what
     the joints really give, and that counts twice, however far off the simulated springs are."""
     if not bench.data.arm or bench.imposed:

@@ -137,7 +137,8 @@ def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
         return {"none": 1.0}
     if not arm:
         return {explanation.parts[0].word: 1.0}
-    sizes = {w: max(size, 1e-300) for w, size in explanation.troubles.items()}
+    sizes = dict(explanation.troubles)
+    sizes[explanation.parts[0].word] += 1e-300
     return {w: size / sum(sizes.values()) for w, size in sizes.items()}
 
 

@@ -18,13 +18,13 @@ from identification.gap.diagnose import _chosen, _held
 from identification.gap.effects import joint_yield, library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation, _counted
+from identification.gap.explanation import Explanation, _counted, up_to_likeliest, up_to_likeliest
 from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes, log_joints
 from identification.gap.penalties import _apart, _on_its_own
 from identification.gap.products import White
 from identification.gap.rows import reduce_rows
-from identification.gap.search import _no_worse, _seeds, _sharpened, search
+from identification.gap.search import _seeds, _sharpened, search
 from identification.gap.variants import Variant, variant
 from identification.gap.verdict import (
     BENCH_DOUBT,
@@ -460,5 +460,5 @@ def test_another_effect_is_looked_for_at_sizes_that_the_first_one_may_have() -> 
     e = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 2.5e-6, 6e-6, 1.5e-5]))
     law = (Part(v, 0.6),)
     assert int(log_joints(e, law).argmax()) == 0
-    levels, _ = _no_worse(e, law)
+    levels, _ = up_to_likeliest(e, law)
     assert [lv.eta for lv in levels] == [0.0, 1e-6]

@@ -129,8 +129,11 @@ def test_a_force_that_is_read_where_nothing_is_moved_is_the_instrument_s(
     assert bool(words_with(make_bench(data), "force_drift")) is drifts
 
 
-@pytest.mark.parametrize("channel", ["force", "displacement"])
-def test_the_search_closes_in_on_a_lag_between_those_of_the_grid(channel: str) -> None:
+# Of a force that lags, what is read while the load comes counts little: hands took it there.
+@pytest.mark.parametrize(("channel", "gained"), [("force", 3), ("displacement", 20)])
+def test_the_search_closes_in_on_a_lag_between_those_of_the_grid(
+    channel: str, gained: float
+) -> None:
     steps = np.repeat(np.arange(13), 3)
     levels = np.array([0.0, 20, 40, 60, 80, 100, 120, 100, 80, 60, 40, 20, 0])[steps]
     branch = np.where(steps < 7, 1, 2)
@@ -147,7 +150,7 @@ def test_the_search_closes_in_on_a_lag_between_those_of_the_grid(channel: str) -
     second = score(engine, engine.levels, finer)
     best = max(second, key=lambda s: s.log_evidence)
     assert best.variant.info["lag_s"] == pytest.approx(true, rel=0.02)
-    assert best.log_evidence > max(s.log_evidence for s in first) + 20
+    assert best.log_evidence > max(s.log_evidence for s in first) + gained
 
 
 def test_loops_of_a_running_recording_are_no_reason_to_look_closer_at_lags() -> None:

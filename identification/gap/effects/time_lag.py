@@ -188,5 +188,5 @@ def _true_force(bench: Bench, kind: str, lag: float) -> Array:
 
 
 # Of a sample's weight: what is read while the load is still seen coming depends on a hand's path.
-_SETTLED, _ON_THE_WAY = 0.02, 0.02
+_SETTLED, _ON_THE_WAY = 0.02, 0.2
 _HOLDS_BACK = 0.05  # of a sample's weight: keeps what nobody saw from running away
