@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from identification.gap.effects import joint_backlash, time_lag
+from identification.gap.effects import contact_seating, joint_backlash, time_lag
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
 from identification.gap.forms.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
@@ -85,11 +85,12 @@ SHAPES: dict[str, Key] = {
     "strain": Key("strain", "text", options=STRAINS),
     "run": Key("run", "count"),
     "axis": Key("axis", "text", options=_SIDES),
-    "law": Key("law", "text", options=("exponential", "hyperbolic", "slack", "toe")),
+    "law": Key("law", "text", options=tuple(contact_seating.LAWS)),
     "force_scale": Key("force_scale_N", "positive"),
     "along": Key("along", "vector"),
     "across": Key("across", "vector"),
     "at_load": Key("at_N", "positive"),
+    "power": Key("power_of_load", "positive"),
     "at_response": Key("at_mm", "positive", factor=1e3),
     "time_constant": Key("time_constant_s", "positive"),
     "at": Key("at_s"),
@@ -186,7 +187,10 @@ GRAMMAR: dict[str, Grammar] = {
     "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
     "load_misalignment": Grammar(
         ("about",),
-        (("tangent", ("along", "across")), ("tangent", ("along", "across", "at_load"))),
+        tuple(
+            ("tangent", ("along", "across", *more))
+            for more in ((), ("at_load",), ("at_load", "power"))
+        ),
     ),
     "pose_error": Grammar(
         ("about", "about_offset", "about_angles", "reads"),

@@ -47,6 +47,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     common = np.where(rows.steady, steep * meter.force / np.sqrt(rows.hold_weight), 0.0)
     if rows.continuous:
         per_sample, common = _running(data, rows, slope, imposed), np.zeros(rows.n)
+    elif imposed:  # the force answers, and what is driven is taken as it was read
+        common, answer = np.zeros(rows.n), _scatter(data.force, hold) or meter.force
+        per_sample = np.hypot(slope * max(answer, 0.33 * meter.force), meter.displacement)
     else:
         alone = np.where(rows.steady, meter.displacement, fallback)
         per_sample = _white(data, rows, alone, slope, hold)
@@ -56,7 +59,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         for j in range(data.joints):
             found = _scatter(data.q[:, j], hold)
             q[j] = max(found or ENCODER_RAD, 1e-7)
-    stated = float(np.median(per_sample)) if rows.continuous else meter.displacement
+    stated = meter.displacement
+    if rows.continuous or imposed:
+        stated = float(np.median(per_sample if rows.continuous else fallback))
     return Noise(
         response=per_sample / np.sqrt(weight), q=q, force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,

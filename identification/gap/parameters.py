@@ -165,13 +165,10 @@ def _seating(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 
 def _misalignment(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Tangents at the largest load."""
-    names, turns = part.variant.info["directions"], part.variant.info["at_N"] is not None
-    per = 4 if turns else 2
-    rows = np.eye(len(found.w))
+    names, powers = part.variant.info["directions"], int(part.variant.info["powers"])
+    rows = np.eye(len(found.w)).reshape(len(names), powers, 2, -1).sum(axis=1)
     return {
-        f"tangent_{name}_{k + 1}": found.linear(
-            rows[per * i + k] + (rows[per * i + k + 2] if turns else 0.0), "1"
-        )
+        f"tangent_{name}_{k + 1}": found.linear(rows[i, k], "1")
         for i, name in enumerate(names)
         for k in range(2)
     }

@@ -1,7 +1,8 @@
 """The fixture between flange and laser target seats itself: soft start at low force.
 
-The same saturating function of the force in every direction and pose: `d (1 - exp(-F/F0))` or
-`d F / (F + F0)`; unseen by encoders, 2 to 100 um.
+The same function of the force in every direction and pose, ever flatter: `d (1 - exp(-F/F0))`,
+`d F / (F + F0)`, or, of rough faces whose asperities take up the load one after the other, `d log(1
++ F/F0)`; unseen by encoders, 2 to 100 um.
 
 Size: 2 to 100 um; 0.3 to 10 % of the deflection.
 Prior: depth positive, sd out of SHARES, equally likely; force scales and laws equally likely.
@@ -29,11 +30,13 @@ LOST = {"slack": 1.0, "toe": 0.5}  # share of a slack's stroke by which the rest
 FINER = np.linspace(-0.32, 0.32, 9)  # of a slack that was found
 SHARES = (0.003, 0.01, 0.03, 0.1)  # of the deflection
 
+SEATED = ("exponential", "hyperbolic", "logarithmic")
 # How much of the depth is gone at x times the force scale, or at x times the stroke of a slack: of
 # one that is taken up bit by bit the stiffness grows in proportion to the stroke.
 LAWS: dict[str, Callable[[Array], Array]] = {
     "exponential": lambda x: np.asarray(-np.expm1(-x)),
     "hyperbolic": lambda x: np.asarray(x / (x + 1)),
+    "logarithmic": lambda x: np.asarray(np.log1p(x)),
     "slack": lambda x: np.minimum(x, 1.0),
     "toe": lambda x: np.asarray(1 - np.maximum(1 - x, 0.0) ** 2),
 }
@@ -51,7 +54,7 @@ def variants(bench: Bench) -> list[Variant]:
     forces = FORCES if bench.data.arm else BENCH_FORCES
     for share in forces:
         f0 = share * top
-        for law in ("exponential", "hyperbolic"):
+        for law in SEATED:
             column = bench.add(bench.outside_column(sign * LAWS[law](size / f0)))
             if law == "exponential":
                 columns.append(column)

@@ -10,6 +10,8 @@ Source: how well screws are set up by eye on floors and stands.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from identification.gap.bench import Bench
@@ -17,10 +19,13 @@ from identification.gap.variants import Variant, variant
 
 WORD = "load_misalignment"
 SCALES = (0.03, 0.1, 0.25)
+# Of the load, from 0 up: a tip that drags on its pad turns the load soon and then no more.
+POWERS = 3
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Two tangents per direction, constant or turning as the load grows; one direction, and all."""
+    """Two tangents per direction, constant or turning as the load grows, soon or late; one
+    direction, and all."""
     rows, data = bench.rows, bench.data
     across = np.stack([s.tangent_lever for s in data.setups])[rows.setup]  # (n, 2, m)
     names = [s.direction for s in data.setups]
@@ -29,8 +34,8 @@ def variants(bench: Bench) -> list[Variant]:
     for name in dict.fromkeys(names):
         mine = np.array([n == name for n in names])[rows.setup]
         pair = []
-        for k, power in ((0, 1), (1, 1), (0, 2), (1, 2)):
-            load = np.where(mine, bench.load * np.abs(bench.load / top) ** (power - 1), 0.0)
+        for power, k in product(range(POWERS), range(2)):
+            load = np.where(mine, bench.load * np.abs(bench.load / top) ** power, 0.0)
             q = across[:, k, :] * bench.compliance * load[:, None]
             tangential = np.zeros((rows.n, 2))
             tangential[:, k] = load
@@ -39,21 +44,21 @@ def variants(bench: Bench) -> list[Variant]:
         every += pair
         out.append(
             variant(WORD, f"direction {name}", pair[:2], SCALES, positive=False, prior=0.3,
-                    directions=[name], at_N=None)
+                    directions=[name], powers=1, at_N=top)
         )  # fmt: skip
         out.append(
             variant(WORD, f"direction {name}, turning", pair, SCALES, positive=False, prior=0.2,
-                    directions=[name], at_N=top)
+                    directions=[name], powers=POWERS, at_N=top)
         )  # fmt: skip
-    if len(every) > 4:
+    if len(every) > 2 * POWERS:
         named = list(dict.fromkeys(names))
-        straight = [c for i, c in enumerate(every) if i % 4 < 2]
+        straight = [c for i, c in enumerate(every) if i % (2 * POWERS) < 2]
         out.append(
             variant(WORD, "all directions", straight, SCALES, positive=False, prior=0.6,
-                    directions=named, at_N=None)
+                    directions=named, powers=1, at_N=top)
         )  # fmt: skip
         out.append(
             variant(WORD, "all directions, turning", every, SCALES, positive=False, prior=0.4,
-                    directions=named, at_N=top)
+                    directions=named, powers=POWERS, at_N=top)
         )  # fmt: skip
     return out

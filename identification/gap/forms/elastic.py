@@ -155,18 +155,20 @@ def seating(bench: Bench, law: Law) -> list[Array]:
 
 def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
-    shares reached at a load, in proportion to it."""
+    shares reached at a load, in proportion to it or to a power of it."""
     terms = []
     for name in v.info["directions"]:
         s = next(s for s in bench.data.setups if s.direction == name)
-        for growth in (False, True) if v.info["at_N"] is not None else (False,):
+        for power in range(int(v.info["powers"])):
             for k in range(2):
                 shape: dict[str, Any] = {
                     "along": _triple(s.unit_vector),
                     "across": _triple(s.tangents[k]),
                 }
-                if growth:
+                if power:
                     shape["at_load"] = float(v.info["at_N"])
+                if power > 1:
+                    shape["power"] = float(power)
                 terms.append(Term("tangent", shape))
     return Law({}, tuple(terms)), np.ones(len(terms))
 
@@ -178,7 +180,7 @@ def misalignment(bench: Bench, law: Law) -> list[Array]:
     for t in law.terms:
         load = np.where(along(bench, t.shape["along"]) > 0, bench.load, 0.0)
         if "at_load" in t.shape:
-            load = load * np.abs(load) / t.shape["at_load"]
+            load = load * np.abs(load / t.shape["at_load"]) ** t.shape.get("power", 1.0)
         parts = np.stack([s.tangents @ np.array(t.shape["across"]) for s in data.setups])
         lever = np.stack([p @ s.tangent_lever for p, s in zip(parts, data.setups, strict=True)])
         q = lever[rows.setup] * bench.compliance * load[:, None]
