@@ -31,7 +31,7 @@ def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> l
 def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
     """With its joint mechanisms in further joints, as far as that is worth it."""
     bench = engine.bench
-    if not bench.data.arm or not start.eta > 0:
+    if not (bench.data.arm and bench.has_q) or not start.eta > 0:
         return start
     best = start
     for word in sorted(start.words & IN_JOINTS):
