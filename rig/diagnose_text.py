@@ -103,7 +103,7 @@ def _answer(r: GapResult) -> str:
             f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
             f"the uncertainty; about {r.remainder * MM:.3g} mm rms of structure remain.{like}"
         )
-    more = [e.name for e in r.effects if e.name != r.verdict]
+    more = [name for name in r.names if name != r.verdict]
     also = f" Beside it: {', '.join(more)}." if more else ""
     meaning = meanings(arm=r.bench.data.arm)[r.verdict]
     return (
@@ -134,15 +134,21 @@ def _where(r: GapResult) -> str:
 def _effects(r: GapResult) -> str:
     lines = ["Effects"] if r.effects else []
     for e in r.effects:
-        lines += _one_effect(e)
+        lines += _one_effect(e, _title(e, [other.name for other in r.effects]))
     ranked = sorted(r.probabilities.items(), key=lambda i: -i[1])
     shown = ", ".join(f"{w} {p:.2f}" for w, p in ranked if p >= 0.005)
     lines.append(f"Probability of being the main cause: {shown}")
     return "\n".join(lines)
 
 
-def _one_effect(e: Effect) -> list[str]:
-    lines = [f"  {e.name}: present with {e.probability:.0%}, {e.share_of_gap:.0%} of the gap"]
+def _title(e: Effect, names: list[str]) -> str:
+    """Its name; of one that sits in several joints with the joint."""
+    place = next(iter(e.places), "")
+    return f"{e.name}, {place}" if place and names.count(e.name) > 1 else e.name
+
+
+def _one_effect(e: Effect, title: str) -> list[str]:
+    lines = [f"  {title}: present with {e.probability:.0%}, {e.share_of_gap:.0%} of the gap"]
     if len(e.places) > 1:
         each = ", ".join(f"{place} ({p:.0%})" for place, p in e.places.items())
         lines.append(f"    these data leave open where it sits: {each}")

@@ -384,7 +384,7 @@ def _ranked(r: Shown, least: float) -> dict[str, float]:
 def _after(r: Shown) -> str:
     """What stands in the simulation after."""
     if r.effects:
-        return "with " + " + ".join(e.name for e in r.effects)
+        return "with " + " + ".join(dict.fromkeys(e.name for e in r.effects))
     return "with springs and gains refitted"
 
 

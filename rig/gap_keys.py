@@ -109,6 +109,7 @@ _COEFFICIENTS: dict[str, Key] = {
     "width": Key("width_rad"),
     "rub": Key("rub_rad"),
     "place": Key("place_rad"),
+    "rest": Key("reading_at_rest_rad"),
     "over_nominal": Key("compliance_over_nominal"),
     "depth": Key("depth_mm", factor=1e3),
     "tangent": Key("tangent"),
@@ -160,7 +161,12 @@ GRAMMAR: dict[str, Grammar] = {
     ),
     "joint_backlash": Grammar(
         ("joint", "zone", "crossing", "kind", "tool"),
-        (("width", ()), ("rub", ()), ("place", ("pose", "direction", "first"))),
+        (
+            ("width", ()),
+            ("rub", ()),
+            ("place", ("pose", "direction", "first")),
+            ("rest", ("pose",)),
+        ),
     ),
     "joint_nonlinear_stiffness": Grammar(
         ("joint", "measured_to", "tool"),

@@ -149,6 +149,7 @@ class _Walk:
 
 _CHANCE = {
     "place": "where the joint lies in its play while unloaded",
+    "rest": "where it lies in its play when it is sent to a pose",
     "shift": "jumps of the datum",
     "drift_knot": "a drift without a law",
     "drift_per_kelvin": "a drift with temperatures, which a procedure does not name",

@@ -180,7 +180,7 @@ def remainder_table(r: Shown, m: Remainder) -> Table:
 def held_table(r: Shown) -> Table:
     """Before and after, fitted, per way of withholding, and with other effects instead."""
     nan = float("nan")
-    named = " + ".join(e.name for e in r.effects) or r.verdict
+    named = " + ".join(dict.fromkeys(e.name for e in r.effects)) or r.verdict
     rows = [("fitted", named, r.before, r.after, nan, nan)]
     rows += [(f"withheld {h.fold}", named, h.before, h.after, *h.ci95) for h in r.held_out]
     if r.held_out:

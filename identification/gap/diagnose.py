@@ -82,6 +82,11 @@ class GapResult:
     fit: Fit
     found: Found
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the effects, each once: one mechanism may sit in several joints."""
+        return tuple(dict.fromkeys(e.name for e in self.effects))
+
 
 def diagnose_gap(
     data: GapData,
@@ -181,9 +186,7 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     if len(best.words) < 3:
         return best
     troubles = best.troubles
-    least = min(
-        LEAST_SHARE * max(troubles.values()), BELOW_NOISE * noise_of(found.engine.bench)
-    )
+    least = min(LEAST_SHARE * max(troubles.values()), BELOW_NOISE * noise_of(found.engine.bench))
     petty = {w for w, size in troubles.items() if size < least} - FREE
     return next((e for e in simpler if best.words - e.words <= petty), best)
 

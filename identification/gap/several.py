@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from identification.gap.compare import closest, marginal, score
 from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation, conditioned, explain, up_to_likeliest
+from identification.gap.explanation import Explanation, explain, up_to_likeliest
 from identification.gap.parts import Part
 from identification.gap.variants import Variant
 

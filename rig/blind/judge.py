@@ -111,7 +111,7 @@ def judge(outcome: Outcome) -> Judged:
         right=right,
         in_set=right or bool(truths & alike),
         exact=verdict == main,
-        found=tuple(str(e["name"]) for e in effects),
+        found=tuple(dict.fromkeys(str(e["name"]) for e in effects)),
     )
 
 
@@ -198,7 +198,8 @@ def intervals(judged: Judged) -> list[dict[str, Any]]:
     if judged.kind not in ("single", "mixture") or judged.outcome.withheld in judged.label["truth"]:
         return []
     out = []
-    found = {e["name"]: e["parameters"] for e in judged.diagnosis.get("effects", [])}
+    # the largest first: what sits in several joints is judged by that
+    found = {e["name"]: e["parameters"] for e in judged.diagnosis.get("effects", [])[::-1]}
     rows = zip(judged.label["truth"], judged.label.get("parameters") or [], strict=False)
     for word, answers in rows:
         for name, true in _true_values(word, answers):

@@ -49,7 +49,8 @@ def _answer(found: Node) -> Rich:
         return (*start, "there is a gap, and no effect of the library explains it down to the "
                 "uncertainty; about ", *rest, " rms of structure remain.",
                 *_alike(found))  # fmt: skip
-    others = [e["name"].text() for e in found["effects"]][1:]
+    named = dict.fromkeys(e["name"].text() for e in found["effects"])
+    others = [name for name in named if name != verdict]
     beside = f" Beside it: {', '.join(others)}." if others else ""
     before, after, noise = (sizes[f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise"))
     meaning = found["meanings"][verdict].text()
@@ -86,8 +87,11 @@ def _where(found: Node) -> list[Block]:
 def _effects(found: Node) -> list[Block]:
     rows: list[tuple[Cell, ...]] = []
     alike: list[Cell] = []
+    words = [e["name"].text() for e in found["effects"]]
     for e in found["effects"]:
         name, empty = e["name"].text(), (NOTHING,)
+        if words.count(name) > 1:  # one mechanism in several joints
+            name = ", ".join([name, *list(e["places"].value)[:1]])
         head: tuple[Cell, ...] = (Word(name, "strong"), e["probability"].percent(),
                                   e["share_of_gap"].percent())  # fmt: skip
         parameters = [

@@ -161,6 +161,8 @@ def test_joint_effects_show_in_their_own_joint_alone(word: str, design: str) -> 
             assert len(moved) == 1, v.label
             assert moved[0] in joints, v.label
             u = columns[: bench.rows.n, c]
+            if word == "joint_backlash" and not u.any():
+                continue  # where in its play the joint is when its reading is as commanded
             weight = bench.rows.weight
             mean = np.add.reduceat(u * weight, edges) / np.add.reduceat(weight, edges)
             np.testing.assert_allclose(
@@ -180,6 +182,7 @@ def test_imposed_displacement_is_kept_whoever_gives_way(word: str) -> None:
     """Laser imposed: motions of all joints and of what lies outside cancel; force pays."""
     bench, _, columns = of(word, "arm imposed")
     edges, n = np.flatnonzero(bench.rows.hold_starts), bench.rows.n
+    columns = columns[:, np.any(columns[:n] != 0, axis=0)]  # not what only a reading is off
     weight = bench.rows.weight
     u = columns[:n] * weight[:, None]
     response = np.add.reduceat(u, edges) / np.add.reduceat(weight, edges)[:, None]

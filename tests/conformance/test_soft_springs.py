@@ -32,7 +32,9 @@ def turning(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
     rig, in a kinematics that the identification does not share."""
     moved, angles = np.zeros(len(rows)), np.zeros((len(rows), 6))
     tcp = np.array(TCP_MM) * 1e-3
-    for (pose, direction, force), at in rows.groupby(["pose", "direction", "force_N"]).groups.items():
+    for (pose, direction, force), at in rows.groupby(
+        ["pose", "direction", "force_N"]
+    ).groups.items():
         q0, unit = np.array(Q[str(pose)]), DIRECTIONS[str(direction)]
         q = q0
         for _ in range(20):

@@ -87,6 +87,31 @@ def test_heat_does_not_jump_and_laws_are_families(word: str, counts: bool) -> No
     assert strain(engine, odd, 0.0) == pytest.approx(FAR if counts else 0.0)
 
 
+@pytest.mark.parametrize(("largest", "stands_out"), [(3.0, True), (0.9, False)])
+def test_no_single_step_of_a_warming_path_stands_out(largest: float, stands_out: bool) -> None:
+    bench, variants, _ = of("thermal_drift", "rich")
+    engine = quick_engine(bench)
+    v = next(v for v in variants if v.label == "winding path")
+    found = fit(engine, Explanation((Part(v, 1e-5),), 0.0, 0.0, (0.0,), 0.0))
+    seen = np.any(engine.columns(v.columns)[: bench.rows.n] != 0, axis=0)
+    pulls = np.zeros(len(found.pulls))
+    pulls[len(found.base) :] = np.where(np.arange(len(seen)) % 2, 0.3, -0.3) * seen
+    pulls[len(found.base) + int(np.flatnonzero(seen)[4])] = largest
+    odd = replace(found, pulls=pulls, base=np.zeros(len(found.base)))
+    asked = strain(engine, odd, 0.0)
+    assert (asked > LIMIT) is stands_out
+
+
+def test_a_joint_with_play_rests_anywhere_in_it() -> None:
+    bench, variants, _ = of("joint_backlash", "rich")
+    engine = quick_engine(bench)
+    v = next(v for v in variants if v.info["joint"] == 3)
+    loose = fit(engine, Explanation((Part(v, 1e-4),), 0.0, 0.0, (0.0,), 0.0))
+    engine.structural = 1e-9
+    assert strain(engine, pulled(engine, "offset P1 4", loose), 0.0) == 0.0
+    assert strain(engine, pulled(engine, "offset P1 3", loose), 0.0) == pytest.approx(FAR)
+
+
 def test_runs_may_be_off_by_the_imperfection_of_the_law_too() -> None:
     engine = quick_engine(of("base_compliance", "rich")[0])
     scatter = pulled(engine, "scatter run")

@@ -48,7 +48,7 @@ def dense_covariance(engine: Engine, eta: float, row_part: float = ROW_PART) -> 
     bench = engine.bench
     n = bench.rows.n
     same = bench.rows.hold[:, None] == bench.rows.hold
-    sigma2 = bench.sigma ** 2
+    sigma2 = bench.sigma**2
     hold = np.outer(bench.noise.hold, bench.noise.hold) * same + (HOLD_PART * eta) ** 2 * same
     part = (row_part * eta) ** 2 / sigma2  # per row, on what differs within a hold
     white = np.diag(sigma2)

@@ -30,6 +30,22 @@ def test_a_lag_that_takes_half_a_hold_is_no_burst() -> None:
     assert not bursts(data)
 
 
+def test_what_comes_late_all_the_time_is_no_burst() -> None:
+    """A reading that is late by more than half of the shorter holds, up and down again; spells of
+    the same size are none the less."""
+    length = np.where(np.arange(80) % 3 == 0, 5, 14)
+    step = np.repeat(np.arange(80), length)
+    up = np.concatenate([np.arange(1, 41), np.arange(39, -1, -1)])
+    level, way = up[step], np.diff(up, prepend=0)[step]
+    within = np.arange(len(step)) - np.flatnonzero(np.diff(step, prepend=-1))[step]
+    late = np.array([0.0, 0.3, 0.8, *np.ones(11)])[within]
+    branch = np.where(step < 40, 1, 2)
+    u = 2e-4 * (level - way * (1 - late))
+    assert not bursts(bench_data(20.0 * level, u, step=step, branch=branch))
+    shaken = 2e-4 * level + 4e-5 * ((within == 2) & (length[step] == 5)) * (-1.0) ** (step // 3)
+    assert bursts(bench_data(20.0 * level, shaken, step=step, branch=branch))
+
+
 def test_a_line_read_at_odd_times_is_no_burst() -> None:
     steps = np.where(np.arange(200) % 20 == 7, 30.0, 1.0)
     t = np.concatenate([[0.0], np.cumsum(steps)])

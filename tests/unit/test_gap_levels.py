@@ -18,7 +18,7 @@ from identification.gap.diagnose import _chosen, _held
 from identification.gap.effects import joint_yield, library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation, _counted, up_to_likeliest, up_to_likeliest
+from identification.gap.explanation import Explanation, _counted, up_to_likeliest
 from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes, log_joints
 from identification.gap.penalties import _apart, _on_its_own

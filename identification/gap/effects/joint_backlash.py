@@ -6,7 +6,8 @@ the torque has turned: a play of radius `zone`, or half of it, on the torque, cu
 the play, or of 0.7 zones with soft ends; flanks that approach slowly leave `zone / |tau|` of the
 play to be taken up. Gears with play rub too: a stop operator of the zone's strength rides along.
 Without torque the joint lies anywhere in its play, a free place per setup at its first zero load
-and at later ones, or where the rubbing, or the push before, left it. The tool's mass is not known:
+and at later ones, or where the rubbing, or the push before, left it: to where its reading is as commanded,
+which is another zero of that reading in every pose. The tool's mass is not known:
 the torque at which the weights are balanced is sought among masses of 0 to 3 kg.
 Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
 force: such plays are placed by the data (flanks.py), with the springs that they bring.
@@ -110,7 +111,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     for kg in masses:
         x = torque + bench.weight(j, kg) if info["crossing"] == "weight" else torque
         for zone in zones:
-            exact = info | {"zone_Nm": float(zone), "tool_kg": float(kg)}
+            exact = info | {"zone_Nm": float(zone), "tool_kg": float(kg), "closely": True}
             label = f"joint {j + 1} {info['crossing']} tool {kg:.2f} kg"
             out += _zone(bench, x, kinds, label, f"{zone:.3g} Nm fine", share, exact, places)
     return out
@@ -143,15 +144,18 @@ def _zone(
     scales = SCALES if bench.data.arm else tuple(s * bench.reach for s in _SHARES)
     j, width, out = int(info["joint"]), float(info["zone_Nm"]), []
     floating = _floating(bench, j, np.abs(x) < width, places)
+    resting = _resting(bench, j, places)
     shapes = _shapes(bench, x, width)
     for kind in kinds:
         columns = [bench.add_joint(j, bench.sense * part) for part in shapes[kind]]
+        rests = kind in HELD or bool(info.get("closely"))
         columns += floating if kind not in HELD else []
+        columns += resting if rests else []
         root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
         out.append(
             variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
                     _less_rub(len(columns)), prior, each=(True,),
-                    within=_inside(len(columns)), **(info | {"kind": kind}))
+                    within=_inside(len(columns)), **(info | {"kind": kind, "rests": rests}))
         )  # fmt: skip
     return out
 
@@ -220,3 +224,22 @@ def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[i
                 if place.any() and not np.all(loose[mine]):
                     places[key].append(bench.add_joint(joint, place.astype(float)))
     return places[key]
+
+
+def resting_columns(bench: Bench, joint: int) -> dict[str, Array]:
+    """Pose -> column (size,) of a reading that is off in it: the controller sends the joint to where
+    its reading should be, whichever side of its play it lies at."""
+    if not bench.has_q:
+        return {}
+    poses, out = [s.pose for s in bench.data.setups], {}
+    for pose in dict.fromkeys(poses):
+        q = np.zeros((bench.rows.n, bench.data.joints))
+        q[np.array([p == pose for p in poses])[bench.rows.setup], joint] = 1.0
+        out[pose] = bench.stacked(q=q)
+    return out
+
+
+def _resting(bench: Bench, joint: int, places: dict[bytes, list[int]]) -> list[int]:
+    if b"rest" not in places:
+        places[b"rest"] = [bench.add(c) for c in resting_columns(bench, joint).values()]
+    return places[b"rest"]

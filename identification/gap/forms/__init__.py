@@ -53,7 +53,7 @@ _TABLE: dict[str, tuple[Describe, Columns]] = {
     "zero_shift": (instruments.describe_shift, instruments.shift),
 }
 # Coefficients of one session that say nothing of the next: chance, or a path without a law.
-SESSION = frozenset({"place", "shift", "drift_knot", "drift_per_kelvin"})
+SESSION = frozenset({"place", "rest", "shift", "drift_knot", "drift_per_kelvin"})
 
 
 # What these do goes through the joints' springs: the law says which springs it counts from, so

@@ -78,6 +78,9 @@ def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
         terms.append(
             Term("place", {"pose": setup.pose, "direction": setup.direction, "first": first})
         )
+    if info["rests"]:
+        poses = joint_backlash.resting_columns(bench, int(info["joint"]))
+        terms += [Term("rest", {"pose": pose}) for pose in poses]
     return Law(constants, tuple(terms)), np.ones(len(terms))
 
 
@@ -91,12 +94,16 @@ def backlash(bench: Bench, law: Law) -> list[Array]:
     else:
         shape = joint_backlash._shapes(bench, x, c["zone"])[c["kind"]]
     parts = {"width": bench.sense * shape[0], "rub": bench.sense * shape[1], "compliance": x}
+    rests = joint_backlash.resting_columns(bench, joint)
     names = [(s.pose, s.direction) for s in bench.data.setups]
     loose = np.abs(x) < c["zone"]
     out = []
     for t in law.terms:
         if t.coefficient in parts:
             out.append(bench.joint_column(joint, parts[t.coefficient]))
+            continue
+        if t.coefficient == "rest":
+            out.append(rests.get(t.shape["pose"], np.zeros(bench.layout.size)))
             continue
         key = (t.shape["pose"], t.shape["direction"])
         place = np.zeros(bench.rows.n)

@@ -1,0 +1,93 @@
+"""What a hand on the screw does: it goes its own way between levels, or drives the displacement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from identification.gap.bench import make_bench
+from identification.gap.data import GapData
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.explanation import Explanation
+from identification.gap.fit import fit
+from identification.gap.hands import open_to_hands
+from identification.gap.imperfection import PATH
+from identification.gap.parts import Part
+from rig.gap_data import gap_data
+from tests.conformance.effect_benches import of, quick_engine
+from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, linear, meta, noisy
+from tests.conformance.test_effect_recovery import typical
+
+LATE_S = 1.3
+
+
+def in_strokes(share: Array, first: Array) -> Array:
+    """How far a screw is at a share of its way: in two strokes, of which the first is that large,
+    with a pause for a new grip between them."""
+    done = np.where(share < 0.4, first * share / 0.4, first)
+    return np.asarray(np.where(share > 0.6, first + (1 - first) * (share - 0.6) / 0.4, done))
+
+
+def late_laser(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+    """The laser shows what was LATE_S ago. A hand takes 5 s from level to level, each time in
+    another way, and comes to rest half a second before the first reading."""
+    rng, force = np.random.default_rng(5), rows["force_N"].to_numpy(float)
+    change = np.diff(force, prepend=force[0])
+    change[rows["time_s"].diff().fillna(-1.0).to_numpy() < 0] = 0.0  # minutes between two runs
+    first = rng.uniform(0.2, 0.8, len(rows))
+    number = (rows["step"].diff().fillna(1.0) != 0) | (rows["branch"] != rows["branch"].shift())
+    hold = number.cumsum().to_numpy()
+    start = np.flatnonzero(np.diff(hold, prepend=-1))
+    since = np.arange(len(rows)) - start[hold - hold[0]] + 0.5 - LATE_S  # s since the hand rests
+    share = np.clip(1 + since / 5.0, 0.0, 1.0)
+    step = change[start][hold - hold[0]]
+    behind = step * (in_strokes(share, first[start][hold - hold[0]]) - 1)
+    slope = np.sum(lever**2 / TRUE, axis=1)
+    return slope * behind, np.zeros((len(rows), 6))
+
+
+@pytest.fixture(scope="module")
+def lagging() -> GapData:
+    design = DESIGNS["medium"]
+    return gap_data(imported(noisy(design, late_laser), meta(design)))
+
+
+def test_a_lag_is_one_however_the_hand_went(lagging: GapData) -> None:
+    found = diagnose_gap(lagging)
+    assert found.verdict == "time_lag"
+    lag = found.effects[0].parameters["lag"]
+    assert lag.low < LATE_S < lag.high  # it says how little the way tells
+
+
+def test_only_where_a_lag_acts_does_the_hand_count() -> None:
+    bench, variants, _ = of("time_lag", "medium")
+    engine = quick_engine(bench)
+    v = next(v for v in variants if v.info["channel"] == "displacement")
+    fitted = fit(engine, Explanation((Part(v, 1.0),), 0.0, 0.0, (0.0,), 0.0))
+    does = np.abs(fitted.contribution(engine, 0)[: bench.rows.n])
+    np.testing.assert_allclose(open_to_hands(engine, fitted), PATH * does)
+    bench, variants, _ = of("joint_creep", "medium")
+    engine = quick_engine(bench)
+    creeps = fit(engine, Explanation((Part(typical(variants), 0.1),), 0.0, 0.0, (0.0,), 0.0))
+    assert not open_to_hands(engine, creeps).any()
+
+
+def test_a_recording_that_runs_on_shows_the_way() -> None:
+    bench, variants, _ = of("time_lag", "bench imposed")
+    engine = quick_engine(bench)
+    fitted = fit(engine, Explanation((Part(variants[0], 1.0),), 0.0, 0.0, (0.0,), 0.0))
+    assert np.abs(fitted.contribution(engine, 0)).max() > 0
+    assert not open_to_hands(engine, fitted).any()
+
+
+def test_where_the_displacement_is_imposed_it_is_the_force_that_scatters() -> None:
+    """Levels of a stroke: each row answers with a force, of its uncertainty over the stiffness."""
+    data = linear("arm imposed")
+    bench = make_bench(data)
+    meter, slope = data.instruments, bench.stated_slope
+    wanted = np.hypot(slope * meter.force, meter.displacement)
+    noise = bench.noise.response * np.sqrt(bench.rows.weight)
+    assert np.all(noise > 0.3 * wanted)
+    assert np.all(noise < 1.2 * wanted)
+    assert bench.noise.stated == pytest.approx(float(np.median(wanted)))

@@ -1,0 +1,67 @@
+"""Laws as others write them: a play that jumps, a tip that drags on its pad, rough faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from identification.gap.data import GapData
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects.contact_seating import LAWS
+from identification.gap.effects.joint_backlash import _side
+from rig.gap_data import gap_data
+from rig.worlds.arm import place
+from tests.conformance.gap_designs import DESIGNS, Array, Q, imported, meta, noisy
+
+JOINT, WIDTH_RAD, STRENGTH_NM = 3, 1.5e-3, 0.9
+
+
+def measured(law: object, design: str = "medium") -> GapData:
+    return gap_data(imported(noisy(DESIGNS[design], law), meta(DESIGNS[design])))  # type: ignore[arg-type]
+
+
+def weights(rows: pd.DataFrame) -> Array:
+    """(n,) Nm of the arm's own weight on the joint, without a tool."""
+    each = {p: float(place(np.array(q)).gravity_torques()[JOINT]) for p, q in Q.items()}
+    return np.array([each[str(p)] for p in rows["pose"]])
+
+
+def jumps(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+    """The joint lies at one side of its play until the net torque pushes it over, against friction
+    that holds it; what it does is counted from where it first lay."""
+    net = lever[:, JOINT] * rows["force_N"].to_numpy() + weights(rows)
+    side, out = float(np.sign(net[0])), []
+    for x in net:
+        side = float(np.sign(x)) if abs(x) > STRENGTH_NM else side
+        out.append(side)
+    deflection = np.zeros((len(rows), 6))
+    deflection[:, JOINT] = 0.5 * WIDTH_RAD * (np.array(out) - out[0])
+    return np.zeros(len(rows)), deflection
+
+
+def test_a_play_in_which_friction_holds_the_joint() -> None:
+    found = diagnose_gap(measured(jumps, "rich"))
+    assert [e.name for e in found.effects] == ["joint_backlash"]
+    assert found.where.joints == (JOINT + 1,)
+    width = found.effects[0].parameters["width"]
+    assert width.value == pytest.approx(WIDTH_RAD, rel=0.05)
+    assert found.after < 1.1 * found.noise
+
+
+def test_which_side_it_lies_at() -> None:
+    x = np.array([-0.1, 2.0, 0.5, -0.5, -2.0, 0.5, 0.1, 0.5])
+    fresh = np.array([True, False, False, False, False, False, True, False])
+    np.testing.assert_array_equal(_side(x, 1.0, fresh), [-1, 1, 1, 1, -1, -1, 1, 1])
+
+
+def test_rough_faces_are_a_seat() -> None:
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        return 1.5e-5 * np.log1p(rows["force_N"].to_numpy() / 4.0), np.zeros((len(rows), 6))
+
+    found = diagnose_gap(measured(law))
+    assert found.verdict == "contact_seating"
+    assert "logarithmic" in found.effects[0].label
+    depth = found.effects[0].parameters["depth"]
+    assert depth.value == pytest.approx(1.5e-2 * np.log1p(200.0 / 4.0), rel=0.1)
+    assert LAWS["logarithmic"](np.array(1.0)) == pytest.approx(np.log(2))
