@@ -1,8 +1,8 @@
 """What hands do on the way from one level to the next, which no reading shows.
 
-A lag shows at the first readings of a hold what the load was before: on a path that somebody's hands
-took, quickly or slowly, first fast and then slow. Straight on is the best guess, and no more: what
-such a reading misses by a share of what the lag does there is no trouble of its own.
+A lag shows at the first readings of a hold what the load was before: on a path that somebody's
+hands took, quickly or slowly, first fast and then slow. Straight on is the best guess, and no more:
+what such a reading misses by a share of what the lag does there is no trouble of its own.
 """
 
 from __future__ import annotations

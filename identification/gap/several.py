@@ -1,4 +1,4 @@
-"""The same trouble in several joints: all gears of an arm rub, creep and bend, one more than others.
+"""The same trouble in several joints: all gears of an arm rub, creep and bend, some more.
 
 A joint mechanism sits in one joint of a variant. Where that leaves what the same mechanism in
 another joint would do, the explanation takes both, as one word: one trouble, seen twice. Only the

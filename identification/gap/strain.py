@@ -106,7 +106,7 @@ def _of_heat(engine: Engine, fitted: Fit) -> Array:
 
 def _jumps(engine: Engine, part: Part, pulls: Array) -> Array:
     """The largest step (paths,) of every free path against its other ones, by the normal deviate
-    that is as seldom: a path whose steps are of one size, however large, has none that stands out."""
+    that is as seldom: where steps are of one size, however large, none stands out."""
     pieces = int(part.variant.info["pieces"])
     seen = np.any(engine.columns(part.variant.columns)[: engine.bench.rows.n] != 0, axis=0)
     out = []

@@ -6,8 +6,8 @@ the torque has turned: a play of radius `zone`, or half of it, on the torque, cu
 the play, or of 0.7 zones with soft ends; flanks that approach slowly leave `zone / |tau|` of the
 play to be taken up. Gears with play rub too: a stop operator of the zone's strength rides along.
 Without torque the joint lies anywhere in its play, a free place per setup at its first zero load
-and at later ones, or where the rubbing, or the push before, left it: to where its reading is as commanded,
-which is another zero of that reading in every pose. The tool's mass is not known:
+and at later ones, or where the rubbing, or the push before, left it: it is sent to where its reading
+is as commanded, which is another zero of that reading in every pose. The tool's mass is not known:
 the torque at which the weights are balanced is sought among masses of 0 to 3 kg.
 Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
 force: such plays are placed by the data (flanks.py), with the springs that they bring.
@@ -204,7 +204,7 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
 
 def _side(x: Array, zone: float, fresh: Flags) -> Array:
     """(n,) -1 or 1: the side of its play to which the net torque x (n,) last pushed a joint that
-    friction of the zone's strength holds there; at first, fresh (n,), that to which it is pushed."""
+    friction of the zone's strength holds there; at first, fresh (n,), to which it is pushed."""
     knows = (np.abs(x) > zone) | fresh
     knows[0] = True
     last = np.maximum.accumulate(np.where(knows, np.arange(len(x)), 0))
@@ -227,8 +227,8 @@ def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[i
 
 
 def resting_columns(bench: Bench, joint: int) -> dict[str, Array]:
-    """Pose -> column (size,) of a reading that is off in it: the controller sends the joint to where
-    its reading should be, whichever side of its play it lies at."""
+    """Pose -> column (size,) of a reading that is off in it: the controller sends the joint to
+    where its reading should be, whichever side of its play it lies at."""
     if not bench.has_q:
         return {}
     poses, out = [s.pose for s in bench.data.setups], {}
