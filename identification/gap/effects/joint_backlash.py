@@ -6,8 +6,8 @@ the torque has turned: a play of radius `zone`, or half of it, on the torque, cu
 the play, or of 0.7 zones with soft ends; flanks that approach slowly leave `zone / |tau|` of the
 play to be taken up. Gears with play rub too: a stop operator of the zone's strength rides along.
 Without torque the joint lies anywhere in its play, a free place per setup at its first zero load
-and at later ones, or where the rubbing, or the push before, left it: it is sent to where its reading
-is as commanded, which is another zero of that reading in every pose. The tool's mass is not known:
+and at later ones, or where the rubbing, or the push before, left it: it is sent to where its
+reading is as commanded, another zero of that reading in every pose. The tool's mass is not known:
 the torque at which the weights are balanced is sought among masses of 0 to 3 kg.
 Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
 force: such plays are placed by the data (flanks.py), with the springs that they bring.
