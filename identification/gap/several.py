@@ -31,11 +31,13 @@ def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> l
 def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
     """With its joint mechanisms in further joints, as far as that is worth it."""
     bench = engine.bench
-    if not (bench.data.arm and bench.has_q) or not start.eta > 0:
+    if not (bench.data.arm and bench.has_q):
         return start
     best = start
     for word in sorted(start.words & IN_JOINTS):
         for _ in range(MOST - 1):
+            if best.eta <= bench.noise.stated:
+                break  # there is nothing left for another joint to do
             found = _in_one_more(engine, variants, best, word)
             if found is None or found.log_weight < best.log_weight:
                 break

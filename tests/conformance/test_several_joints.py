@@ -73,7 +73,7 @@ def test_friction_in_one_joint_stays_in_one() -> None:
 def alone(found: GapResult) -> Explanation:
     """The explanation with the first of the joints only, far from the noise."""
     part = found.fit.parts[0]
-    return replace(explain(found.engine, (part,), 0.0), eta=1e-6, log_weight=-1e6)
+    return replace(explain(found.engine, (part,), 0.0), eta=1e-5, log_weight=-1e6)
 
 
 def test_only_joint_readings_tell_several_joints_apart() -> None:
