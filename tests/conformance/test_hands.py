@@ -29,9 +29,9 @@ def in_strokes(share: Array, first: Array) -> Array:
     return np.asarray(np.where(share > 0.6, first + (1 - first) * (share - 0.6) / 0.4, done))
 
 
-def late_laser(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
-    """The laser shows what was LATE_S ago. A hand takes 5 s from level to level, each time in
-    another way, and comes to rest half a second before the first reading."""
+def behind(rows: pd.DataFrame) -> Array:
+    """(n,) N by which a reading lags that shows what was LATE_S ago. A hand takes 5 s from level to
+    level, each time in another way, and comes to rest half a second before the first reading."""
     rng, force = np.random.default_rng(5), rows["force_N"].to_numpy(float)
     change = np.diff(force, prepend=force[0])
     change[rows["time_s"].diff().fillna(-1.0).to_numpy() < 0] = 0.0  # minutes between two runs
@@ -42,20 +42,27 @@ def late_laser(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
     since = np.arange(len(rows)) - start[hold - hold[0]] + 0.5 - LATE_S  # s since the hand rests
     share = np.clip(1 + since / 5.0, 0.0, 1.0)
     step = change[start][hold - hold[0]]
-    behind = step * (in_strokes(share, first[start][hold - hold[0]]) - 1)
-    slope = np.sum(lever**2 / TRUE, axis=1)
-    return slope * behind, np.zeros((len(rows), 6))
+    return step * (in_strokes(share, first[start][hold - hold[0]]) - 1)
 
 
-@pytest.fixture(scope="module")
-def lagging() -> GapData:
+def late_laser(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+    """The laser shows what was before."""
+    return np.sum(lever**2 / TRUE, axis=1) * behind(rows), np.zeros((len(rows), 6))
+
+
+def lagging(channel: str) -> GapData:
     design = DESIGNS["medium"]
-    return gap_data(imported(noisy(design, late_laser), meta(design)))
+    table = noisy(design, late_laser if channel == "displacement" else None)
+    if channel == "force":
+        table["force_N"] += behind(table.assign(force_N=np.round(table["force_N"])))
+    return gap_data(imported(table, meta(design)))
 
 
-def test_a_lag_is_one_however_the_hand_went(lagging: GapData) -> None:
-    found = diagnose_gap(lagging)
+@pytest.mark.parametrize("channel", ["displacement", "force"])
+def test_a_lag_is_one_however_the_hand_went(channel: str) -> None:
+    found = diagnose_gap(lagging(channel))
     assert found.verdict == "time_lag"
+    assert found.fit.parts[0].variant.info["channel"] == channel
     lag = found.effects[0].parameters["lag"]
     assert lag.low < LATE_S < lag.high  # it says how little the way tells
 

@@ -12,7 +12,7 @@ from identification.gap.effects.contact_seating import LAWS
 from identification.gap.effects.joint_backlash import _side
 from rig.gap_data import gap_data
 from rig.worlds.arm import place
-from tests.conformance.gap_designs import DESIGNS, Array, Q, imported, meta, noisy
+from tests.conformance.gap_designs import DESIGNS, TCP_MM, TRUE, Array, Q, imported, meta, noisy
 
 JOINT, WIDTH_RAD, STRENGTH_NM = 3, 1.5e-3, 0.9
 
@@ -65,3 +65,39 @@ def test_rough_faces_are_a_seat() -> None:
     depth = found.effects[0].parameters["depth"]
     assert depth.value == pytest.approx(1.5e-2 * np.log1p(200.0 / 4.0), rel=0.1)
     assert LAWS["logarithmic"](np.array(1.0)) == pytest.approx(np.log(2))
+
+
+def dragging(rows: pd.DataFrame) -> Array:
+    """(n, 2) N across the direction: the tip drags on its pad, and turns the load soon, then no
+    more; two components, as shares of a tangent each."""
+    force = rows["force_N"].to_numpy()
+    turned = force * np.tanh(3 * np.abs(force) / 200.0)
+    return np.column_stack([0.12 * turned, -0.07 * turned])
+
+
+def test_a_tip_that_drags_on_its_pad_is_a_load_askew() -> None:
+    design = DESIGNS["rich"]
+
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        moved = np.zeros((len(rows), 6))
+        for pose, angles in Q.items():
+            arm = place(np.array(angles))
+            levers = arm.levers(arm.tool(np.array(TCP_MM) * 1e-3))  # (6, 3)
+            for direction, others in (("x", (1, 2)), ("y", (2, 0))):
+                mine = ((rows["pose"] == pose) & (rows["direction"] == direction)).to_numpy()
+                moved[mine] = dragging(rows)[mine] @ levers[:, others].T / TRUE
+        return np.zeros(len(rows)), moved
+
+    table = noisy(design, law)
+    across = dragging(table)  # of the readings: half a newton of noise in 200 turns next to nothing
+    for direction, others in (("x", "yz"), ("y", "zx")):
+        mine = (table["direction"] == direction).to_numpy()
+        for k, axis in enumerate(others):
+            table.loc[mine, f"force_{axis}_N"] += across[mine, k]
+    found = diagnose_gap(gap_data(imported(table, meta(design))))
+    assert found.verdict == "load_misalignment"
+    assert found.probabilities["load_misalignment"] > 0.8
+    tangents = [
+        p.value for n, p in found.effects[0].parameters.items() if n.startswith("tangent_x")
+    ]
+    assert np.hypot(*tangents) == pytest.approx(np.hypot(0.12, 0.07), rel=0.05)
