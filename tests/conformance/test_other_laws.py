@@ -97,6 +97,7 @@ def test_a_tip_that_drags_on_its_pad_is_a_load_askew() -> None:
     found = diagnose_gap(gap_data(imported(table, meta(design))))
     assert found.verdict == "load_misalignment"
     assert found.probabilities["load_misalignment"] > 0.8
+    assert found.after < 1.1 * found.noise
     tangents = [
         p.value for n, p in found.effects[0].parameters.items() if n.startswith("tangent_x")
     ]

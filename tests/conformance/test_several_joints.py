@@ -12,7 +12,8 @@ import pytest
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.explanation import Explanation, explain
-from identification.gap.parts import Part
+from identification.gap.parts import Part, Sizes
+from identification.gap.penalties import pettiness
 from identification.gap.several import family_of, in_more_joints
 from rig.diagnose_text import render
 from rig.gap_data import gap_data
@@ -107,4 +108,6 @@ def test_a_joint_that_does_next_to_nothing_is_not_one_of_several() -> None:
     petty = explain(found.engine, (first, Part(second.variant, 1e-4 * second.scale)), 0.0)
     assert both.log_weight > -100.0
     assert petty.log_weight < -5000.0
+    rubs = Sizes(np.array([1e-5, 2e-6]), np.array([1e-5, 2e-6]), 1e-10)
+    assert pettiness(found.engine, (first, second), rubs) == 0.0
     assert both.troubles["joint_hysteresis"] == pytest.approx(np.hypot(*both.sizes))

@@ -88,3 +88,4 @@ def test_wrong_springs_alone_are_named(law: str) -> None:
     result = diagnose_gap(data(law))
     assert result.verdict == "joint_stiffness_error"
     assert [e.name for e in result.effects] == ["joint_stiffness_error"]
+    assert result.remainder < result.bench.noise.stated  # springs are laws: exact
