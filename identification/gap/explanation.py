@@ -12,7 +12,7 @@ import numpy as np
 from identification.gap.compare import condition
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
-from identification.gap.imperfection import LINEAR, PATH, level_prior
+from identification.gap.imperfection import LINEAR, level_prior
 from identification.gap.parts import (
     Part,
     Sizes,
@@ -120,8 +120,6 @@ def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Exp
         REMAINDER * engine.structural / max(len(together), 1),
         min(LAW_REMAINDER * float(each.max(initial=0.0)), REMAINDER * engine.structural),
     )
-    if "time_lag" in together and not engine.bench.rows.continuous:
-        least = max(least, PATH * together["time_lag"])
     good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
     share = np.exp(logs - logs.max())
     fraction = float(share @ good / share.sum())
