@@ -8,7 +8,6 @@ import pytest
 
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects.contact_seating import LAWS
 from identification.gap.effects.joint_backlash import _side
 from rig.gap_data import gap_data
 from rig.worlds.arm import place
@@ -55,16 +54,24 @@ def test_which_side_it_lies_at() -> None:
     np.testing.assert_array_equal(_side(x, 1.0, fresh), [-1, 1, 1, 1, -1, -1, 1, 1])
 
 
-def test_rough_faces_are_a_seat() -> None:
+SEATS = {
+    "logarithmic": lambda f: 15.0 * np.log1p(f / 4.0),  # rough faces
+    "Hertz": lambda f: 1.2 * np.abs(f) ** (2 / 3),  # a ball on a plate
+    "slack": lambda f: 30.0 * np.minimum(f / 31.0, 1.0),  # a gap that closes on a weak spring
+}
+
+
+@pytest.mark.parametrize("kind", list(SEATS))
+def test_seats_of_other_shapes(kind: str) -> None:
     def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
-        return 1.5e-5 * np.log1p(rows["force_N"].to_numpy() / 4.0), np.zeros((len(rows), 6))
+        return 1e-6 * SEATS[kind](rows["force_N"].to_numpy()), np.zeros((len(rows), 6))
 
     found = diagnose_gap(measured(law))
-    assert found.verdict == "contact_seating"
-    assert "logarithmic" in found.effects[0].label
+    assert [e.name for e in found.effects] == ["contact_seating"]
+    assert kind in found.effects[0].label
     depth = found.effects[0].parameters["depth"]
-    assert depth.value == pytest.approx(1.5e-2 * np.log1p(200.0 / 4.0), rel=0.1)
-    assert LAWS["logarithmic"](np.array(1.0)) == pytest.approx(np.log(2))
+    assert depth.value == pytest.approx(1e-3 * SEATS[kind](np.array(200.0)), rel=0.1)
+    assert found.after < 1.1 * found.noise
 
 
 def dragging(rows: pd.DataFrame) -> Array:

@@ -1,8 +1,9 @@
 """The fixture between flange and laser target seats itself: soft start at low force.
 
 The same function of the force in every direction and pose, ever flatter: `d (1 - exp(-F/F0))`,
-`d F / (F + F0)`, or, of rough faces whose asperities take up the load one after the other, `d log(1
-+ F/F0)`; unseen by encoders, 2 to 100 um.
+`d F / (F + F0)`, `d log(1 + F/F0)` of rough faces whose asperities take up the load one after the
+other, `d F^(2/3)` of a ball on a plate (Hertz 1881), or a gap that closes on a weak spring at F0;
+unseen by encoders, 2 to 100 um.
 
 Size: 2 to 100 um; 0.3 to 10 % of the deflection.
 Prior: depth positive, sd out of SHARES, equally likely; force scales and laws equally likely.
@@ -24,20 +25,24 @@ FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
 # A bench has no second direction that would tell a seat from a curved spring: only low forces.
 BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
 BENCH_SHARES = (0.01, 0.03, 0.1)
+HERTZ_AT = 0.1  # of the largest force: where its scale is put
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8)  # of an imposed stroke
 SEATS = (0.08, 0.16, 0.25, 0.35, 0.5, 0.7)  # of the stroke beyond a slack
 LOST = {"slack": 1.0, "toe": 0.5}  # share of a slack's stroke by which the rest comes late
 FINER = np.linspace(-0.32, 0.32, 9)  # of a slack that was found
 SHARES = (0.003, 0.01, 0.03, 0.1)  # of the deflection
 
-# Without an arm a seat that goes on and on can't be told from a curved spring.
-SEATED = ("exponential", "hyperbolic", "logarithmic")
+SEATED = ("exponential", "hyperbolic")
+# Of an arm, whose other directions tell a seat that goes on and on from a curved spring, and a gap
+# that closes on a weak spring from a knee.
+BESIDES = ("logarithmic", "slack")
 # How much of the depth is gone at x times the force scale, or at x times the stroke of a slack: of
 # one that is taken up bit by bit the stiffness grows in proportion to the stroke.
 LAWS: dict[str, Callable[[Array], Array]] = {
     "exponential": lambda x: np.asarray(-np.expm1(-x)),
     "hyperbolic": lambda x: np.asarray(x / (x + 1)),
     "logarithmic": lambda x: np.asarray(np.log1p(x)),
+    "Hertz": lambda x: np.asarray(np.abs(x) ** (2 / 3)),
     "slack": lambda x: np.minimum(x, 1.0),
     "toe": lambda x: np.asarray(1 - np.maximum(1 - x, 0.0) ** 2),
 }
@@ -50,18 +55,16 @@ def variants(bench: Bench) -> list[Variant]:
     if not top > 0 or not (bench.data.arm or bench.course.force_keeps_its_sign):
         return []
     scales = tuple(s * bench.reach for s in (SHARES if bench.data.arm else BENCH_SHARES))
-    size, sign = pressed(bench)
-    out, columns = [], []
+    out: list[Variant] = []
+    columns: list[int] = []
     forces = FORCES if bench.data.arm else BENCH_FORCES
     for share in forces:
-        f0 = share * top
-        for law in SEATED if bench.data.arm else SEATED[:2]:
-            column = bench.add(bench.outside_column(sign * LAWS[law](size / f0)))
+        for law in (*SEATED, *(BESIDES if bench.data.arm else ())):
+            out.append(_seated(bench, law, share * top, scales))
             if law == "exponential":
-                columns.append(column)
-            out.append(
-                variant(WORD, f"{law} {share:g}", [column], scales, force_N=f0, laws=((law, f0),))
-            )
+                columns += out[-1].columns
+    if bench.data.arm:  # a ball on a plate has no force of its own
+        out.append(_seated(bench, "Hertz", HERTZ_AT * top, scales))
     out.append(
         variant(
             WORD,
@@ -74,6 +77,17 @@ def variants(bench: Bench) -> list[Variant]:
         )
     )
     return [*out, *_slacks(bench)]
+
+
+def _seated(
+    bench: Bench, law: str, f0: float, scales: tuple[float, ...], prior: float = 1.0
+) -> Variant:
+    """One law with a force scale N."""
+    share = f0 / float(np.abs(bench.load).max())
+    size, sign = pressed(bench)
+    column = bench.add(bench.outside_column(sign * LAWS[law](size / f0)))
+    return variant(WORD, f"{law} {share:.3g}", [column], scales, force_N=f0, laws=((law, f0),),
+                   prior=prior)  # fmt: skip
 
 
 def pressed(bench: Bench) -> tuple[Array, Array]:
@@ -152,6 +166,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Slacks about one that was found, close: of the steps of a first look."""
     law, force = found.info["laws"][0]
     wide = force * (1 + close * FINER)
+    if bench.data.arm:
+        return [_seated(bench, law, f, found.scales, 1 / len(FINER)) for f in wide.tolist()]
     wide = wide[wide < _stroke(bench)].tolist()
     if len(found.columns) > 1:
         return [_then_seats(bench, w, 1 / len(SLACKS) / len(FINER)) for w in wide]
