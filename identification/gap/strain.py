@@ -100,8 +100,18 @@ def _of_heat(engine: Engine, fitted: Fit) -> Array:
         if part.word == "thermal_drift":
             out.append(np.abs(fitted.pulls_of(i)))
             if part.variant.info.get("path") == "free":
-                out.append(_jumps(engine, part, out[-1]) * LIMIT / JUMP)
+                jumps = _jumps(engine, part, out[-1]) * LIMIT / JUMP
+                out.append(jumps * _of_the_gap(engine, fitted.contribution(engine, i)))
     return np.concatenate(out)
+
+
+def _of_the_gap(engine: Engine, contribution: Array) -> float:
+    """1 for what moves at least a share of the gap that an explanation may not leave, less below:
+    what a slip leaves, a little heat beside it may mop up."""
+    weight = engine.bench.rows.weight
+    moved = engine.bench.rows.moved(contribution[: engine.bench.rows.n, None])[:, 0]
+    size = float(np.sqrt(weight @ moved**2 / weight.sum()))
+    return min(size / max(REMAINDER * engine.structural, 1e-300), 1.0) ** 2
 
 
 def _jumps(engine: Engine, part: Part, pulls: Array) -> Array:

@@ -51,7 +51,7 @@ def test_a_play_in_which_friction_holds_the_joint() -> None:
 def test_which_side_it_lies_at() -> None:
     x = np.array([-0.1, 2.0, 0.5, -0.5, -2.0, 0.5, 0.1, 0.5])
     fresh = np.array([True, False, False, False, False, False, True, False])
-    np.testing.assert_array_equal(_side(x, 1.0, fresh), [-1, 1, 1, 1, -1, -1, 1, 1])
+    np.testing.assert_array_equal(_side(x, 1.0, fresh), [0, 1, 1, 1, -1, -1, 0, 0])
 
 
 SEATS = {

@@ -204,11 +204,12 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
 
 def _side(x: Array, zone: float, fresh: Flags) -> Array:
     """(n,) -1 or 1: the side of its play to which the net torque x (n,) last pushed a joint that
-    friction of the zone's strength holds there; at first, fresh (n,), to which it is pushed."""
-    knows = (np.abs(x) > zone) | fresh
+    friction of the zone's strength holds there; 0, its middle, until it is pushed after fresh."""
+    pushed = np.abs(x) > zone
+    knows = pushed | fresh
     knows[0] = True
     last = np.maximum.accumulate(np.where(knows, np.arange(len(x)), 0))
-    return np.where(x[last] < 0, -1.0, 1.0)
+    return np.where(pushed[last], np.sign(x[last]), 0.0)
 
 
 def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[int]]) -> list[int]:
