@@ -45,9 +45,17 @@ def _hysteresis(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     found = _beside_line(found, len(radius), joint)
     slips = (radius < float(np.ptp(np.append(bench.torque[:, joint], 0.0)))).astype(float)
     return {
-        "friction": found.linear(slips * radius, torque_unit(bench)),
+        "friction": _from_zero(found.linear(slips * radius, torque_unit(bench))),
         "share_through_friction": found.per_spring(slips, joint),
     }
+
+
+def _from_zero(p: Parameter) -> Parameter:
+    """Of what is not below zero, however little the data tell of it."""
+    if p.low >= 0:
+        return p
+    value, low, high, *inner = (max(v, 0.0) for v in (p.value, p.low, p.high, *p.ci90))
+    return Parameter(value, low, high, p.unit, (inner[0], inner[1]))
 
 
 def _beside_line(found: Found, k: int, joint: int) -> Found:

@@ -403,3 +403,18 @@ def test_explanations_by_other_words_move_parameters_as_far_as_they_are_likely()
 
     assert width(0.0) > width(-2.0) > width(-9.0)
     assert width(-9.0) == width(-20.0)  # what hardly counts does not
+
+
+def test_friction_is_not_below_zero() -> None:
+    """However little the data tell of it: an interval that reaches below ends there."""
+    load = 80 * np.sin(np.arange(300) / 15)
+    bench = make_bench(bench_data(load, load * 1e-5, step=np.full(300, -1), branch=np.full(300, 3)))
+    rubs = of(bench, "joint_hysteresis", "r 0.2")
+    k = len(rubs.columns)
+    softer = Softer({}, {}, {})
+    for way, below in ((-0.1, True), (0.9, False)):
+        read = parameters(bench, Part(rubs, 1.0), np.full(k, way), 0.01 * np.eye(k), softer)
+        friction = read["friction"]
+        assert (friction.value == 0.0) is below
+        assert (friction.low == 0.0) is below
+        assert 0 <= friction.ci90[0] <= friction.ci90[1] <= friction.high
