@@ -123,7 +123,9 @@ def test_force_through_the_whole_path(rig: Rig, channels: int) -> None:
     assert loaded.count >= 2000
     assert loaded.invalid == 0
     assert loaded.source.startswith("emulated")
-    assert loaded.end - loaded.start == pytest.approx(loaded.count / 1000)
+    # The first blocks of a stream are stamped late by as much as they were delivered late, until one
+    # comes sooner (`Timeline`): on a busy machine by a millisecond.
+    assert loaded.end - loaded.start == pytest.approx(loaded.count / 1000, abs=0.01)
     names = [s.name for s in rig.device.signals]
     assert (
         len(names) == len(loaded.values) == len(loaded.sd) == channels + (3 if channels == 3 else 6)
