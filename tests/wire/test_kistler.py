@@ -123,7 +123,7 @@ def test_force_through_the_whole_path(rig: Rig, channels: int) -> None:
     assert loaded.count >= 2000
     assert loaded.invalid == 0
     assert loaded.source.startswith("emulated")
-    # The first blocks of a stream are stamped as late as they were delivered, until one comes sooner
+    # The first blocks are stamped as late as they were delivered, until one comes sooner
     # (`Timeline`): on a busy machine by a millisecond.
     assert loaded.end - loaded.start == pytest.approx(loaded.count / 1000, abs=0.01)
     names = [s.name for s in rig.device.signals]
