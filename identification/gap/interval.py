@@ -24,6 +24,11 @@ class Parameter:
     inner: tuple[float, float] | None = None
 
     @property
+    def sd(self) -> float:
+        """Of a normal law with this interval."""
+        return (self.high - self.low) / (2 * TWO_SIDED)
+
+    @property
     def ci90(self) -> tuple[float, float]:
         """The 90 % interval."""
         if self.inner is not None:
@@ -32,6 +37,18 @@ class Parameter:
             self.value + TWO_SIDED_90 / TWO_SIDED * (v - self.value) for v in (self.low, self.high)
         )
         return low, high
+
+    def over(self, factor: Parameter) -> Parameter:
+        """Divided by a factor that is known independently of it."""
+        value = self.value / factor.value
+        half = (factor.high - factor.low) / 2 / factor.value * abs(value)
+
+        def ends(low: float, high: float, half: float) -> tuple[float, float]:
+            off = np.hypot(np.array([low, high]) / factor.value - value, half)
+            return value - float(off[0]), value + float(off[1])
+
+        inner = self.inner and ends(*self.inner, half * TWO_SIDED_90 / TWO_SIDED)
+        return Parameter(value, *ends(self.low, self.high, half), self.unit, inner)
 
 
 @dataclass(frozen=True, eq=False)

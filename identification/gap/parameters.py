@@ -23,6 +23,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.contact_seating import LAWS
+from identification.gap.effects.joint_backlash import unreached
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from identification.gap.history import half_sample, settling_share, standing_on
 from identification.gap.interval import NOMINAL, TWO_SIDED, Found, Parameter, Softer, normal
@@ -72,9 +73,13 @@ def _beside_line(found: Found, k: int, joint: int) -> Found:
     return Found(w[:k], cov[:k, :k], Softer(value, variance, cross))
 
 
-def _backlash(bench: Bench, _: Part, found: Found) -> dict[str, Parameter]:
+def _backlash(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
+    """What nobody reached of a play was taken to be as the shape has it: a rectangular
+    distribution, from nothing to twice that (GUM 4.3.7)."""
     arm = bench.data.arm
-    return {"width": found.one(0, "rad" if arm else "mm", 1.0 if arm else 1e3)}
+    seen = found.one(0, "rad" if arm else "mm", 1.0 if arm else 1e3)
+    sd = float(np.hypot(seen.sd, unreached(bench, part.variant) * seen.value / 3**0.5))
+    return {"width": normal(seen.value, sd**2, seen.unit)}
 
 
 def _curve(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
@@ -228,7 +233,7 @@ def _lag(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     does = sum((v * bench.columns[c][:n] for v, c in zip(w, part.variant.columns, strict=True)),
                np.zeros(n))  # fmt: skip
     total = found.linear(np.ones(len(w)), "1")
-    relative = (total.high - total.low) / (2 * TWO_SIDED) / max(abs(total.value), 1e-6)
+    relative = total.sd / max(abs(total.value), 1e-6)
     lags, misses, spread = np.zeros(3), np.zeros(3), np.zeros(3)
     for k, kind in enumerate(("delay", "filter", "average")):
         lags[k], misses[k] = closest_lag(bench, info["channel"], kind, does)

@@ -19,6 +19,7 @@ from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Soft
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part, energies, log_joints, signs_kept
 from identification.gap.penalties import SAME_JOINT
+from identification.gap.readings import as_moved
 from identification.gap.several import family_of
 from identification.gap.variants import Variant, place_of
 
@@ -192,10 +193,11 @@ DEFINED = 0.01
 def _read(engine: Engine, explanation: Explanation) -> list[Parameters]:
     """Parameters of the effects of an explanation as it is."""
     fitted = fit(engine, explanation, alike=True)
-    return [
+    read = [
         parameters(engine.bench, part, *fitted.of(i), _softer(engine, fitted, i))
         for i, part in enumerate(explanation.parts)
     ]
+    return as_moved(engine.bench, explanation.parts, read)
 
 
 _Weighed = list[tuple[Explanation, float]]

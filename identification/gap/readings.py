@@ -10,6 +10,8 @@ from identification.gap.effects import displacement_scale, time_lag
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
+from identification.gap.interval import Parameter
+from identification.gap.parts import Part
 from identification.gap.variants import Variant
 
 _CLOSE = 0.5  # of the steps between lags
@@ -49,3 +51,30 @@ def _about(bench: Bench, found: Variant) -> list[Variant]:
     if found.word == time_lag.WORD:
         return time_lag.refined(bench, found, _CLOSE)
     return displacement_scale.variants(bench)
+
+
+def as_moved(
+    bench: Bench, parts: tuple[Part, ...], read: list[dict[str, Parameter]]
+) -> list[dict[str, Parameter]]:
+    """Parameters of the parts of an explanation, where a gain of the laser is one of them: what
+    only the laser saw of the others was read by that factor too large."""
+    gain = next((r["factor"] for p, r in zip(parts, read, strict=True)
+                 if p.word == displacement_scale.WORD), None)  # fmt: skip
+    if gain is None or not bench.data.arm or bench.has_q:
+        return read
+    return [
+        {name: p.over(gain) if name in _LENGTHS.get(part.word, ()) else p for name, p in r.items()}
+        for part, r in zip(parts, read, strict=True)
+    ]
+
+
+# what grows with the reading: lengths, and shares of the springs as they are
+_LENGTHS = {
+    "joint_backlash": ("width",),
+    "contact_seating": ("depth",),
+    "joint_yield": ("slope_beyond_over_elastic",),
+    "base_slip": ("slope_beyond_over_elastic",),
+    "joint_hysteresis": ("share_through_friction",),
+    "joint_creep": ("creep_fraction", "creep_fraction_of_run"),
+    "joint_nonlinear_stiffness": ("change_of_compliance_over_range",),
+}

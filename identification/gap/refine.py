@@ -30,6 +30,7 @@ _REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 6  # words that are refined
 _STEPS = 2  # to the springs beside what goes through them
 _CLOSE = 0.2  # of the first look's steps
+_LOOKS = 6  # at most, at one share of the steps
 _WINDOW = 12.0  # nats above `none` that a word must have to be refined
 
 
@@ -101,8 +102,16 @@ _ELSEWHERE = 3  # shapes that are looked at elsewhere
 
 
 def _backlash(word: _Word) -> list[Variant]:
-    places = _places(word.alone, word.beside)
-    return _closing_in(word, joint_backlash.refined, places, joint_backlash.CLOSE)
+    """Beside the leading word, and alone: that may be a curve which does what the play does."""
+    looks = [(word, _places(word.alone, word.beside))]
+    if word.beside:
+        looks.append((replace(word, ranked=[joint_backlash.WORD]), word.alone[:1]))
+    return [
+        v
+        for of, starts in looks
+        for refined in (joint_backlash.refined, joint_backlash.uneven)
+        for v in _closing_in(of, refined, starts, joint_backlash.CLOSE)
+    ]
 
 
 def _friction(word: _Word) -> list[Variant]:
@@ -200,14 +209,21 @@ def _closing_in(
     word: _Word, refined: Callable[..., list[Variant]], starts: list[Scored],
     closer: tuple[float, ...] = (_CLOSE,),
 ) -> list[Variant]:  # fmt: skip
-    """Finer shapes about those that were found, and finer ones still about the best of these."""
+    """Finer shapes about those that were found, and finer ones still about the best of these. What
+    is best moves along narrow valleys (a zone is as wide as the crossing is far): every look but
+    the closest is moved after it until it stays, and the last one is kept."""
     engine = word.engine
     fresh = [v for s in starts for v in refined(engine.bench, s.variant)]
     finer, found = list(fresh), list[Scored]()
     for share in closer if fresh else ():
-        engine.extend()
-        found += _scored_beside(engine, word.families, word.ranked, fresh)
-        fresh = refined(engine.bench, max(found, key=_evidence).variant, share)
+        best: Variant | None = None
+        for _ in range(_LOOKS if share > closer[-1] else 1):
+            engine.extend()
+            found += _scored_beside(engine, word.families, word.ranked, fresh)
+            last, best = best, max(found, key=_evidence).variant
+            if best is last:
+                break
+            fresh = refined(engine.bench, best, share)
         finer += fresh
     return finer
 

@@ -30,6 +30,7 @@ from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
 KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
+UNEVEN = {"softer up": (2.5, 1.0), "softer down": (1.0, 2.5)}  # soft ends, one more than the other
 KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", *KEPT)
 PLACED = ("gap", "held")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
@@ -38,10 +39,11 @@ HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
 _FINE_PRIOR = 8.0  # of all finer shapes together, however often it is looked closer
-_CLOSER = 0.3  # power of the share: zones need not be known as well as masses
+_CLOSER = 0.6  # power of the share: zones need not be known as well as masses
 _TOOL_STEPS_KG = np.linspace(-0.7, 0.7, 9)
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
+_VISITED = 0.45  # of the play from an end: nearer than the middle
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
 MOST_RUB = 0.25  # of it at most
 _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an arm
@@ -88,28 +90,67 @@ def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Arra
     return out
 
 
+def net(bench: Bench, j: int, crossing: str, kg: float) -> Array:
+    """(n,) Nm whose zero the play is passed at: of the load, or with the weights and a tool of that
+    mass."""
+    torque = bench.true_torque[:, j]
+    return torque + bench.weight(j, kg) if crossing == "weight" else torque
+
+
+def unreached(bench: Bench, variant: Variant) -> float:
+    """Share of the play, 0 to 1, that no load took up: ends that flanks come near to, and, where
+    the joint is taken to rest in the middle, the side to which nobody pushed it."""
+    info = variant.info
+    if info["kind"] in PLACED:
+        return 0.0
+    x = net(bench, int(info["joint"]), str(info["crossing"]), float(info["tool_kg"]))
+    place = _shapes(bench, x, float(info["zone_Nm"]))[info["kind"]][0]
+    left = [0.5 - float(place.max()), 0.5 + float(place.min())]
+    return sum(v for v in left if v < _VISITED or info["kind"] in HELD)
+
+
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Zones about one that was found; where weights decide about the crossing, at masses of the
     tool in between: the zone is small beside what they do. close: share of the steps; the last ones
     are of the same kind."""
-    info, j = dict(found.info), int(found.info["joint"])
-    if info["kind"] in PLACED:
+    kind = found.info["kind"]
+    if kind in PLACED:
         return []
+    beside = _REFINED if bench.data.arm else _BENCH_REFINED
+    kinds = tuple(dict.fromkeys([kind, *(beside if close >= CLOSE[0] else ())]))
+    return _finer(bench, found, kinds, close)
+
+
+def uneven(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
+    """The same for ends of which one is softer: at first from scratch, for nobody looked yet."""
+    kind = found.info["kind"]
+    if kind in PLACED or not bench.data.arm:
+        return []
+    if kind in UNEVEN:
+        return _finer(bench, found, tuple(UNEVEN) if close >= CLOSE[0] else (kind,), close)
+    span = bench.reach_of(bench.true_torque[:, int(found.info["joint"])])
+    return _finer(bench, found, tuple(UNEVEN), close, np.array(ZONES) * span)
+
+
+def _finer(
+    bench: Bench, found: Variant, kinds: tuple[str, ...], close: float, zones: Array | None = None
+) -> list[Variant]:
+    """Variants of these kinds about one that was found; zones (k,) Nm: others than about it."""
+    info, j = dict(found.info), int(found.info["joint"])
     torque = bench.true_torque[:, j]
     weighty = info["crossing"] == "weight" and np.any(bench.weight_per_kg(j))
     steps = _TOOL_STEPS_KG if weighty else np.zeros(1)
     masses = float(info["tool_kg"]) + close * steps
-    ratios = np.array([1 / 1.5, 1.0, 1.5]) if weighty else np.geomspace(1 / 1.5, 1.5, 7)
-    zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
-    # what changes over more of the range is a curved spring
-    zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
-    beside = _REFINED if bench.data.arm else _BENCH_REFINED
-    kinds = tuple(dict.fromkeys([info["kind"], *(beside if close >= CLOSE[0] else ())]))
+    if zones is None:
+        ratios = np.array([1 / 1.5, 1.0, 1.5]) if weighty else np.geomspace(1 / 1.5, 1.5, 7)
+        zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
+        # what changes over more of the range is a curved spring
+        zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
     out: list[Variant] = []
     share = _FINE_PRIOR / (1 + len(CLOSE)) / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}
     for kg in masses:
-        x = torque + bench.weight(j, kg) if info["crossing"] == "weight" else torque
+        x = net(bench, j, info["crossing"], kg)
         for zone in zones:
             exact = info | {"zone_Nm": float(zone), "tool_kg": float(kg), "closely": True}
             label = f"joint {j + 1} {info['crossing']} tool {kg:.2f} kg"
@@ -193,13 +234,19 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
         "friction": [np.clip(state[:, 0] / zone, -1, 1) / 2, rub],
         "friction 1/2": [np.clip(state[:, 3] / zone, -1, 1) / 2, rub],
         "friction 3": [np.tanh(state[:, 1] / zone) / 2, rub],
-        "soft": [-np.sign(x) * np.expm1(-np.abs(x) / zone) / 2, rub],
+        "soft": [_ends(x, zone, zone), rub],
         "slow": [x / (np.abs(x) + zone) / 2, rub],
         "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
         "kept": [np.clip(kept[:, 0] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
         "kept 1/2": [np.clip(kept[:, 1] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
         "jumps": [_side(x, zone, bench.moved) / 2, -(x - kept[:, 0]) / (2 * zone)],
+        **{kind: [_ends(x, up * zone, down * zone), rub] for kind, (up, down) in UNEVEN.items()},
     }
+
+
+def _ends(x: Array, up: float, down: float) -> Array:
+    """(n,) -1/2 to 1/2: place in the play under the net torque x (n,), its ends soft over these."""
+    return np.where(x > 0, -np.expm1(-np.maximum(x, 0) / up), np.expm1(np.minimum(x, 0) / down)) / 2
 
 
 def _side(x: Array, zone: float, fresh: Flags) -> Array:

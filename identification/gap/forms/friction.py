@@ -114,11 +114,8 @@ def backlash(bench: Bench, law: Law) -> list[Array]:
 
 
 def _net(bench: Bench, law: Law) -> Array:
-    joint = law.constants["joint"]
-    torque = bench.true_torque[:, joint]
-    if law.constants["crossing"] == "load":
-        return torque
-    return np.asarray(torque + bench.weight(joint, law.constants.get("tool", TOOL_KG)))
+    c = law.constants
+    return joint_backlash.net(bench, c["joint"], c["crossing"], c.get("tool", TOOL_KG))
 
 
 def _places(bench: Bench, law: Law) -> list[tuple[int, bool]]:
