@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.effects import WORDS
 from identification.gap.forms import Form, Law, Term
+from identification.gap.words import WORDS
 from rig.errors import did_you_mean
 from rig.gap_keys import (
     ABOUT,

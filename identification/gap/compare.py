@@ -11,11 +11,12 @@ import numpy as np
 
 from identification.gap.data import Array, Ints
 from identification.gap.evidence import Engine, Level
-from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION, LINEAR
+from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION
 from identification.gap.products import squares_of
 from identification.gap.signs import Limits
 from identification.gap.table import Stack, Table
 from identification.gap.variants import Variant
+from identification.gap.words import LINEAR
 
 
 class Scored(NamedTuple):

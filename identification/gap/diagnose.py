@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from identification.gap.compare import score
 from identification.gap.data import GapData, Ints
 from identification.gap.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.earned import FREE, earned, noise_of, sample_rms
-from identification.gap.effects import WORDS, library
+from identification.gap.effects import library
 from identification.gap.ends import without_ends
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Explanation, Found, Likeness
@@ -33,6 +33,7 @@ from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
 from identification.gap.verdict import NOISY
+from identification.gap.words import WORDS
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
 # laws themselves are only families.
@@ -270,17 +271,25 @@ def _effects(found: Found, variants: list[Variant], chosen: Explanation) -> tupl
 
 def _with_twins(result: GapResult, chosen: Explanation, withheld: set[str]) -> GapResult:
     """Effects that no channel tells from the same law elsewhere share their probability with it,
-    openly: between the two only priors and grids would decide."""
+    openly: between the two only priors and grids would decide. The verdict, which they are together
+    the likeliest for, stays the most probable word."""
     probabilities, effects = dict(result.probabilities), []
     for i, (effect, part) in enumerate(zip(result.effects, result.fit.parts, strict=True)):
         twin = twin_of(result.engine, part, result.fit.of(i)[0], chosen.eta)
         same = [twin.word] if twin is not None and twin.word not in withheld else []
         alike = tuple(dict.fromkeys([*effect.indistinguishable_from, *same]))
         effects.append(replace(effect, indistinguishable_from=alike))
-        if i == 0 and same:
-            each = (probabilities[effect.name] + probabilities[same[0]]) / 2
-            probabilities[effect.name] = probabilities[same[0]] = each
+        if effect.name == result.verdict and same:
+            probabilities |= _shared(probabilities, effect.name, same[0])
     return replace(result, effects=tuple(effects), probabilities=probabilities)
+
+
+def _shared(probabilities: Mapping[str, float], word: str, twin: str) -> dict[str, float]:
+    """The same for both, or as much more for the word as another one has."""
+    both = probabilities[word] + probabilities[twin]
+    others = max(p for w, p in probabilities.items() if w not in (word, twin))
+    mine = min(max(both / 2, others), both)
+    return {word: mine, twin: both - mine}
 
 
 def _alike(found: Found, chosen: Explanation, word: str) -> tuple[str, ...]:

@@ -16,14 +16,13 @@ from identification.gap.explanation import Explanation, Found
 from identification.gap.fit import Fit, fit
 from identification.gap.hands import open_to_hands
 from identification.gap.heldout import folds, held_out
-from identification.gap.imperfection import LINEAR
 from identification.gap.verdict import weighed
+from identification.gap.words import DRIFTS, LINEAR
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
 CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
 SHARP = 8.0  # how fast weight is lost about the limit, per factor e
 # What drifts do in one run no other run foretells; nor a jump of the datum beside them.
-DRIFTS = frozenset({"force_drift", "thermal_drift"})
 FREE = DRIFTS | {"zero_shift"}
 _LOOKED_AT, _WITHIN = 6, 9.0  # explanations, and nats below the best, that are looked at
 

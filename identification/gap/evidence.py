@@ -24,14 +24,13 @@ from numpy.typing import NDArray
 
 from identification.gap.base import Base
 from identification.gap.bench import Bench
-from identification.gap.data import UNLOADING, Array
+from identification.gap.data import UNLOADING, Array, Flags, Ints
 from identification.gap.growing import Growing
 from identification.gap.products import Gathered, Some, Weights, White
-from identification.gap.rows import rises
+from identification.gap.rows import Rows, rises
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
-CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
-CONTINUOUS_ROW_PART = 0.3  # neighbouring rows of a running recording err alike
+_CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
 _NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
 _AT_ONCE = 500_000  # numbers: what they take stays near the processor
 LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
@@ -199,14 +198,12 @@ class Engine:
 
     def _left(self, eta: float) -> Weights:
         """What an imperfection leaves of the precision."""
-        part = HOLD_PART if not self.bench.rows.continuous else CONTINUOUS_HOLD_PART
-        hold = self.bench.noise.hold[self._edges] ** 2 + (part * eta) ** 2
+        hold = self.bench.noise.hold[self._edges] ** 2 + (hold_part(self.bench.rows) * eta) ** 2
         lever = (eta / LEVER_M) ** 2 if self.bench.data.arm else 0.0
-        row_part = ROW_PART if not self.bench.rows.continuous else CONTINUOUS_ROW_PART
         return Weights(
             1 / (1 + hold * self._length_u**2),
             1 / (1 + lever * self._length_q**2),
-            1 / (1 + (row_part * eta / self.sigma[self._inside]) ** 2),
+            1 / (1 + (ROW_PART * eta / self.sigma[self._inside]) ** 2),
         )
 
     def _common(self, white: White, weights: list[Weights]) -> list[Array]:
@@ -261,6 +258,11 @@ class Engine:
 _FEW = 8  # kinds of rows
 
 
+def hold_part(rows: Rows) -> float:
+    """Share of an imperfection that a hold, or a stretch of a running recording, has to itself."""
+    return _CONTINUOUS_HOLD_PART if rows.continuous else HOLD_PART
+
+
 def _groups(noise: Array) -> tuple[slice, ...]:
     """Rows in ascending order of their noise whose noise is the same; none where hardly any is."""
     edges = np.flatnonzero(np.diff(noise) > 1e-12 * noise[1:]) + 1
@@ -296,16 +298,13 @@ def structural_rms(bench: Bench, base: Base, target: Array) -> float:
     n, sigma = bench.rows.n, bench.sigma
     A = base.columns * base.sd / sigma[:, None]
     beta = base.sd * np.linalg.solve(A.T @ A + np.eye(len(base.sd)), A.T @ (target / sigma))
-    weight = bench.rows.weight
-    left = (target - base.columns @ beta)[:n]
-    return float(np.sqrt(weight @ left**2 / weight.sum()))
+    return bench.rows.rms((target - base.columns @ beta)[:n])
 
 
 def _variance(bench: Bench) -> float:
     """Mean square (m^2) of the response about its mean per setup: a law that does more, as what
     yields far beyond its threshold on an imposed path, is no further off for that."""
-    weight, moved = bench.rows.weight, bench.rows.moved(bench.response[:, None])[:, 0]
-    return float(weight @ moved**2 / weight.sum())
+    return bench.rows.rms(bench.rows.moved(bench.response[:, None])[:, 0]) ** 2
 
 
 def level_columns(bench: Bench) -> Array:
@@ -339,10 +338,7 @@ def run_columns(bench: Bench) -> Array:
 
 
 def level_covariance(bench: Bench) -> Array:
-    """Imperfection of levels of one setup: alike for neighbouring forces, half so between branches.
-
-    Unit variance; `exp(-|dF| / a quarter of the range)`, a path that may have corners.
-    """
+    """(levels, levels) of the imperfection at the levels of a bench, of unit variance."""
     rows = bench.rows
     count = int(rows.level.max()) + 1
     sums = np.bincount(rows.level, minlength=count)
@@ -350,8 +346,12 @@ def level_covariance(bench: Bench) -> Array:
     first = np.unique(rows.level, return_index=True)[1]
     setup = rows.setup[first]
     branch = (rises(bench.load) if rows.continuous else rows.branch)[first]
-    span = np.ptp(bench.load) or 1.0
-    near = np.exp(-np.abs(load[:, None] - load) / (_NEIGHBOUR * span))
-    same = setup[:, None] == setup
-    alike = np.where(branch[:, None] == branch, 1.0, 0.5)
-    return np.asarray(near * same * alike + 1e-9 * np.eye(count))
+    return alike(setup, branch, load, float(np.ptp(bench.load)))
+
+
+def alike(setup: Ints, branch: Ints | Flags, load: Array, span: float) -> Array:
+    """(k, k) covariance of what goes wrong at levels: unit variance, `exp(-|dF| / a quarter of the
+    range)`, a path that may have corners; half so between branches, none between setups."""
+    near = np.exp(-np.abs(load[:, None] - load) / (_NEIGHBOUR * (span or 1.0)))
+    branches = np.where(branch[:, None] == branch, 1.0, 0.5)
+    return np.asarray(near * branches * (setup[:, None] == setup) + 1e-9 * np.eye(len(load)))

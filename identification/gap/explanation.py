@@ -12,7 +12,7 @@ import numpy as np
 from identification.gap.compare import condition
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
-from identification.gap.imperfection import LINEAR, level_prior
+from identification.gap.imperfection import level_prior
 from identification.gap.parts import (
     Part,
     Sizes,
@@ -22,7 +22,6 @@ from identification.gap.parts import (
     signs_kept,
 )
 from identification.gap.penalties import (
-    FRICTION,
     TOE_AND_KNEE,
     cancelling,
     pettiness,
@@ -31,6 +30,7 @@ from identification.gap.penalties import (
     within_stated,
 )
 from identification.gap.priors import prior_of
+from identification.gap.words import FRICTION, LINEAR
 
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.

@@ -8,11 +8,11 @@ import numpy as np
 
 from identification.gap.data import Array, Flags
 from identification.gap.evidence import (
-    HOLD_PART,
     LEVER_M,
     ROW_PART,
     RUN_PART,
     Engine,
+    hold_part,
     level_columns,
     level_covariance,
     run_columns,
@@ -113,11 +113,10 @@ def _misled(engine: Engine, parts: tuple[Part, ...], w: Array, eta: float) -> Ar
         runs = RUN_PART * run_columns(engine.bench)
         begin = [engine.bench.stacked(m.astype(float)) for m in _phases(engine)]
         engine.cache["imperfection"] = np.column_stack([levels, runs, *begin])
-    n, weight = engine.bench.rows.n, engine.bench.rows.weight
+    rows = engine.bench.rows
     columns = engine.columns(c for p in parts for c in p.variant.columns)
-    does = (columns[:n] @ w)[:, None]
-    moved = engine.bench.rows.moved(does)[:, 0]
-    size = float(np.sqrt(weight @ moved**2 / weight.sum()))
+    moved = rows.moved((columns[: rows.n] @ w)[:, None])[:, 0]
+    size = rows.rms(moved)
     own = [engine.bench.stacked(moved * m / size) for m in _phases(engine) if size > 0]
     return eta * np.column_stack([engine.cache["imperfection"], *own])
 
@@ -140,7 +139,7 @@ def _weighed(engine: Engine, X: Array, eta: float, keep: Flags) -> Array:
     key, common = _holds(engine, eta)
     sigma2 = engine.sigma**2
     n = engine.bench.rows.n
-    sigma2[:n] += (ROW_PART * eta) ** 2 / np.maximum(engine.bench.rows.weight, 1.0)
+    sigma2[:n] += (ROW_PART * eta) ** 2  # more samples of the same row are as far off
     p = np.where(keep, 1 / sigma2, 0.0)
     out = X * p[:, None]
     held = np.flatnonzero((common > 0) & keep)
@@ -163,5 +162,5 @@ def _holds(engine: Engine, eta: float) -> tuple[Array, Array]:
     key, common = np.arange(size) + float(n), np.zeros(size)
     key[:n] = bench.rows.hold
     common[bench.layout.q] = eta / LEVER_M
-    common[:n] = np.hypot(bench.noise.hold, HOLD_PART * eta)
+    common[:n] = np.hypot(bench.noise.hold, hold_part(bench.rows) * eta)
     return np.asarray(key, dtype=float), common

@@ -15,17 +15,6 @@ IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a 
 # Elasticity, gains and leverage are laws, not families, and as exact as the springs of the base,
 # which count as exact: to a thousandth of their size.
 LAW_IMPERFECTION = 0.002
-LINEAR = frozenset(
-    [
-        "link_flexibility",
-        "base_compliance",
-        "load_misalignment",
-        "force_scale",
-        "displacement_scale",
-        "pose_error",
-        "joint_stiffness_error",
-    ]
-)
 LEAST_IMPERFECTION = 0.01
 # Of what a lag does at a reading of a hold: it repeats a path between levels that hands took and
 # nobody saw. Who turns a third of a step in a fifth of the time, in several strokes, is so far off.

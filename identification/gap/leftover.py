@@ -18,9 +18,9 @@ from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.hands import open_to_hands
 from identification.gap.noise import UNSURE
-from identification.gap.penalties import CURVES, FRICTION
 from identification.gap.strain import LIMIT, strain
 from identification.gap.verdict import weighed
+from identification.gap.words import CURVES, FRICTION
 
 # An elastic curve that falls while it is pushed on, or a force that is nearly lost, as none is that
 # has made something yield or slide: a snap, a slip, a crack are likelier.

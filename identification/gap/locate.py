@@ -9,12 +9,9 @@ import numpy as np
 from identification.gap.data import BRANCH_NAMES, Array, Flags, Ints
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit
-from identification.gap.imperfection import LINEAR
+from identification.gap.words import INSTRUMENTS, LINEAR
 
 _SHOWS = 0.15  # an effect shows where it reaches this share of its largest part
-_INSTRUMENT = frozenset(
-    ["load_misalignment", "force_drift", "force_scale", "time_lag", "pose_error"]
-)  # channels that say nothing about the encoders
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +50,7 @@ def locate(engine: Engine, fit: Fit, gap: Array) -> Where:
         repetitions=tuple(int(r) for r in np.unique(bench.rows.repetition[rows])),
         joints=_joints(engine, fit),
         seen_by_encoders=(word.startswith("joint_") if bench.has_q and word and
-                          word not in _INSTRUMENT else None),
+                          word not in INSTRUMENTS else None),
         share=inside / total if total > 0 else 0.0,
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import Array, GapData, Ints
-from identification.gap.rows import Rows, hold_ids
+from identification.gap.rows import Rows, hold_ids, scatter_within
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -18,7 +18,6 @@ RUN_SHARE = 0.33
 # What is stated of a bench's instruments is known to a factor of two (GUM G.4.2: a type B estimate
 # is worth few degrees of freedom): what is left below twice that is no structure.
 UNSURE = 3**0.5  # of it, beyond it in quadrature
-_ENOUGH = 30  # second differences: then their scatter is known to about an eighth
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     if rows.continuous:
         per_sample, common = _running(data, rows, slope, imposed), np.zeros(rows.n)
     elif imposed:  # the force answers, and what is driven is taken as it was read
-        common, answer = np.zeros(rows.n), _scatter(data.force, hold) or meter.force
+        common, answer = np.zeros(rows.n), scatter_within(data.force, hold) or meter.force
         per_sample = np.hypot(slope * max(answer, 0.33 * meter.force), meter.displacement)
     else:
         alone = np.where(rows.steady, meter.displacement, fallback)
@@ -57,7 +56,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     q = np.full(data.joints, ENCODER_RAD)
     if data.q is not None and not rows.continuous:
         for j in range(data.joints):
-            found = _scatter(data.q[:, j], hold)
+            found = scatter_within(data.q[:, j], hold)
             q[j] = max(found or ENCODER_RAD, 1e-7)
     stated = meter.displacement
     if rows.continuous or imposed:
@@ -222,23 +221,11 @@ def tangent(rows: Rows, force_sd: float) -> Array:
 def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Ints) -> Array:
     """Noise of one sample in every row (n,): measured where holds are long enough, else `alone`."""
     if float(rows.weight @ rows.steady) < 0.5 * float(rows.weight.sum()):
-        measured = _scatter(data.displacement - float(np.median(slope)) * data.force, hold)
+        measured = scatter_within(data.displacement - float(np.median(slope)) * data.force, hold)
         return alone if measured is None else np.full(rows.n, measured)
-    measured = _scatter(data.displacement, hold)
+    measured = scatter_within(data.displacement, hold)
     if measured is None:
         return alone
     # never less than a third of what is stated: second differences can't see everything
     white = max(measured, 0.33 * data.instruments.displacement)
     return np.where(rows.steady, white, np.hypot(white, slope * data.instruments.force))
-
-
-def _scatter(values: Array, hold: Ints) -> float | None:
-    """Standard deviation of the white part, from second differences within holds, the first
-    sample left out (it may lag); trimmed at 5 %, corrected for that (normal noise: 0.8713)."""
-    second = values[3:] - 2 * values[2:-1] + values[1:-2] if len(values) > 3 else np.zeros(0)
-    same = (hold[3:] == hold[:-3]) if len(values) > 3 else np.zeros(0, dtype=bool)
-    squares = np.sort((second[same]) ** 2)
-    if squares.size < _ENOUGH:
-        return None
-    kept = squares[: int(0.95 * squares.size)]
-    return float(np.sqrt(kept.mean() / 6.0) / 0.8713)

@@ -9,9 +9,9 @@ import numpy as np
 from identification.gap.compare import imperfect, mean_squares
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
-from identification.gap.imperfection import LINEAR
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
+from identification.gap.words import LINEAR
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,23 +51,22 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     lv, plain = engine.levels[level], squares[0]
     inner = np.eye(len(columns)) + root.T @ squares[level] @ root
     w = root @ np.linalg.solve(inner, root.T @ lv.moment[columns])
-    n, weight = engine.bench.rows.n, engine.bench.rows.weight
-    precision = float(np.sum(1 / engine.sigma[:n] ** 2))
+    rows = engine.bench.rows
+    precision = float(np.sum(1 / engine.sigma[: rows.n] ** 2))
     sizes, moves, energy, start = [], [], 0.0, 0
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
         does = engine.responses(c) @ np.column_stack([part, imperfect(p.variant) * part])
-        moved, faulty = engine.bench.rows.moved(does).T
-        square = float(weight @ moved**2 / weight.sum())
-        moves.append(square**0.5)
+        moved, faulty = rows.moved(does).T
+        moves.append(rows.rms(moved))
         if p.word in LINEAR:
             sizes.append(_beyond_springs(engine, moved))
         else:
             mine = slice(start, start + k)
             structural = float(part @ plain[mine, mine] @ part) / precision
-            sizes.append(float(np.sqrt(min(structural, square))))
-        energy += float(weight @ faulty**2 / weight.sum())
+            sizes.append(min(max(structural, 0.0) ** 0.5, moves[-1]))
+        energy += rows.rms(faulty) ** 2
         start += k
     return Sizes(np.array(sizes), np.array(moves), min(energy, engine.most))
 

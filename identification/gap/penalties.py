@@ -7,29 +7,15 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
-from identification.gap.imperfection import LINEAR
 from identification.gap.parts import Part, Sizes
+from identification.gap.words import CURVES, FRICTION, LINEAR, MECHANISMS
 
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
 # Mechanisms of the same kind mimic parts of each other: rate-dependent flow looks like creep.
 LEAST_SHARE_AKIN = 0.3
 CANCELLING = 1.4  # times the gap: larger effects of one explanation cancel each other
-MECHANISMS = frozenset(
-    [
-        "joint_yield",
-        "joint_backlash",
-        "joint_nonlinear_stiffness",
-        "joint_hysteresis",
-        "joint_creep",
-        "base_slip",
-        "contact_seating",
-    ]
-)
-# Curves of the load, which one direction without joint readings can't tell apart.
-CURVES = frozenset({"contact_seating", "joint_nonlinear_stiffness"})
 TOE_AND_KNEE = frozenset({"contact_seating", "joint_yield"})
-FRICTION = frozenset({"joint_yield", "joint_hysteresis", "base_slip"})
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 
 
@@ -115,10 +101,9 @@ def within_stated(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> floa
 
 def _rms_of_line(engine: Engine, part: Part) -> float:
     """rms (m) by which a gain of one, or a spring twice as soft, moves."""
-    n, weight = engine.bench.rows.n, engine.bench.rows.weight
-    line = engine.columns(part.variant.columns)[:n, :1]
-    moved = engine.bench.rows.moved(line)[:, 0]
-    return max(float(np.sqrt(weight @ moved**2 / weight.sum())), 1e-300)
+    rows = engine.bench.rows
+    line = engine.columns(part.variant.columns)[: rows.n, :1]
+    return max(rows.rms(rows.moved(line)[:, 0]), 1e-300)
 
 
 _WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations

@@ -14,7 +14,7 @@ from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
-from identification.gap.imperfection import IMPERFECTION, LINEAR, level_prior
+from identification.gap.imperfection import IMPERFECTION, level_prior
 from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part, energies, log_joints, signs_kept
@@ -22,6 +22,7 @@ from identification.gap.penalties import SAME_JOINT
 from identification.gap.readings import as_moved
 from identification.gap.several import family_of
 from identification.gap.variants import Variant, place_of
+from identification.gap.words import LINEAR
 
 Parameters = dict[str, Parameter]
 

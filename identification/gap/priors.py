@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 from identification.gap.bench import Bench
 from identification.gap.course import Course
-from identification.gap.effects import WORDS
-from identification.gap.penalties import CURVES
+from identification.gap.words import CURVES, WORDS
 
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
 LOG_ONE = log(0.37)

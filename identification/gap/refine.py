@@ -22,9 +22,9 @@ from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import fit
 from identification.gap.forms import about_springs
-from identification.gap.imperfection import LINEAR
 from identification.gap.parts import Part
 from identification.gap.variants import Variant, place_of
+from identification.gap.words import LINEAR
 
 _REFINED = 2  # joints, or axes, at which it is refined
 _LEADING = 6  # words that are refined

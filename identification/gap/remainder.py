@@ -2,7 +2,7 @@
 
 The residual of a fit is read as `r = g(setup, branch, force) + noise`, with g a Gaussian process
 over levels of load: alike for neighbouring loads of one setup, half so between branches (as
-`evidence.level_covariance` has it), of unknown size eta. Noise is that of the instruments, widened
+`evidence.alike` has it), of unknown size eta. Noise is that of the instruments, widened
 where visits of a level scatter more than that. Everything is Gaussian for a given eta, so the
 posterior of g is exact (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq.
 2.23-2.24), and eta is integrated over a grid. No claim about a cause: this is the size of what no
@@ -17,12 +17,11 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import LOADING, UNLOADING, Array, Ints
-from identification.gap.evidence import Engine
+from identification.gap.evidence import Engine, alike
 from identification.gap.fit import Fit
 
 _TURN = 0.02
 _CLASSES = 24  # of the load of a running recording, per sense of motion
-_NEIGHBOUR = 0.25  # share of the range of load over which what remains stays alike
 _SIZES = 40  # grid points of eta
 _SMALLEST = 0.05  # of the noise of a level: an eta below that can't be told from none
 _DRAWS = 2000
@@ -92,7 +91,7 @@ def remainder(engine: Engine, fit: Fit) -> Remainder:
 
     load, first = mean_of(bench.load), np.unique(level, return_index=True)[1]
     setup, branch = bench.rows.setup[first], branch[first]
-    covariance = _covariance(setup, branch, load, float(np.ptp(bench.load)))
+    covariance = alike(setup, branch, load, float(np.ptp(bench.load)))
     mean, sd, draws = _posterior(covariance, residual, variance)
     weight = samples / samples.sum()
     low, high = np.quantile(np.sqrt(draws**2 @ weight), [0.025, 0.975])
@@ -133,14 +132,6 @@ def _level_ids(bench: Bench, branch: Ints) -> Ints:
     number = np.minimum(share * _CLASSES, _CLASSES - 1).astype(np.int64)
     keys = np.column_stack([rows.setup, branch, number])
     return np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
-
-
-def _covariance(setup: Ints, branch: Ints, load: Array, span: float) -> Array:
-    """(k, k) of unit variance: `exp(-|dF| / a quarter of the range)` within a setup, half of it
-    between branches."""
-    near = np.exp(-np.abs(load[:, None] - load) / (_NEIGHBOUR * (span or 1.0)))
-    alike = np.where(branch[:, None] == branch, 1.0, 0.5)
-    return np.asarray(near * alike * (setup[:, None] == setup) + 1e-9 * np.eye(len(load)))
 
 
 def _levels(

@@ -15,9 +15,9 @@ from identification.gap.explanation import (
     explain,
     up_to_likeliest,
 )
-from identification.gap.finer import gained
+from identification.gap.finer import LOG_STEP, gained
 from identification.gap.noise import UNSURE
-from identification.gap.parts import Part, part_sizes
+from identification.gap.parts import Part, log_joint_between, part_sizes
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
 from identification.gap.readings import reading_all
 from identification.gap.several import in_more_joints, polished
@@ -75,13 +75,21 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
 
 
 def _as_stated(engine: Engine) -> float:
-    """log evidence of what was stated: the noise, and a little more of it than that."""
-    more = [lv.log_base for lv in engine.levels[1:] if lv.eta <= _hidden(engine)]
-    more = more or [engine.levels[1].log_base]
+    """log evidence of what was stated: the noise, and a little more of it than that, as finely as
+    it is looked at beside an effect."""
+    least, hidden = float(engine.etas[1]), _hidden(engine)
+    steps = np.arange(
+        -_BELOW, 1 + np.floor(_PER_STEP * np.log(max(hidden / least, 1.0)) / LOG_STEP)
+    )
+    etas = least * np.exp(steps / _PER_STEP * LOG_STEP)
+    more = [log_joint_between(engine, (), float(eta)) for eta in etas]
     less = _SURE_SHARE if engine.bench.noise.sure else _UNSURE_SHARE
     return log_mean(
         [engine.levels[0].log_base, *more], [1 - less, *(less / len(more) for _ in more)]
     )
+
+
+_BELOW, _PER_STEP = 3, 3  # looks below the first level, and per step between levels
 
 
 def _hidden(engine: Engine) -> float:

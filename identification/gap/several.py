@@ -12,11 +12,8 @@ from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, explain, up_to_likeliest
 from identification.gap.parts import Part
 from identification.gap.variants import Variant
+from identification.gap.words import IN_JOINTS
 
-IN_JOINTS = frozenset(
-    ["joint_yield", "joint_backlash", "joint_nonlinear_stiffness", "joint_hysteresis",
-     "joint_creep"]
-)  # fmt: skip
 MOST = 3  # joints of one word
 # Nats that a joint more has to bring: the choice among the first one's shapes is not counted again.
 WORTH = 6.0

@@ -19,7 +19,8 @@ from identification.gap.evidence import LEVER_M, Engine
 from identification.gap.explanation import REMAINDER
 from identification.gap.fit import Fit
 from identification.gap.parts import Part
-from identification.gap.penalties import MECHANISMS, joints_of
+from identification.gap.penalties import joints_of
+from identification.gap.words import MECHANISMS
 
 # Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and
 # two beyond 5.5; of 16 stand-ins that were strained at all 13 beyond 6, the others between 5 and 6.
@@ -108,9 +109,8 @@ def _of_heat(engine: Engine, fitted: Fit) -> Array:
 def _of_the_gap(engine: Engine, contribution: Array) -> float:
     """1 for what moves at least a share of the gap that an explanation may not leave, less below:
     what a slip leaves, a little heat beside it may mop up."""
-    weight = engine.bench.rows.weight
-    moved = engine.bench.rows.moved(contribution[: engine.bench.rows.n, None])[:, 0]
-    size = float(np.sqrt(weight @ moved**2 / weight.sum()))
+    rows = engine.bench.rows
+    size = rows.rms(rows.moved(contribution[: rows.n, None])[:, 0])
     return min(size / max(REMAINDER * engine.structural, 1e-300), 1.0) ** 2
 
 

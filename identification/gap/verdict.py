@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.effects import WORDS
 from identification.gap.explanation import Explanation, Found
 from identification.gap.noise import UNSURE
+from identification.gap.words import WORDS
 
 # Neighbouring points of one smooth run are no independent witnesses of its law.
 TEMPER = 0.12

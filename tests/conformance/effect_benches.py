@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData
-from identification.gap.effects import NEED_ARM, WORDS
 from identification.gap.evidence import Engine
 from identification.gap.variants import Variant
+from identification.gap.words import NEED_ARM, WORDS
 from tests.conformance.gap_designs import (
     ARMS,
     DESIGNS,

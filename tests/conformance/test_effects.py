@@ -15,11 +15,11 @@ import pytest
 from identification.gap import effects
 from identification.gap.bench import make_bench
 from identification.gap.data import GapData
-from identification.gap.effects import WORDS
 from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
+from identification.gap.words import WORDS
 from tests.conformance.effect_benches import (
     IN_JOINTS,
     OUTSIDE,

@@ -19,7 +19,8 @@ from identification.arm import tool_offset
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.effects import WORDS, library
+from identification.gap.effects import library
+from identification.gap.words import WORDS
 from rig.dataset import Dataset
 from rig.diagnose import diagnose
 from rig.errors import InputError

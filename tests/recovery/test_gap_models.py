@@ -12,12 +12,13 @@ import pytest
 from identification.gap.bench import make_bench
 from identification.gap.diagnose import Effect, GapResult
 from identification.gap.discriminate import NextMeasurement
-from identification.gap.effects import WORDS, library
+from identification.gap.effects import library
 from identification.gap.fit import Fit
 from identification.gap.forms import SESSION, law_of
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
 from identification.gap.variants import Variant
+from identification.gap.words import WORDS
 from rig.dataset import Dataset, write
 from rig.diagnose import Diagnosis, diagnose
 from rig.errors import InputError

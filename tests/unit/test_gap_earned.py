@@ -12,7 +12,7 @@ from identification.gap.bench import make_bench
 from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import WORTH_OF_THIRD, diagnose_gap
 from identification.gap.diagnose import _chosen as chosen_of
-from identification.gap.earned import DRIFTS, earned
+from identification.gap.earned import earned
 from identification.gap.effects.drift import free_path, path_root
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
@@ -23,6 +23,7 @@ from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import cancelling, pettiness, trifle
 from identification.gap.variants import variant
 from identification.gap.verdict import weighed
+from identification.gap.words import DRIFTS
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, REPETITIONS, SAMPLES = 8, 3, 4

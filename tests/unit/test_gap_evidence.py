@@ -10,7 +10,7 @@ from identification.gap import evidence, table
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import condition, score
-from identification.gap.effects import WORDS, library
+from identification.gap.effects import library
 from identification.gap.evidence import (
     HOLD_PART,
     ROW_PART,
@@ -24,6 +24,7 @@ from identification.gap.priors import prior_of
 from identification.gap.search import search
 from identification.gap.table import Table
 from identification.gap.variants import variant
+from identification.gap.words import WORDS
 from tests.unit.test_gap_operators import bench_data
 
 

@@ -10,7 +10,7 @@ import pytest
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData
-from identification.gap.effects import NEED_ARM, WORDS, library
+from identification.gap.effects import library
 from identification.gap.effects.joint_yield import refined
 from identification.gap.evidence import Engine
 from identification.gap.forms import SESSION, Form, describe, law_of, lawful, realise, rows_of
@@ -19,6 +19,7 @@ from identification.gap.forms.law import HUNG, KEPT, Law, Term
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
 from identification.gap.twins import twin_of
+from identification.gap.words import NEED_ARM, WORDS
 from tests.unit.test_gap_operators import bench_data
 
 

@@ -15,10 +15,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from identification.gap.bench import Bench, make_bench
-from identification.gap.effects import WORDS, library
+from identification.gap.effects import library
 from identification.gap.forms import Form, Law, Term, describe, realise
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
+from identification.gap.words import WORDS
 from rig.errors import InputError
 from rig.gap_forms import FormError, effects_of, from_entry, to_entry
 from rig.gap_model import _comment

@@ -190,7 +190,7 @@ def test_covariance_under_alike_mistakes_is_the_scatter_of_the_estimate() -> Non
     engine, eta = small_engine(bench, (0.0, 6e-6)), 6e-6
     plain = fit(engine, explained(engine, eta))
     alike = fit(engine, explained(engine, eta), alike=True)
-    V = np.diag(bench.sigma**2 + (ROW_PART * eta) ** 2 / bench.rows.weight)
+    V = np.diag(bench.sigma**2 + (ROW_PART * eta) ** 2)
     same = np.equal.outer(bench.rows.hold, bench.rows.hold)
     V += same * (np.outer(bench.noise.hold, bench.noise.hold) + (HOLD_PART * eta) ** 2)
     levels = level_covariance(bench)[np.ix_(bench.rows.level, bench.rows.level)]

@@ -12,7 +12,7 @@ from identification.gap.base import base_columns
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.effects import WORDS, library
+from identification.gap.effects import library
 from identification.gap.effects.contact_seating import refined
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation
@@ -22,6 +22,7 @@ from identification.gap.penalties import _same_element
 from identification.gap.priors import prior_of
 from identification.gap.strange import strangers
 from identification.gap.verdict import BENCH_DOUBT, trusted
+from identification.gap.words import WORDS
 from rig.diagnose_text import meanings, render
 from tests.unit.test_gap_linear import charged
 from tests.unit.test_gap_operators import bench_data

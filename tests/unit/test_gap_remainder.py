@@ -7,10 +7,10 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
-from identification.gap.evidence import Engine
+from identification.gap.evidence import Engine, alike
 from identification.gap.explanation import Explanation
 from identification.gap.fit import Fit, fit
-from identification.gap.remainder import Remainder, branches, remainder
+from identification.gap.remainder import Remainder, _posterior, branches, remainder
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, REPETITIONS, SAMPLES = 10, 4, 4
@@ -87,14 +87,13 @@ def test_scatter_of_holds_beyond_the_noise_is_no_structure() -> None:
 
 def test_the_posterior_is_that_of_a_dense_gaussian() -> None:
     """With the size given, mean and variance by the textbook's formulae."""
-    from identification.gap.remainder import _covariance, _posterior
 
     load = np.linspace(0, 100, 6)
     zero = np.zeros(6, dtype=np.int64)
-    C = _covariance(zero, zero, load, 100.0)
+    C = alike(zero, zero, load, 100.0)
     assert C[0, 0] == pytest.approx(1)
     assert C[0, 1] == pytest.approx(np.exp(-0.2 / 0.25))
-    two = _covariance(zero, np.array([0, 0, 0, 1, 1, 1]), load, 100.0)
+    two = alike(zero, np.array([0, 0, 0, 1, 1, 1]), load, 100.0)
     assert two[2, 3] == pytest.approx(0.5 * C[2, 3])
     y, variance = np.array([3.0, 2, 1, -1, -2, -3]), np.full(6, 1e-4)
     mean, sd, draws = _posterior(C, y, variance)
@@ -106,7 +105,6 @@ def test_the_posterior_is_that_of_a_dense_gaussian() -> None:
 
 
 def test_no_remainder_is_half_the_prior() -> None:
-    from identification.gap.remainder import _posterior
 
     _, _, draws = _posterior(np.eye(4), np.zeros(4), np.ones(4))
     assert np.mean(np.all(draws == 0, axis=1)) > 0.5

@@ -11,7 +11,7 @@ import pytest
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import STANDING, library
+from identification.gap.effects import library
 from identification.gap.effects.drift import free_paths, shares
 from identification.gap.effects.joint_yield import grown
 from identification.gap.history import sampling_time
@@ -21,6 +21,7 @@ from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.priors import prior_of
 from identification.gap.rows import hold_ids, is_continuous, passes, reduce_rows, turns
+from identification.gap.words import STANDING
 from tests.unit.test_gap_operators import bench_data
 
 SPRING = 1e5  # N/m

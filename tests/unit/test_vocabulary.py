@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from identification.gap.effects import NEED_ARM
-from identification.gap.effects import WORDS as FITTED
+from identification.gap.words import NEED_ARM
+from identification.gap.words import WORDS as FITTED
 from rig.diagnose_text import MEANING
 from rig.worlds.hidden.words import EFFECTS as DRAWN
 from rig.worlds.hidden.words import IN_JOINTS, OUTSIDE_JOINTS

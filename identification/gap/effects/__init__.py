@@ -7,31 +7,7 @@ from importlib import import_module
 
 from identification.gap.bench import Bench
 from identification.gap.variants import Variant
-
-WORDS = (
-    "joint_yield",
-    "joint_backlash",
-    "joint_nonlinear_stiffness",
-    "joint_hysteresis",
-    "joint_creep",
-    "link_flexibility",
-    "base_compliance",
-    "base_slip",
-    "contact_seating",
-    "load_misalignment",
-    "force_drift",
-    "force_scale",
-    "displacement_scale",
-    "thermal_drift",
-    "zero_shift",
-    "time_lag",
-    "pose_error",
-    "joint_stiffness_error",
-)
-NEED_ARM = ("link_flexibility", "base_compliance", "base_slip", "pose_error", "load_misalignment")
-
-# What a load that stands can show: where nothing is loaded anew, no stiffness is seen.
-STANDING = ("joint_creep", "force_drift", "thermal_drift", "zero_shift")
+from identification.gap.words import NEED_ARM, STANDING, WORDS
 
 
 def library(bench: Bench, words: Iterable[str] = WORDS) -> list[Variant]:
