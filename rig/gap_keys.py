@@ -65,6 +65,7 @@ CONSTANTS: dict[str, Key] = {
     "about": Key("about_joint_stiffness_Nm_per_rad", "springs"),
     "about_offset": Key("about_offset_m", "vector"),
     "about_angles": Key("about_angles_rad", "six"),
+    "about_turn": Key("about_turn_rad", "vector"),
     "reads": Key("displacement_read_over_true", "positive"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
 }
@@ -91,6 +92,7 @@ SHAPES: dict[str, Key] = {
     "across": Key("across", "vector"),
     "at_load": Key("at_N", "positive"),
     "power": Key("power_of_load", "positive"),
+    "drags_over": Key("drags_over_N", "positive"),
     "at_response": Key("at_mm", "positive", factor=1e3),
     "time_constant": Key("time_constant_s", "positive"),
     "at": Key("at_s"),
@@ -115,6 +117,7 @@ _COEFFICIENTS: dict[str, Key] = {
     "tangent": Key("tangent"),
     "offset": Key("offset_mm", factor=1e3),
     "angle": Key("angle_rad"),
+    "turn": Key("turn_rad"),
     "gain": Key("excess_share_of_reading"),
     "share": Key("share"),
     "shift": Key("shift_mm", factor=1e3),
@@ -195,12 +198,18 @@ GRAMMAR: dict[str, Grammar] = {
         ("about",),
         tuple(
             ("tangent", ("along", "across", *more))
-            for more in ((), ("at_load",), ("at_load", "power"))
+            for more in (
+                (),
+                ("at_load",),
+                ("at_load", "power"),
+                ("drags_over",),
+                ("at_load", "drags_over"),
+            )
         ),
     ),
     "pose_error": Grammar(
-        ("about", "about_offset", "about_angles", "reads"),
-        (("offset", ("axis",)), ("angle", ("joint",))),
+        ("about", "about_offset", "about_angles", "about_turn", "reads"),
+        (("offset", ("axis",)), ("angle", ("joint",)), ("turn", ("axis",))),
     ),
     "force_scale": Grammar(("about",), (("gain", ()), ("gain", ("at_load",)))),
     "displacement_scale": Grammar((), (("gain", ()), ("gain", ("at_response",)))),

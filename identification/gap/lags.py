@@ -30,7 +30,7 @@ def closest_lag(bench: Bench, channel: str, kind: str, does: Array) -> tuple[flo
     return best[1], float(np.sqrt(best[0] / max(float(y @ y), 1e-300)))
 
 
-@lru_cache(maxsize=3)
+@lru_cache(maxsize=4)
 def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
     """Lags (k,) s and what each does to the responses (k, n)."""
     lags = _LAGS * sampling_time(bench.rows)

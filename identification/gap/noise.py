@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import Array, GapData, Ints
-from identification.gap.rows import Rows, hold_ids, scatter_within
+from identification.gap.rows import ENOUGH, Rows, hold_ids, scatter_within
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -53,20 +53,47 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         alone = np.where(rows.steady, meter.displacement, fallback)
         per_sample = _white(data, rows, alone, slope, hold)
     weight = np.ones(rows.n) if rows.continuous else rows.weight
-    q = np.full(data.joints, ENCODER_RAD)
-    if data.q is not None and not rows.continuous:
-        for j in range(data.joints):
-            found = scatter_within(data.q[:, j], hold)
-            q[j] = max(found or ENCODER_RAD, 1e-7)
     stated = meter.displacement
     if rows.continuous or imposed:
         stated = float(np.median(per_sample if rows.continuous else fallback))
     return Noise(
-        response=per_sample / np.sqrt(weight), q=q, force=meter.force,
+        response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
         raised=_raised(data) if rows.continuous else 1.0,
         sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
     )  # fmt: skip
+
+
+def _encoders(data: GapData, rows: Rows, hold: Ints) -> Array:
+    """Noise of one joint reading (m,), rad: within holds, or between repetitions where holds are
+    too short; what is usual where neither tells."""
+    q = np.full(data.joints, ENCODER_RAD)
+    if data.q is None or rows.continuous:
+        return q
+    each = [scatter_within(data.q[:, j], hold) for j in range(data.joints)]
+    if any(found is None for found in each):
+        q[:] = _between_repetitions(data, rows) or ENCODER_RAD
+    for j, found in enumerate(each):
+        q[j] = max(found or q[j], 1e-7)
+    return q
+
+
+def _between_repetitions(data: GapData, rows: Rows) -> float | None:
+    """Noise of one joint reading from how levels repeat, rad: that of the middle joint, as one may
+    have a trouble of its own. Forces that differ a little are allowed for as simulated."""
+    assert rows.q is not None
+    lever = np.stack([s.lever for s in data.setups])[rows.setup]
+    left = rows.q - lever * data.compliance * rows.force[:, None]
+    free = rows.n
+    for group in (rows.level, rows.run):
+        size = np.bincount(group)
+        left = left - np.stack([np.bincount(group, w) / size for w in left.T], axis=1)[group]
+        free -= len(size)
+    free += len(np.unique(rows.setup))
+    if free < ENOUGH:
+        return None
+    spread = np.median(np.abs(left) * np.sqrt(rows.weight)[:, None], axis=0) / 0.6745
+    return float(np.median(spread) * (rows.n / free) ** 0.5)
 
 
 def _raised(data: GapData) -> float:

@@ -25,6 +25,7 @@ from identification.gap.data import Array
 from identification.gap.effects.contact_seating import LAWS
 from identification.gap.effects.joint_backlash import unreached
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
+from identification.gap.effects.time_lag import KINDS
 from identification.gap.history import half_sample, settling_share, standing_on
 from identification.gap.interval import NOMINAL, TWO_SIDED, Found, Parameter, Softer, normal
 from identification.gap.lags import closest_lag
@@ -177,9 +178,9 @@ def _seating(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 
 
 def _misalignment(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
-    """Tangents at the largest load."""
-    names, powers = part.variant.info["directions"], int(part.variant.info["powers"])
-    rows = np.eye(len(found.w)).reshape(len(names), powers, 2, -1).sum(axis=1)
+    """Tangents at the largest load, as it was come to."""
+    names, count = part.variant.info["directions"], len(part.variant.info["shapes"][0])
+    rows = np.eye(len(found.w)).reshape(len(names), count, 2, -1).sum(axis=1)
     return {
         f"tangent_{name}_{k + 1}": found.linear(rows[i, k], "1")
         for i, name in enumerate(names)
@@ -226,7 +227,7 @@ def _shift(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 def _lag(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
     a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
-    is read as the delay, the filter and the moving average that do the same, each the more the
+    is read as the lag of every kind that does the same, each the more the
     closer it comes."""
     n, info = bench.rows.n, part.variant.info
     w = found.w
@@ -234,8 +235,8 @@ def _lag(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
                np.zeros(n))  # fmt: skip
     total = found.linear(np.ones(len(w)), "1")
     relative = total.sd / max(abs(total.value), 1e-6)
-    lags, misses, spread = np.zeros(3), np.zeros(3), np.zeros(3)
-    for k, kind in enumerate(("delay", "filter", "average")):
+    lags, misses, spread = np.zeros((3, len(KINDS)))
+    for k, kind in enumerate(KINDS):
         lags[k], misses[k] = closest_lag(bench, info["channel"], kind, does)
         more, _ = closest_lag(bench, info["channel"], kind, does * (1 + min(relative, 0.5)))
         spread[k] = more - lags[k]
@@ -263,9 +264,11 @@ def _turning_sd(bench: Bench, lag: float) -> float:
 
 
 def _pose(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
-    """Tool offset and angles of the joints."""
+    """Tool offset, angles of the joints, turn of the base."""
     kind = part.variant.info["kind"]
     out: dict[str, Parameter] = {}
+    if kind == "base":
+        return {f"base_turned_about_{a}": found.one(i, "rad") for i, a in enumerate("xyz")}
     if kind in ("tool", "both"):
         out |= {f"offset_{a}": found.one(i, "mm", 1e3) for i, a in enumerate("xyz")}
     if kind in ("joints", "both"):

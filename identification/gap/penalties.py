@@ -112,14 +112,15 @@ _WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
 def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats for every effect below the noise of a single sample of a running recording:
     thousands of samples would show it, but for what noise of low frequency does to it. Of levels at
-    rest for every one far below that, but for what springs may hide or other channels
-    show: that is no gap."""
+    rest for every one far below that: that is no gap. What springs may hide, or other channels
+    show, counts by how far it moves."""
     noise = engine.bench.noise.stated
     if engine.bench.rows.continuous:
         sizes = np.maximum(_counted(parts, found), 1e-300)
         return 20.0 * float(np.maximum(np.log(noise / sizes), 0.0).sum())
-    small = [s for p, s in zip(parts, found.gap, strict=True) if p.word not in _SHOWN_ELSEWHERE]
-    return sum(_wall(FAR_BELOW_NOISE * noise / max(float(s), 1e-300)) for s in small)
+    elsewhere = np.array([p.word in _SHOWN_ELSEWHERE for p in parts], dtype=bool)
+    sizes = np.maximum(np.where(elsewhere, found.moved, found.gap), 1e-300)
+    return sum(_wall(FAR_BELOW_NOISE * noise / float(size)) for size in sizes)
 
 
 FAR_BELOW_NOISE = 0.2

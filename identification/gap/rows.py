@@ -173,7 +173,7 @@ _STEADY_PER_ROW, _STEADY_ONCE = 2.6, 12.5
 # What is stated is known to a factor of two (GUM G.4.2): a force that scatters more than that may
 # really tremble.
 _MISJUDGED = 2.0
-_ENOUGH = 30  # second differences: then their scatter is known to about an eighth
+ENOUGH = 30  # second differences: then their scatter is known to about an eighth
 
 
 def scatter_within(values: Array, hold: Ints) -> float | None:
@@ -183,7 +183,7 @@ def scatter_within(values: Array, hold: Ints) -> float | None:
     second = values[3:] - 2 * values[2:-1] + values[1:-2] if len(values) > 3 else np.zeros(0)
     same = (hold[3:] == hold[:-3]) if len(values) > 3 else np.zeros(0, dtype=bool)
     squares = np.sort((second[same]) ** 2)
-    if squares.size < _ENOUGH:
+    if squares.size < ENOUGH:
         return None
     kept = squares[: int(0.95 * squares.size)]
     return float(np.sqrt(kept.mean() / 6.0) / 0.8713)

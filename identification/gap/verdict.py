@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.gap.explanation import Explanation, Found
 from identification.gap.noise import UNSURE
+from identification.gap.penalties import LEAST_SHARE
 from identification.gap.words import WORDS
 
 # Neighbouring points of one smooth run are no independent witnesses of its law.
@@ -96,7 +97,7 @@ NOISY, STATED = 3.0, 0.1
 # 0.05, three have 0.37 * 0.05^2 (`priors`); and of 32 words that were taken away in the blind check
 # 7 were met down to the noise by three others: 0.0009 against 0.05 * 7 / 32.
 THREE = 0.1
-TELLING = 0.1  # of the largest: a smaller one is no trouble beside it
+TELLING = LEAST_SHARE  # of the largest: what is smaller is no trouble beside it
 # Nats that a third effect has to bring beyond which it takes all three: of 300 hidden cases, known
 # effects had asked for a third by 13 to 19 nats, what stood in for a missing word by 91 and 613.
 TAKES_THREE = 30.0

@@ -1,64 +1,103 @@
 """The load does not act along the nominal direction: a share t of it acts across.
 
 The target then moves along the direction by `F n' C t`; recorded force components grow with the
-load by t F. Screws on floors and stands are set up within 1 to 15 degrees.
+load by t F. Screws on floors and stands are set up within 1 to 15 degrees. A tip that drags on its
+pad pulls the other way when the load goes back.
 
 Size: 1 to 15 degrees, tangents of 0.02 to 0.25.
 Prior: tangents of either sign, sd out of SCALES, equally likely.
-Source: how well screws are set up by eye on floors and stands.
+Source: how well screws are set up by eye on floors and stands; friction of steel on steel.
 """
 
 from __future__ import annotations
 
-from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.data import Array, Flags
 from identification.gap.variants import Variant, variant
 
 WORD = "load_misalignment"
 SCALES = (0.03, 0.1, 0.25)
-# Of the load, from 0 up: a tip that drags on its pad turns the load soon and then no more.
-POWERS = 3
+DRAGS = (
+    0.05,
+    0.12,
+    0.25,
+)  # of the largest load: over so much of it a tip turns from one way to the other
+
+
+class Shape(NamedTuple):
+    """How what pulls across goes with the load: with a power of it, that of a tangent of 1 at
+    at_N; where drags_N is above 0 against the way that the load goes, turning over so much of it.
+    """
+
+    power: float
+    at_N: float
+    drags_N: float = 0.0
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Two tangents per direction, constant or turning as the load grows, soon or late; one
-    direction, and all."""
-    rows, data = bench.rows, bench.data
-    across = np.stack([s.tangent_lever for s in data.setups])[rows.setup]  # (n, 2, m)
-    names = [s.direction for s in data.setups]
-    top = float(np.abs(bench.load).max()) or 1.0
-    out, every = [], []
-    for name in dict.fromkeys(names):
-        mine = np.array([n == name for n in names])[rows.setup]
-        pair = []
-        for power, k in product(range(POWERS), range(2)):
-            load = np.where(mine, bench.load * np.abs(bench.load / top) ** power, 0.0)
-            q = across[:, k, :] * bench.compliance * load[:, None]
-            tangential = np.zeros((rows.n, 2))
-            tangential[:, k] = load
-            response = np.sum(bench.lever * q, axis=1)
-            pair.append(bench.add(bench.stacked(response, q, tangential)))
-        every += pair
-        out.append(
-            variant(WORD, f"direction {name}", pair[:2], SCALES, positive=False, prior=0.3,
-                    directions=[name], powers=1, at_N=top)
-        )  # fmt: skip
-        out.append(
-            variant(WORD, f"direction {name}, turning", pair, SCALES, positive=False, prior=0.2,
-                    directions=[name], powers=POWERS, at_N=top)
-        )  # fmt: skip
-    if len(every) > 2 * POWERS:
-        named = list(dict.fromkeys(names))
-        straight = [c for i, c in enumerate(every) if i % (2 * POWERS) < 2]
-        out.append(
-            variant(WORD, "all directions", straight, SCALES, positive=False, prior=0.6,
-                    directions=named, powers=1, at_N=top)
-        )  # fmt: skip
-        out.append(
-            variant(WORD, "all directions, turning", every, SCALES, positive=False, prior=0.4,
-                    directions=named, powers=POWERS, at_N=top)
-        )  # fmt: skip
+    """Two tangents per direction: constant, turning as the load grows, soon or late, or dragging;
+    one direction, and all."""
+    known: dict[str, list[_Known]] = {}
+    for name in dict.fromkeys(s.direction for s in bench.data.setups):
+        mine = np.array([s.direction == name for s in bench.data.setups])[bench.rows.setup]
+        known[name] = [
+            _Known(label, shapes, _columns(bench, shapes, mine), share)
+            for label, shapes, share in _kinds(float(np.abs(bench.load[mine]).max()) or 1.0)
+        ]
+    groups = [([name], f"direction {name}", 0.3) for name in known]
+    if len(groups) > 1:
+        groups.append((list(known), "all directions", 0.6))
+    return [
+        variant(WORD, label + each[0].label, [c for k in each for c in k.columns], SCALES,
+                positive=False, prior=prior * each[0].share, directions=names,
+                shapes=[k.shapes for k in each])
+        for names, label, prior in groups
+        for each in zip(*(known[name] for name in names), strict=True)
+    ]  # fmt: skip
+
+
+class _Known(NamedTuple):
+    """A kind of misalignment of one direction, with its columns, and its share of the prior."""
+
+    label: str
+    shapes: tuple[Shape, ...]
+    columns: list[int]
+    share: float
+
+
+def _kinds(top: float) -> list[tuple[str, tuple[Shape, ...], float]]:
+    straight = Shape(1, top)
+    out = [("", (straight,), 1.0), (", turning", tuple(Shape(p, top) for p in (1, 2, 3)), 0.7)]
+    for share in DRAGS:
+        reach = share * top
+        drags = (straight, Shape(0, top, reach), Shape(1, top, reach))
+        out.append((f", dragging {share:g}", drags, 0.2))
     return out
+
+
+def _columns(bench: Bench, shapes: tuple[Shape, ...], mine: Flags) -> list[int]:
+    loads = [np.where(mine, across(bench, shape), 0.0) for shape in shapes]
+    return [bench.add(pulled(bench, load, k)) for load in loads for k in range(2)]
+
+
+def across(bench: Bench, shape: Shape) -> Array:
+    """(n,) N across, of a tangent of 1."""
+    load = np.sign(bench.load) * shape.at_N * np.abs(bench.load / shape.at_N) ** shape.power
+    if not shape.drags_N:
+        return load
+    reach = np.array([shape.drags_N])  # the tip is off its pad between runs
+    held = bench.load - bench.plays(bench.load, reach, bench.rows.starts)[:, 0]
+    return np.abs(load) * held / shape.drags_N
+
+
+def pulled(bench: Bench, load: Array, k: int) -> Array:
+    """Stacked column of a load (n,) along tangent k of every setup."""
+    lever = np.stack([s.tangent_lever[k] for s in bench.data.setups])[bench.rows.setup]
+    q = lever * bench.compliance * load[:, None]
+    tangential = np.zeros((bench.rows.n, 2))
+    tangential[:, k] = load
+    return bench.stacked(np.sum(bench.lever * q, axis=1), q, tangential)

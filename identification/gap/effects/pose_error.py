@@ -1,12 +1,15 @@
 """The arm stands, or the tool is, elsewhere than simulated: wrong leverage.
 
 Tool offset d in the flange frame changes every lever by `R d . (n x z)`; a joint that stands off
-by e changes them by `dJ/dq e`, and its reading at zero load shows e. The target moves with the
-square of the levers. Offsets of 5 to 300 mm, angles of 0.2 to 5 degrees.
+by e changes them by `dJ/dq e`, and its reading at zero load shows e. A base that stands turned by e
+against the directions of the push sees these turned back: levers `J' exp(-e x) n`, and no reading
+shows it. The target moves with the square of the levers. Offsets of 5 to 300 mm, angles of 0.2 to 5
+degrees, of the base 1 to 15.
 
-Size: tools 5 to 300 mm off, joints 0.2 to 5 degrees.
-Prior: either sign, sd out of OFFSETS_M or ANGLES_RAD, equally likely.
-Source: wrong tool frames and zero positions of joints.
+Size: tools 5 to 300 mm off, joints 0.2 to 5 degrees, the base 1 to 15 degrees.
+Prior: either sign, sd out of OFFSETS_M, ANGLES_RAD or TURNS_RAD, equally likely; half of it on a
+base that is turned.
+Source: wrong tool frames, zero positions of joints, bases and rigs lined up by eye.
 """
 
 from __future__ import annotations
@@ -24,10 +27,11 @@ from identification.gap.variants import Variant, variant
 WORD = "pose_error"
 OFFSETS_M = (0.01, 0.04, 0.15)
 ANGLES_RAD = (0.005, 0.02, 0.06)
+TURNS_RAD = (0.02, 0.06, 0.17)
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Tool offset, joints standing elsewhere, and both; to first order."""
+    """Tool offset, joints standing elsewhere, both, and a base that is turned; to first order."""
     at = np.zeros(3), np.zeros(bench.data.joints)
     columns = [bench.add(c) for c in secants(bench, *at, bench.compliance)]
     out = []
@@ -40,6 +44,9 @@ def variants(bench: Bench) -> list[Variant]:
         label = f"tool {offset * 1e3:g} mm, joints {angle:g} rad"
         sizes = [offset] * 3 + [angle] * joints
         out.append(_variant(label, columns, sizes, 0.5, "both"))
+    columns = [bench.add(c) for c in turned(bench, np.zeros(3), bench.compliance)]
+    for size in TURNS_RAD:
+        out.append(_variant(f"base {size:g} rad", columns, [size] * 3, 0.5, "base"))
     return out
 
 
@@ -52,18 +59,22 @@ def refined(bench: Bench, found: Variant, estimate: Callable[[Variant], Estimate
     the gain of the displacement that go with it, in a few steps. estimate: what is most probable
     with a variant."""
     kind, out = str(found.info["kind"]), found
-    offset, angles = np.zeros(3), np.zeros(bench.data.joints)
+    offset, angles, turn = np.zeros(3), np.zeros(bench.data.joints), np.zeros(3)
     for _ in range(_STEPS):
         w, softer, reads = estimate(out)
-        offset = w[:3] if kind != "joints" else offset
-        angles = w[-len(angles) :] if kind != "tool" else angles
+        offset = w[:3] if kind in ("tool", "both") else offset
+        angles = w[-len(angles) :] if kind in ("joints", "both") else angles
+        turn = w if kind == "base" else turn
         compliance = bench.compliance * np.maximum(1 + softer, 0.1)
-        columns = secants(bench, offset, angles, compliance, reads)
-        used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
+        if kind == "base":
+            used = turned(bench, turn, compliance, reads)
+        else:
+            columns = secants(bench, offset, angles, compliance, reads)
+            used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
         out = replace(
             found, label=f"{found.label}, as they are", prior=3.0,
             columns=tuple(bench.add(c) for c in used),
-            info={**found.info, "offset_m": offset, "angles_rad": angles,
+            info={**found.info, "offset_m": offset, "angles_rad": angles, "turn_rad": turn,
                   "compliance": compliance, "reads": reads},
         )  # fmt: skip
     return [out]
@@ -95,18 +106,38 @@ def secants(
         bent = np.broadcast_to(s.bent_lever, (m, m, m))
         shifts.append(s.offset_lever + 0.5 * np.einsum("ijk,j->ik", across, angles))
         turns.append(s.turned_lever + 0.5 * (bent @ angles + across @ offset))
-    moved, turned = np.stack(shifts)[bench.rows.setup], np.stack(turns)[bench.rows.setup]
-    middle = reads * (bench.lever + 0.5 * (moved @ offset + turned @ angles))
-    elastic = compliance * bench.load[:, None]
-    out = []
-    for change in [moved[:, :, k] for k in range(3)]:
-        out.append(bench.stacked(2 * np.sum(middle * change * elastic, axis=1), change * elastic))
-    for j in range(bench.data.joints):
-        q = turned[:, :, j] * elastic
-        q[:, j] += 1.0
-        response = 2 * np.sum(middle * turned[:, :, j] * elastic, axis=1)
-        out.append(bench.stacked(response, q))
+    moved, swung = np.stack(shifts)[bench.rows.setup], np.stack(turns)[bench.rows.setup]
+    middle = reads * (bench.lever + 0.5 * (moved @ offset + swung @ angles))
+    out = _through(bench, np.concatenate([moved, swung], axis=2), middle, compliance)
+    for j in range(m):
+        q = np.zeros((bench.rows.n, m))
+        q[:, j] = 1.0
+        out[3 + j] = out[3 + j] + bench.stacked(q=q)
     return out
+
+
+def turned(bench: Bench, turn: Array, compliance: Array, reads: float = 1.0) -> list[Array]:
+    """Stacked columns per radian by which the base stands turned about x, y, z (3), exact where it
+    is: turn (3,) rad, `exp(-E) - 1 = -(1 - E/2 + E^2/6 - ...) E`; compliance, reads: as there."""
+    E = np.cross(np.eye(3), turn).T  # E v = turn x v
+    series = np.eye(3) - E / 2 + E @ E / 6 - E @ E @ E / 24
+    changes = []
+    for s in bench.data.setups:
+        axes = np.vstack([s.unit_vector, s.tangents])
+        seen = -axes @ series @ np.cross(np.eye(3), s.unit_vector).T
+        changes.append(np.vstack([s.lever, s.tangent_lever]).T @ seen)  # (m, 3)
+    swung = np.stack(changes)[bench.rows.setup]
+    middle = reads * (bench.lever + 0.5 * swung @ turn)
+    return _through(bench, swung, middle, compliance)
+
+
+def _through(bench: Bench, change: Array, middle: Array, compliance: Array) -> list[Array]:
+    """Stacked columns of changes (n, m, k) of the levers, about levers (n, m) in the middle."""
+    elastic = compliance * bench.load[:, None]
+    return [
+        bench.stacked(2 * np.sum(middle * each * elastic, axis=1), each * elastic)
+        for each in np.moveaxis(change, 2, 0)
+    ]
 
 
 def _variant(
@@ -114,5 +145,5 @@ def _variant(
 ) -> Variant:
     return variant(
         WORD, label, columns, (1.0,), np.diag(sizes), positive=False, prior=prior, kind=kind,
-        offset_m=np.zeros(3), angles_rad=np.zeros(6), reads=1.0,
+        offset_m=np.zeros(3), angles_rad=np.zeros(6), turn_rad=np.zeros(3), reads=1.0,
     )  # fmt: skip

@@ -1,7 +1,7 @@
 """One channel lags the other: shows where the load changes, at the first samples of a hold.
 
-Pure delay of the laser, `u(t) = u_0(t - d)`, or of the force; a first-order filter of either; or a
-mean over the last readings, which comes late by half of its window.
+Pure delay of the laser, `u(t) = u_0(t - d)`, or of the force; a first-order filter of either, or
+one that is delayed as well; or a mean over the last readings, late by half of its window.
 Lags of filters, averaging and transmission: 0.05 to 10 s.
 
 Size: 0.05 to 10 s; 0.6 to 12 times the sampling interval here.
@@ -47,7 +47,7 @@ def variants(bench: Bench) -> list[Variant]:
     return out
 
 
-KINDS = ("delay", "filter", "average")
+KINDS = ("delay", "filter", "average", "delayed filter")
 _STEP = 1.13
 _STEPS = np.array([-3, -2, -1, 0, 1, 2, 3])
 
@@ -74,12 +74,12 @@ def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
     """A lag as a delay, a filter, a mean, and as something between delay and filter."""
     out, pair = [], []
     known = channel != _driven(bench) or not bench.rows.continuous
-    for kind in KINDS if known else KINDS[:-1]:
+    for kind in KINDS if known else KINDS[:2]:
         change = late(bench, channel, kind, lag)
         if not np.any(change):
             continue
         column = bench.add(change)
-        pair += [column] if kind != "average" else []
+        pair += [column] if kind in KINDS[:2] else []
         info: dict[str, Any] = {"lag_s": lag, "kind": kind, "channel": channel}
         out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", [column], (0.5, 1.0),
                            prior=likely, least=LEAST, **info))  # fmt: skip
@@ -149,6 +149,10 @@ def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
         return delayed(values, lag, bench.rows)
     if kind == "average":
         return averaged(values, 2 * lag, bench.rows)
+    if kind == "delayed filter":  # half of the lag each: as of two filters, too
+        return retarded(
+            delayed(values, lag / 2, bench.rows), np.array([lag / 2]), bench.rows, bench.rest
+        )
     return retarded(values, np.array([lag]), bench.rows, bench.rest)
 
 

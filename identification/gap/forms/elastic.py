@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from identification.gap.effects.base_compliance import moments
 from identification.gap.effects.contact_seating import LAWS, pressed
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
+from identification.gap.effects.load_misalignment import Shape, across
 from identification.gap.forms.law import Law, Term, along, scaled
 from identification.gap.history import retarded
 from identification.gap.variants import Variant
@@ -155,21 +157,22 @@ def seating(bench: Bench, law: Law) -> list[Array]:
 
 def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
-    shares reached at a load, in proportion to it or to a power of it."""
+    shares reached at a load, in proportion to it or to a power of it; shares that drag."""
     terms = []
-    for name in v.info["directions"]:
+    for name, shapes in zip(v.info["directions"], v.info["shapes"], strict=True):
         s = next(s for s in bench.data.setups if s.direction == name)
-        for power in range(int(v.info["powers"])):
-            for k in range(2):
-                shape: dict[str, Any] = {
-                    "along": _triple(s.unit_vector),
-                    "across": _triple(s.tangents[k]),
-                }
-                if power:
-                    shape["at_load"] = float(v.info["at_N"])
-                if power > 1:
-                    shape["power"] = float(power)
-                terms.append(Term("tangent", shape))
+        for how, k in product(shapes, range(2)):
+            shape: dict[str, Any] = {
+                "along": _triple(s.unit_vector),
+                "across": _triple(s.tangents[k]),
+            }
+            if how.power != 1:
+                shape["at_load"] = how.at_N
+            if how.power > 2:
+                shape["power"] = float(how.power - 1)
+            if how.drags_N:
+                shape["drags_over"] = how.drags_N
+            terms.append(Term("tangent", shape))
     return Law({}, tuple(terms)), np.ones(len(terms))
 
 
@@ -178,9 +181,10 @@ def misalignment(bench: Bench, law: Law) -> list[Array]:
     rows, data = bench.rows, bench.data
     out = []
     for t in law.terms:
-        load = np.where(along(bench, t.shape["along"]) > 0, bench.load, 0.0)
-        if "at_load" in t.shape:
-            load = load * np.abs(load / t.shape["at_load"]) ** t.shape.get("power", 1.0)
+        drags, at = t.shape.get("drags_over", 0.0), t.shape.get("at_load")
+        power = 1.0 if at is None else 0.0 if drags else 1 + t.shape.get("power", 1.0)
+        how = Shape(power, at or 1.0, drags)
+        load = np.where(along(bench, t.shape["along"]) > 0, across(bench, how), 0.0)
         parts = np.stack([s.tangents @ np.array(t.shape["across"]) for s in data.setups])
         lever = np.stack([p @ s.tangent_lever for p, s in zip(parts, data.setups, strict=True)])
         q = lever[rows.setup] * bench.compliance * load[:, None]
@@ -190,15 +194,19 @@ def misalignment(bench: Bench, law: Law) -> list[Array]:
 
 
 def describe_pose(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: offset of the tool in the flange frame, angles of the joints; about where they are."""
+    """Terms: offset of the tool in the flange frame, angles of the joints, turn of the base; about
+    where they are."""
     terms = []
     if v.info["kind"] in ("tool", "both"):
         terms += [Term("offset", {"axis": a}) for a in "xyz"]
     if v.info["kind"] in ("joints", "both"):
         terms += [Term("angle", {"joint": j}) for j in range(bench.data.joints)]
+    if v.info["kind"] == "base":
+        terms = [Term("turn", {"axis": a}) for a in "xyz"]
     about = {
         "about_offset": _triple(v.info["offset_m"]),
         "about_angles": tuple(float(a) for a in v.info["angles_rad"]),
+        "about_turn": _triple(v.info["turn_rad"]),
         "reads": float(v.info["reads"]),
     }
     return Law(about, tuple(terms)), np.ones(len(terms))
@@ -208,9 +216,14 @@ def pose(bench: Bench, law: Law) -> list[Array]:
     """Change of the levers, by the secants of the library."""
     at = np.array(law.constants["about_offset"]), np.array(law.constants["about_angles"])
     reads = float(law.constants["reads"])
-    columns = pose_error.secants(bench, *at, bench.compliance, reads)
+    moved = pose_error.secants(bench, *at, bench.compliance, reads)
+    about = np.array(law.constants.get("about_turn", (0.0, 0.0, 0.0)))
+    turned = pose_error.turned(bench, about, bench.compliance, reads)
+    columns = {"offset": moved[:3], "angle": moved[3:], "turn": turned}
     return [
-        columns["xyz".index(t.shape["axis"]) if t.coefficient == "offset" else 3 + t.shape["joint"]]
+        columns[t.coefficient][
+            t.shape["joint"] if "joint" in t.shape else "xyz".index(t.shape["axis"])
+        ]
         for t in law.terms
     ]
 
