@@ -29,6 +29,10 @@ class BadReply(DeviceError):
     """The device answered, and the answer makes no sense or refuses what was asked."""
 
 
+class NotDischarged(BadReply):
+    """The amplifier was to be in Reset, and its outputs did not fall to zero."""
+
+
 class OutOfRange(DeviceError):
     """The device says that what it measures lies outside its range."""
 

@@ -64,8 +64,15 @@ class Dynamometer(Device, Protocol):
     force_x_N, force_y_N, force_z_N on the robot in its base frame, then moments and raw channels.
     """
 
+    @property
+    def reset_by_hand(self) -> bool:
+        """Whether a person must turn the amplifier's switch before `reset` and `operate`."""
+
     def reset(self) -> None:
-        """Holds the charge amplifier in Reset (force meaningless) for its settle time."""
+        """Holds the charge amplifier in Reset (force meaningless) for its settle time.
+
+        Raises NotDischarged where its outputs do not fall to zero.
+        """
 
     def operate(self) -> None:
         """Switches to Operate and waits for the settle time."""

@@ -64,7 +64,11 @@ class EmulationHost:
 
         try:
             endpoints = {name: emulator.start() for name, emulator in self.emulators.items()}
-            handlers = {"fault": self._fault_by_message, "quit": leave}
+            handlers = {
+                "fault": self._fault_by_message,
+                "amplifier": self._amplifier_by_message,
+                "quit": leave,
+            }
             self._screw = ScrewServer(self.scene, handlers)
             endpoints["operator"] = self._screw.start()
         except BaseException:
@@ -117,6 +121,16 @@ class EmulationHost:
             self.inject(str(message.get("device")), str(message.get("kind")))
         except InputError as error:
             raise ValueError(str(error)) from None
+        return None
+
+    def _amplifier_by_message(self, message: object) -> object:
+        """The amplifier's switch, for a station without a Reset line."""
+        from drivers.kistler.emulator import KistlerEmulator
+
+        amplifier = self.emulators.get("dynamometer")
+        if message not in ("reset", "operate") or not isinstance(amplifier, KistlerEmulator):
+            raise ValueError('the amplifier is turned to "reset" or "operate", where there is one')
+        amplifier.turn_switch(reset=message == "reset")
         return None
 
     def _show_scheduled(self) -> None:

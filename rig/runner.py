@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import degrees, isnan, nan, radians
 
+from drivers.errors import NotDischarged
 from drivers.interfaces import Loader, Prompt
 from rig.errors import MeasurementStopped
 from rig.procedure.acquisition import Acquisition
@@ -22,6 +23,8 @@ TARE_S = 2.0
 # Within this the arm counts as standing in its reference pose: RTDE shows commanded poses to
 # 0.001 deg, and by hand on the pendant a joint is brought there to about a tenth of a degree.
 POSE_TOLERANCE_DEG = 0.5
+TO_RESET = "Turn the charge amplifier to Reset, then confirm."
+TO_OPERATE = "Turn the charge amplifier to Operate, then confirm."
 
 
 class Runner:
@@ -61,8 +64,6 @@ class Runner:
         """All runs and repetitions that are not done yet."""
         if self._progress.open_step_row is not None:
             self._recorder.discard(self._progress.open_step_row, "interrupted before its end")
-        # In Reset nothing that happens while the rig is set up can overload the amplifier.
-        self._devices.dynamometer.reset()
         for index, run, repetition in self._protocol.sequence():
             if (index, repetition) not in self._progress.repetitions:
                 self._repetition_until_accepted(index, run, repetition)
@@ -144,9 +145,10 @@ class Runner:
         run = where.run
         if self._mounted == (run.pose, run.direction):
             return
-        self._devices.dynamometer.reset()
-        pose = self._protocol.poses[run.pose]
         self._supervision.show(phase="mounting")
+        # In Reset nothing that happens while the rig is set up can overload the amplifier.
+        self._reset()
+        pose = self._protocol.poses[run.pose]
         if self._protocol.move_arm and pose.program is not None:
             self._play(pose.program, pose.q_rad)
             words = f"The arm stands in {run.pose}."
@@ -201,8 +203,8 @@ class Runner:
         """Unload, reset and operate the amplifier, tare, set the datum of a new setup."""
         self._supervision.show(phase="taring", step=0, target_N=0.0, band_N=0.0)
         self._unload()
-        self._devices.dynamometer.reset()
-        self._devices.dynamometer.operate()
+        self._reset()
+        self._operate()
         _, force, laser = self._acquisition.average(TARE_S)
         self._devices.dynamometer.tare(force)
         if isnan(self._recorder.datum_mm):
@@ -214,6 +216,28 @@ class Runner:
         data = {"datum_mm": self._recorder.datum_mm, "segment": self._segment}
         self._steps.event(where, "tared", "amplifier reset, force tared", **data)
         return where
+
+    def _reset(self) -> None:
+        """By the line, or by the operator's hand: a switch that was not turned is asked for again,
+        because the repetitions measured so far are no worse for it."""
+        prompt = Prompt("reset", TO_RESET)
+        while True:
+            if self._devices.dynamometer.reset_by_hand:
+                self._supervision.obey(self._supervision.ask(prompt, watching=False))
+            try:
+                self._devices.dynamometer.reset()
+            except NotDischarged as error:
+                if not self._devices.dynamometer.reset_by_hand:
+                    raise
+                text = f"Not discharged: {error.fault}. {TO_RESET}"
+                prompt = Prompt("reset", text, ("ok", "abort"))
+            else:
+                return
+
+    def _operate(self) -> None:
+        if self._devices.dynamometer.reset_by_hand:
+            self._supervision.ask(Prompt("operate", TO_OPERATE), watching=False)
+        self._devices.dynamometer.operate()
 
     def _reason(self) -> str:
         return self._supervision.ask(Prompt("skip_reason", "Why? (one line)", ()))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.errors import BadReply, CannotConnect, Overload, ReadTimeout
+from drivers.errors import BadReply, CannotConnect, NotDischarged, Overload, ReadTimeout
 from drivers.kistler.calibration import Calibration, drift_bound_N_per_s
 from drivers.kistler.explain import DEVICE, device_error
 from drivers.kistler.settings import KistlerSettings, PerAxis
@@ -128,8 +128,8 @@ class Kistler9257B:
     def reset(self) -> None:
         """Discharges the amplifier: force meaningless until `operate`. Forgets the tare.
 
-        Raises BadReply when the outputs do not fall to zero, which a dead or inverted Reset line
-        would leave unseen.
+        Raises NotDischarged when the outputs do not fall to zero, which a dead or inverted Reset
+        line, or a switch that nobody turned, would leave unseen.
         """
         with self._lock:
             self._valid_from = math.inf
@@ -138,8 +138,7 @@ class Kistler9257B:
         self._await_block_from(self._clock.now())
         self._clear(valid_from=math.inf)
         self._zero = np.zeros(len(self.signals))
-        if not self.reset_by_hand:
-            self._check_discharged()
+        self._check_discharged()
 
     def operate(self) -> None:
         """Lets the amplifier integrate, waits for the settle time and the first sound samples.
@@ -314,13 +313,20 @@ class Kistler9257B:
             volts = self._volts
         channel = int(np.abs(volts).argmax())
         if abs(volts[channel]) > RESET_RESIDUAL_V:
-            raise BadReply(
+            raise NotDischarged(
                 DEVICE,
                 f"in Reset channel {channel + 1} still shows {volts[channel]:.2f} V, more than"
-                f" {RESET_RESIDUAL_V:g} V: Reset line {self.settings.reset_line} has no effect",
-                "Check its wiring, `reset_line` and `reset_active_high` in the station file,"
+                f" {RESET_RESIDUAL_V:g} V: {self._why_charged()}",
+                "Turn the charge amplifier's switch to Reset."
+                if self.reset_by_hand
+                else "Check its wiring, `reset_line` and `reset_active_high` in the station file,"
                 " or set `reset_line: null` and press Reset by hand.",
             )
+
+    def _why_charged(self) -> str:
+        if self.reset_by_hand:
+            return "the amplifier's switch does not stand at Reset"
+        return f"Reset line {self.settings.reset_line} has no effect"
 
     def _await_block_from(self, start: float) -> None:
         """Waits for a block that was sampled wholly after `start`, and drops all up to it."""

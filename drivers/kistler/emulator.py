@@ -148,10 +148,12 @@ class KistlerEmulator:
 
     def drive_line(self, high: bool) -> None:
         """The Reset/Operate line is set."""
-        if self._fault == "no_reset":
-            return
+        if self._fault != "no_reset":
+            self.turn_switch(reset=high == self._settings.reset_active_high)
+
+    def turn_switch(self, *, reset: bool) -> None:
+        """The amplifier's own switch is turned, as by hand where there is no line."""
         with self._lock:
-            reset = high == self._settings.reset_active_high
             self._chain.switch(self._scene.now(), operate=not reset)
 
     # ------------------------------------------------------------------ faults

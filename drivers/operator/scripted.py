@@ -26,9 +26,10 @@ class ScriptedOperator:
 
     Knows what a person at the screw would know: the views and what its own turns did. Answers
     prompts with their first answer, or with `answers[prompt.key]`; a prompt "mount" is carried
-    out in the emulated scene, a prompt "unload" by the views that come meanwhile, or, when none
-    come, by turning back what was turned since the set-up. `press` queues a command, as a key of
-    the console would. `guide` and `ask` may run in different threads.
+    out in the emulated scene, "reset" and "operate" at the switch of the emulated amplifier, and
+    "unload" by the views that come meanwhile, or, when none come, by turning back what was turned
+    since the set-up. `press` queues a command, as a key of the console would. `guide` and `ask` may
+    run in different threads.
     """
 
     name = "operator"
@@ -96,6 +97,8 @@ class ScriptedOperator:
             self._mount(prompt.details)
         if prompt.key == "unload":
             self._unload()
+        if prompt.key in ("reset", "operate"):
+            self._screw().request(amplifier=prompt.key)
         return answer
 
     def guide(self, view: LiveView) -> None:

@@ -18,7 +18,7 @@ JOIN_S = 20.0
 POLL_S = 0.05
 END_S = 1.0
 # Questions whose answer is work in the emulated scene, whoever gives it.
-MANUAL_WORK = ("mount", "unload")
+MANUAL_WORK = ("mount", "unload", "reset", "operate")
 
 
 @runtime_checkable

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from drivers.clock import Clock
-from drivers.errors import DeviceError
+from drivers.errors import DeviceError, NotDischarged
 from drivers.interfaces import Command, LiveView, Prompt
 from drivers.readings import Reading, RobotState, Signal
 
@@ -103,11 +103,16 @@ class FakeRobot(FakeDevice):
 class FakeDynamometer(FakeDevice):
     name = "dynamometer"
     signals = tuple(Signal(f"force_{a}_N", "N", a) for a in "xyz")
+    reset_by_hand = False
+    charged = 0  # so often the switch stands elsewhere when it should be at Reset
 
     def values(self) -> tuple[float, ...]:
         return (self.arm.force + self.arm.offset_N, 0.0, 0.0)
 
     def reset(self) -> None:
+        self.charged -= 1
+        if self.charged >= 0:
+            raise NotDischarged(self.name, "in Reset channel 1 still shows 2.00 V", "Turn it.")
         self.arm.offset_N = 3.0
 
     def operate(self) -> None: ...

@@ -26,7 +26,8 @@ class Rig:
     def __init__(self) -> None:
         self.scene = StillScene(speed=20.0, stiffness_N_per_m=57e3)
         self.asked: list[object] = []
-        self.server = ScrewServer(self.scene, {"fault": self.fault})
+        handlers = {"fault": self.fault, "amplifier": self.fault}
+        self.server = ScrewServer(self.scene, handlers)
         self.address = self.server.start()
 
     def fault(self, value: object) -> object:
@@ -182,6 +183,15 @@ def test_scripted_operator_mounts_and_answers(rig: Rig) -> None:
     hand.notify("careful", "warning")
     assert (hand.command(), hand.command()) == ("pause", None)
     assert list(hand.notices) == [("warning", "careful")]
+    hand.close()
+
+
+def test_turns_the_switch_of_the_amplifier(rig: Rig) -> None:
+    hand = operator(rig)
+    hand.open()
+    assert hand.ask(Prompt("reset", "Turn it to Reset.")) == "ok"
+    assert hand.ask(Prompt("operate", "Turn it to Operate.")) == "ok"
+    assert rig.asked == ["reset", "operate"]
     hand.close()
 
 

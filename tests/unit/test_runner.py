@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from drivers.errors import ReadTimeout, SafetyStop
+from drivers.errors import NotDischarged, ReadTimeout, SafetyStop
 from drivers.interfaces import LiveView
 from rig.errors import MeasurementStopped
 from rig.journal import Journal, Record, replay
@@ -66,7 +66,8 @@ class Bench:
         self.arm = Arm(self.clock)
         self.robot = FakeRobot(self.arm)
         self.loader = FakeLoader(self.arm)
-        self.devices = Devices(self.robot, FakeDynamometer(self.arm), FakeLaser(self.arm))
+        self.dynamometer = FakeDynamometer(self.arm)
+        self.devices = Devices(self.robot, self.dynamometer, FakeLaser(self.arm))
         self.path = folder / "run.h5.journal"
         self.checkpoints = 0
         self.runner: Runner | None = None
@@ -154,6 +155,44 @@ def test_the_operator_is_asked_in_the_order_of_the_procedure(bench: Bench) -> No
     bench.run()
     keys = [p.key for p in bench.loader.asked]
     assert keys == ["mount", "unload", "unload", "unload", "unload"]
+
+
+def test_an_amplifier_without_a_line_is_switched_by_the_operator(bench: Bench) -> None:
+    bench.dynamometer.reset_by_hand = True
+    bench.run()
+    keys = [p.key for p in bench.loader.asked]
+    tare = ["unload", "reset", "operate"]
+    assert keys == ["reset", "mount", *tare, "unload", *tare, "unload"]
+    texts = {p.key: p.text for p in bench.loader.asked}
+    assert texts["reset"] == "Turn the charge amplifier to Reset, then confirm."
+    assert texts["operate"] == "Turn the charge amplifier to Operate, then confirm."
+
+
+def test_a_switch_that_was_not_turned_is_asked_for_again(bench: Bench) -> None:
+    bench.dynamometer.reset_by_hand, bench.dynamometer.charged = True, 2
+    bench.run()
+    asked = [p for p in bench.loader.asked if p.key == "reset"]
+    assert len(asked) == 2 + 3
+    assert asked[1].text == (
+        "Not discharged: in Reset channel 1 still shows 2.00 V. "
+        "Turn the charge amplifier to Reset, then confirm."
+    )
+    assert asked[1].answers == ("ok", "abort")
+    assert bench.steps() == ALL
+
+
+def test_a_switch_that_cannot_be_turned_ends_the_measurement(bench: Bench) -> None:
+    bench.dynamometer.reset_by_hand, bench.dynamometer.charged = True, 2
+    bench.loader.answers["reset"] = ["ok", "abort"]
+    with pytest.raises(MeasurementStopped, match="the operator ended the measurement"):
+        bench.run()
+
+
+def test_a_line_without_effect_is_a_failed_device(bench: Bench) -> None:
+    bench.dynamometer.charged = 1
+    with pytest.raises(NotDischarged):
+        bench.run()
+    assert not bench.loader.asked
 
 
 def test_redo_step_discards_its_rows_and_measures_it_again(bench: Bench) -> None:

@@ -42,14 +42,15 @@ prompts: {}
 """
 
 
-def station(speed: float = 30, faults: str = "[]", seed: int = 1) -> str:
-    """The emulated station of the project with another speed, other faults, another seed."""
+def station(speed: float = 30, faults: str = "[]", seed: int = 1, **others: str) -> str:
+    """The emulated station of the project with another speed, other faults, another seed, and
+    `others` by their key."""
     text = (HOME / "protocols" / "stations" / "emulated.yaml").read_text(encoding="utf-8")
     lines = []
     for line in text.splitlines():
         key = line.strip().split(":")[0]
         indent = line[: len(line) - len(line.lstrip())]
-        changed = {"name": "test", "speed": speed, "seed": seed, "faults": faults}
+        changed = {"name": "test", "speed": speed, "seed": seed, "faults": faults, **others}
         lines.append(f"{indent}{key}: {changed[key]}" if key in changed else line)
     return "\n".join(lines) + "\n"
 

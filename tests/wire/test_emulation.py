@@ -17,7 +17,7 @@ import psutil
 import pytest
 
 from drivers.clock import Clock
-from drivers.errors import CannotConnect, DeviceError
+from drivers.errors import BadReply, CannotConnect, DeviceError, NotDischarged
 from drivers.ild2200.client import Ild2200
 from drivers.kistler.client import Kistler9257B
 from drivers.operator.screw import ScrewClient
@@ -133,6 +133,28 @@ def test_the_screw_moves_the_arm_to_another_pose(rig: EmulatedRig) -> None:
         stack.callback(screw.close)
         screw.mount(Y, OTHER_Q)
         assert eventually(lambda: robot.state().q == pytest.approx(OTHER_Q, abs=1e-3), 5.0)
+
+
+def test_the_switch_of_the_amplifier_is_turned_at_the_screws_port() -> None:
+    given = station()
+    assert given.dynamometer
+    by_hand = replace(given, dynamometer=replace(given.dynamometer, reset_line=None))
+    with ExitStack() as stack:
+        running = stack.enter_context(EmulatedRig(by_hand, {"P1": REFERENCE_Q_RAD}))
+        assert running.dynamometer
+        dynamometer = Kistler9257B(running.dynamometer, Clock(20.0), emulated=True)
+        stack.callback(dynamometer.close)
+        dynamometer.open()
+        screw = ScrewClient(str(running.operator.screw))
+        stack.callback(screw.close)
+        screw.mount(Y, None)
+        screw.turn(1.5e-3)
+        with pytest.raises(NotDischarged, match="switch does not stand at Reset"):
+            dynamometer.reset()
+        screw.request(amplifier="reset")
+        dynamometer.reset()
+        with pytest.raises(BadReply, match='turned to "reset" or "operate"'):
+            screw.request(amplifier="off")
 
 
 # --- faults ----------------------------------------------------------------------------------

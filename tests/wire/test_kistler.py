@@ -13,7 +13,14 @@ import nidaqmx.errors
 import numpy as np
 import pytest
 
-from drivers.errors import BadReply, CannotConnect, DeviceError, Overload, ReadTimeout
+from drivers.errors import (
+    BadReply,
+    CannotConnect,
+    DeviceError,
+    NotDischarged,
+    Overload,
+    ReadTimeout,
+)
 from drivers.kistler.calibration import Array, u_type_a
 from drivers.kistler.client import Kistler9257B
 from drivers.kistler.emulator import KistlerEmulator
@@ -236,6 +243,18 @@ def test_without_a_line_nothing_is_driven(rig: Rig) -> None:
     assert not {"CreateDOChan", "WriteDigitalLines"} & set(rig.emulator.calls)
 
 
+def test_a_switch_that_nobody_turned_is_noticed(rig: Rig) -> None:
+    rig.build(reset_line=None).ready()
+    rig.scene.force = np.array([100.0, 0.0, 0.0])
+    with pytest.raises(NotDischarged) as caught:
+        rig.device.reset()
+    wanted = "the amplifier's switch does not stand at Reset", "Turn the charge amplifier's switch"
+    check(caught.value, (NotDischarged, *wanted))
+    assert "line" not in str(caught.value)
+    rig.emulator.turn_switch(reset=True)
+    rig.device.reset()
+
+
 def test_inverted_line(rig: Rig) -> None:
     rig.build(reset_active_high=False).ready()
     rig.scene.force = FORCE
@@ -421,8 +440,9 @@ def test_reset_line_without_effect(rig: Rig, when: str, fault_table: FaultTable)
     rig.scene.force = np.array([100.0, 0.0, 0.0])
     with pytest.raises(BadReply) as caught:
         rig.device.reset()
-    fault_table("dynamometer", "no_reset", when, "BadReply", str(caught.value))
-    check(caught.value, (BadReply, "Reset line port0/line0 has no effect", "reset_active_high"))
+    fault_table("dynamometer", "no_reset", when, "NotDischarged", str(caught.value))
+    wanted = "Reset line port0/line0 has no effect", "reset_active_high"
+    check(caught.value, (NotDischarged, *wanted))
 
 
 def test_line_that_the_device_lacks(rig: Rig) -> None:

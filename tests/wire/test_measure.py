@@ -62,6 +62,20 @@ def test_a_short_run_ends_complete_and_marked_as_emulated(tmp_path: Path) -> Non
     assert no_process_left(tmp_path)
 
 
+def test_an_amplifier_without_a_line_is_switched_by_the_emulated_hand(tmp_path: Path) -> None:
+    words = write_files(tmp_path, reset_line="null", speed=60)
+    outcome = run_rig(*words, cwd=tmp_path)
+    assert outcome.status == 0, outcome.stderr
+    dataset = load(tmp_path / "run.h5")
+    assert steps_of(dataset) == STEPS
+    columns = dataset.columns
+    zero = (columns["branch"] == "zero") & (columns["settled"] == 1)
+    assert columns["force_N"][zero] == pytest.approx(0.0, abs=1.0)
+    asked = [e["key"] for e in dataset.events if e["kind"] == "prompt"]
+    assert asked.count("reset") == 3
+    assert asked.count("operate") == 2
+
+
 def test_measurements_are_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "run.h5").write_bytes(b"precious")
     outcome = run_rig(*write_files(tmp_path), cwd=tmp_path)
