@@ -29,6 +29,10 @@ class BadReply(DeviceError):
     """The device answered, and the answer makes no sense or refuses what was asked."""
 
 
+class NotWanted(DeviceError):
+    """What was under way was called off before its end, and has been told to stop."""
+
+
 class NotDischarged(BadReply):
     """The amplifier was to be in Reset, and its outputs did not fall to zero."""
 

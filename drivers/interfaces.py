@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -50,9 +50,18 @@ class Robot(Device, Protocol):
         """The newest values; raises when they are stale."""
 
     def go_to_reference(
-        self, program: str, q_rad: Sequence[float], tolerance_rad: float, deadline_s: float
+        self,
+        program: str,
+        q_rad: Sequence[float],
+        tolerance_rad: float,
+        deadline_s: float,
+        wanted: Callable[[], bool],
     ) -> None:
-        """Loads and plays a program taught on the pendant, and verifies the arrival by reading."""
+        """Loads and plays a program taught on the pendant, and verifies the arrival by reading.
+
+        `wanted` is asked all the while; once it says False the program is stopped, and NotWanted
+        raised.
+        """
 
     def accept_present_state(self) -> None:
         """The arm was moved on purpose, by hand or pendant: mode and program changes up to now

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import degrees, isnan, nan, radians
 
-from drivers.errors import NotDischarged
+from drivers.errors import NotDischarged, NotWanted
 from drivers.interfaces import Loader, Prompt
 from rig.errors import MeasurementStopped
 from rig.procedure.acquisition import Acquisition
@@ -57,7 +57,8 @@ class Runner:
         self._segment = progress.segment
 
     def interrupt(self) -> None:
-        """Ctrl-C: the first asks, the second stops at once (raises KeyboardInterrupt)."""
+        """Ctrl-C: the first asks, the second stops at once (raises KeyboardInterrupt), and so does
+        the first while the arm moves."""
         self._supervision.interrupt()
 
     def run(self) -> None:
@@ -173,7 +174,14 @@ class Runner:
             raise MeasurementStopped("the operator did not confirm the arm's motion")
         tolerance = radians(POSE_TOLERANCE_DEG)
         deadline = self._protocol.step_deadline_s
-        self._devices.robot.go_to_reference(program, q_rad, tolerance, deadline)
+        robot = self._devices.robot
+        try:
+            with self._supervision.moving() as wanted:
+                robot.go_to_reference(program, q_rad, tolerance, deadline, wanted)
+        except NotWanted as error:
+            raise MeasurementStopped(
+                f"the operator ended the measurement: {error.fault}. {error.remedy}"
+            ) from error
 
     def _verify_pose(self, name: str, q_rad: tuple[float, ...]) -> None:
         while True:

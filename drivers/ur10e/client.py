@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any
 
 from drivers.clock import Clock
-from drivers.errors import BadReply, CannotConnect, DeviceError, ReadTimeout, SafetyStop
+from drivers.errors import (
+    BadReply,
+    CannotConnect,
+    DeviceError,
+    NotWanted,
+    ReadTimeout,
+    SafetyStop,
+)
 from drivers.readings import Reading, RobotState, Signal
 from drivers.stream import Block, Stream
 from drivers.ur10e.dashboard import Dashboard
@@ -283,14 +290,19 @@ class Ur10e:
             raise self._alarm
 
     def go_to_reference(
-        self, program: str, q_rad: Sequence[float], tolerance_rad: float, deadline_s: float
+        self,
+        program: str,
+        q_rad: Sequence[float],
+        tolerance_rad: float,
+        deadline_s: float,
+        wanted: Callable[[], bool] = lambda: True,
     ) -> None:
         """Loads and plays a program taught on the pendant, and verifies the arrival by reading.
 
         Arrived: every joint within `tolerance_rad` of `q_rad` (6) and standing still for half a
         second, safety normal, program state steady. `deadline_s` in wall-clock seconds. Whatever
-        prevents the arrival, Ctrl-C included, stops the program that was started here.
-        Raises SafetyStop, ReadTimeout, CannotConnect, BadReply (refused, or ended elsewhere).
+        prevents the arrival, Ctrl-C included, stops the program that was started here. Raises
+        SafetyStop, ReadTimeout, CannotConnect, BadReply (refused, or ended elsewhere), NotWanted.
         """
         if not self._settings.dashboard:
             raise BadReply(
@@ -304,9 +316,10 @@ class Ur10e:
         deadline = time.monotonic() + deadline_s
         with self._dashboard() as dashboard:
             dashboard.load(program)
+            self._go_on(program, wanted)
             try:
                 dashboard.play()
-                self._await_arrival(program, q_rad, tolerance_rad, deadline, deadline_s)
+                self._await_arrival(program, q_rad, tolerance_rad, deadline, deadline_s, wanted)
             except BaseException:
                 self._stop_program()
                 raise
@@ -318,8 +331,20 @@ class Ur10e:
         return Dashboard(self.name, self._settings.host, limit)
 
     def _stop_program(self) -> None:
-        with suppress(DeviceError), self._dashboard() as dashboard:
-            dashboard.stop()
+        """In a thread of its own, which a second Ctrl-C does not cut short."""
+
+        def stop() -> None:
+            with suppress(DeviceError), self._dashboard() as dashboard:
+                dashboard.stop()
+
+        thread = Thread(target=stop, name="ur10e stop")
+        thread.start()
+        thread.join()
+
+    def _go_on(self, program: str, wanted: Callable[[], bool]) -> None:
+        if not wanted():
+            fault = f'the program "{program}" was called off before the arm arrived'
+            raise NotWanted(self.name, fault, "See that the arm stands still.")
 
     def _await_arrival(
         self,
@@ -328,10 +353,12 @@ class Ur10e:
         tolerance_rad: float,
         deadline: float,
         deadline_s: float,
+        wanted: Callable[[], bool],
     ) -> None:
         still_since: float | None = None
         runtime = -1
         while True:
+            self._go_on(program, wanted)
             self._check()
             state = self._state()
             now = time.monotonic()

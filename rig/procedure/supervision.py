@@ -7,8 +7,9 @@ to know them.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import replace
 from math import nan
 from typing import Any
@@ -50,6 +51,7 @@ class Supervision:
         self._unit_vector: Vector = (nan, nan, nan)
         self._warned: set[str] = set()
         self._interrupts = 0
+        self._moving = False
         self._prompts = 0
         self.view = LiveView(
             phase="idle", pose="", direction="", repetition=0, repetitions=repetitions, step=0,
@@ -75,10 +77,27 @@ class Supervision:
         self._warned.clear()
 
     def interrupt(self) -> None:
-        """Ctrl-C: the first asks at the next tick, the second stops at once."""
+        """Ctrl-C: the first asks at the next tick, the second stops at once; while the arm moves,
+        when there are no ticks, so does the first."""
         self._interrupts += 1
-        if self._interrupts > 1:
+        if self._moving or self._interrupts > 1:
             raise KeyboardInterrupt
+
+    @contextmanager
+    def moving(self) -> Iterator[Callable[[], bool]]:
+        """While the arm moves; gives what tells whether the operator still wants it to."""
+        self._moving = True
+        try:
+            yield self._motion_wanted
+        finally:
+            self._moving = False
+
+    def _motion_wanted(self) -> bool:
+        while (command := self._loader.command()) is not None:
+            if command == "abort":
+                return False
+            self._loader.notify("The arm moves: nothing but an abort is heard.", "warning")
+        return not self._interrupts  # one that came before the arm moved
 
     def tick(self) -> tuple[Live, Slot | None]:
         """Waits for the next tick; watches limits, operator and Ctrl-C on the way."""

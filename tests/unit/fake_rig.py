@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from drivers.clock import Clock
-from drivers.errors import DeviceError, NotDischarged
+from drivers.errors import DeviceError, NotDischarged, NotWanted
 from drivers.interfaces import Command, LiveView, Prompt
 from drivers.readings import Reading, RobotState, Signal
 
@@ -84,6 +84,7 @@ class FakeRobot(FakeDevice):
     name = "robot"
     signals = tuple(Signal(f"q{i}_rad", "rad", f"joint {i}") for i in range(1, 7))
     moved: tuple[str, ...] = ()
+    on_the_way: Callable[[], None] = staticmethod(lambda: None)
 
     def values(self) -> tuple[float, ...]:
         return self.arm.q
@@ -95,9 +96,17 @@ class FakeRobot(FakeDevice):
         return RobotState(self.arm.q, self.arm.q, (30.0,) * 6, 7, 1, 1, 2, 0.0, 0.0)
 
     def go_to_reference(
-        self, program: str, q_rad: object, tolerance_rad: float, deadline_s: float
+        self,
+        program: str,
+        q_rad: object,
+        tolerance_rad: float,
+        deadline_s: float,
+        wanted: Callable[[], bool],
     ) -> None:
         self.moved = (*self.moved, program)
+        self.on_the_way()
+        if not wanted():
+            raise NotWanted(self.name, f'the program "{program}" was called off', "Look at it.")
 
 
 class FakeDynamometer(FakeDevice):

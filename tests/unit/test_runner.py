@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from drivers.errors import NotDischarged, ReadTimeout, SafetyStop
-from drivers.interfaces import LiveView
+from drivers.interfaces import Command, LiveView
 from rig.errors import MeasurementStopped
 from rig.journal import Journal, Record, replay
 from rig.procedure.acquisition import Acquisition
@@ -53,6 +53,8 @@ limits:
   displacement_rate_mm_per_s: {max: 100, at: warn}
 prompts: {}
 """
+
+MOVING = PROTOCOL.replace("move_arm: false", "move_arm: true")
 
 Step = tuple[int, str, int]
 
@@ -303,17 +305,48 @@ def test_the_arm_moves_only_if_protocol_and_operator_say_so(tmp_path: Path) -> N
     still = Bench(tmp_path)
     still.run()
     assert still.robot.moved == ()
-    text = PROTOCOL.replace("move_arm: false", "move_arm: true")
     (tmp_path / "a").mkdir()
-    refused = Bench(tmp_path / "a", text)
+    refused = Bench(tmp_path / "a", MOVING)
     refused.loader.answers["confirm_move"] = ["abort"]
     with pytest.raises(MeasurementStopped, match="did not confirm the arm's motion"):
         refused.run()
     assert refused.robot.moved == ()
     (tmp_path / "b").mkdir()
-    moving = Bench(tmp_path / "b", text)
+    moving = Bench(tmp_path / "b", MOVING)
     moving.run()
     assert moving.robot.moved == ("go.urp",)
+
+
+def test_an_abort_while_the_arm_moves_stops_it(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, MOVING)
+    wishes: list[Command] = ["pause", "abort"]
+    bench.robot.on_the_way = lambda: bench.loader.commands.extend(wishes)
+    reason = 'the operator ended the measurement: the program "go.urp" was called off. Look at it.'
+    with pytest.raises(MeasurementStopped) as stopped:
+        bench.run()
+    assert str(stopped.value) == reason
+    assert bench.loader.said == ["The arm moves: nothing but an abort is heard."]
+
+
+def test_the_first_ctrl_c_while_the_arm_moves_stops_at_once(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, MOVING)
+    bench.robot.on_the_way = lambda: bench.runner and bench.runner.interrupt()
+    with pytest.raises(KeyboardInterrupt):
+        bench.run()
+
+
+def test_a_ctrl_c_before_the_arm_moves_keeps_it_where_it_is(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, MOVING)
+    ask = bench.loader.ask
+
+    def asked(prompt: Any) -> str:
+        if prompt.key == "confirm_move" and bench.runner:
+            bench.runner.interrupt()
+        return ask(prompt)
+
+    bench.loader.ask = asked  # type: ignore[method-assign]
+    with pytest.raises(MeasurementStopped, match="was called off"):
+        bench.run()
 
 
 def test_a_wrong_pose_is_noticed(bench: Bench) -> None:

@@ -18,9 +18,10 @@ import psutil
 import pytest
 
 from drivers.clock import Clock
-from drivers.errors import BadReply, CannotConnect, SafetyStop
+from drivers.errors import BadReply, CannotConnect, NotWanted, SafetyStop
 from drivers.interfaces import Robot
 from drivers.ur10e.client import Ur10e
+from drivers.ur10e.dashboard import Dashboard
 from drivers.ur10e.emulator import Ur10eEmulator
 from drivers.ur10e.settings import Ur10eSettings
 from drivers.ur10e.words import PLAYING, STOPPED
@@ -259,6 +260,75 @@ def test_ctrl_c_on_the_way_stops_the_program(rig: Rig) -> None:
     with pytest.raises(KeyboardInterrupt):
         robot.go_to_reference("reference.urp", REFERENCE, 1e-3, 20.0)
     assert emulator.commands[-1] == "stop"
+
+
+def test_a_motion_that_is_no_longer_wanted_is_stopped(rig: Rig) -> None:
+    scene, emulator, robot = rig()
+    robot.open()
+    with pytest.raises(NotWanted, match=r'"reference\.urp" was called off before the arm arrived'):
+        robot.go_to_reference("reference.urp", REFERENCE, 1e-3, 20.0, _for_s(0.3))
+    assert emulator.commands[-2:] == ("play", "stop")
+    stands = scene.q_target.copy()
+    assert 0 < stands[0] < REFERENCE[0]
+    time.sleep(0.2)
+    assert scene.q_target.tolist() == stands.tolist()
+
+
+def test_a_motion_that_is_not_wanted_never_begins(rig: Rig) -> None:
+    _, emulator, robot = rig()
+    robot.open()
+    with pytest.raises(NotWanted):
+        robot.go_to_reference("reference.urp", REFERENCE, 1e-3, 20.0, lambda: False)
+    assert "play" not in emulator.commands
+
+
+def _for_s(seconds: float) -> Callable[[], bool]:
+    end: list[float] = []
+
+    def wanted() -> bool:
+        end.append(time.monotonic() + seconds)
+        return time.monotonic() < end[0]
+
+    return wanted
+
+
+def test_a_second_ctrl_c_does_not_cut_the_stop_short(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, emulator, robot = rig()
+    robot.open()
+    monkeypatch.setattr(Dashboard, "__init__", _slowly(Dashboard.__init__))
+
+    def impatient(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    earlier = signal.signal(signal.SIGALRM, impatient)
+    wanted = _for_s(0.3)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            robot.go_to_reference(
+                "reference.urp", REFERENCE, 1e-3, 20.0, lambda: wanted() or _alarm()
+            )
+    finally:
+        signal.signal(signal.SIGALRM, earlier)
+    assert emulator.commands[-1] == "play"
+    deadline = time.monotonic() + 5
+    while emulator.commands[-1] != "stop":
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def _alarm() -> bool:
+    signal.setitimer(signal.ITIMER_REAL, 0.1)
+    return False
+
+
+def _slowly(call: Callable[..., None]) -> Callable[..., None]:
+    def later(*given: object) -> None:
+        time.sleep(0.4)
+        call(*given)
+
+    return later
 
 
 def test_a_move_by_hand_is_accepted_only_when_said_so(rig: Rig) -> None:
