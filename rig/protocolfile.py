@@ -251,6 +251,9 @@ def _poses(written: ProtocolFile) -> Found:
                     (*path, "tcp_xyz_mm", i),
                     f"{value:.10g} mm is no tool; allowed: -2000 to 2000 mm.",
                 )
+        if pose.program is not None and not pose.program.isprintable():
+            what = f"{pose.program!r} holds a character that cannot be printed; write the "
+            yield (*path, "program"), what + "program's name as the pendant shows it."
         if written.move_arm and name in used and pose.program is None:
             what = "move_arm is true, and this pose has no program; name the one taught on the "
             yield path, what + "pendant, or set move_arm to false."

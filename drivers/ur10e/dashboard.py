@@ -84,6 +84,9 @@ class Dashboard:
             raise BadReply(self._device, fault, _REMOTE)
 
     def _exchange(self, command: str) -> str:
+        if not command.isprintable():  # a line feed would begin a second command
+            fault = f"{command!r} is not one printable line, and was not sent to {self._where}"
+            raise BadReply(self._device, fault, "Correct the program's name in the protocol.")
         self._link.settimeout(max(0.01, self._deadline - time.monotonic()))
         try:
             self._link.sendall(command.encode() + b"\n")

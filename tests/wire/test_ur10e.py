@@ -210,6 +210,15 @@ def test_a_program_that_is_not_there(rig: Rig) -> None:
     assert "play" not in emulator.commands
 
 
+def test_a_program_name_is_no_way_to_send_commands(rig: Rig) -> None:
+    _, emulator, robot = rig()
+    robot.open()
+    before = emulator.commands
+    with pytest.raises(BadReply, match="is not one printable line, and was not sent"):
+        robot.go_to_reference("reference.urp\npower off", REFERENCE, 1e-3, 5.0)
+    assert emulator.commands == before
+
+
 @pytest.mark.parametrize(
     ("programs_end", "deadline_s", "words"),
     [(True, 20.0, "ended with joint 2 0.5000 rad away"), (False, 2.0, "did not arrive within 2 s")],
