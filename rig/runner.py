@@ -79,19 +79,16 @@ class Runner:
         self._supervision.look_along(where.unit_vector)
         while True:
             self._steps.event(where, "repetition_start", f"{run.direction}, {repetition}")
-            outcome = "measured"
             try:
                 self._repetition(where)
-            except Wish as wish:
-                if wish.what != "skip":
-                    self._recorder.discard(first_row, "repetition redone")
-                    self._steps.event(where, "repetition_redone", "measured again")
-                    self._progress.forget_repetition(index, repetition)
-                    continue
-                outcome = f"skipped: {self._reason()}"
-            self._steps.event(where, "repetition_done", outcome, outcome=outcome)
+            except Wish:  # to redo the repetition; what is wished of a step stays there
+                self._recorder.discard(first_row, "repetition redone")
+                self._steps.event(where, "repetition_redone", "measured again")
+                self._progress.forget_repetition(index, repetition)
+                continue
+            self._steps.event(where, "repetition_done", "measured", outcome="measured")
             self._progress.repetitions.add((index, repetition))
-            self._loader.notify(f"{run.direction}, repetition {repetition}: {outcome}")
+            self._loader.notify(f"{run.direction}, repetition {repetition}: measured")
             return
 
     def _repetition(self, where: Where) -> None:

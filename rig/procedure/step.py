@@ -130,7 +130,7 @@ class StepProcedure:
         if settle.at_deadline == "stop":
             raise MeasurementStopped(f"{text}; the protocol stops there. {UNLOAD}")
         if settle.at_deadline == "ask":
-            answers = ("record", "redo_step", "skip", "abort")
+            answers = self._supervision.answers(("record", "redo_step", "skip", "abort"))
             self._supervision.obey(
                 self._supervision.ask(Prompt("settle_deadline", f"{text}.", answers))
             )

@@ -21,6 +21,7 @@ from rig.procedure.limits import UNLOAD, Breach, Live, Watch
 from rig.procedure.recorder import Recorder, Slot, Vector
 
 PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
+OF_A_STEP = ("redo_step", "skip")  # without a step under way there is nothing that they could mean
 
 
 class Wish(Exception):
@@ -147,6 +148,10 @@ class Supervision:
         self._recorder.event("prompt", prompt.text, key=prompt.key, answer=answer.result())
         return answer.result()
 
+    def answers(self, answers: tuple[str, ...]) -> tuple[str, ...]:
+        """Those of `answers` that mean something now."""
+        return tuple(a for a in answers if self.view.step or a not in OF_A_STEP)
+
     def obey(self, answer: str) -> None:
         """Turns an answer or a command into what it asks for; others do nothing."""
         if answer == "abort":
@@ -168,6 +173,9 @@ class Supervision:
         command = self._loader.command()
         if command == "pause":
             self._pause("Paused. The arm may be under load.")
+        elif command in OF_A_STEP and not self.view.step:
+            wish = command.replace("_", " ")
+            self._loader.notify(f"No step is under way: nothing to {wish}.", "warning")
         elif command is not None:
             self.obey(command)
 
@@ -176,7 +184,7 @@ class Supervision:
         phase = self.view.phase
         self.show(phase="paused")
         self._checkpoint()
-        answer = self.ask(Prompt("paused", text, PAUSE_ANSWERS))
+        answer = self.ask(Prompt("paused", text, self.answers(PAUSE_ANSWERS)))
         self.show(phase=phase)
         self._recorder.event("resume", f"after the pause: {answer}")
         # What was under way before a pause of unknown length is measured again from its start.

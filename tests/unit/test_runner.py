@@ -224,6 +224,65 @@ def test_skip_asks_for_the_reason_and_goes_on(bench: Bench) -> None:
     assert outcomes.count("skipped: screw slipped") == 1
 
 
+def outside(bench: Bench, phase: str, command: Command) -> None:
+    """Gives the command once, late in the first repetition, with no step under way."""
+    done: list[bool] = []
+
+    def script(view: LiveView) -> None:
+        measured = bool(bench.events("unloaded"))
+        if measured and (view.phase, view.repetition) == (phase, 1) and not done:
+            done.append(True)
+            bench.loader.commands.append(command)
+
+    bench.loader.script = script
+
+
+@pytest.mark.parametrize("phase", ["zero", "rest"])
+@pytest.mark.parametrize("command", ["redo_step", "skip"])
+def test_without_a_step_there_is_none_to_redo_or_skip(
+    bench: Bench, phase: str, command: Command
+) -> None:
+    outside(bench, phase, command)
+    bench.run()
+    assert bench.loader.said[0] == (
+        f"No step is under way: nothing to {command.replace('_', ' ')}."
+    )
+    assert not bench.events("discard")
+    assert [e["outcome"] for e in bench.events("repetition_done")] == ["measured"] * 2
+    assert bench.steps() == ALL
+
+
+@pytest.mark.parametrize("phase", ["zero", "rest"])
+def test_a_pause_without_a_step_offers_what_is_left_and_goes_on(bench: Bench, phase: str) -> None:
+    outside(bench, phase, "pause")
+    bench.run()
+    paused = next(p for p in bench.loader.asked if p.key == "paused")
+    assert paused.answers == ("continue", "redo_repetition", "abort")
+    assert not bench.events("discard")
+    assert bench.steps() == ALL
+
+
+def test_a_pause_in_a_step_offers_to_redo_and_to_skip_it(bench: Bench) -> None:
+    at(bench, 2, lambda: bench.loader.commands.append("pause"))
+    bench.run()
+    paused = next(p for p in bench.loader.asked if p.key == "paused")
+    assert {"redo_step", "skip"} <= set(paused.answers)
+
+
+def test_a_zero_plateau_that_does_not_settle_is_no_step(bench: Bench) -> None:
+    text = PROTOCOL.replace("at_deadline: record", "at_deadline: ask")
+    bench.protocol = parse_protocol(text, bench.path)
+
+    def creep(view: LiveView) -> None:
+        if view.phase == "settling" and view.branch == "zero":
+            bench.arm.u -= 0.0005
+
+    bench.loader.script = creep
+    bench.run()
+    asked = [p for p in bench.loader.asked if p.key == "settle_deadline"]
+    assert [p.answers for p in asked] == [("record", "abort")] * 4
+
+
 def test_abort_keeps_rows_and_says_what_to_do_with_the_hands(bench: Bench) -> None:
     at(bench, 2, lambda: bench.loader.commands.append("abort"))
     message = r"the operator ended the measurement\. Turn the screw back"
