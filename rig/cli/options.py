@@ -3,14 +3,37 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+
+def _json_file(name: str | None) -> str | None:
+    """Refuses a place that cannot be written to before the work that would be lost there."""
+    from rig.errors import InputError
+
+    if name is None or name == "-":
+        return name
+    folder = os.path.dirname(name) or "."
+    if os.path.isdir(name):
+        raise InputError(f"--json {name}: is a folder. Give the name of a file, or - for stdout.")
+    if not os.path.isdir(folder):
+        raise InputError(f"--json {name}: the folder {folder} does not exist. Create it first.")
+    if not os.path.exists(name) and not os.access(folder, os.W_OK):
+        raise InputError(
+            f"--json {name}: nothing may be written into the folder {folder}. Choose another."
+        )
+    return name
+
+
 JsonOption = Annotated[
-    str | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - : stdout.")
+    str | None,
+    typer.Option(
+        "--json", metavar="FILE", callback=_json_file, help="Write the result as JSON; - : stdout."
+    ),
 ]
 StationOption = Annotated[
     str | None,
@@ -37,14 +60,29 @@ def say(text: str) -> None:
 
 
 def give(result: Any, json_file: str | None) -> None:
-    """Prints the text of a result, or writes its JSON where asked."""
-    if json_file is not None:
-        text = json.dumps(result.to_json(), indent=2, allow_nan=False)
-        if json_file == "-":
-            typer.echo(text)
-            return
-        Path(json_file).write_text(text + "\n", encoding="utf-8")
+    """Prints the text of a result, and writes its JSON where asked; on stdout that is all."""
+    text = "" if json_file is None else json.dumps(result.to_json(), indent=2, allow_nan=False)
+    if json_file == "-":
+        typer.echo(text)
+        return
     typer.echo(result.to_text())
+    if json_file is not None:
+        _write_json(Path(json_file), text + "\n")
+
+
+def _write_json(path: Path, text: str) -> None:
+    """InputError where that fails. Pipes and devices are written to; a file is replaced."""
+    from rig.errors import InputError
+    from rig.storage.files import in_place_of
+
+    if not path.exists() or (path.is_file() and not path.is_symlink()):
+        with in_place_of(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        return
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}.") from error
 
 
 def list_written(paths: Iterable[Path]) -> None:

@@ -105,6 +105,58 @@ def test_bad_input_is_status_2_and_one_message(
     assert not list(files.glob("*.journal"))
 
 
+@pytest.mark.parametrize(
+    ("place", "says"),
+    [
+        ("no/such/r.json", "--json no/such/r.json: the folder no/such does not exist. Create it"),
+        (".", "--json .: is a folder. Give the name of a file, or - for stdout."),
+        ("shut/r.json", "--json shut/r.json: nothing may be written into the folder shut."),
+    ],
+)
+def test_json_that_could_not_be_written_is_said_before_the_work(
+    rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch, place: str, says: str
+) -> None:
+    (files / "shut").mkdir()
+    monkeypatch.setattr(os, "access", lambda folder, _mode: folder != "shut")
+    status, out, err = rig("analyze", "never-read.h5", "--json", place)
+    assert (status, out) == (2, "")
+    assert err.startswith(says)
+
+
+def test_json_that_cannot_be_written_costs_no_result(
+    rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    (files / "r.json").write_text("older")
+
+    def full(*_: object, **__: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    status, out, err = rig("analyze", "d.h5", "--json", "r.json")
+    assert status == 2
+    assert "N/mm" in out
+    assert err.startswith("r.json: cannot be written: No space left on device.")
+    assert (files / "r.json").read_text() == "older"
+    (files / "link.json").symlink_to("r.json")
+    status, _, err = rig("analyze", "d.h5", "--json", "link.json")
+    assert (status, err) == (2, "link.json: cannot be written: No space left on device.\n")
+
+
+def test_json_goes_into_a_pipe_and_through_a_link(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    (files / "link.json").symlink_to("real.json")
+    (files / "real.json").write_text("older")
+    os.mkfifo("pipe.json")
+    pipe = os.open("pipe.json", os.O_RDONLY | os.O_NONBLOCK)
+    for place in ("pipe.json", "link.json"):
+        assert rig("analyze", "d.h5", "--json", place)[0] == 0
+    assert os.read(pipe, 60_000).startswith(b'{\n  "schema": "rig.analysis/1"')
+    os.close(pipe)
+    assert (files / "link.json").is_symlink()
+    assert json.loads((files / "real.json").read_text())["schema"] == "rig.analysis/1"
+
+
 @pytest.mark.parametrize("words", [["frobnicate"], ["measure", "--stations", "x"], ["analyze"]])
 def test_wrong_words_are_status_2(rig: Rig, words: list[str]) -> None:
     status, _, err = rig(*words)
