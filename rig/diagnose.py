@@ -8,8 +8,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from identification.gap.data import BRANCH_NAMES, GapData
 from identification.gap.diagnose import Effect, GapResult, check_words, diagnose_gap, explain_gap
 from identification.gap.forms.known import less_known
@@ -22,6 +20,7 @@ from rig.gap_forms import effects_of
 from rig.meta import Simulation
 from rig.model import load_model
 from rig.other_setups import elsewhere
+from rig.other_simulator import with_curves
 
 MM = 1e3  # mm per m
 Progress = Callable[[str, float], None]
@@ -97,7 +96,7 @@ def diagnose(
     else:
         data, known = _believing(dataset, model)
     if simulation is not None:
-        data = _with_curves(data, simulation)
+        data = with_curves(data, simulation)
     out, forced = tuple(withhold), tuple(add)
     try:
         check_words({*out, *forced})
@@ -145,53 +144,6 @@ def _believing(dataset: Dataset, model: Path) -> tuple[GapData, tuple[dict[str, 
         return less_known(data, effects.forms), read.effects
     except ValueError as error:
         raise InputError(f"{model}: effects: {error}. Give a model without effects.") from error
-
-
-def _with_curves(data: GapData, csv: Path) -> GapData:
-    """Displacement that the curves (pose, direction, force_N, displacement_mm) give per sample."""
-    import pandas as pd
-
-    try:
-        table = pd.read_csv(csv, comment="#")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{csv}: can't be read as CSV ({error}).") from error
-    missing = {"force_N", "displacement_mm"} - set(table.columns)
-    if missing:
-        raise InputError(
-            f"{csv}: lacks the column {sorted(missing)[0]}; "
-            "wanted: pose, direction, force_N, displacement_mm."
-        )
-    if "branch" in table.columns:
-        raise InputError(
-            f"{csv}: these curves depend on the path that they were simulated along (branch, "
-            "repetition). Give the model itself: --model MODEL.yaml."
-        )
-    simulated = np.empty(len(data.force))
-    for s, setup in enumerate(data.setups):
-        mine = np.ones(len(table), dtype=bool)
-        for key, value in (("pose", setup.pose), ("direction", setup.direction)):
-            if key in table.columns:
-                mine &= (table[key].astype(str) == value).to_numpy()
-        curve = table[mine].sort_values("force_N")
-        if len(curve) < 2:
-            raise InputError(
-                f"{csv}: {len(curve)} rows for pose {setup.pose or '-'}, direction "
-                f"{setup.direction}; wanted: at least 2, over the range of force."
-            )
-        rows = data.setup == s
-        simulated[rows] = _along(
-            data.force[rows], curve["force_N"].to_numpy(float),
-            curve["displacement_mm"].to_numpy(float) / MM,
-        )  # fmt: skip
-    return replace(data, simulated=simulated)
-
-
-def _along(force: Any, f: Any, u: Any) -> Any:
-    """Linear between the curve's points, straight on beyond its ends."""
-    inner = np.interp(force, f, u)
-    below = u[0] + (force - f[0]) * (u[1] - u[0]) / max(f[1] - f[0], 1e-300)
-    above = u[-1] + (force - f[-1]) * (u[-1] - u[-2]) / max(f[-1] - f[-2], 1e-300)
-    return np.where(force < f[0], below, np.where(force > f[-1], above, inner))
 
 
 def _looks_like(r: GapResult) -> dict[str, Any] | None:

@@ -1,0 +1,97 @@
+"""The table of another simulator's curves: what it gives, and every way to be none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from identification.gap.data import GapData
+from rig.dataset import load
+from rig.errors import InputError
+from rig.gap_data import gap_data
+from rig.other_simulator import with_curves
+from rig.tables import import_table
+from tests.unit.test_cli import META, TABLE
+
+HEAD = "direction,force_N,displacement_mm\n"
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> GapData:
+    """Forces 0, 20 ... 100 N along x, three times."""
+    (tmp_path / "t.csv").write_text(TABLE)
+    (tmp_path / "m.yaml").write_text(META)
+    import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
+    return gap_data(load(tmp_path / "d.h5"))
+
+
+def simulated_mm(data: GapData, folder: Path, text: str) -> list[float]:
+    """At 0, 20 ... 100 N."""
+    (folder / "c.csv").write_text(text)
+    return [1e3 * u for u in with_curves(data, folder / "c.csv").simulated[:6]]
+
+
+def test_straight_between_the_points_and_beyond_them(data: GapData, tmp_path: Path) -> None:
+    rows = "# an FE program's\nx,60,0.5\nx,20,0.1\ny,20,9\nx,40,0.3\n"
+    assert simulated_mm(data, tmp_path, HEAD + rows) == pytest.approx(
+        [-0.1, 0.1, 0.3, 0.5, 0.7, 0.9]
+    )
+
+
+@pytest.mark.parametrize(
+    ("again", "ends_mm"),
+    [
+        ("100,1.2", (0.0, 1.1)),
+        ("0,-0.1", (-0.05, 1.0)),
+        ("0.00000000001,-0.1", (-0.05, 1.0)),  # the rounding of whoever wrote the table
+        ("99.99999999999,1.2", (0.0, 1.1)),
+    ],
+)
+def test_points_at_one_force_count_as_their_mean(
+    data: GapData, tmp_path: Path, again: str, ends_mm: tuple[float, float]
+) -> None:
+    rows = f"x,0,0\nx,20,0.2\nx,80,0.8\nx,100,1\nx,{again}\n"
+    low, high = ends_mm
+    assert simulated_mm(data, tmp_path, HEAD + rows) == pytest.approx(
+        [low, 0.2, 0.4, 0.6, 0.8, high]
+    )
+
+
+def test_beyond_two_points_at_the_largest_force_nothing_explodes(
+    data: GapData, tmp_path: Path
+) -> None:
+    found = simulated_mm(data, tmp_path, HEAD + "x,0,0\nx,40,0.3\nx,40,0.5\n")
+    assert found == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ("x,0,0\nx,20 N,1\n", 'c.csv:3: column force_N: "20 N" is not a number; wanted: a number'),
+        ("x,0,0\nx,20,soft\n", 'c.csv:3: column displacement_mm: "soft" is not a number'),
+        ("x,0,0\n\nx,20,\n", "c.csv:4: column displacement_mm: an empty cell is not allowed;"),
+        ("x,0,0\nx,nan,1\n", 'c.csv:3: column force_N: "nan" is not allowed; wanted: a finite num'),
+        ("x,0,0\nx,20,inf\n", 'c.csv:3: column displacement_mm: "inf" is not allowed'),
+        ("x,0,0\nx,20\n", "c.csv:3: 2 cells, but the header names 3 columns"),
+        ("x,20,0.1\nx,20,0.3\n", "c.csv: 2 rows for pose -, direction x, all at one force;"),
+        ("y,0,0\ny,20,0.3\n", "c.csv: 0 rows for pose -, direction x; wanted: at least 2"),
+        ("", "c.csv: 0 rows for pose -, direction x"),
+    ],
+)
+def test_a_table_that_holds_no_curves(data: GapData, tmp_path: Path, rows: str, says: str) -> None:
+    with pytest.raises(InputError) as caught:
+        simulated_mm(data, tmp_path, HEAD + rows)
+    assert str(caught.value).startswith(f"{tmp_path}/{says}")
+
+
+@pytest.mark.parametrize(
+    ("head", "says"),
+    [
+        ("direction,force_N", "lacks the column displacement_mm; wanted: pose, direction, force_N"),
+        ("branch,force_N,displacement_mm", "these curves depend on the path"),
+    ],
+)
+def test_a_header_that_does_not_fit(data: GapData, tmp_path: Path, head: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        simulated_mm(data, tmp_path, head + "\n")
