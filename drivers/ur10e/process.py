@@ -15,6 +15,7 @@ from typing import IO, Any
 
 _PROJECT = Path(__file__).resolve().parents[2]
 _END_WAIT_S = 0.5
+_KILLED_WAIT_S = 2.0
 
 
 class ReceiveProcess:
@@ -61,7 +62,8 @@ class ReceiveProcess:
             process.wait(_END_WAIT_S)
         except subprocess.TimeoutExpired:
             process.kill()
-            process.wait()
+            with contextlib.suppress(subprocess.TimeoutExpired):  # stuck in the system
+                process.wait(_KILLED_WAIT_S)
         self._thread.join(_END_WAIT_S)
         if process.stdout is not None and not self._thread.is_alive():
             process.stdout.close()

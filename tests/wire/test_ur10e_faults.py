@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -22,6 +23,7 @@ from drivers.errors import BadReply, CannotConnect, DeviceError, ReadTimeout, Sa
 from drivers.ur10e import probe as probe_module
 from drivers.ur10e.client import Ur10e
 from drivers.ur10e.emulator import FAULTS, Ur10eEmulator
+from drivers.ur10e.process import ReceiveProcess
 from drivers.ur10e.settings import Ur10eSettings
 from tests.wire.scene import StillScene
 
@@ -259,6 +261,20 @@ def test_a_name_service_that_stays_mute(monkeypatch: pytest.MonkeyPatch) -> None
             Ur10e(settings, Clock()).open()
     finally:
         released.set()
+
+
+def test_a_process_that_outlives_its_kill_is_left_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    process = ReceiveProcess({}, lambda _: None, lambda _: None)
+    real = process._process
+
+    def stuck(timeout: float | None = None) -> int:
+        assert timeout is not None, "waits for ever"
+        raise subprocess.TimeoutExpired("child", timeout)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(real, "wait", stuck)
+        process.stop()
+    assert real.wait(10) != 0
 
 
 def test_a_host_name_that_nobody_knows() -> None:
