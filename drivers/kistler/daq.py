@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -18,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers import network
 from drivers.errors import CannotConnect
 from drivers.kistler.explain import DEVICE, NonsenseReply
 from drivers.kistler.settings import KistlerSettings
@@ -217,8 +217,7 @@ def probe(address: str, until: float) -> None:
     host, _, port = address.rpartition(":")
     remedy = "Start the server there and check `grpc_server` in the station file."
     try:
-        timeout = max(0.001, until - time.monotonic())
-        socket.create_connection((host.strip("[]"), int(port)), timeout=timeout).close()
+        network.connect(host.strip("[]"), int(port), until).close()
     except ConnectionRefusedError:
         fault = f"nothing listens at {address}: no gRPC device server runs there"
         raise CannotConnect(DEVICE, fault, remedy) from None

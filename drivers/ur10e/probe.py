@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import socket
 import struct
-import threading
 import time
 from collections import deque
 from dataclasses import dataclass
 
+from drivers import network
 from drivers.errors import BadReply, CannotConnect, DeviceError
 from drivers.ur10e import rtde
 
@@ -37,9 +37,7 @@ def connect(device: str, host: str, port: int, deadline: float, remedy: str) -> 
     where = f"{host}:{port}"
     began = time.monotonic()
     try:
-        address = _resolve(host, port, deadline)
-        remaining = max(0.01, deadline - time.monotonic())
-        return socket.create_connection(address, timeout=remaining)
+        return network.connect(host, port, deadline, socket.AF_INET)  # as the client library
     except socket.gaierror as error:
         fault = f'the host name "{host}" is unknown ({error.strerror})'
     except UnicodeError:
@@ -51,29 +49,6 @@ def connect(device: str, host: str, port: int, deadline: float, remedy: str) -> 
     except OSError as error:
         fault = f"there is no way to {where} ({error.strerror or error})"
     raise CannotConnect(device, fault, remedy)
-
-
-def _resolve(host: str, port: int, deadline: float) -> tuple[str, int]:
-    """The host's address; TimeoutError where the name service, which knows no deadline, is mute."""
-    found: list[tuple[str, int]] = []
-    failed: list[OSError | UnicodeError] = []
-
-    def ask() -> None:
-        try:
-            kind = socket.SOCK_STREAM  # the client library speaks IPv4 only
-            address = socket.getaddrinfo(host, port, socket.AF_INET, kind)[0][4]
-            found.append((str(address[0]), port))
-        except (OSError, UnicodeError) as error:
-            failed.append(error)
-
-    thread = threading.Thread(target=ask, name="ur10e name lookup", daemon=True)
-    thread.start()
-    thread.join(max(0.01, deadline - time.monotonic()))
-    if failed:
-        raise failed[0]
-    if not found:
-        raise TimeoutError
-    return found[0]
 
 
 def probe(device: str, host: str, frequency_Hz: float, deadline: float) -> Handshake:

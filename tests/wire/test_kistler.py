@@ -23,6 +23,7 @@ from drivers.errors import (
 )
 from drivers.kistler.calibration import Array, u_type_a
 from drivers.kistler.client import Kistler9257B
+from drivers.kistler.daq import probe
 from drivers.kistler.emulator import KistlerEmulator
 from drivers.kistler.explain import device_error
 from drivers.kistler.settings import KistlerSettings, PerAxis
@@ -465,6 +466,35 @@ def test_a_host_that_is_not_there(rig: Rig) -> None:
     rig.connect("no-such-host.invalid:31763", connect_deadline_s=2.0)
     with pytest.raises(CannotConnect, match=r"no-such-host\.invalid:31763"):
         rig.device.open()
+
+
+def test_a_name_service_that_stays_mute(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    released = threading.Event()
+
+    def mute(*_: object) -> list[object]:
+        released.wait(50)
+        raise OSError
+
+    rig.build()
+    monkeypatch.setattr("socket.getaddrinfo", mute)
+    rig.connect("daq.lab:31763", connect_deadline_s=0.3)
+    began = time.monotonic()
+    try:
+        with pytest.raises(CannotConnect, match=r"daq\.lab:31763 does not answer"):
+            rig.device.open()
+        assert time.monotonic() - began < 5
+    finally:
+        released.set()
+
+
+def test_an_address_of_ip_version_6() -> None:
+    with socket.socket(socket.AF_INET6) as server:
+        try:
+            server.bind(("::1", 0))
+        except OSError:
+            pytest.skip("this computer has no IPv6")
+        server.listen()
+        probe(f"[::1]:{server.getsockname()[1]}", time.monotonic() + 5)
 
 
 def test_every_fault_is_tried_and_unknown_ones_are_refused(rig: Rig) -> None:
