@@ -68,8 +68,11 @@ class Acquisition:
 
         Blocks that began before the call are discarded, so that nothing older gets in.
         """
+        began = self._clock.now()
         for device in self.devices.all():
-            device.collect()
+            # The first to end after the call may have begun before it, and goes with the older.
+            while device.collect().end < began:
+                pass
         self._clock.sleep(seconds)
         devices = self.devices
         readings = devices.robot.collect(), devices.dynamometer.collect(), devices.laser.collect()

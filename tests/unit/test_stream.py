@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 
+from drivers.readings import Reading
 from drivers.stream import Block, Stream
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.devices import Devices
@@ -30,6 +34,35 @@ def test_what_is_older_than_asked_for_is_left_out_but_for_the_last(
     assert (reading.start, reading.end) == pytest.approx((start, end))
     assert reading.count == count
     assert blocks.collect(0.0) is None  # and it never comes up again
+
+
+class BlockedLaser(FakeLaser):
+    """Blocks of 0.4 s, each of which reaches the computer half a second after its end."""
+
+    taken = 0
+
+    def collect(self, since: float = -math.inf) -> Reading:
+        del since
+        clock = self.arm.clock
+        ready = int((clock.now() - 0.3) / 0.4)
+        if ready <= self.taken:
+            ready = self.taken + 1
+            clock.sleep_until(0.3 + 0.4 * ready)
+        first, self.taken = self.taken, ready
+        return replace(self.latest(), start=0.4 * first - 0.2, end=0.4 * ready - 0.2)
+
+
+def test_what_is_averaged_began_after_the_call() -> None:
+    clock = JumpClock()
+    arm = Arm(clock)
+    devices = Devices(FakeRobot(arm), FakeDynamometer(arm), BlockedLaser(arm))
+    acquisition = Acquisition(devices, clock, 1.0)
+    for _ in range(3):
+        clock.t = math.ceil(clock.t) + 1.0
+        began = clock.now()
+        _, _, laser = acquisition.average(2.0)
+        assert began <= laser.start < began + 0.4
+        assert laser.end > began + 1.5
 
 
 def test_a_slot_that_comes_late_holds_its_own_period() -> None:
