@@ -121,6 +121,21 @@ class LimitLevel:
     action: Literal["stop", "pause", "warn"]
 
 
+Phase = Literal[
+    "idle",  # before the first set-up
+    "mounting",
+    "taring",
+    "zero",  # a plateau without load
+    "approach",
+    "settling",
+    "sampling",
+    "unloading",
+    "rest",
+    "paused",
+]
+Branch = Literal["zero", "loading", "unloading"]
+
+
 @dataclass(frozen=True, slots=True)
 class LiveView:
     """All that the person at the screw sees, ten times a second.
@@ -129,7 +144,7 @@ class LiveView:
     Ages are wall-clock seconds of the newest single value at the time of the view.
     """
 
-    phase: str  # "zero", "approach", "step", "settling", "sampling", "unloading", "paused"
+    phase: Phase
     pose: str
     direction: str
     repetition: int
@@ -146,7 +161,7 @@ class LiveView:
     samples_wanted: int
     stale: tuple[str, ...] = ()
     message: str = ""
-    branch: str = "zero"  # "zero", "loading", "unloading"
+    branch: Branch = "zero"
     force_age_s: float = 0.0
     displacement_age_s: float = 0.0
     limits: tuple[LimitLevel, ...] = ()

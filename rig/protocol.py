@@ -8,6 +8,7 @@ from math import hypot
 from pathlib import Path
 from typing import Literal
 
+from drivers.interfaces import Branch
 from rig.model import robot_names
 from rig.protocolfile import (
     ForceBand,
@@ -68,7 +69,7 @@ class Step:
     level share it."""
 
     number: int
-    branch: Literal["zero", "loading", "unloading"]
+    branch: Branch
     target_N: float
 
 

@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass, field
 
-from drivers.interfaces import LiveView
+from drivers.interfaces import LiveView, Phase
 
 LARGEST_TURN_MM = 0.3
 SMALLEST_TURN_MM = 0.001
@@ -17,7 +17,7 @@ FIRST_GUESS_N_PER_MM = 150.0  # stiffer than the arm: first turns come out too s
 SEARCH_GUESS_N_PER_MM = 100.0
 GAVE_WAY = 0.3  # of the stiffest: below it the arm gives way, above it it is merely soft
 HAND_MM_PER_S = 1.0
-HANDS_OFF = ("idle", "mounting", "settling", "sampling", "paused")
+HANDS_OFF: tuple[Phase, ...] = ("idle", "mounting", "settling", "sampling", "paused")
 PATIENCE_S, PATIENCE_WALL_S = 5.0, 0.5
 
 

@@ -13,7 +13,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from drivers.interfaces import LiveView, Prompt
+from drivers.interfaces import LiveView, Phase, Prompt
 
 GLYPHS = {
     "0": ("█▀█", "█ █", "█▄█"),
@@ -34,7 +34,7 @@ GLYPHS = {
 KEYS = "p pause   r redo step   R redo repetition   s skip   a abort"
 NO_SAFETY = "Software monitoring is no safety function."
 EMULATED = " EMULATED: no real arm, no real measurement "
-HANDS_OFF = {
+HANDS_OFF: dict[Phase, str] = {
     "idle": "WAIT",
     "mounting": "SET UP",
     "taring": "HANDS OFF - force is being zeroed",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import isfinite, nan
 
 from drivers.interfaces import LimitLevel, LiveView, Prompt
+from drivers.interfaces import Phase as LivePhase
 from drivers.operator.screen import turning
 from rig.panel.state import (
     STALE_S,
@@ -27,7 +28,7 @@ from rig.protocol import MeasurementProtocol
 from rig.station import Station
 
 BANNER = "EMULATED: no real arm, no real measurement"
-PHASES: dict[str, Phase] = {
+PHASES: dict[LivePhase, Phase] = {
     "idle": "starting",
     "mounting": "prompt",
     "taring": "zero",

@@ -12,9 +12,9 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import replace
 from math import nan
-from typing import Any
+from typing import TypedDict, Unpack
 
-from drivers.interfaces import Command, LiveView, Loader, Prompt
+from drivers.interfaces import Branch, Command, LimitLevel, LiveView, Loader, Phase, Prompt
 from rig.errors import MeasurementStopped
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.limits import UNLOAD, Breach, Live, Watch
@@ -22,6 +22,29 @@ from rig.procedure.recorder import Recorder, Slot, Vector
 
 PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
 OF_A_STEP = ("redo_step", "skip")  # without a step under way there is nothing that they could mean
+
+
+class Changes(TypedDict, total=False):
+    """The fields of `LiveView` that change on the way."""
+
+    phase: Phase
+    pose: str
+    direction: str
+    repetition: int
+    step: int
+    steps: int
+    force_N: float
+    target_N: float
+    band_N: float
+    displacement_mm: float
+    stiffness_N_per_mm: float
+    settle_remaining_s: float
+    samples: int
+    samples_wanted: int
+    branch: Branch
+    force_age_s: float
+    displacement_age_s: float
+    limits: tuple[LimitLevel, ...]
 
 
 class Wish(Exception):
@@ -64,7 +87,7 @@ class Supervision:
         """Seconds of the session clock."""
         return self._acquisition.now()
 
-    def show(self, **changes: Any) -> None:
+    def show(self, **changes: Unpack[Changes]) -> None:
         """Changes fields of the live view."""
         self.view = replace(self.view, **changes)
 

@@ -6,10 +6,12 @@ import json
 from dataclasses import replace
 from math import nan
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
-from drivers.interfaces import LimitLevel, LiveView, Prompt
+from drivers.interfaces import LimitLevel, LiveView, Phase, Prompt
+from drivers.operator.screen import HANDS_OFF
 from rig.panel.picture import PHASES, Moment, Setting, state_of
 from rig.panel.plan import plan_of, prediction_of
 from rig.panel.state import Slots, State, to_json
@@ -75,9 +77,9 @@ def test_hands_are_off_while_settling_and_while_values_are_old() -> None:
 
 def test_every_phase_of_the_procedure_has_a_name_on_the_page() -> None:
     source = "".join(p.read_text("utf-8") for p in (HOME / "rig").rglob("*.py"))
-    used = {part.split('"')[0] for part in source.split('show(phase="')[1:]}
-    assert used
-    assert used <= set(PHASES)
+    used = {part.split('"')[0] for part in source.split('show(phase="')[1:]} | {"idle"}
+    assert used == set(get_args(Phase)) == set(PHASES)
+    assert {*HANDS_OFF, "approach", "unloading"} == used, "what else stands on the console's screen"
     for phase in PHASES:
         assert shown(phase=phase).phase == PHASES[phase]
 
