@@ -92,6 +92,7 @@ SHAPES: dict[str, Key] = {
     "across": Key("across", "vector"),
     "at_load": Key("at_N", "positive"),
     "power": Key("power_of_load", "positive"),
+    "at_moment": Key("at_Nm", "positive"),
     "drags_over": Key("drags_over_N", "positive"),
     "at_response": Key("at_mm", "positive", factor=1e3),
     "time_constant": Key("time_constant_s", "positive"),
@@ -192,7 +193,10 @@ GRAMMAR: dict[str, Grammar] = {
     ),
     "joint_stiffness_error": Grammar((), (("compliance", ("joint",)),)),
     "link_flexibility": Grammar(("placed",), (("over_nominal", ("segment", "strain")),)),
-    "base_compliance": Grammar(("depth",), (("compliance", ("axis",)), ("compliance_xy", ()))),
+    "base_compliance": Grammar(
+        ("depth",),
+        (("compliance", ("axis",)), ("compliance_xy", ()), ("compliance", ("axis", "at_moment"))),
+    ),
     "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
     "load_misalignment": Grammar(
         ("about",),

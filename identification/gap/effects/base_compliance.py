@@ -1,11 +1,12 @@
 """The mounting tilts or turns elastically: rotations about axes through, or below, the base.
 
 A moment about axis a gives a rotation `c_a M_a`, and the target moves by the same lever: along the
-direction `c_a (r x n)_a^2` per newton. Unseen by encoders. 5e5 to 2e6 Nm/rad.
+direction `c_a (r x n)_a^2` per newton; on rubber feet `c_a (1 + b |M_a|)`, less under a large
+moment, or more. Unseen by encoders. 5e5 to 2e6 Nm/rad.
 
 Size: 5e-7 to 2e-6 rad/Nm; tables and stands up to ten times softer.
 Prior: compliances positive, sd out of SCALES, equally likely; turned axes at 0.5, single ones at
-0.3.
+0.3, feet that bend at 0.3: by BENDS at the largest moment.
 Source: stiffness of bolted mountings of arms, 5e5 to 2e6 Nm/rad.
 """
 
@@ -31,6 +32,7 @@ DEPTHS_M = (
 )  # of tilt axes below the base: flange, table, floor
 COUPLED = 0.6  # sd of what couples two axes, against that of their own compliances
 SCALES = (3e-7, 1e-6, 3e-6)  # rad/Nm
+BENDS = 0.4  # of the compliance without a moment, at the largest one
 
 
 def moments(bench: Bench, depth: float) -> Array:
@@ -58,7 +60,10 @@ def variants(bench: Bench) -> list[Variant]:
         )  # fmt: skip
         if np.abs(both).max() > 1e-3:
             coupling = bench.add(bench.outside_column(both * bench.load))
-            out.append(_turned(depth, [*(columns[a] for a in seen), coupling], seen))
+            stand = _turned(depth, [*(columns[a] for a in seen), coupling], seen)
+            out += [stand, _on_feet(bench, stand, m)]
+        else:
+            out.append(_on_feet(bench, out[-1], m))
         for a in seen:
             if a < 2 or depth == 0:
                 out.append(
@@ -78,3 +83,29 @@ def _turned(depth: float, columns: list[int], axes: list[int]) -> Variant:
     return variant(WORD, f"turned axes {depth:g} m below", columns, SCALES, root, total,
                    prior=0.5, each=(True,) * len(axes), within=between, axes=axes, depth_m=depth,
                    turned=True)  # fmt: skip
+
+
+def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
+    """The same with compliances that change with the moment about their axis; m (n, 3) m."""
+    axes, k = list(stand.info["axes"]), len(stand.columns)
+    tops = {a: float(np.abs(m[:, a] * bench.load).max()) or 1.0 for a in axes}
+    bent = [bench.add(outside(bench, m[:, a], tops[a])) for a in axes]
+    root = np.zeros((k + len(bent), k + len(bent)))
+    root[:k, :k] = stand.root
+    root[k:, k:] = BENDS * np.eye(len(bent))
+    # the slope stays positive up to the largest moment
+    within = np.zeros((len(stand.within) + len(bent), len(root)))
+    within[: len(stand.within), :k] = stand.within
+    for i in range(len(bent)):
+        within[len(stand.within) + i, [i, k + i]] = 1.0, 2.0
+    positive = None if stand.positive is None else np.append(stand.positive, np.zeros(len(bent)))
+    return variant(
+        WORD, f"{stand.label}, on feet", [*stand.columns, *bent], SCALES, root,
+        False if positive is None else positive, prior=0.3,
+        each=stand.each, within=within, **{**stand.info, "at_moment_Nm": tops},
+    )  # fmt: skip
+
+
+def outside(bench: Bench, m: Array, top: float) -> Array:
+    """Stacked column of a rotation `M |M| / top` about an axis of lever m (n,) m."""
+    return bench.outside_column(m**2 * bench.load * np.abs(m * bench.load) / top)

@@ -10,7 +10,7 @@ import numpy as np
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array
 from identification.gap.effects import pose_error
-from identification.gap.effects.base_compliance import moments
+from identification.gap.effects.base_compliance import moments, outside
 from identification.gap.effects.contact_seating import LAWS, pressed
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
@@ -125,17 +125,28 @@ def links(bench: Bench, law: Law) -> list[Array]:
 
 
 def describe_base(_: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: axes through a point `depth` below the base, and what couples two that lie turned."""
+    """Terms: axes through a point `depth` below the base, what couples two that lie turned, and
+    what a moment adds."""
     terms = [Term("compliance", {"axis": "xyz"[a]}) for a in v.info["axes"]]
     terms += [Term("compliance_xy")] if v.info["turned"] else []
+    tops = v.info.get("at_moment_Nm", {})
+    terms += [Term("compliance", {"axis": "xyz"[a], "at_moment": tops[a]}) for a in tops]
     return Law({"depth": float(v.info["depth_m"])}, tuple(terms)), np.ones(len(terms))
 
 
 def base(bench: Bench, law: Law) -> list[Array]:
-    """`(r x n)_a^2` times the load, of a coupling `2 (r x n)_x (r x n)_y`."""
-    m = moments(bench, law.constants["depth"])
-    lever = {"x": m[:, 0] ** 2, "y": m[:, 1] ** 2, "z": m[:, 2] ** 2, "xy": 2 * m[:, 0] * m[:, 1]}
-    return [bench.outside_column(lever[t.shape.get("axis", "xy")] * bench.load) for t in law.terms]
+    """`(r x n)_a^2` times the load, of a coupling `2 (r x n)_x (r x n)_y`; of what a moment adds
+    times its share of a moment."""
+    m, out = moments(bench, law.constants["depth"]), []
+    lever = dict(zip("xyz", m.T, strict=True))
+    for t in law.terms:
+        axis = str(t.shape.get("axis", "xy"))
+        if "at_moment" in t.shape:
+            out.append(outside(bench, lever[axis], t.shape["at_moment"]))
+            continue
+        square = lever[axis] ** 2 if axis in lever else 2 * lever["x"] * lever["y"]
+        out.append(bench.outside_column(square * bench.load))
+    return out
 
 
 def describe_seating(_: Bench, v: Variant) -> tuple[Law, Array]:
