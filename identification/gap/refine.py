@@ -102,16 +102,31 @@ _ELSEWHERE = 3  # shapes that are looked at elsewhere
 
 
 def _backlash(word: _Word) -> list[Variant]:
-    """Beside the leading word, and alone: that may be a curve which does what the play does."""
-    looks = [(word, _places(word.alone, word.beside))]
-    if word.beside:
-        looks.append((replace(word, ranked=[joint_backlash.WORD]), word.alone[:1]))
-    return [
-        v
-        for of, starts in looks
-        for refined in (joint_backlash.refined, joint_backlash.uneven)
-        for v in _closing_in(of, refined, starts, joint_backlash.CLOSE)
-    ]
+    """Beside the leading word; and alone, where it explains nearly as much: that may be a curve
+    which does what the play does. Ends of which one is softer where a play is there to see."""
+    first = [s.log_evidence for s in (word.beside or word.alone)[:1]]
+    seen = first and (not word.beside or first[0] > _lead(word) + _WINDOW)
+    looks = [(word, _places(word.alone, word.beside), bool(seen))]
+    if word.beside and _gain(word, joint_backlash.WORD) > _NEARLY * _gain(word, word.ranked[0]):
+        looks.append((replace(word, ranked=[joint_backlash.WORD]), word.alone[:1], True))
+    out: list[Variant] = []
+    for of, starts, uneven in looks:
+        out += _closing_in(of, joint_backlash.refined, starts, joint_backlash.CLOSE)
+        if uneven:
+            out += _closing_in(of, joint_backlash.uneven, starts, joint_backlash.CLOSE)
+    return out
+
+
+_NEARLY = 0.7  # of what the leading word brings, nats above `none`
+
+
+def _gain(word: _Word, name: str) -> float:
+    none = max(level.log_base for level in word.engine.levels)
+    return marginal(word.families[name]) - none
+
+
+def _lead(word: _Word) -> float:
+    return closest(word.families[word.ranked[0]]).log_evidence
 
 
 def _friction(word: _Word) -> list[Variant]:

@@ -61,8 +61,8 @@ def variants(bench: Bench) -> list[Variant]:
         if np.abs(both).max() > 1e-3:
             coupling = bench.add(bench.outside_column(both * bench.load))
             stand = _turned(depth, [*(columns[a] for a in seen), coupling], seen)
-            out += [stand, _on_feet(bench, stand, m)]
-        else:
+            out.append(stand)
+        if bench.has_q and any(a < 2 for a in seen):  # else any joint's curve
             out.append(_on_feet(bench, out[-1], m))
         for a in seen:
             if a < 2 or depth == 0:
@@ -86,8 +86,9 @@ def _turned(depth: float, columns: list[int], axes: list[int]) -> Variant:
 
 
 def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
-    """The same with compliances that change with the moment about their axis; m (n, 3) m."""
-    axes, k = list(stand.info["axes"]), len(stand.columns)
+    """The same with compliances that change with the moment about a lying axis, by which feet are
+    pressed; m (n, 3) m."""
+    axes, k = [a for a in stand.info["axes"] if a < 2], len(stand.columns)
     tops = {a: float(np.abs(m[:, a] * bench.load).max()) or 1.0 for a in axes}
     bent = [bench.add(outside(bench, m[:, a], tops[a])) for a in axes]
     root = np.zeros((k + len(bent), k + len(bent)))
@@ -97,7 +98,8 @@ def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
     within = np.zeros((len(stand.within) + len(bent), len(root)))
     within[: len(stand.within), :k] = stand.within
     for i in range(len(bent)):
-        within[len(stand.within) + i, [i, k + i]] = 1.0, 2.0
+        own = stand.info["axes"].index(axes[i])
+        within[len(stand.within) + i, [own, k + i]] = 1.0, 2.0
     positive = None if stand.positive is None else np.append(stand.positive, np.zeros(len(bent)))
     return variant(
         WORD, f"{stand.label}, on feet", [*stand.columns, *bent], SCALES, root,

@@ -30,7 +30,8 @@ from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
 KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
-UNEVEN = {"softer up": (2.5, 1.0), "softer down": (1.0, 2.5)}  # soft ends, one more than the other
+_SOFTER = 2.5  # of soft ends one than the other
+UNEVEN = {"softer up": (_SOFTER, 1.0), "softer down": (1.0, _SOFTER)}
 KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", *KEPT)
 PLACED = ("gap", "held")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
@@ -129,7 +130,7 @@ def uneven(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     if kind in UNEVEN:
         return _finer(bench, found, tuple(UNEVEN) if close >= CLOSE[0] else (kind,), close)
     span = bench.reach_of(bench.true_torque[:, int(found.info["joint"])])
-    return _finer(bench, found, tuple(UNEVEN), close, np.array(ZONES) * span)
+    return _finer(bench, found, tuple(UNEVEN), close, np.array(ZONES) / _SOFTER * span)
 
 
 def _finer(
@@ -145,7 +146,8 @@ def _finer(
         ratios = np.array([1 / 1.5, 1.0, 1.5]) if weighty else np.geomspace(1 / 1.5, 1.5, 7)
         zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
         # what changes over more of the range is a curved spring
-        zones = np.unique(np.minimum(zones, ZONES[-1] * bench.reach_of(torque)))
+        widest = ZONES[-1] / (_SOFTER if kinds[0] in UNEVEN else 1.0) * bench.reach_of(torque)
+        zones = np.unique(np.minimum(zones, widest))
     out: list[Variant] = []
     share = _FINE_PRIOR / (1 + len(CLOSE)) / (len(masses) * len(zones) * len(kinds))
     places: dict[bytes, list[int]] = {}

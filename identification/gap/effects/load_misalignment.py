@@ -46,7 +46,7 @@ def variants(bench: Bench) -> list[Variant]:
         mine = np.array([s.direction == name for s in bench.data.setups])[bench.rows.setup]
         known[name] = [
             _Known(label, shapes, _columns(bench, shapes, mine), share)
-            for label, shapes, share in _kinds(float(np.abs(bench.load[mine]).max()) or 1.0)
+            for label, shapes, share in _kinds(bench, float(np.abs(bench.load[mine]).max()) or 1.0)
         ]
     groups = [([name], f"direction {name}", 0.3) for name in known]
     if len(groups) > 1:
@@ -69,10 +69,13 @@ class _Known(NamedTuple):
     share: float
 
 
-def _kinds(top: float) -> list[tuple[str, tuple[Shape, ...], float]]:
-    straight = Shape(1, top)
-    out = [("", (straight,), 1.0), (", turning", tuple(Shape(p, top) for p in (1, 2, 3)), 0.7)]
-    for share in DRAGS:
+def _kinds(bench: Bench, top: float) -> list[tuple[str, tuple[Shape, ...], float]]:
+    """Label, shapes, share of the prior. Turning soon and dragging only where the force across was
+    recorded: what they do to the target alone, any curve or friction does."""
+    seen, straight = bench.rows.tangential is not None, Shape(1, top)
+    powers = (1, 2, 3) if seen else (1, 2)
+    out = [("", (straight,), 1.0), (", turning", tuple(Shape(p, top) for p in powers), 0.7)]
+    for share in DRAGS if seen else ():
         reach = share * top
         drags = (straight, Shape(0, top, reach), Shape(1, top, reach))
         out.append((f", dragging {share:g}", drags, 0.2))
