@@ -156,9 +156,9 @@ def test_units_of_force_and_displacement_do_not_matter() -> None:
 
 
 def test_noise_lowers_confidence_and_invents_nothing() -> None:
-    """The same rig measured ever worse, and META saying so."""
+    """The same rig measured ever worse, and META saying so: plain, hardly, drowned."""
     seen = []
-    for times in (1.0, 8.0, 64.0):
+    for times in (1.0, 4.0, 64.0):
         rows = noisy(BENCH, seating, seed=3, noise=times)
         text = meta(BENCH).replace("0.05", f"{0.05 * times}").replace("0.002", f"{0.002 * times}")
         found = diagnose_gap(data_of(rows, text))
