@@ -118,9 +118,12 @@ def secants(
 
 def turned(bench: Bench, turn: Array, compliance: Array, reads: float = 1.0) -> list[Array]:
     """Stacked columns per radian by which the base stands turned about x, y, z (3), exact where it
-    is: turn (3,) rad, `exp(-E) - 1 = -(1 - E/2 + E^2/6 - ...) E`; compliance, reads: as there."""
-    E = np.cross(np.eye(3), turn).T  # E v = turn x v
-    series = np.eye(3) - E / 2 + E @ E / 6 - E @ E @ E / 24
+    is: turn (3,) rad, `exp(-E) - 1 = -(1 - a E + b E^2) E` (Rodrigues); compliance, reads: as
+    there."""
+    E = np.cross(turn, np.eye(3)).T  # E v = turn x v
+    angle = max(float(np.linalg.norm(turn)), 1e-4)
+    a, b = (1 - np.cos(angle)) / angle**2, (1 - np.sin(angle) / angle) / angle**2
+    series = np.eye(3) - a * E + b * E @ E
     changes = []
     for s in bench.data.setups:
         axes = np.vstack([s.unit_vector, s.tangents])

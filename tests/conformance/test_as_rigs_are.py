@@ -1,0 +1,204 @@
+"""Rigs as they are: bases that stand turned, tips that stick, feet that stiffen, slow amplifiers;
+and what is no effect: a little more noise, a component that moves nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from identification.arm import tool_offset
+from identification.gap.bench import make_bench
+from identification.gap.data import GapData
+from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.effects import load_misalignment
+from identification.gap.effects.load_misalignment import Shape
+from identification.gap.effects.pose_error import turned
+from rig.gap_data import gap_data
+from rig.model import load_robot
+from tests.conformance.gap_designs import (
+    DESIGNS,
+    TCP_MM,
+    TRUE,
+    Array,
+    Law,
+    Q,
+    imported,
+    levers,
+    linear,
+    meta,
+    noisy,
+)
+
+MEDIUM, RICH = DESIGNS["medium"], DESIGNS["rich"]
+ARM, TOOL = load_robot("ur10e"), tool_offset(np.array(TCP_MM) * 1e-3)
+
+
+def about(axis: int, angle: float) -> Array:
+    """Rotation matrix about a base axis."""
+    i, k = (axis + 1) % 3, (axis + 2) % 3
+    out, c, s = np.eye(3), np.cos(angle), np.sin(angle)
+    out[i, i], out[i, k], out[k, i], out[k, k] = c, -s, s, c
+    return out
+
+
+def seen_turned(rows: pd.DataFrame, axis: int, angle: float) -> Array:
+    """(n, 6) levers of an arm whose base stands turned against the directions of the push."""
+    out = np.zeros((len(rows), 6))
+    for (pose, direction), mine in rows.groupby(["pose", "direction"]).indices.items():
+        n = about(axis, angle).T @ np.eye(3)["xyz".index(direction)]
+        out[mine] = ARM.jacobian(np.array(Q[str(pose)]), TOOL)[:3].T @ n
+    return out
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_columns_of_a_turned_base_are_exact_where_it_is(axis: int) -> None:
+    bench = make_bench(linear("medium"))
+    turn = 0.2 * np.eye(3)[axis]
+    rows = pd.DataFrame({
+        "pose": "P1", "direction": [bench.data.setups[s].direction for s in bench.rows.setup]
+    })  # fmt: skip
+    there, force = seen_turned(rows, axis, 0.2), bench.load[:, None]
+    moved = (there**2 - bench.lever**2) @ bench.compliance * bench.load
+    column = 0.2 * turned(bench, turn, bench.compliance)[axis]
+    np.testing.assert_allclose(column[: bench.rows.n], moved, atol=1e-8 * np.abs(moved).max())
+    q = (there - bench.lever) * bench.compliance * force
+    own = bench.stacked(q=q)[bench.layout.q]
+    np.testing.assert_allclose(column[bench.layout.q], own, atol=1e-8 * np.abs(own).max())
+
+
+def test_a_base_that_stands_turned_is_found() -> None:
+    angle = 0.15
+
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        there, force = seen_turned(rows, 2, angle), rows["force_N"].to_numpy(float)[:, None]
+        joints = there * force / TRUE
+        deflection = joints - lever * force / TRUE
+        return np.sum(there * joints, axis=1) - np.sum(lever * joints, axis=1), deflection
+
+    found = diagnosed(law, RICH)
+    assert [e.name for e in found.effects] == ["pose_error"]
+    assert found.after < 1.1 * found.noise
+    p = found.effects[0].parameters["base_turned_about_z"]
+    assert p.low < angle < p.high
+    assert p.value == pytest.approx(angle, abs=0.005)
+
+
+def diagnosed(law: Law, design=MEDIUM, across: Array | None = None) -> GapResult:  # type: ignore[no-untyped-def]
+    """across (n, 2) N: along the axes that follow the direction's."""
+    table = noisy(design, law)
+    for direction, others in (("x", "yz"), ("y", "zx")):
+        mine = (table["direction"] == direction).to_numpy()
+        for k, axis in enumerate(others if across is not None else ""):
+            assert across is not None
+            table.loc[mine, f"force_{axis}_N"] += across[mine, k]
+    return diagnose_gap(gap_data(imported(table, meta(design))))
+
+
+def sticking(rows: pd.DataFrame) -> Array:
+    """(n, 2) N: a tip that holds on to its pad until the load has gone back by a third of it."""
+    out, held = np.zeros(len(rows)), 0.0
+    top = rows.groupby("direction")["force_N"].transform("max").to_numpy()
+    fresh = (rows[["pose", "direction", "repetition"]].shift() != rows[
+        ["pose", "direction", "repetition"]]).any(axis=1)  # fmt: skip
+    for i, force in enumerate(rows["force_N"]):
+        reach = 0.15 * top[i]
+        held = 0.0 if fresh.iloc[i] else held
+        held = min(max(held, force - reach), force + reach)
+        out[i] = held
+    return np.column_stack([0.15 * out, -0.09 * out])
+
+
+def test_a_tip_that_sticks_as_the_load_goes_back_is_a_load_askew() -> None:
+    design = replace(MEDIUM, components=True)
+
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        arm = ARM.jacobian(np.array(Q["P1"]), TOOL)[:3]
+        moved, pull = np.zeros((len(rows), 6)), sticking(rows)
+        for direction, others in (("x", [1, 2]), ("y", [2, 0])):
+            mine = (rows["direction"] == direction).to_numpy()
+            moved[mine] = pull[mine] @ arm[others] / TRUE
+        return np.zeros(len(rows)), moved
+
+    found = diagnosed(law, design, sticking(noisy(design)))
+    assert found.verdict == "load_misalignment"
+    assert "dragging" in found.effects[0].label
+    assert found.after < 1.15 * found.noise
+
+
+def test_without_components_nothing_is_said_to_drag() -> None:
+    labels = [
+        [v.label for v in load_misalignment.variants(make_bench(gap_data(imported(
+            noisy(replace(MEDIUM, components=c)), meta(MEDIUM)))))]
+        for c in (False, True)
+    ]  # fmt: skip
+    assert not any("dragging" in label for label in labels[0])
+    assert any("dragging" in label for label in labels[1])
+
+
+def test_what_drags_turns_over_its_reach_and_begins_anew_with_every_run() -> None:
+    bench = make_bench(linear("medium"))
+    reach = 0.1 * float(bench.load.max())
+    pull = load_misalignment.across(bench, Shape(0, 50.0, reach))
+    loading = (bench.rows.branch == 1) & (bench.load > 1.05 * reach)
+    np.testing.assert_allclose(pull[loading], 50.0)
+    first = bench.rows.starts
+    assert np.all(np.abs(pull[first]) < 5.0)
+    assert pull[bench.rows.branch == 2].min() == pytest.approx(-50.0)
+
+
+def test_feet_that_stiffen_under_a_large_moment() -> None:
+    """Axes through the base; half as soft at 100 Nm."""
+
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        out, force = np.zeros(len(rows)), rows["force_N"].to_numpy(float)
+        for (pose, direction), mine in rows.groupby(["pose", "direction"]).indices.items():
+            n = np.eye(3)["xyz".index(direction)]
+            arm = np.cross(ARM.fk(np.array(Q[str(pose)]), TOOL)[:3, 3], n)[:2]
+            moment = arm * force[mine, None]
+            out[mine] = (6e-6 * moment / (1 + np.abs(moment) / 60.0)) @ arm
+        return out, np.zeros((len(rows), 6))
+
+    found = diagnosed(law, RICH)
+    assert found.verdict == "base_compliance"
+    assert "on feet" in found.effects[0].label
+    assert found.after < 1.1 * found.noise
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_twice_the_stated_noise_is_no_effect(seed: int) -> None:
+    """Of force and displacement: a lag of a third of a sample averages two readings, and a spring
+    that fits exactly is as good as one with a little more of anything."""
+    design = replace(DESIGNS["bench"], steps=20, hold=12)
+    found = diagnose_gap(gap_data(imported(noisy(design, seed=seed, noise=2.0), meta(design))))
+    assert found.verdict == "none"
+
+
+def test_joint_readings_that_scatter_more_are_no_structure() -> None:
+    """Two samples a step: no hold tells their noise, how levels repeat does."""
+    design = replace(DESIGNS["paper"], readings=True, hold=2)
+    table, rng = noisy(design), np.random.default_rng(5)
+    for j in range(6):
+        table[f"q{j + 1}_rad"] += rng.normal(0, 1.3e-5, len(table))
+    data = gap_data(imported(table, meta(design)))
+    assert diagnose_gap(data).verdict == "none"
+    np.testing.assert_allclose(make_bench(data).noise.q, np.hypot(1e-5, 1.3e-5), rtol=0.3)
+
+
+def test_a_component_that_moves_nothing_is_no_effect() -> None:
+    """Half a per cent of the push across, which only the dynamometer feels."""
+    design = replace(RICH, components=True)
+    across = np.column_stack([noisy(design)["force_N"] * s for s in (0.008, -0.008)])
+    data: GapData = gap_data(imported(noisy(design), meta(design)))
+    assert data.tangential is not None
+    found = diagnosed(
+        lambda rows, _: (np.zeros(len(rows)), np.zeros((len(rows), 6))), design, across
+    )
+    assert found.verdict == "none"
+
+
+def test_levers_are_those_of_the_arm() -> None:
+    rows = noisy(MEDIUM)
+    np.testing.assert_allclose(seen_turned(rows, 2, 0.0), levers(rows), atol=1e-12)
