@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.gap.data import Array, Ints
 from identification.gap.evidence import Engine, Level
+from identification.gap.factor import factor_of
 from identification.gap.imperfection import IMPERFECTION, LAW_IMPERFECTION
 from identification.gap.products import squares_of
 from identification.gap.signs import Limits
@@ -123,7 +124,7 @@ def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float)
     c = np.array(columns)
     T = scale * root
     beside = level.beside(columns) - level.taken[:, c].T @ level.taken
-    factor = np.linalg.cholesky(np.eye(len(c)) + T.T @ beside[:, c] @ T)
+    factor = factor_of(np.eye(len(c)) + T.T @ beside[:, c] @ T)
     turn = np.linalg.solve(factor, T.T)
     cross, left = turn @ beside, turn @ level.moment[c]
     return replace(

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING, Array, Flags, Ints
+from identification.gap.factor import factor_of
 from identification.gap.growing import Growing
 from identification.gap.products import Gathered, Some, Weights, White
 from identification.gap.rows import Rows, rises
@@ -233,7 +234,7 @@ class Engine:
             root[kb : kb + levels, kb : kb + levels] = eta * np.linalg.cholesky(covariance)
             root[kb + levels :, kb + levels :] = RUN_PART * eta * np.eye(count - levels)
         b = slice(1, 1 + kb + count)
-        factor = np.asarray(np.linalg.cholesky(np.eye(kb + count) + root.T @ gram[b, b] @ root))
+        factor = factor_of(np.eye(kb + count) + root.T @ gram[b, b] @ root)
         turn = np.asarray(solve_triangular(factor, root.T, lower=True, check_finite=False))
         left = turn @ gram[b, 0]
         share = self._freedom / max(len(w.contrast), 1)

@@ -9,6 +9,7 @@ import numpy as np
 from identification.gap.compare import imperfect, mean_squares
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
+from identification.gap.factor import factor_of
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 from identification.gap.words import LINEAR
@@ -95,7 +96,7 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
     columns = [c for p in parts for c in p.variant.columns]
     root = block([p.root for p in parts])
     precision = np.eye(len(columns)) + root.T @ level.square(columns) @ root
-    factor = np.linalg.cholesky(precision)
+    factor = factor_of(precision)
     roots = np.linalg.solve(factor, root.T)  # of the covariance
     w = roots.T @ np.linalg.solve(factor, root.T @ level.moment[columns])
     out, start = 0.0, 0
@@ -157,7 +158,7 @@ def _asked(engine: Engine, parts: tuple[Part, ...]) -> tuple[Array, Array]:
 
 def _together(parts: tuple[Part, ...], gram: Array, moment: Array, log_base: Array) -> Array:
     root = block([p.root for p in parts])
-    factor = np.linalg.cholesky(np.eye(len(root)) + root.T @ gram @ root)
+    factor = factor_of(np.eye(len(root)) + root.T @ gram @ root)
     left = np.linalg.solve(factor, (moment @ root)[..., None])[..., 0]
     lost = np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(axis=-1)
     return np.asarray(log_base + 0.5 * np.sum(left**2, axis=-1) - lost)
