@@ -12,10 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.gap.bench import make_bench
+from identification.gap.bench import Bench, make_bench
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import joint_backlash, library
 from identification.gap.interval import Parameter
+from identification.gap.parameters import parameters
+from identification.gap.parts import Part
+from identification.gap.variants import Variant
 from rig.gap_data import gap_data
 from rig.worlds.arm import place
 from rig.worlds.hidden.memory import play
@@ -88,22 +91,30 @@ def test_a_play_that_was_pushed_to_one_side_only() -> None:
     assert unreached("free", 0.01, 0.0) == pytest.approx(0.0, abs=0.01)
 
 
+def test_half_a_play_that_nobody_saw_is_in_the_interval() -> None:
+    bench, found = pushed("kept", 0.01, 0.0)
+    k = len(found.columns)
+    width = parameters(bench, Part(found, 1.0), 1e-3 * np.eye(k)[0], np.zeros((k, k)))["width"]
+    assert width.value == 1e-3
+    assert width.sd == pytest.approx(0.5e-3 / 3**0.5, rel=0.05)
+
+
 def unreached(kind: str, zone: float, both: float) -> float:
-    """Of a play in joint 1 that no weight acts on; zone: of the range; both: share of the load that
+    return joint_backlash.unreached(*pushed(kind, zone, both))
+
+
+def pushed(kind: str, zone: float, both: float) -> tuple[Bench, Variant]:
+    """A play in joint 1 that no weight acts on; zone: of the range; both: share of the load that
     pushes the other way."""
-    data = linear("medium")
-    bench = make_bench(data)
+    bench = make_bench(linear("medium"))
     torque = bench.torque[:, 0]
-    pushed = np.where(torque < 0, both * torque, torque)
-    bench = replace(
-        bench,
-        load=bench.load * np.divide(pushed, torque, where=torque != 0, out=np.ones(len(torque))),
-    )
+    load = np.where(torque < 0, both, 1.0) * bench.load
+    bench = replace(bench, load=load)
     found = next(
         v for v in library(bench, ["joint_backlash"]) if v.label.startswith("joint 1 load kept")
     )
     info = found.info | {"kind": kind, "zone_Nm": zone * bench.reach_of(bench.torque[:, 0])}
-    return joint_backlash.unreached(bench, replace(found, info=info))
+    return bench, replace(found, info=info)
 
 
 def test_a_parameter_over_a_factor() -> None:

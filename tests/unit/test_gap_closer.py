@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -13,8 +16,8 @@ from identification.gap.effects import joint_hysteresis, joint_yield, library
 from identification.gap.effects.joint_hysteresis import EXPONENTIAL, REACHES
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
-from identification.gap.refine import refine
-from identification.gap.variants import Variant
+from identification.gap.refine import _closing_in, refine
+from identification.gap.variants import Variant, variant
 from tests.unit.test_gap_forms import arm_data, bench_without_arm
 
 
@@ -95,3 +98,29 @@ def test_what_stands_out_is_looked_at_closer() -> None:
     singles = score(engine, engine.levels, library(bench, ["joint_yield"]))
     times = {v.info["flow_s"] for v in refine(engine, singles)}
     assert times - {0.0, *joint_yield.FLOWS_S, *joint_yield.SQUARE_S}
+
+
+def test_looks_move_on_until_the_best_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps of 1, then halves, then tenths, towards what lies 3.2 away; the last looks are kept."""
+    looked: list[float] = []
+
+    def refined(_: object, found: Variant, close: float = 1.0) -> list[Variant]:
+        at = float(found.info["at"])
+        return [replace(found, info={"at": at + k * close}) for k in (-1, 0, 1)]
+
+    def scored(_: object, __: object, ___: object, family: list[Variant]) -> list[SimpleNamespace]:
+        looked.append(len(family))
+        return [
+            SimpleNamespace(variant=v, log_evidence=-((float(v.info["at"]) - 3.2) ** 2))
+            for v in family
+        ]
+
+    monkeypatch.setattr("identification.gap.refine._scored_beside", scored)
+    word = SimpleNamespace(engine=SimpleNamespace(extend=lambda: None, bench=None),
+                           families={}, ranked=[])  # fmt: skip
+    start = SimpleNamespace(variant=variant("joint_backlash", "start", [0], (1.0,), at=0.0))
+    finer = _closing_in(word, refined, [start], (0.5, 0.1))  # type: ignore[arg-type, list-item]
+    best = min((float(v.info["at"]) for v in finer), key=lambda at: abs(at - 3.2))
+    assert best == pytest.approx(3.2, abs=0.15)
+    assert len(finer) == 3 * 3  # one look a share, wherever it ended
+    assert len(looked) < 9

@@ -24,6 +24,7 @@ from identification.gap.penalties import cancelling, pettiness, trifle
 from identification.gap.variants import variant
 from identification.gap.verdict import weighed
 from identification.gap.words import DRIFTS
+from tests.conformance.effect_benches import of, quick_engine
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, REPETITIONS, SAMPLES = 8, 3, 4
@@ -298,3 +299,12 @@ def test_a_drift_that_comes_and_goes_is_no_drift(cycles: float, swings: bool) ->
     kept = {x.words: x.good for x in looked_up(whole).explanations if x.parts}
     assert kept[law.words] is not swings
     assert kept[beside.words] is not swings  # nor where it only fills up what others leave
+
+
+def test_what_moves_the_target_by_nothing_is_a_trifle_whoever_shows_it() -> None:
+    """Of levels at rest: a load askew that only the dynamometer feels; springs that hide it."""
+    bench, variants, _ = of("load_misalignment", "rich")
+    engine, noise = quick_engine(bench), bench.noise.stated
+    part = (Part(variants[0], 1.0),)
+    assert trifle(engine, part, Sizes(np.zeros(1), np.array([0.05 * noise]), 0.0)) > 20
+    assert trifle(engine, part, Sizes(np.zeros(1), np.array([0.5 * noise]), 0.0)) == 0.0

@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 from identification.gap import evidence, table
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import condition, score
+from identification.gap.compare import condition, log_mean, score
 from identification.gap.effects import library
 from identification.gap.evidence import (
     HOLD_PART,
@@ -20,11 +20,16 @@ from identification.gap.evidence import (
     level_covariance,
     run_columns,
 )
+from identification.gap.finer import LOG_STEP
+from identification.gap.fit import _holds
+from identification.gap.parts import log_joint_between
 from identification.gap.priors import prior_of
-from identification.gap.search import search
+from identification.gap.search import _as_stated, search
 from identification.gap.table import Table
 from identification.gap.variants import variant
 from identification.gap.words import WORDS
+from tests.conformance.effect_benches import quick_engine
+from tests.conformance.gap_designs import linear
 from tests.unit.test_gap_operators import bench_data
 
 
@@ -206,3 +211,28 @@ def test_probabilities_cover_all_words_and_sum_to_one() -> None:
 def test_words_that_need_an_arm_are_never_given_without_one() -> None:
     words = {v.word for v in library(small_bench())}
     assert not words & {"link_flexibility", "base_compliance", "base_slip", "pose_error"}
+
+
+def test_fit_and_evidence_take_one_imperfection_of_a_hold() -> None:
+    """Of a running recording, too: what a stretch has to itself."""
+    for name, part in (("bench imposed", 0.6), ("medium", HOLD_PART)):
+        bench = make_bench(linear(name))
+        engine = quick_engine(bench)
+        assert evidence.hold_part(bench.rows) == part
+        _, common = _holds(engine, 2e-6)
+        wanted = np.hypot(bench.noise.hold, part * 2e-6)
+        np.testing.assert_allclose(common[: bench.rows.n], wanted)
+
+
+def test_none_is_looked_at_between_the_levels_as_well() -> None:
+    """Levels that scatter by a little less than the first size of imperfection."""
+    bench, rng = small_bench(), np.random.default_rng(2)
+    target = bench.observed - prediction(bench)
+    target[: bench.rows.n] += 4e-7 * rng.normal(size=bench.rows.level.max() + 1)[bench.rows.level]
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
+    sizes = 3e-6 * np.exp(-LOG_STEP * np.array([1.0, 2 / 3, 1 / 3, 0.0]))
+    between = [log_joint_between(engine, (), float(eta)) for eta in sizes]
+    less = 0.2  # a bench whose noise is known to a factor
+    wanted = log_mean([engine.levels[0].log_base, *between], [1 - less, *[less / 4] * 4])
+    assert _as_stated(engine) == pytest.approx(wanted, abs=1e-6)
+    assert max(between[:3]) > between[3] + 1.0  # which the levels alone would not see
