@@ -110,19 +110,23 @@ _WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
 
 
 def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats for every effect below the noise of a single sample of a running recording:
-    thousands of samples would show it, but for what noise of low frequency does to it. Of levels at
-    rest for every one far below that: that is no gap. What springs may hide, or other channels
-    show, counts by how far it moves."""
+    """Penalty in nats for every effect below the noise of a single sample of a running recording,
+    steep below half of it, or all of it where a path may take any way: thousands of samples would
+    show it, but noise of low frequency wanders as far. Of levels at rest for every one far below
+    that: that is no gap. What springs may hide, or other channels show, counts by how far it moves.
+    """
     noise = engine.bench.noise.stated
     if engine.bench.rows.continuous:
         sizes = np.maximum(_counted(parts, found), 1e-300)
-        return 20.0 * float(np.maximum(np.log(noise / sizes), 0.0).sum())
+        below = 20.0 * float(np.maximum(np.log(noise / sizes), 0.0).sum())
+        least = [1.0 if p.variant.info.get("path") == "free" else _WANDERS for p in parts]
+        return below + sum(_wall(w * noise / float(s)) for w, s in zip(least, sizes, strict=True))
     elsewhere = np.array([p.word in _SHOWN_ELSEWHERE for p in parts], dtype=bool)
     sizes = np.maximum(np.where(elsewhere, found.moved, found.gap), 1e-300)
     return sum(_wall(FAR_BELOW_NOISE * noise / float(size)) for size in sizes)
 
 
+_WANDERS = 0.5
 FAR_BELOW_NOISE = 0.2
 _SHOWN_ELSEWHERE = LINEAR | {"force_drift"}
 
