@@ -21,7 +21,7 @@ from identification.gap.heldout import ALWAYS_IN, folds, held_out
 from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import cancelling, pettiness, trifle
-from identification.gap.variants import variant
+from identification.gap.variants import Variant, variant
 from identification.gap.verdict import weighed
 from identification.gap.words import DRIFTS
 from tests.conformance.effect_benches import of, quick_engine
@@ -308,3 +308,20 @@ def test_what_moves_the_target_by_nothing_is_a_trifle_whoever_shows_it() -> None
     part = (Part(variants[0], 1.0),)
     assert trifle(engine, part, Sizes(np.zeros(1), np.array([0.05 * noise]), 0.0)) > 20
     assert trifle(engine, part, Sizes(np.zeros(1), np.array([0.5 * noise]), 0.0)) == 0.0
+
+
+def test_a_path_that_may_take_any_way_is_no_effect_below_the_noise_of_a_sample() -> None:
+    """Of a running recording; a law may be, down to half of it, at 20 nats a factor e."""
+    bench, variants, _ = of("thermal_drift", "bench imposed")
+    engine, noise = quick_engine(bench), bench.noise.stated
+    free = next(v for v in variants if v.info["path"] == "free")
+    line = next(v for v in variants if v.info["path"] != "free")
+
+    def charged(v: Variant, size: float) -> float:
+        one = np.array([size * noise])
+        return trifle(engine, (Part(v, 1.0),), Sizes(one, one, 0.0))
+
+    assert charged(line, 0.8) == pytest.approx(20 * np.log(1 / 0.8))
+    assert charged(free, 0.8) == pytest.approx((20 + 60) * np.log(1 / 0.8))
+    assert charged(line, 0.25) == pytest.approx(20 * np.log(4) + 60 * np.log(2))
+    assert charged(free, 1.1) == charged(line, 1.1) == 0.0
