@@ -32,6 +32,7 @@ from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
 from rig.runner import Runner
 from rig.software import software_version
 from rig.station import Station, load_station, parse_station
+from rig.storage.files import check_folder
 
 if TYPE_CHECKING:
     from rig.panel.link import PanelOptions
@@ -133,8 +134,7 @@ def _refuse_existing(path: Path) -> None:
             f"{path}: exists already, and measurements are never overwritten. "
             "Choose another name with -o, or go on with an interrupted one by --resume."
         )
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist. Create it first.")
+    check_folder(path)
 
 
 @dataclass(frozen=True)

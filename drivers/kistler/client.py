@@ -313,20 +313,20 @@ class Kistler9257B:
             volts = self._volts
         channel = int(np.abs(volts).argmax())
         if abs(volts[channel]) > RESET_RESIDUAL_V:
-            raise NotDischarged(
-                DEVICE,
-                f"in Reset channel {channel + 1} still shows {volts[channel]:.2f} V, more than"
-                f" {RESET_RESIDUAL_V:g} V: {self._why_charged()}",
-                "Turn the charge amplifier's switch to Reset."
-                if self.reset_by_hand
-                else "Check its wiring, `reset_line` and `reset_active_high` in the station file,"
-                " or set `reset_line: null` and press Reset by hand.",
-            )
+            seen = f"in Reset channel {channel + 1} still shows {volts[channel]:.2f} V, more than"
+            why, remedy = self._why_charged()
+            raise NotDischarged(DEVICE, f"{seen} {RESET_RESIDUAL_V:g} V: {why}", remedy)
 
-    def _why_charged(self) -> str:
+    def _why_charged(self) -> tuple[str, str]:
+        """Fault and remedy."""
         if self.reset_by_hand:
-            return "the amplifier's switch does not stand at Reset"
-        return f"Reset line {self.settings.reset_line} has no effect"
+            fault = "the amplifier's switch does not stand at Reset"
+            return fault, "Turn the charge amplifier's switch to Reset."
+        return (
+            f"Reset line {self.settings.reset_line} has no effect",
+            "Check its wiring, `reset_line` and `reset_active_high` in the station file,"
+            " or set `reset_line: null` and press Reset by hand.",
+        )
 
     def _await_block_from(self, start: float) -> None:
         """Waits for a block that was sampled wholly after `start`, and drops all up to it."""

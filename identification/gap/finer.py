@@ -15,7 +15,7 @@ from identification.gap.evidence import Engine
 from identification.gap.imperfection import level_prior, log_share
 from identification.gap.parts import Part, log_joint_between, log_joints
 
-_PARTS = 3  # of a step between levels
+PARTS = 3  # of a step between levels
 _POINTS = 25  # of the integral, per part of a step
 LOG_STEP = np.log(2.5)  # between levels
 
@@ -30,7 +30,7 @@ def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:
     last = min(max(best, 1) + 1, len(etas) - 1)
     lowest = np.log(etas[1]) - 2 * LOG_STEP if best <= 1 else np.log(etas[best - 1])
     # a parabola takes three points, however near the levels lie
-    parts_between = max(2, round((np.log(etas[last]) - lowest) / LOG_STEP * _PARTS))
+    parts_between = max(2, round((np.log(etas[last]) - lowest) / LOG_STEP * PARTS))
     x = np.linspace(lowest, np.log(etas[last]), parts_between + 1)
     known = {round(float(v), 6): j for v, j in zip(np.log(etas[1:]), joint[1:], strict=True)}
     missing = [v for v in x.tolist() if round(v, 6) not in known]

@@ -227,8 +227,7 @@ def _shift(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 def _lag(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
     a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
-    is read as the lag of every kind that does the same, each the more the
-    closer it comes."""
+    is read as the lag of every kind that does the same, each the more the closer it comes."""
     n, info = bench.rows.n, part.variant.info
     w = found.w
     does = sum((v * bench.columns[c][:n] for v, c in zip(w, part.variant.columns, strict=True)),

@@ -126,7 +126,7 @@ def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     return sum(_wall(FAR_BELOW_NOISE * noise / float(size)) for size in sizes)
 
 
-_WANDERS = 0.5
+_WANDERS = 0.5  # of the noise of a sample: as far as what is slow in it goes
 FAR_BELOW_NOISE = 0.2
 _SHOWN_ELSEWHERE = LINEAR | {"force_drift"}
 

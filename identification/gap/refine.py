@@ -104,9 +104,8 @@ _ELSEWHERE = 3  # shapes that are looked at elsewhere
 def _backlash(word: _Word) -> list[Variant]:
     """Beside the leading word; and alone, where it explains nearly as much: that may be a curve
     which does what the play does. Ends of which one is softer where a play is there to see."""
-    first = [s.log_evidence for s in (word.beside or word.alone)[:1]]
-    seen = first and (not word.beside or first[0] > _lead(word) + _WINDOW)
-    looks = [(word, _places(word.alone, word.beside), bool(seen))]
+    seen = not word.beside or word.beside[0].log_evidence > _lead(word) + _WINDOW
+    looks = [(word, _places(word.alone, word.beside), seen)]
     if word.beside and _gain(word, joint_backlash.WORD) > _NEARLY * _gain(word, word.ranked[0]):
         looks.append((replace(word, ranked=[joint_backlash.WORD]), word.alone[:1], True))
     out: list[Variant] = []

@@ -145,9 +145,8 @@ def reduce_rows(data: GapData) -> Rows:
     holds = _blocks(run) if continuous else _consecutive(hold[edges])
     zero = (branch == ZERO) & (step <= 0)
     weight = count.astype(float)
-    sd = data.instruments.force
-    white = 0.0 if continuous else scatter_within(data.force, hold) or 0.0
-    sd = min(max(sd, white), _MISJUDGED * sd)
+    stated = data.instruments.force
+    sd = stated if continuous else _noise_in_holds(data.force, hold, stated)
     steady, mean_force, hold_weight = _steady(holds, force, weight, sd)
     session = mean(_session(data))
     return Rows(
@@ -187,6 +186,11 @@ def scatter_within(values: Array, hold: Ints) -> float | None:
         return None
     kept = squares[: int(0.95 * squares.size)]
     return float(np.sqrt(kept.mean() / 6.0) / 0.8713)
+
+
+def _noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
+    """What values (n,) scatter in their holds: as stated, or more as far as that may be wrong."""
+    return min(max(stated, scatter_within(values, hold) or 0.0), _MISJUDGED * stated)
 
 
 def _steady(hold: Ints, force: Array, weight: Array, sd: float) -> tuple[Flags, Array, Array]:

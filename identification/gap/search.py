@@ -15,7 +15,7 @@ from identification.gap.explanation import (
     explain,
     up_to_likeliest,
 )
-from identification.gap.finer import LOG_STEP, gained
+from identification.gap.finer import LOG_STEP, PARTS, gained
 from identification.gap.noise import UNSURE
 from identification.gap.parts import Part, log_joint_between, part_sizes
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
@@ -78,18 +78,13 @@ def _as_stated(engine: Engine) -> float:
     """log evidence of what was stated: the noise, and a little more of it than that, as finely as
     it is looked at beside an effect."""
     least, hidden = float(engine.etas[1]), _hidden(engine)
-    steps = np.arange(
-        -_BELOW, 1 + np.floor(_PER_STEP * np.log(max(hidden / least, 1.0)) / LOG_STEP)
-    )
-    etas = least * np.exp(steps / _PER_STEP * LOG_STEP)
+    above = np.floor(PARTS * np.log(max(hidden / least, 1.0)) / LOG_STEP)
+    etas = least * np.exp(np.arange(-PARTS, above + 1) / PARTS * LOG_STEP)
     more = [log_joint_between(engine, (), float(eta)) for eta in etas]
     less = _SURE_SHARE if engine.bench.noise.sure else _UNSURE_SHARE
     return log_mean(
         [engine.levels[0].log_base, *more], [1 - less, *(less / len(more) for _ in more)]
     )
-
-
-_BELOW, _PER_STEP = 3, 3  # looks below the first level, and per step between levels
 
 
 def _hidden(engine: Engine) -> float:

@@ -14,17 +14,17 @@ import typer
 def _json_file(name: str | None) -> str | None:
     """Refuses a place that cannot be written to before the work that would be lost there."""
     from rig.errors import InputError
+    from rig.storage.files import check_folder
 
     if name is None or name == "-":
         return name
-    folder = os.path.dirname(name) or "."
-    if os.path.isdir(name):
+    path = Path(name)
+    if path.is_dir():
         raise InputError(f"--json {name}: is a folder. Give the name of a file, or - for stdout.")
-    if not os.path.isdir(folder):
-        raise InputError(f"--json {name}: the folder {folder} does not exist. Create it first.")
-    if not os.path.exists(name) and not os.access(folder, os.W_OK):
+    check_folder(path, "--json ")
+    if not path.exists() and not os.access(str(path.parent), os.W_OK):
         raise InputError(
-            f"--json {name}: nothing may be written into the folder {folder}. Choose another."
+            f"--json {name}: nothing may be written into the folder {path.parent}. Choose another."
         )
     return name
 

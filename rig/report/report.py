@@ -14,7 +14,7 @@ from rig.errors import InputError
 from rig.report.diagnosing import Job, diagnosing, usable_cores
 from rig.report.document import Document, Figure, figures
 from rig.report.wishes import Wishes, named
-from rig.storage.files import in_place_of
+from rig.storage.files import check_folder, in_place_of
 from rig.terminal import Progress, silent
 
 if TYPE_CHECKING:
@@ -113,8 +113,8 @@ def checked(page: Path, pdf: Path | None) -> Path:
     for path, kinds, option in ((page, (".html", ".htm"), "-o"), (pdf, (".pdf",), "--pdf")):
         if path is not None and path.suffix.lower() not in kinds:
             raise InputError(f"{option} {path}: a name that ends in {kinds[0]} is wanted.")
-        if path is not None and not path.parent.is_dir():
-            raise InputError(f"{path}: the folder {path.parent} does not exist. Create it first.")
+        if path is not None:
+            check_folder(path)
     return page
 
 

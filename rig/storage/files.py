@@ -38,6 +38,14 @@ def in_place_of(path: Path) -> Iterator[Path]:
         ) from error
 
 
+def check_folder(path: Path, option: str = "") -> None:
+    """Before long work whose result would be lost; InputError where the folder is not there."""
+    if not path.parent.is_dir():
+        raise InputError(
+            f"{option}{path}: the folder {path.parent} does not exist. Create it first."
+        )
+
+
 def sync_folder(folder: Path) -> None:
     """Makes names in a folder durable; on Windows the file system does it by itself."""
     if sys.platform == "win32":

@@ -90,7 +90,7 @@ def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
     pressed; m (n, 3) m."""
     axes, k = [a for a in stand.info["axes"] if a < 2], len(stand.columns)
     tops = {a: float(np.abs(m[:, a] * bench.load).max()) or 1.0 for a in axes}
-    bent = [bench.add(outside(bench, m[:, a], tops[a])) for a in axes]
+    bent = [bench.add(bent_column(bench, m[:, a], tops[a])) for a in axes]
     root = np.zeros((k + len(bent), k + len(bent)))
     root[:k, :k] = stand.root
     root[k:, k:] = BENDS * np.eye(len(bent))
@@ -108,6 +108,6 @@ def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
     )  # fmt: skip
 
 
-def outside(bench: Bench, m: Array, top: float) -> Array:
+def bent_column(bench: Bench, m: Array, top: float) -> Array:
     """Stacked column of a rotation `M |M| / top` about an axis of lever m (n,) m."""
     return bench.outside_column(m**2 * bench.load * np.abs(m * bench.load) / top)

@@ -21,11 +21,8 @@ from identification.gap.variants import Variant, variant
 
 WORD = "load_misalignment"
 SCALES = (0.03, 0.1, 0.25)
-DRAGS = (
-    0.05,
-    0.12,
-    0.25,
-)  # of the largest load: over so much of it a tip turns from one way to the other
+# Of the largest load: over so much of it a tip turns from one way to the other.
+DRAGS = (0.05, 0.12, 0.25)
 
 
 class Shape(NamedTuple):
@@ -84,7 +81,8 @@ def _kinds(bench: Bench, top: float) -> list[tuple[str, tuple[Shape, ...], float
 
 def _columns(bench: Bench, shapes: tuple[Shape, ...], mine: Flags) -> list[int]:
     loads = [np.where(mine, across(bench, shape), 0.0) for shape in shapes]
-    return [bench.add(pulled(bench, load, k)) for load in loads for k in range(2)]
+    both = np.eye(2)[:, None, :].repeat(len(bench.data.setups), axis=1)  # along either tangent
+    return [bench.add(pulled(bench, load, each)) for load in loads for each in both]
 
 
 def across(bench: Bench, shape: Shape) -> Array:
@@ -97,10 +95,11 @@ def across(bench: Bench, shape: Shape) -> Array:
     return np.abs(load) * held / shape.drags_N
 
 
-def pulled(bench: Bench, load: Array, k: int) -> Array:
-    """Stacked column of a load (n,) along tangent k of every setup."""
-    lever = np.stack([s.tangent_lever[k] for s in bench.data.setups])[bench.rows.setup]
+def pulled(bench: Bench, load: Array, shares: Array) -> Array:
+    """Stacked column of a load (n,) N that pulls along the tangents of every setup by shares
+    (setups, 2)."""
+    each = zip(shares, bench.data.setups, strict=True)
+    lever = np.stack([share @ s.tangent_lever for share, s in each])[bench.rows.setup]
     q = lever * bench.compliance * load[:, None]
-    tangential = np.zeros((bench.rows.n, 2))
-    tangential[:, k] = load
+    tangential = shares[bench.rows.setup] * load[:, None]
     return bench.stacked(np.sum(bench.lever * q, axis=1), q, tangential)

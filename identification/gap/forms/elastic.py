@@ -10,11 +10,11 @@ import numpy as np
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array
 from identification.gap.effects import pose_error
-from identification.gap.effects.base_compliance import moments, outside
+from identification.gap.effects.base_compliance import bent_column, moments
 from identification.gap.effects.contact_seating import LAWS, pressed
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
-from identification.gap.effects.load_misalignment import Shape, across
+from identification.gap.effects.load_misalignment import Shape, across, pulled
 from identification.gap.forms.law import Law, Term, along, scaled
 from identification.gap.history import retarded
 from identification.gap.variants import Variant
@@ -142,7 +142,7 @@ def base(bench: Bench, law: Law) -> list[Array]:
     for t in law.terms:
         axis = str(t.shape.get("axis", "xy"))
         if "at_moment" in t.shape:
-            out.append(outside(bench, lever[axis], t.shape["at_moment"]))
+            out.append(bent_column(bench, lever[axis], t.shape["at_moment"]))
             continue
         square = lever[axis] ** 2 if axis in lever else 2 * lever["x"] * lever["y"]
         out.append(bench.outside_column(square * bench.load))
@@ -189,18 +189,14 @@ def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
 
 def misalignment(bench: Bench, law: Law) -> list[Array]:
     """Deflections under the load across, for setups of the same direction and sense."""
-    rows, data = bench.rows, bench.data
     out = []
     for t in law.terms:
         drags, at = t.shape.get("drags_over", 0.0), t.shape.get("at_load")
         power = 1.0 if at is None else 0.0 if drags else 1 + t.shape.get("power", 1.0)
         how = Shape(power, at or 1.0, drags)
         load = np.where(along(bench, t.shape["along"]) > 0, across(bench, how), 0.0)
-        parts = np.stack([s.tangents @ np.array(t.shape["across"]) for s in data.setups])
-        lever = np.stack([p @ s.tangent_lever for p, s in zip(parts, data.setups, strict=True)])
-        q = lever[rows.setup] * bench.compliance * load[:, None]
-        response = np.sum(bench.lever * q, axis=1)
-        out.append(bench.stacked(response, q, parts[rows.setup] * load[:, None]))
+        shares = np.stack([s.tangents @ np.array(t.shape["across"]) for s in bench.data.setups])
+        out.append(pulled(bench, load, shares))
     return out
 
 
