@@ -208,6 +208,7 @@ GRAMMAR: dict[str, Grammar] = {
                 ("at_load", "power"),
                 ("drags_over",),
                 ("at_load", "drags_over"),
+                ("run",),
             )
         ),
     ),

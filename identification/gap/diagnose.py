@@ -24,6 +24,7 @@ from identification.gap.heldout import HeldOut, folds, held_out, stated_predicti
 from identification.gap.interval import Parameter
 from identification.gap.leftover import looked_up
 from identification.gap.locate import Where, locate
+from identification.gap.noise import NOISY, SWINGS
 from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
 from identification.gap.refine import refine
@@ -32,7 +33,6 @@ from identification.gap.strain import what_is_strained
 from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
-from identification.gap.verdict import NOISY
 from identification.gap.words import WORDS
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
@@ -370,6 +370,11 @@ def _notes(bench: Bench) -> tuple[str, ...]:
     if bench.course.timeless:
         out.append("No time was recorded: lags, creep and how fast it flowed are left out.")
     out += faults(data)
+    if bench.noise.swings > SWINGS:
+        out.append(
+            f"At rest the displacement swings by {bench.noise.swings:.1f} times what is stated of "
+            "one sample: a vibration, or a pick-up of the mains. See to it before you measure."
+        )
     if bench.noise.raised > NOISY:
         out.append(
             f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "

@@ -35,7 +35,7 @@ from identification.gap.variants import Variant
 
 ENOUGH = 3.0  # nats: odds of 20 to 1
 _DECISIVE = 10.0  # more certainty than this is worth no further minute
-_BESIDES = 4  # further procedures that would do, for who can't do the best
+_BESIDES = 2  # further procedures that would do, for who can't do the best
 _REPETITIONS = 2  # simulated
 _SHAPES = 8  # of each word, the best on the present data
 _WITHIN = 12.0  # nats below the best that a shape may lie

@@ -7,7 +7,10 @@ need be zeroed: the crossing lies anywhere. Two laws, by what is driven:
 - force: friction `r` holds the flank until the load has turned, then it changes within a zone `e`
   of no more than the friction, `tanh(play_r(F - centre) / e)`.
 
-Both are met to a few percent or not at all: corners are sharp, and a grid of places would miss
+- either: friction inside the play alone, which springs back or holds, and an end that friction does
+  not pass: the same place of `play_r(x - centre)` instead of `x - centre`, `r` of any size.
+
+They are met to a few percent or not at all: corners are sharp, and a grid of places would miss
 them. So the places are found by least squares, before the evidence is asked. Play: Krasnosel'skii,
 Pokrovskii 1989. Where no play passes through the load's range none is placed.
 """
@@ -26,22 +29,25 @@ ENOUGH = 0.3  # rms that may be left of what a straight line leaves
 ENOUGH_BESIDE = 0.5  # and of what line and friction do
 CORNERS = 0.8  # round ones: of what a smooth curve leaves beside the same friction
 SHARP = 0.15  # corners over a smaller share of the half width are none of a smooth curve
+BETTER = 0.7  # friction within the play, than beside it or at its flanks
 HOPEFUL = 0.8  # a search that starts from no better is not begun
 _BEYOND = 0.03  # of the load's range: so far it has to go past either corner
+_BACK = 0.1  # of the slope of the springs
 _CENTRES = np.linspace(-0.25, 0.25, 9)  # starts, of the range
 _HALVES = (0.03, 0.07, 0.13, 0.2)
 _CORNERS = (0.02, 0.2)  # of the half width
 _FRICTIONS = (0.002, 0.005, 0.01, 0.02)  # radius inside the play, of the range
 _HELD = (0.003, 0.01, 0.03)  # radius that holds a flank, of the range
+_DRAGS = (0.01, 0.03, 0.1)  # radius within the play, of the range
 _ZONES = (0.15, 0.4, 0.9)  # of that radius
 _DESCENTS, _HALVINGS, _ROUNDS = 3, 6, 4  # of the search; halvings of its steps; rounds each
 
 
 @dataclass(frozen=True)
 class Flanks:
-    """All in units of the load (Nm; N without an arm). kind: "gap" or "held". zone: half width of
-    a gap, or within what load a held joint changes flanks; corner: over which the gap's corners are
-    round; friction: radius of the play operator beside it."""
+    """All in units of the load (Nm; N without an arm). kind: "gap", "held" or "dragged". zone: half
+    width of a gap, or within what load a held joint changes flanks; corner: over which the gap's
+    corners are round; friction: radius of the play operator beside it, or within it if dragged."""
 
     kind: str
     centre: float
@@ -69,14 +75,30 @@ def placed(bench: Bench, load: Array) -> Flanks | None:
         return None
     find = _gap if bench.imposed else _held
     found, left = find(bench, load, span, HOPEFUL * plain)
+    dragged, rest = _dragged(bench, load, span, HOPEFUL * plain)
+    if rest < BETTER * left and not _snaps(bench, load, dragged):
+        found, left = dragged, rest
     if left < ENOUGH * plain and _crossed(load, found) and _needed(bench, load, found, left):
         return found
     return None
 
 
+def _snaps(bench: Bench, load: Array, found: Flanks) -> bool:
+    """Whether the answer of an imposed displacement turns back within the play: a joint that is
+    dragged through it goes no faster than what drags it, but what is unstable does."""
+    if not bench.imposed:
+        return False
+    root = np.sqrt(bench.rows.weight)[:, None]
+    columns = np.column_stack([load, shapes(bench, load, found)[0], np.ones(len(load))])
+    (spring, play, _), *_ = np.linalg.lstsq(columns * root, bench.response * root[:, 0], rcond=None)
+    return bool((spring + play / (2 * found.zone)) * spring < -_BACK * spring**2)
+
+
 def _crossed(load: Array, found: Flanks) -> bool:
     """Whether the load (n,) went clearly beyond both ends of the play."""
-    inside = found.zone if found.kind == "gap" else found.friction
+    inside = {"gap": found.zone, "held": found.friction}.get(
+        found.kind, found.zone + found.friction
+    )
     margin = _BEYOND * float(np.ptp(load))
     low, high = float(load.min()) + margin, float(load.max()) - margin
     return low < found.centre - inside and found.centre + inside < high
@@ -102,7 +124,7 @@ def _smooth(load: Array) -> list[Array]:
 def _place(load: Array, state: Array, flanks: Flanks) -> Array:
     if flanks.kind == "held":
         return np.asarray(np.tanh(state / flanks.zone) / 2)
-    x = load - flanks.centre
+    x = state if flanks.kind == "dragged" else load - flanks.centre
     return np.asarray((x - _dead_zone(x, flanks.zone, flanks.corner)) / (2 * flanks.zone))
 
 
@@ -150,6 +172,25 @@ def _held(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, 
     starts = [np.array([middle + c, np.log(r), np.log(z)])
               for c in _CENTRES for r in _HELD for z in _ZONES]  # fmt: skip
     best, rest = _descend(left, starts, np.array([0.03, 0.5, 0.5]), most)
+    return flanks(best), rest
+
+
+def _dragged(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, float]:
+    y, weight = bench.response, bench.rows.weight
+
+    def flanks(p: Array) -> Flanks:
+        half, radius = span * np.exp(p[1:3])
+        return Flanks("dragged", span * float(p[0]), float(half), _CORNERS[0] * float(half),
+                      float(radius))  # fmt: skip
+
+    def left(p: Array) -> float:
+        f = flanks(p)
+        return _left([load, shapes(bench, load, f)[0]], y, weight)
+
+    middle = float(load.min() + load.max()) / (2 * span)
+    starts = [np.array([middle + c, np.log(h), np.log(r)])
+              for c in _CENTRES for h in _HALVES for r in _DRAGS]  # fmt: skip
+    best, rest = _descend(left, starts, np.array([0.03, 0.3, 0.5]), most)
     return flanks(best), rest
 
 

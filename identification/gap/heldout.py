@@ -3,9 +3,9 @@
 Folds are whole repetitions, directions or poses; of a single run, blocks of time. The first
 repetition of a setup is never withheld: where something slipped or yielded in it for good, the
 later ones do not show what happened, and the datum is set in it. The zero-load rows of a withheld
-run stay in: they carry its datum (of the laser, and of a drift), which no model can know. The datum
-of a withheld direction, of a laser that is zeroed before each run, or of a run that was never read
-without load is taken from its own mean.
+run stay in: they carry its datum (of the laser, and of a drift), which no model can know; as do the
+forces that it was pushed across with. The datum of a withheld direction, of a laser that is zeroed
+before each run, or of a run that was never read without load is taken from its own mean.
 """
 
 from __future__ import annotations
@@ -137,14 +137,15 @@ def stated_prediction(engine: Engine) -> Array:
 
 
 def _stacked_keep(engine: Engine, out: Flags) -> Flags:
-    """Stacked rows to fit on: not the fold, but its zero-load rows."""
+    """Stacked rows to fit on: not the fold, but its zero-load rows, and the forces across that it
+    was loaded with: like the load itself they are given, the motion is foretold."""
     bench, n = engine.bench, engine.bench.rows.n
     row = ~out | bench.rows.zero
     keep = np.ones(bench.layout.size, dtype=bool)
     keep[:n] = row
     held = row[np.flatnonzero(bench.rows.hold_starts)]
-    copies = (bench.layout.tangential.stop - n) // max(len(held), 1)
-    keep[n : bench.layout.tangential.stop] = np.tile(held, copies)
+    q = bench.layout.q
+    keep[q] = np.tile(held, (q.stop - q.start) // max(len(held), 1))
     return keep
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import Array, GapData, Ints
-from identification.gap.rows import ENOUGH, Rows, hold_ids, scatter_within
+from identification.gap.rows import ENOUGH, Rows, hold_ids, scatter_within, swing_within
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -18,6 +18,9 @@ RUN_SHARE = 0.33
 # What is stated of a bench's instruments is known to a factor of two (GUM G.4.2: a type B estimate
 # is worth few degrees of freedom): what is left below twice that is no structure.
 UNSURE = 3**0.5  # of it, beyond it in quadrature
+# Readings that scatter so many times more than stated are not explained by what was stated, nor
+# such that swing by more than that at rest.
+NOISY, SWINGS = 3.0, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +28,8 @@ class Noise:
     """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
     already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
     one sample. raised: how many times what is stated a running recording scatters, at least 1.
-    sure: of an arm's instruments, or measured; what else is stated is known to a factor UNSURE."""
+    sure: of an arm's instruments, or measured; what else is stated is known to a factor UNSURE.
+    swings: how many times what is stated an arm goes to and fro while nothing changes."""
 
     response: Array
     q: Array
@@ -35,6 +39,12 @@ class Noise:
     stated: float
     raised: float = 1.0
     sure: bool = True
+    swings: float = 0.0
+
+    @property
+    def misjudged(self) -> bool:
+        """Whether what was stated does not explain what the readings do while nothing changes."""
+        return self.raised > NOISY or self.swings > SWINGS
 
 
 def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Noise:
@@ -60,6 +70,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
         raised=_raised(data) if rows.continuous else 1.0,
+        swings=swing_within(data.displacement, hold) / meter.displacement if data.arm else 0.0,
         sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
     )  # fmt: skip
 

@@ -178,9 +178,10 @@ def _seating(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 
 
 def _misalignment(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
-    """Tangents at the largest load, as it was come to."""
+    """Tangents at the largest load, as it was come to; of single runs their mean."""
     names, count = part.variant.info["directions"], len(part.variant.info["shapes"][0])
-    rows = np.eye(len(found.w)).reshape(len(names), count, 2, -1).sum(axis=1)
+    common = np.eye(2 * len(names) * count, len(found.w))
+    rows = common.reshape(len(names), count, 2, -1).sum(axis=1)
     return {
         f"tangent_{name}_{k + 1}": found.linear(rows[i, k], "1")
         for i, name in enumerate(names)

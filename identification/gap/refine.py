@@ -45,6 +45,11 @@ class _Word:
     alone: list[Scored]
     beside: list[Scored]
 
+    @property
+    def name(self) -> str:
+        """What it is."""
+        return self.alone[0].variant.word
+
 
 def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
     """Finer shapes of the words that stand out among single effects and that a grid meets badly:
@@ -65,6 +70,8 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
 
 
 def _knees(word: _Word) -> list[Variant]:
+    if not (_seen(word) or _nearly_leads(word)):
+        return []
     places = _places(word.alone, word.beside, joint_yield.is_sharp)
     finer = _closing_in(word, joint_yield.refined, places, joint_yield.CLOSE)
     return finer + _elsewhere(word, finer)
@@ -104,24 +111,32 @@ _ELSEWHERE = 3  # shapes that are looked at elsewhere
 def _backlash(word: _Word) -> list[Variant]:
     """Beside the leading word; and alone, where it explains nearly as much: that may be a curve
     which does what the play does. Ends of which one is softer where a play is there to see."""
-    seen = not word.beside or word.beside[0].log_evidence > _lead(word) + _WINDOW
+    seen = _seen(word)
     looks = [(word, _places(word.alone, word.beside), seen)]
-    if word.beside and _gain(word, joint_backlash.WORD) > _NEARLY * _gain(word, word.ranked[0]):
+    if word.beside and _nearly_leads(word):
         looks.append((replace(word, ranked=[joint_backlash.WORD]), word.alone[:1], True))
     out: list[Variant] = []
     for of, starts, uneven in looks:
-        out += _closing_in(of, joint_backlash.refined, starts, joint_backlash.CLOSE)
+        closer = joint_backlash.CLOSE if uneven else joint_backlash.CLOSE[:1]
+        out += _closing_in(of, joint_backlash.refined, starts, closer)
         if uneven:
             out += _closing_in(of, joint_backlash.uneven, starts, joint_backlash.CLOSE)
     return out
 
 
-_NEARLY = 0.7  # of what the leading word brings, nats above `none`
+def _seen(word: _Word) -> bool:
+    """Whether it explains something beside the leading word, or is that."""
+    return not word.beside or word.beside[0].log_evidence > _lead(word) + _WINDOW
 
 
-def _gain(word: _Word, name: str) -> float:
+def _nearly_leads(word: _Word) -> bool:
+    """Whether it explains alone nearly as much as the leading word does."""
     none = max(level.log_base for level in word.engine.levels)
-    return marginal(word.families[name]) - none
+    mine, first = (marginal(word.families[n]) - none for n in (word.name, word.ranked[0]))
+    return mine > _NEARLY * first
+
+
+_NEARLY = 0.7  # of what the leading word brings, nats above `none`
 
 
 def _lead(word: _Word) -> float:
@@ -144,6 +159,8 @@ def _seats(word: _Word) -> list[Variant]:
 
 
 def _lags(word: _Word) -> list[Variant]:
+    if not (_seen(word) or _nearly_leads(word)):
+        return []
     channels = {s.variant.info["channel"]: s for s in reversed(word.beside or word.alone)}
     return _closing_in(word, time_lag.refined, list(channels.values()))
 

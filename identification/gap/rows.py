@@ -188,6 +188,26 @@ def scatter_within(values: Array, hold: Ints) -> float | None:
     return float(np.sqrt(kept.mean() / 6.0) / 0.8713)
 
 
+def swing_within(values: Array, hold: Ints) -> float:
+    """rms of what values (n,) within holds have in common with the next one, beyond a line: a
+    vibration that samples follow, not their own noise. 0 where there are too few."""
+    count = np.bincount(hold)[hold]
+
+    def per_hold(v: Array) -> Array:
+        return np.asarray(np.bincount(hold, weights=v)[hold])
+
+    at = np.arange(len(values), dtype=float)
+    at -= per_hold(at) / count
+    left = values - per_hold(values) / count
+    left -= at * per_hold(at * left) / np.maximum(per_hold(at**2), 1.0)
+    pairs = (hold[1:] == hold[:-1]) & (count[1:] >= _SWINGS)
+    common = (left[1:] * left[:-1])[pairs]
+    return float(max(common.mean(), 0.0) ** 0.5) if common.size >= ENOUGH else 0.0
+
+
+_SWINGS = 5  # samples of a hold
+
+
 def _noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
     """What values (n,) scatter in their holds: as stated, or more as far as that may be wrong."""
     return min(max(stated, scatter_within(values, hold) or 0.0), _MISJUDGED * stated)

@@ -17,6 +17,7 @@ from identification.gap.words import IN_JOINTS
 MOST = 3  # joints of one word
 # Nats that a joint more has to bring: the choice among the first one's shapes is not counted again.
 WORTH = 6.0
+_HOPELESS = 2000.0  # nats below, from which no other choice of shapes has been seen to come back
 
 
 def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> list[Variant]:
@@ -52,7 +53,10 @@ def _in_one_more(
     scored = score(engine, levels, others, energy)
     top = closest(scored)
     parts = (*start.parts, Part(top.variant, top.scale))
-    return polished(engine, variants, explain(engine, parts, marginal(scored) - WORTH))
+    found = explain(engine, parts, marginal(scored) - WORTH)
+    if found.log_weight < start.log_weight - _HOPELESS:
+        return None
+    return polished(engine, variants, found)
 
 
 def polished(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:

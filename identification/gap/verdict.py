@@ -51,7 +51,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     for e in ranked:
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         good *= kept.get(e.words, 1.0)
-        if not e.parts and found.engine.bench.noise.raised > NOISY:
+        if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
         said = _simpler(e, ranked, kept) or e
         many = THREE if _tells_of_three(said) else 1.0
@@ -89,9 +89,7 @@ def _of_the_strange(found: Found, kept: Mapping[frozenset[str], float]) -> float
 
 
 EXPLAINED = 1.0  # nats
-# Readings that scatter so many times more than stated are not explained by what was stated: so much
-# is left of `none`.
-NOISY, STATED = 3.0, 0.1
+STATED = 0.1  # so much is left of `none` where what was stated does not explain the noise
 
 # What three troubles at once keep: a single one that the library lacks is likelier. A priori it has
 # 0.05, three have 0.37 * 0.05^2 (`priors`); and of 32 words that were taken away in the blind check

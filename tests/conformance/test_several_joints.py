@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from identification.gap.bench import make_bench
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.explanation import Explanation, explain
@@ -84,9 +85,7 @@ def test_only_joint_readings_tell_several_joints_apart() -> None:
     assert [p.variant.info["joint"] for p in more.parts] == [
         p.variant.info["joint"] for p in found.fit.parts
     ]
-    blind = replace(rubbing(0, 2), q=None)
-    engine = quick_engine(replace(found.bench, data=blind, layout=replace(
-        found.bench.layout, q=slice(0, 0))))  # fmt: skip
+    engine = quick_engine(make_bench(replace(rubbing(0, 2), q=None)))
     assert not engine.bench.has_q
     start = alone(found)
     assert in_more_joints(engine, variants, start) is start

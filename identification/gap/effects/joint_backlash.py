@@ -33,7 +33,7 @@ KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
 _SOFTER = 2.5  # of soft ends one than the other
 UNEVEN = {"softer up": (_SOFTER, 1.0), "softer down": (1.0, _SOFTER)}
 KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", *KEPT)
-PLACED = ("gap", "held")
+PLACED = ("gap", "held", "dragged")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
 _REFINED, _BENCH_REFINED = ("free", "soft", "slow", *KEPT), ("soft", "slow")
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
@@ -173,7 +173,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
     root = np.diag([1.0, FRICTION, 1.0])
     return [
         variant(WORD, f"joint {j + 1} {flanks.kind}{name}", columns[:k], scales, root[:k, :k],
-                _less_rub(k) if flanks.kind == "held" else np.eye(k)[0], _PLACED_PRIOR,
+                np.eye(k)[0] if flanks.kind == "gap" else _less_rub(k), _PLACED_PRIOR,
                 each=(True, True), **info)
         for k, name in ((2, ""), (3, ", other springs"))
     ]  # fmt: skip

@@ -2,7 +2,7 @@
 
 The target then moves along the direction by `F n' C t`; recorded force components grow with the
 load by t F. Screws on floors and stands are set up within 1 to 15 degrees. A tip that drags on its
-pad pulls the other way when the load goes back.
+pad pulls the other way when the load goes back; one that is let go between runs finds another seat.
 
 Size: 1 to 15 degrees, tangents of 0.02 to 0.25.
 Prior: tangents of either sign, sd out of SCALES, equally likely.
@@ -23,6 +23,8 @@ WORD = "load_misalignment"
 SCALES = (0.03, 0.1, 0.25)
 # Of the largest load: over so much of it a tip turns from one way to the other.
 DRAGS = (0.05, 0.12, 0.25)
+_BETWEEN_RUNS = 0.5  # of the sd of the mean: by how much tips of single runs differ
+_DRAGS_SHARE = _EACH_RUN_SHARE = 0.2  # of the prior
 
 
 class Shape(NamedTuple):
@@ -48,13 +50,29 @@ def variants(bench: Bench) -> list[Variant]:
     groups = [([name], f"direction {name}", 0.3) for name in known]
     if len(groups) > 1:
         groups.append((list(known), "all directions", 0.6))
-    return [
+    out = [
         variant(WORD, label + each[0].label, [c for k in each for c in k.columns], SCALES,
                 positive=False, prior=prior * each[0].share, directions=names,
                 shapes=[k.shapes for k in each])
         for names, label, prior in groups
         for each in zip(*(known[name] for name in names), strict=True)
     ]  # fmt: skip
+    return out + _each_run(bench, {name: kinds[0] for name, kinds in known.items()})
+
+
+def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
+    """All directions, with what the tip of every run is off from their mean; only where the force
+    across was recorded."""
+    runs = np.unique(bench.rows.run)
+    if bench.rows.tangential is None or len(runs) <= len(straight):
+        return []
+    common = [c for k in straight.values() for c in k.columns]
+    shapes = [k.shapes for k in straight.values()]
+    own = [c for r in runs for c in _columns(bench, shapes[0], bench.rows.run == r)]
+    root = np.diag([1.0] * len(common) + [_BETWEEN_RUNS] * len(own))
+    return [variant(WORD, "each run", [*common, *own], SCALES, root, positive=False,
+                    prior=0.6 * _EACH_RUN_SHARE, directions=list(straight), shapes=shapes,
+                    runs=runs.tolist())]  # fmt: skip
 
 
 class _Known(NamedTuple):
@@ -75,7 +93,7 @@ def _kinds(bench: Bench, top: float) -> list[tuple[str, tuple[Shape, ...], float
     for share in DRAGS if seen else ():
         reach = share * top
         drags = (straight, Shape(0, top, reach), Shape(1, top, reach))
-        out.append((f", dragging {share:g}", drags, 0.2))
+        out.append((f", dragging {share:g}", drags, _DRAGS_SHARE))
     return out
 
 

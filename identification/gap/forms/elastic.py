@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.bench import TOOL_KG, Bench
-from identification.gap.data import Array
+from identification.gap.data import Array, Setup
 from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import bent_column, moments
 from identification.gap.effects.contact_seating import LAWS, pressed
@@ -168,15 +168,13 @@ def seating(bench: Bench, law: Law) -> list[Array]:
 
 def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
-    shares reached at a load, in proportion to it or to a power of it; shares that drag."""
+    shares reached at a load, in proportion to it or to a power of it; shares that drag; shares of
+    single runs (numbers from 0) beyond these."""
     terms = []
     for name, shapes in zip(v.info["directions"], v.info["shapes"], strict=True):
         s = next(s for s in bench.data.setups if s.direction == name)
         for how, k in product(shapes, range(2)):
-            shape: dict[str, Any] = {
-                "along": _triple(s.unit_vector),
-                "across": _triple(s.tangents[k]),
-            }
+            shape = _sideways(s, k)
             if how.power != 1:
                 shape["at_load"] = how.at_N
             if how.power > 2:
@@ -184,7 +182,14 @@ def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
             if how.drags_N:
                 shape["drags_over"] = how.drags_N
             terms.append(Term("tangent", shape))
+    for run in v.info.get("runs", ()):
+        s = bench.data.setups[bench.rows.setup[int(np.argmax(bench.rows.run == run))]]
+        terms += [Term("tangent", _sideways(s, k) | {"run": int(run)}) for k in range(2)]
     return Law({}, tuple(terms)), np.ones(len(terms))
+
+
+def _sideways(setup: Setup, k: int) -> dict[str, Any]:
+    return {"along": _triple(setup.unit_vector), "across": _triple(setup.tangents[k])}
 
 
 def misalignment(bench: Bench, law: Law) -> list[Array]:
@@ -194,7 +199,10 @@ def misalignment(bench: Bench, law: Law) -> list[Array]:
         drags, at = t.shape.get("drags_over", 0.0), t.shape.get("at_load")
         power = 1.0 if at is None else 0.0 if drags else 1 + t.shape.get("power", 1.0)
         how = Shape(power, at or 1.0, drags)
-        load = np.where(along(bench, t.shape["along"]) > 0, across(bench, how), 0.0)
+        there = along(bench, t.shape["along"]) > 0
+        if "run" in t.shape:
+            there &= bench.rows.run == t.shape["run"]
+        load = np.where(there, across(bench, how), 0.0)
         shares = np.stack([s.tangents @ np.array(t.shape["across"]) for s in bench.data.setups])
         out.append(pulled(bench, load, shares))
     return out
