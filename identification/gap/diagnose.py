@@ -340,9 +340,14 @@ def _next(
 def _disbelieved(found: Found, verdict: str) -> tuple[str, ...]:
     """Why an arm's best explanation was not believed, where that is what it asks for: META may
     state too little, and only its author can tell."""
-    best = found.explanations[0]
+    best, swings = found.explanations[0], found.engine.bench.noise.swings
     if verdict != "unknown" or not found.engine.bench.data.arm:
         return ()
+    if not best.parts and swings > SWINGS:
+        return (
+            f"While nothing changes the displacement swings by {swings:.1f} times what is stated "
+            "of one sample: a vibration, or a pick-up of the mains. Find it before you go on.",
+        )
     asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
     if not asks:
         return ()
@@ -370,11 +375,6 @@ def _notes(bench: Bench) -> tuple[str, ...]:
     if bench.course.timeless:
         out.append("No time was recorded: lags, creep and how fast it flowed are left out.")
     out += faults(data)
-    if bench.noise.swings > SWINGS:
-        out.append(
-            f"At rest the displacement swings by {bench.noise.swings:.1f} times what is stated of "
-            "one sample: a vibration, or a pick-up of the mains. See to it before you measure."
-        )
     if bench.noise.raised > NOISY:
         out.append(
             f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "

@@ -189,17 +189,10 @@ def scatter_within(values: Array, hold: Ints) -> float | None:
 
 
 def swing_within(values: Array, hold: Ints) -> float:
-    """rms of what values (n,) within holds have in common with the next one, beyond a line: a
-    vibration that samples follow, not their own noise. 0 where there are too few."""
+    """rms of what values (n,) have in common with the next one about the mean of their hold: a
+    vibration that samples follow, not their own noise. 0 where holds are too short."""
     count = np.bincount(hold)[hold]
-
-    def per_hold(v: Array) -> Array:
-        return np.asarray(np.bincount(hold, weights=v)[hold])
-
-    at = np.arange(len(values), dtype=float)
-    at -= per_hold(at) / count
-    left = values - per_hold(values) / count
-    left -= at * per_hold(at * left) / np.maximum(per_hold(at**2), 1.0)
+    left = values - np.bincount(hold, weights=values)[hold] / count
     pairs = (hold[1:] == hold[:-1]) & (count[1:] >= _SWINGS)
     common = (left[1:] * left[:-1])[pairs]
     return float(max(common.mean(), 0.0) ** 0.5) if common.size >= ENOUGH else 0.0

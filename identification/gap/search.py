@@ -31,9 +31,9 @@ _STEP = 0.6  # of the noise: between the least size of an imperfection and the n
 _SHARPENED = 8  # explanations at the most
 _PROMISING = 7  # further words of an explanation that are looked at closely
 # Explanations around which another effect is looked for. Of an arm, further ones cost a fifth of
-# the time and change no verdict in 150 cases; on a bench the two that belong together may both look
+# the time and change no verdict in 300 cases; on a bench the two that belong together may both look
 # poor alone, where the spring is wrong as well.
-_SEEDS, _BENCH_SEEDS = 3, 6
+_SEEDS, _BENCH_SEEDS = 4, 6
 _READING = 6  # explanations whose instruments are looked at beside what else moves
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 

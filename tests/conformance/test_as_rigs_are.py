@@ -16,6 +16,7 @@ from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import load_misalignment
 from identification.gap.effects.load_misalignment import Shape
 from identification.gap.effects.pose_error import turned
+from identification.gap.forms import law_of, rows_of
 from rig.gap_data import gap_data
 from rig.model import load_robot
 from tests.conformance.gap_designs import (
@@ -126,6 +127,69 @@ def test_a_tip_that_sticks_as_the_load_goes_back_is_a_load_askew() -> None:
     assert found.verdict == "load_misalignment"
     assert "dragging" in found.effects[0].label
     assert found.after < 1.15 * found.noise
+
+
+SEATS = np.random.default_rng(3).normal(0.0, 0.05, (2, 3, 2))  # tangents per direction and run
+
+
+def seated(rows: pd.DataFrame) -> Array:
+    """(n, 2) N: the tip stands on another place of its pad in every run."""
+    direction = rows["direction"].map({"x": 0, "y": 1}).to_numpy()
+    tangent = SEATS[direction, rows["repetition"].to_numpy(int) - 1]
+    return tangent * rows["force_N"].to_numpy()[:, None]
+
+
+def test_a_tip_that_seats_anew_in_every_run_is_a_load_askew() -> None:
+    """What the components tell of a withheld run is given, as its load is: so it is foreseen."""
+    design = replace(MEDIUM, components=True)
+
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        arm = ARM.jacobian(np.array(Q["P1"]), TOOL)[:3]
+        moved, pull = np.zeros((len(rows), 6)), seated(rows)
+        for direction, others in (("x", [1, 2]), ("y", [2, 0])):
+            mine = (rows["direction"] == direction).to_numpy()
+            moved[mine] = pull[mine] @ arm[others] / TRUE
+        return np.zeros(len(rows)), moved
+
+    found = diagnosed(law, design, seated(noisy(design)))
+    assert found.verdict == "load_misalignment"
+    assert "each run" in found.effects[0].label
+    assert found.held_out[0].fold == "repetition"
+    assert found.held_out[0].after < 1.2 * found.noise
+    p = found.effects[0].parameters
+    for k, direction in enumerate("xy"):
+        mean = np.hypot(*SEATS[k].mean(axis=0))
+        seen = np.hypot(*(p[f"tangent_{direction}_{i}"].value for i in (1, 2)))
+        assert seen == pytest.approx(mean, rel=0.3)
+    part = found.fit.parts[0]
+    law_, unit = law_of(found.bench, part.variant)
+    runs = [t.shape["run"] for t in law_.terms if "run" in t.shape]
+    assert runs == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+    columns = found.engine.columns(part.variant.columns)
+    rebuilt = rows_of(found.bench, part.word, law_) * unit
+    np.testing.assert_allclose(rebuilt, columns, atol=1e-9 * np.abs(columns).max())
+
+
+@pytest.mark.parametrize("components", [False, True])
+def test_where_no_component_tells_it_no_run_has_an_angle_of_its_own(components: bool) -> None:
+    design = replace(MEDIUM, components=components)
+    bench = make_bench(gap_data(imported(noisy(design), meta(design))))
+    labels = [v.label for v in load_misalignment.variants(bench)]
+    assert ("each run" in labels) == components
+
+
+def test_a_vibration_that_the_samples_follow_is_no_noise_of_the_instruments() -> None:
+    """Once in 6.3 samples, twice what is stated; white noise of the same size is none."""
+    swinging = noisy(RICH)
+    swinging["displacement_mm"] += 0.006 * np.sin(np.arange(len(swinging)))
+    found = diagnose_gap(gap_data(imported(swinging, meta(RICH))))
+    assert found.verdict == "unknown"
+    assert any("a vibration" in n for n in found.notes)
+    rough = noisy(RICH)
+    rough["displacement_mm"] += np.random.default_rng(1).normal(0, 0.0042, len(rough))
+    found = diagnose_gap(gap_data(imported(rough, meta(RICH))))
+    assert found.verdict == "none"
+    assert not any("a vibration" in n for n in found.notes)
 
 
 def test_without_components_nothing_is_said_to_drag() -> None:

@@ -91,6 +91,24 @@ def test_only_joint_readings_tell_several_joints_apart() -> None:
     assert in_more_joints(engine, variants, start) is start
 
 
+def test_a_joint_more_that_is_far_worse_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No choice of shapes comes back from there."""
+    found = result(0, 2)
+    variants = [p.variant for p in found.fit.parts]
+    polished: list[float] = []
+
+    def spy(_: object, __: object, start: Explanation) -> Explanation:
+        polished.append(start.log_weight)
+        return start
+
+    monkeypatch.setattr("identification.gap.several.polished", spy)
+    far = replace(alone(found), log_weight=1e6)
+    assert in_more_joints(found.engine, variants, far) is far
+    assert not polished
+    in_more_joints(found.engine, variants, alone(found))
+    assert polished
+
+
 def test_a_joint_is_taken_once() -> None:
     found = result(0, 2)
     variants = [p.variant for p in found.fit.parts]

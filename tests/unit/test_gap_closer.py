@@ -10,13 +10,13 @@ import pytest
 
 from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import score
+from identification.gap.compare import closest, score
 from identification.gap.data import Array
 from identification.gap.effects import joint_hysteresis, joint_yield, library
 from identification.gap.effects.joint_hysteresis import EXPONENTIAL, REACHES
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
-from identification.gap.refine import _closing_in, refine
+from identification.gap.refine import _FINER, _closing_in, _Word, refine
 from identification.gap.variants import Variant, variant
 from tests.unit.test_gap_forms import arm_data, bench_without_arm
 
@@ -98,6 +98,36 @@ def test_what_stands_out_is_looked_at_closer() -> None:
     singles = score(engine, engine.levels, library(bench, ["joint_yield"]))
     times = {v.info["flow_s"] for v in refine(engine, singles)}
     assert times - {0.0, *joint_yield.FLOWS_S, *joint_yield.SQUARE_S}
+
+
+@pytest.mark.parametrize("word", ["joint_yield", "time_lag", "joint_backlash"])
+def test_what_shows_nothing_is_not_looked_at_closely(word: str) -> None:
+    """A curve leads; another word that explains half as much alone, and nothing beside it. Plays
+    are looked at once, wherever they are."""
+    bench = make_bench(arm_data())
+    words = ["joint_nonlinear_stiffness", word]
+    variants = library(bench, words)
+    curve = next(v for v in variants if v.word == words[0] and v.info["joint"] == 1)
+    engine = engine_with(bench, bench.columns[curve.columns[0]])
+    singles = score(engine, engine.levels, variants)
+    first = max(s.log_evidence for s in singles if s.variant.word == words[0])
+    none = max(lv.log_base for lv in engine.levels)
+
+    def told(share: float, beside: float) -> int:
+        """Closer shapes of the word where it brings so much."""
+        alone = [s._replace(log_evidence=none + share * (first - none) if s.variant.word == word
+                            else s.log_evidence) for s in singles]  # fmt: skip
+        mine = [s for s in alone if s.variant.word == word][:1]
+        families = {w: [s for s in alone if s.variant.word == w] for w in words}
+        lead = closest(families[words[0]]).log_evidence
+        beside_it = [s._replace(log_evidence=lead + beside) for s in mine]
+        looked = _Word(engine, families, [words[0], word], families[word], beside_it)
+        return len(_FINER[word](looked))
+
+    few, many = told(0.5, 1.0), told(0.5, 20.0)
+    assert few == 0 if word != "joint_backlash" else few < many
+    assert many > 0
+    assert told(0.9, 1.0) > few
 
 
 def test_looks_move_on_until_the_best_stays(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,6 +86,37 @@ def test_flanks_that_friction_holds_are_found(radius: float, centre: float) -> N
     assert found.friction / TOP == pytest.approx(radius, rel=0.2)
 
 
+def dragged(half: float, radius: float, centre: float, driven: str) -> Bench:
+    """Friction of `radius` within the gap alone, as of grease: the joint is dragged through it."""
+    x = to_and_fro()
+    place = np.clip(held(x - centre, radius), -half, half)
+    if driven == "force":
+        return a_bench(x, x + 2 * place, "force")
+    return a_bench(x - 0.9 * place, x, "displacement")
+
+
+@pytest.mark.parametrize("driven", ["force", "displacement"])
+@pytest.mark.parametrize(("half", "radius", "centre"), [(0.15, 0.06, 0.0), (0.1, 0.04, 0.2)])
+def test_plays_that_rub_within_are_found(
+    half: float, radius: float, centre: float, driven: str
+) -> None:
+    bench = dragged(half, radius, centre, driven)
+    found = placed(bench, bench.torque[:, 0])
+    assert found is not None
+    assert found.kind == "dragged"
+    assert found.centre / TOP == pytest.approx(centre, abs=0.01)
+    assert found.zone / TOP == pytest.approx(half, rel=0.1)
+    assert found.friction / TOP == pytest.approx(radius, rel=0.15)
+
+
+def test_what_snaps_back_while_it_is_pushed_on_is_no_play() -> None:
+    """The force falls as the stroke goes on: a magnet lets go, a shell snaps through."""
+    x = to_and_fro()
+    bench = a_bench(x - 3 * np.clip(held(x, 0.2), -0.1, 0.1), x, "displacement")
+    found = placed(bench, bench.torque[:, 0])
+    assert found is None or found.kind != "dragged"
+
+
 def a_curve(imposed: str) -> Bench:
     x = to_and_fro()
     curved = x + 2 * x**3
@@ -121,7 +152,11 @@ def test_no_play_is_placed_where_there_is_none(bench: Bench) -> None:
     assert placed(bench, bench.torque[:, 0]) is None
 
 
-@pytest.mark.parametrize("bench", [gap(0.2, 0.1, rub=0.02), teeth(0.05, 0.1)], ids=["gap", "teeth"])
+@pytest.mark.parametrize(
+    "bench",
+    [gap(0.2, 0.1, rub=0.02), teeth(0.05, 0.1), dragged(0.15, 0.06, 0.1, "displacement")],
+    ids=["gap", "teeth", "dragged"],
+)
 def test_placed_plays_are_their_laws_and_explain_the_data(bench: Bench) -> None:
     fresh = replace(bench, columns=Pool())
     made = [v for v in joint_backlash.variants(fresh) if v.info["kind"] in joint_backlash.PLACED]

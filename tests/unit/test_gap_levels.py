@@ -354,7 +354,7 @@ def test_a_sure_verdict_gives_a_little_away_on_a_bench_more_of_it(arm: bool, mos
     assert none == pytest.approx(1.0 if arm else 1 - most + each)
 
 
-@pytest.mark.parametrize(("arm", "around"), [(True, 3), (False, 6)])
+@pytest.mark.parametrize(("arm", "around"), [(True, 4), (False, 6)])
 def test_pairs_are_looked_for_around_the_best_words(
     arm: bool, around: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
