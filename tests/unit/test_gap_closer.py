@@ -10,9 +10,9 @@ import pytest
 
 from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import closest, score
+from identification.gap.compare import by_word, closest, score
 from identification.gap.data import Array
-from identification.gap.effects import joint_hysteresis, joint_yield, library
+from identification.gap.effects import joint_backlash, joint_hysteresis, joint_yield, library
 from identification.gap.effects.joint_hysteresis import EXPONENTIAL, REACHES
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
@@ -128,6 +128,32 @@ def test_what_shows_nothing_is_not_looked_at_closely(word: str) -> None:
     assert few == 0 if word != "joint_backlash" else few < many
     assert many > 0
     assert told(0.9, 1.0) > few
+
+
+@pytest.mark.parametrize(("beside", "closely"), [(1.0, False), (20.0, True)])
+def test_plays_are_closed_in_on_only_where_one_shows(
+    beside: float, closely: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[tuple[float, ...]] = []
+
+    def spy(_: object, __: object, ___: object, closer: tuple[float, ...]) -> list[Variant]:
+        looked.append(closer)
+        return []
+
+    monkeypatch.setattr("identification.gap.refine._closing_in", spy)
+    bench = make_bench(arm_data())
+    variants = library(bench, ["joint_nonlinear_stiffness", "joint_backlash"])
+    curve = next(v for v in variants if v.word != "joint_backlash" and v.info["joint"] == 1)
+    engine = engine_with(bench, bench.columns[curve.columns[0]])
+    families = by_word(score(engine, engine.levels, variants))
+    lead = closest(families["joint_nonlinear_stiffness"]).log_evidence
+    mine = families["joint_backlash"][0]
+    none = max(lv.log_base for lv in engine.levels)
+    alone = [mine._replace(log_evidence=none)]
+    families["joint_backlash"] = alone
+    seen = [mine._replace(log_evidence=lead + beside)]
+    _FINER["joint_backlash"](_Word(engine, families, list(families), alone, seen))
+    assert looked[0] == (joint_backlash.CLOSE if closely else joint_backlash.CLOSE[:1])
 
 
 def test_looks_move_on_until_the_best_stays(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ from identification.gap.effects.drift import free_path, path_root
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
 from identification.gap.faults import bursts
-from identification.gap.heldout import ALWAYS_IN, folds, held_out
+from identification.gap.heldout import ALWAYS_IN, _stacked_keep, folds, held_out
 from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import cancelling, pettiness, trifle
@@ -25,6 +25,7 @@ from identification.gap.variants import Variant, variant
 from identification.gap.verdict import weighed
 from identification.gap.words import DRIFTS
 from tests.conformance.effect_benches import of, quick_engine
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, REPETITIONS, SAMPLES = 8, 3, 4
@@ -325,3 +326,20 @@ def test_a_path_that_may_take_any_way_is_no_effect_below_the_noise_of_a_sample()
     assert charged(free, 0.8) == pytest.approx((20 + 60) * np.log(1 / 0.8))
     assert charged(line, 0.25) == pytest.approx(20 * np.log(4) + 60 * np.log(2))
     assert charged(free, 1.1) == charged(line, 1.1) == 0.0
+
+
+def test_of_a_withheld_run_the_datum_and_the_forces_across_stay_in() -> None:
+    """Its motion and its joint readings are withheld, but for the rows without load."""
+    data = arm_data()
+    assert data.q is not None
+    bench = make_bench(replace(data, tangential=np.zeros((len(data.force), 2))))
+    e = Engine(bench, base_columns(bench), bench.observed, np.array([0.0, 1e-6]))
+    out = bench.rows.run == bench.rows.run.max()
+    keep = _stacked_keep(e, out)
+    layout, first = bench.layout, np.flatnonzero(bench.rows.hold_starts)
+    np.testing.assert_array_equal(keep[: bench.rows.n], ~out | bench.rows.zero)
+    q = keep[layout.q].reshape(-1, len(first))
+    np.testing.assert_array_equal(q, np.tile((~out | bench.rows.zero)[first], (len(q), 1)))
+    assert not q.all()
+    assert keep[layout.tangential].all()
+    assert layout.tangential.stop > layout.tangential.start

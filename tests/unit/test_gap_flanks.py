@@ -11,7 +11,7 @@ import pytest
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
-from identification.gap.flanks import placed
+from identification.gap.flanks import Flanks, _crossed, placed
 from identification.gap.forms import law_of, rows_of
 from identification.gap.pool import Pool
 from tests.unit.test_gap_operators import bench_data
@@ -107,6 +107,17 @@ def test_plays_that_rub_within_are_found(
     assert found.centre / TOP == pytest.approx(centre, abs=0.01)
     assert found.zone / TOP == pytest.approx(half, rel=0.1)
     assert found.friction / TOP == pytest.approx(radius, rel=0.15)
+
+
+@pytest.mark.parametrize(("kind", "ends"), [("gap", 0.2), ("held", 0.1), ("dragged", 0.3)])
+def test_a_play_ends_where_friction_lets_it(kind: str, ends: float) -> None:
+    """It has to be passed by 0.03 of the range, of 2 here, at either end."""
+    load = TOP * to_and_fro()
+    for side in (1.0, -1.0):
+        for margin, seen in ((0.01, True), (-0.01, False)):
+            centre = side * (1.0 - 0.06 - ends - margin) * TOP
+            found = Flanks(kind, centre, 0.2 * TOP, 0.01 * TOP, 0.1 * TOP)
+            assert _crossed(load, found) == seen
 
 
 def test_what_snaps_back_while_it_is_pushed_on_is_no_play() -> None:

@@ -23,7 +23,7 @@ from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes, log_joints
 from identification.gap.penalties import _apart, _on_its_own
 from identification.gap.products import White
-from identification.gap.rows import reduce_rows
+from identification.gap.rows import reduce_rows, swing_within
 from identification.gap.search import _seeds, _sharpened, search
 from identification.gap.variants import Variant, variant
 from identification.gap.verdict import (
@@ -462,3 +462,12 @@ def test_another_effect_is_looked_for_at_sizes_that_the_first_one_may_have() -> 
     assert int(log_joints(e, law).argmax()) == 0
     levels, _ = up_to_likeliest(e, law)
     assert [lv.eta for lv in levels] == [0.0, 1e-6]
+
+
+def test_what_swings_at_rest_is_what_neighbours_within_a_hold_have_in_common() -> None:
+    """Holds of six: 1, 1, 1, -1, -1, -1 about their means; of shorter ones nothing is said."""
+    hold = np.repeat(np.arange(20), 6)
+    values = np.tile([1.0, 1, 1, -1, -1, -1], 20) + 50.0 * hold
+    assert swing_within(values, hold) == pytest.approx(0.6**0.5)
+    assert swing_within(np.tile([1.0, -1.0], 60), hold) == 0.0
+    assert swing_within(values, np.repeat(np.arange(40), 3)) == 0.0
