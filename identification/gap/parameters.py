@@ -41,18 +41,22 @@ def parameters(
     return _TABLE[part.word](bench, part, Found(w, cov, softer))
 
 
+# No interval of these reaches below zero.
+NOT_NEGATIVE = frozenset({"friction", "lag", "threshold", "threshold_of_load", "width"})
+
+
 def _hysteresis(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Of the strengths that slip within the range."""
     radius, joint = np.asarray(part.variant.info["radius"]), int(part.variant.info["joint"])
     found = _beside_line(found, len(radius), joint)
     slips = (radius < float(np.ptp(np.append(bench.torque[:, joint], 0.0)))).astype(float)
     return {
-        "friction": _from_zero(found.linear(slips * radius, torque_unit(bench))),
+        "friction": from_zero(found.linear(slips * radius, torque_unit(bench))),
         "share_through_friction": found.per_spring(slips, joint),
     }
 
 
-def _from_zero(p: Parameter) -> Parameter:
+def from_zero(p: Parameter) -> Parameter:
     """Of what is not below zero, however little the data tell of it."""
     if p.low >= 0:
         return p

@@ -16,7 +16,7 @@ from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
 from identification.gap.imperfection import IMPERFECTION, level_prior
 from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Softer
-from identification.gap.parameters import parameters
+from identification.gap.parameters import NOT_NEGATIVE, from_zero, parameters
 from identification.gap.parts import Part, energies, log_joints, signs_kept
 from identification.gap.penalties import SAME_JOINT
 from identification.gap.readings import as_moved
@@ -59,6 +59,7 @@ def parameters_of(
         of_rivals = [(r[word], w) for r, w in others if word in r]
         wide = {n: _wider(p, _moves(n, p.value, i, beside, of_rivals)) for n, p in own.items()}
         found = {n: _stretched(p) for n, p in wide.items()} if beside else wide
+        found = {n: from_zero(p) if n in NOT_NEGATIVE else p for n, p in found.items()}
         out.append(Known(found, shapes.places()))
     return out
 

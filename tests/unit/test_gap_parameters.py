@@ -274,6 +274,20 @@ def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
     assert found.high > 60.0
 
 
+def test_no_interval_of_a_threshold_reaches_below_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However much it moves with what stands beside it."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    info = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
+    v = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**info, "joint": 0})
+    monkeypatch.setattr("identification.gap.posterior._moves", lambda *_: 100.0**2)
+    chosen = Explanation((Part(v, 1.0),), 0.0, 0.0, (0.0,), 0.0)
+    found = parameters_of(engine, [v], chosen)[0].parameters
+    assert found["threshold"].low == found["threshold"].ci90[0] == 0.0
+    assert found["threshold"].high > 200.0
+    assert found["slope_beyond_over_elastic"].low < 0.0
+
+
 def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> None:
     """One column in two joints: of one there are forty shapes, of the other a single one."""
     bench = small_bench()
