@@ -37,11 +37,13 @@ class Part:
 class Sizes:
     """rms (m) of each part's most probable contribution: to the gap, where what springs would take
     over is none, unless the effect is linear itself; and as it moves. energy: mean square (m^2) of
-    all contributions, what is a law counted by its imperfection."""
+    all contributions, what is a law counted by its imperfection. signed: whether the most probable
+    coefficients of each part have the sign that physics wants."""
 
     gap: Array
     moved: Array
     energy: float
+    signed: tuple[bool, ...] = ()
 
 
 def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
@@ -54,7 +56,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     w = root @ np.linalg.solve(inner, root.T @ lv.moment[columns])
     rows = engine.bench.rows
     precision = float(np.sum(1 / engine.sigma[: rows.n] ** 2))
-    sizes, moves, energy, start = [], [], 0.0, 0
+    sizes, moves, signed, energy, start = [], [], [], 0.0, 0
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
@@ -69,7 +71,9 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
             sizes.append(min(max(structural, 0.0) ** 0.5, moves[-1]))
         energy += rows.rms(faulty) ** 2
         start += k
-    return Sizes(np.array(sizes), np.array(moves), min(energy, engine.most))
+        limit = p.variant.positive
+        signed.append(limit is None or float(limit @ part) >= p.variant.least)
+    return Sizes(np.array(sizes), np.array(moves), min(energy, engine.most), tuple(signed))
 
 
 def _beyond_springs(engine: Engine, moved: Array) -> float:

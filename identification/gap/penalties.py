@@ -24,6 +24,8 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     penalty, sizes = 0.0, _counted(parts, found)
     for i, p in enumerate(parts):
         for k, other in enumerate(parts):
+            if _only_rubs(engine, p, other) and found.signed and not found.signed[i]:
+                penalty += 1e4
             if i < k and _same_element(engine, p, other) and not _on_its_own(parts, found, i, k):
                 penalty += 1e4
             # a small knee beside a large error of the springs is no freedom of the latter
@@ -157,6 +159,11 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     if not (springs or words <= FRICTION):
         return False
     return same or not (engine.bench.has_q or _apart(engine, one, other))
+
+
+def _only_rubs(engine: Engine, play: Part, curve: Part) -> bool:
+    """Without an arm a curve may take back what a play does but for its friction."""
+    return not engine.bench.data.arm and play.word == "joint_backlash" and curve.word in CURVES
 
 
 def _on_its_own(parts: tuple[Part, ...], found: Sizes, i: int, k: int) -> bool:

@@ -3,16 +3,21 @@ none."""
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
+from identification.gap.evidence import Engine
 from identification.gap.flanks import Flanks, _crossed, placed
 from identification.gap.forms import law_of, rows_of
+from identification.gap.parts import Part, part_sizes
+from identification.gap.penalties import pettiness
 from identification.gap.pool import Pool
 from tests.unit.test_gap_operators import bench_data
 
@@ -234,3 +239,21 @@ def test_a_pull_without_a_way_back_has_no_fine_curve() -> None:
     u = np.linspace(0, 1, N)
     bench = replace(a_bench(foam(u), u, "displacement"), columns=Pool())
     assert not [v for v in joint_nonlinear_stiffness.variants(bench) if "fine" in v.label]
+
+
+@pytest.mark.parametrize(("column", "plays"), [(0, True), (1, False)])
+def test_what_only_rubs_is_no_play_that_a_curve_takes_back(column: int, plays: bool) -> None:
+    """Of what the play and the friction beside it do in a variant, one is all that was seen."""
+    bench = replace(teeth(0.05), columns=Pool())
+    play = next(v for v in joint_backlash.variants(bench) if v.info["kind"] == "friction")
+    curve = next(iter(joint_nonlinear_stiffness.variants(bench)))
+    target = 3e-4 * bench.columns[play.columns[column]]
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-7]))
+    parts = (Part(play, 1e-3), Part(curve, 1e-6))
+    found = part_sizes(engine, parts, 0)
+    assert found.signed == (plays, True)
+    alike = replace(found, gap=np.array([1e-5, 1e-5]), moved=np.array([1e-5, 1e-5]))
+    assert (pettiness(engine, parts, alike) > 5e3) == (not plays)
+    on_arm = copy(engine)
+    on_arm.bench = replace(bench, data=replace(bench.data, arm=True))
+    assert pettiness(on_arm, parts, alike) < 5e3
