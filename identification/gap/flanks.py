@@ -5,8 +5,7 @@ need be zeroed: the crossing lies anywhere. Two laws, by what is driven:
 
 - displacement: no force inside the play, then springs, `dead_zone(u - centre)`;
 - force: friction `r` holds the flank until the load has turned, then it changes within a zone `e`
-  of no more than the friction, `tanh(play_r(F - centre) / e)`.
-
+  of no more than the friction, `tanh(play_r(F - centre) / e)`;
 - either: friction inside the play alone, which springs back or holds, and an end that friction does
   not pass: the same place of `play_r(x - centre)` instead of `x - centre`, `r` of any size.
 
@@ -157,40 +156,37 @@ def _gap(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, f
 
 
 def _held(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, float]:
-    y, weight = bench.response, bench.rows.weight
-
     def flanks(p: Array) -> Flanks:
         radius = span * float(np.exp(p[1]))
         zone = radius * float(np.exp(min(p[2], 0.0)))
         return Flanks("held", span * float(p[0]), zone, zone, radius)
 
-    def left(p: Array) -> float:
-        f = flanks(p)
-        return _left([load, shapes(bench, load, f)[0]], y, weight)
-
-    middle = float(load.min() + load.max()) / (2 * span)
-    starts = [np.array([middle + c, np.log(r), np.log(z)])
-              for c in _CENTRES for r in _HELD for z in _ZONES]  # fmt: skip
-    best, rest = _descend(left, starts, np.array([0.03, 0.5, 0.5]), most)
-    return flanks(best), rest
+    return _with_friction(bench, load, span, most, flanks, _HELD, _ZONES, 0.5)
 
 
 def _dragged(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, float]:
-    y, weight = bench.response, bench.rows.weight
-
     def flanks(p: Array) -> Flanks:
         half, radius = span * np.exp(p[1:3])
         return Flanks("dragged", span * float(p[0]), float(half), _CORNERS[0] * float(half),
                       float(radius))  # fmt: skip
 
+    return _with_friction(bench, load, span, most, flanks, _HALVES, _DRAGS, 0.3)
+
+
+def _with_friction(
+    bench: Bench, load: Array, span: float, most: float, flanks: Callable[[Array], Flanks],
+    widths: tuple[float, ...], others: tuple[float, ...], step: float,
+) -> tuple[Flanks, float]:  # fmt: skip
+    """The best of flanks that friction is part of, by centre and the logarithms of a width, in
+    steps of `step`, and of a second one; what they leave."""
+
     def left(p: Array) -> float:
-        f = flanks(p)
-        return _left([load, shapes(bench, load, f)[0]], y, weight)
+        return _left([load, shapes(bench, load, flanks(p))[0]], bench.response, bench.rows.weight)
 
     middle = float(load.min() + load.max()) / (2 * span)
-    starts = [np.array([middle + c, np.log(h), np.log(r)])
-              for c in _CENTRES for h in _HALVES for r in _DRAGS]  # fmt: skip
-    best, rest = _descend(left, starts, np.array([0.03, 0.3, 0.5]), most)
+    starts = [np.array([middle + c, np.log(w), np.log(o)])
+              for c in _CENTRES for w in widths for o in others]  # fmt: skip
+    best, rest = _descend(left, starts, np.array([0.03, step, 0.5]), most)
     return flanks(best), rest
 
 

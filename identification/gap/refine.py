@@ -70,7 +70,7 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
 
 
 def _knees(word: _Word) -> list[Variant]:
-    if not (_seen(word) or _nearly_leads(word)):
+    if not _shows(word):
         return []
     places = _places(word.alone, word.beside, joint_yield.is_sharp)
     finer = _closing_in(word, joint_yield.refined, places, joint_yield.CLOSE)
@@ -124,6 +124,11 @@ def _backlash(word: _Word) -> list[Variant]:
     return out
 
 
+def _shows(word: _Word) -> bool:
+    """Whether it is worth closer looks."""
+    return _seen(word) or _nearly_leads(word)
+
+
 def _seen(word: _Word) -> bool:
     """Whether it explains something beside the leading word, or is that."""
     return not word.beside or word.beside[0].log_evidence > _lead(word) + _WINDOW
@@ -159,7 +164,7 @@ def _seats(word: _Word) -> list[Variant]:
 
 
 def _lags(word: _Word) -> list[Variant]:
-    if not (_seen(word) or _nearly_leads(word)):
+    if not _shows(word):
         return []
     channels = {s.variant.info["channel"]: s for s in reversed(word.beside or word.alone)}
     return _closing_in(word, time_lag.refined, list(channels.values()))

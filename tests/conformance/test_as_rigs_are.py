@@ -3,6 +3,7 @@ and what is no effect: a little more noise, a component that moves nothing."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -112,18 +113,23 @@ def sticking(rows: pd.DataFrame) -> Array:
     return np.column_stack([0.15 * out, -0.09 * out])
 
 
-def test_a_tip_that_sticks_as_the_load_goes_back_is_a_load_askew() -> None:
+def askew(pulls: Callable[[pd.DataFrame], Array]) -> GapResult:
+    """pulls: (n, 2) N across, of the rows; the dynamometer's components show it."""
     design = replace(MEDIUM, components=True)
 
     def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
         arm = ARM.jacobian(np.array(Q["P1"]), TOOL)[:3]
-        moved, pull = np.zeros((len(rows), 6)), sticking(rows)
+        moved, pull = np.zeros((len(rows), 6)), pulls(rows)
         for direction, others in (("x", [1, 2]), ("y", [2, 0])):
             mine = (rows["direction"] == direction).to_numpy()
             moved[mine] = pull[mine] @ arm[others] / TRUE
         return np.zeros(len(rows)), moved
 
-    found = diagnosed(law, design, sticking(noisy(design)))
+    return diagnosed(law, design, pulls(noisy(design)))
+
+
+def test_a_tip_that_sticks_as_the_load_goes_back_is_a_load_askew() -> None:
+    found = askew(sticking)
     assert found.verdict == "load_misalignment"
     assert "dragging" in found.effects[0].label
     assert found.after < 1.15 * found.noise
@@ -141,17 +147,7 @@ def seated(rows: pd.DataFrame) -> Array:
 
 def test_a_tip_that_seats_anew_in_every_run_is_a_load_askew() -> None:
     """What the components tell of a withheld run is given, as its load is: so it is foreseen."""
-    design = replace(MEDIUM, components=True)
-
-    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
-        arm = ARM.jacobian(np.array(Q["P1"]), TOOL)[:3]
-        moved, pull = np.zeros((len(rows), 6)), seated(rows)
-        for direction, others in (("x", [1, 2]), ("y", [2, 0])):
-            mine = (rows["direction"] == direction).to_numpy()
-            moved[mine] = pull[mine] @ arm[others] / TRUE
-        return np.zeros(len(rows)), moved
-
-    found = diagnosed(law, design, seated(noisy(design)))
+    found = askew(seated)
     assert found.verdict == "load_misalignment"
     assert "each run" in found.effects[0].label
     assert found.held_out[0].fold == "repetition"

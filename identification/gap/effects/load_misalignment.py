@@ -24,6 +24,7 @@ SCALES = (0.03, 0.1, 0.25)
 # Of the largest load: over so much of it a tip turns from one way to the other.
 DRAGS = (0.05, 0.12, 0.25)
 _BETWEEN_RUNS = 0.5  # of the sd of the mean: by how much tips of single runs differ
+_ALL = 0.6  # prior of all directions
 _DRAGS_SHARE = _EACH_RUN_SHARE = 0.2  # of the prior
 
 
@@ -49,7 +50,7 @@ def variants(bench: Bench) -> list[Variant]:
         ]
     groups = [([name], f"direction {name}", 0.3) for name in known]
     if len(groups) > 1:
-        groups.append((list(known), "all directions", 0.6))
+        groups.append((list(known), "all directions", _ALL))
     out = [
         variant(WORD, label + each[0].label, [c for k in each for c in k.columns], SCALES,
                 positive=False, prior=prior * each[0].share, directions=names,
@@ -71,7 +72,7 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
     own = [c for r in runs for c in _columns(bench, shapes[0], bench.rows.run == r)]
     root = np.diag([1.0] * len(common) + [_BETWEEN_RUNS] * len(own))
     return [variant(WORD, "each run", [*common, *own], SCALES, root, positive=False,
-                    prior=0.6 * _EACH_RUN_SHARE, directions=list(straight), shapes=shapes,
+                    prior=_ALL * _EACH_RUN_SHARE, directions=list(straight), shapes=shapes,
                     runs=runs.tolist())]  # fmt: skip
 
 
