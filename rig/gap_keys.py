@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from identification.gap.effects import contact_seating, joint_backlash, time_lag
+from identification.gap.effects import base_slip, contact_seating, joint_backlash, time_lag
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
 from identification.gap.forms.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
@@ -45,7 +45,7 @@ CONSTANTS: dict[str, Key] = {
     "memory": _MEMORY,
     "flow_time": Key("flow_time_s", "size"),
     "flow_exponent": Key("flow_exponent", "positive"),
-    "axis": Key("axis", "text", options=_SIDES),
+    "axis": Key("axis", "text", options=tuple(base_slip.AXES)),
     "depth": Key("axis_below_base_mm", factor=1e3),
     "law": Key("law", "text", options=FRICTION_LAWS),
     "placed": Key("placed", "text", options=PLACED),
@@ -92,7 +92,6 @@ SHAPES: dict[str, Key] = {
     "across": Key("across", "vector"),
     "at_load": Key("at_N", "positive"),
     "power": Key("power_of_load", "positive"),
-    "at_moment": Key("at_Nm", "positive"),
     "drags_over": Key("drags_over_N", "positive"),
     "at_response": Key("at_mm", "positive", factor=1e3),
     "time_constant": Key("time_constant_s", "positive"),
@@ -195,7 +194,7 @@ GRAMMAR: dict[str, Grammar] = {
     "link_flexibility": Grammar(("placed",), (("over_nominal", ("segment", "strain")),)),
     "base_compliance": Grammar(
         ("depth",),
-        (("compliance", ("axis",)), ("compliance_xy", ()), ("compliance", ("axis", "at_moment"))),
+        (("compliance", ("axis",)), ("compliance_xy", ()), ("compliance", ("axis", "beyond"))),
     ),
     "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
     "load_misalignment": Grammar(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log
 
@@ -52,6 +52,13 @@ class Explanation:
     sizes: tuple[float, ...]
     log_good: float
 
+    def sized(self, sizes: Iterable[float]) -> Explanation:
+        """With other sizes (rms m) of its effects, the largest first."""
+        each = list(sizes)
+        order = _order(self.parts, each)
+        return replace(self, parts=tuple(self.parts[i] for i in order),
+                       sizes=tuple(float(each[i]) for i in order))  # fmt: skip
+
     @property
     def good(self) -> bool:
         """It leaves little enough."""
@@ -66,6 +73,12 @@ class Explanation:
     def troubles(self) -> dict[str, float]:
         """Word -> rms m of what it does in all its joints together, the largest first."""
         return _together(self.parts, self.sizes)
+
+
+def _order(parts: tuple[Part, ...], sizes: Sequence[float] | Array) -> list[int]:
+    """The effects that do most in all their joints together first."""
+    whole = _together(parts, sizes)
+    return sorted(range(len(parts)), key=lambda i: (-whole[parts[i].word], -sizes[i]))
 
 
 def _together(parts: tuple[Part, ...], sizes: Iterable[float]) -> dict[str, float]:
@@ -123,7 +136,7 @@ def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Exp
     good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
     share = np.exp(logs - logs.max())
     fraction = float(share @ good / share.sum())
-    order = sorted(range(len(parts)), key=lambda i: (-together[parts[i].word], -each[i]))
+    order = _order(parts, each)
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
     weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
     weight -= within_stated(engine, parts, sizes)

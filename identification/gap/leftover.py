@@ -18,6 +18,8 @@ from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.hands import open_to_hands
 from identification.gap.noise import UNSURE
+from identification.gap.rests import wanders
+from identification.gap.snaps import let_go
 from identification.gap.strain import LIMIT, strain
 from identification.gap.verdict import weighed
 from identification.gap.words import CURVES, FRICTION
@@ -25,6 +27,9 @@ from identification.gap.words import CURVES, FRICTION
 # An elastic curve that falls while it is pushed on, or a force that is nearly lost, as none is that
 # has made something yield or slide: a snap, a slip, a crack are likelier.
 SNAPS, _FALL, _LOST = 0.1, 0.15, 0.6  # share that is kept; falls, of the range: beyond noise, most
+LET_GO = 1e-8  # share that is kept where forces let go at once: no law does that
+COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whenever it is let go
+_WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
 # A machine that moves by its own displacement reading: what would drift there it takes back.
 HELD = 0.02
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
@@ -51,7 +56,8 @@ def looked_up(found: Found) -> Found:
         lost = [e.words for e in done.values() if not e.good]
         heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
         done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
-    out = tuple(done.get(e.words, e) for e in found.explanations)
+    seen = (done.get(e.words, e) for e in found.explanations)
+    out = tuple(sorted(seen, key=lambda e: -e.log_weight))
     return weighed(replace(found, explanations=out), found.kept)
 
 
@@ -117,13 +123,19 @@ def _share(left: float, allowed: float) -> float:
 
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
+    data = engine.bench.data
+    if _WANDERING[wanders(data)] in explanation.words:
+        e = explanation
+        return replace(e, log_weight=e.log_weight - COMES_BACK, log_good=e.log_good - COMES_BACK)
     left = _left(engine, fit(engine, explanation))
     share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
     fall = engine.bench.course.fall
-    snaps = (fall > _FALL and explanation.words & CURVES) or (
+    gives = (fall > _FALL and explanation.words & CURVES) or (
         fall > _LOST and explanation.words & FRICTION
     )
-    if snaps:
+    if let_go(data):
+        share *= LET_GO
+    elif gives:
         share *= SNAPS
     elif engine.bench.imposed and explanation.parts[0].word == "thermal_drift":
         share *= HELD

@@ -24,6 +24,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.contact_seating import LAWS
 from identification.gap.effects.joint_backlash import unreached
+from identification.gap.effects.joint_hysteresis import BY_LOAD
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from identification.gap.effects.time_lag import KINDS
 from identification.gap.history import half_sample, settling_share, standing_on
@@ -46,10 +47,13 @@ NOT_NEGATIVE = frozenset({"friction", "lag", "threshold", "threshold_of_load", "
 
 
 def _hysteresis(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
-    """Of the strengths that slip within the range."""
+    """Of the strengths that slip within the range; of friction in proportion to the load, at the
+    largest one."""
     radius, joint = np.asarray(part.variant.info["radius"]), int(part.variant.info["joint"])
     found = _beside_line(found, len(radius), joint)
     slips = (radius < float(np.ptp(np.append(bench.torque[:, joint], 0.0)))).astype(float)
+    if part.variant.info["law"] in BY_LOAD:
+        radius = np.full(len(radius), float(np.abs(bench.torque[:, joint]).max()))
     return {
         "friction": from_zero(found.linear(slips * radius, torque_unit(bench))),
         "share_through_friction": found.per_spring(slips, joint),

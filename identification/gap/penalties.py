@@ -62,12 +62,14 @@ def _wall(beyond: float) -> float:
 
 
 def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats, a steep wall, for curves of a joint that hardly bend: a spring is off there.
-    An arm's turning bends its line a little; a bench's line that is far off may bend within the
-    noise of a sample, where that is stated to a factor."""
+    """Penalty in nats, a steep wall, for curves of a joint that hardly bend, and for friction with
+    other springs that hardly rubs: a spring is off there. An arm's turning bends its line a little;
+    a bench's line that is far off may bend within the noise of a sample, where that is stated to a
+    factor."""
     noise, penalty = engine.bench.noise, 0.0
     for p, gap, moved in zip(parts, found.gap, found.moved, strict=True):
-        if "line" not in p.variant.info.get("kinds", ()) or not moved > 0:
+        line = "line" in p.variant.info.get("kinds", ()) or "other_springs" in p.variant.info
+        if not line or not moved > 0:
             continue
         least = BENDS * moved
         if not engine.bench.data.arm:
@@ -112,17 +114,17 @@ _WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
 
 
 def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats for every effect below the noise of a single sample of a running recording,
-    steep below half of it, or all of it where a path may take any way: thousands of samples would
-    show it, but noise of low frequency wanders as far. Of levels at rest for every one far below
-    that: that is no gap. What springs may hide, or other channels show, counts by how far it moves.
-    """
-    noise = engine.bench.noise.stated
-    if engine.bench.rows.continuous:
+    """Penalty in nats for every effect below the noise of a single sample of a rig without an arm,
+    or of a running recording, steep below half of it, or all of it where a path may take any way:
+    thousands of samples would show it, but noise of low frequency wanders as far. Of an arm at rest
+    for every one far below that: that is no gap. What springs may hide, or other channels show,
+    counts by how far it moves."""
+    noise, seen = engine.bench.noise.stated, engine.bench.noise.seen
+    if seen > 0:
         sizes = np.maximum(_counted(parts, found), 1e-300)
-        below = 20.0 * float(np.maximum(np.log(noise / sizes), 0.0).sum())
+        below = 20.0 * float(np.maximum(np.log(seen / sizes), 0.0).sum())
         least = [1.0 if p.variant.info.get("path") == "free" else _WANDERS for p in parts]
-        return below + sum(_wall(w * noise / float(s)) for w, s in zip(least, sizes, strict=True))
+        return below + sum(_wall(w * seen / float(s)) for w, s in zip(least, sizes, strict=True))
     elsewhere = np.array([p.word in _SHOWN_ELSEWHERE for p in parts], dtype=bool)
     sizes = np.maximum(np.where(elsewhere, found.moved, found.gap), 1e-300)
     return sum(_wall(FAR_BELOW_NOISE * noise / float(size)) for size in sizes)

@@ -137,7 +137,7 @@ def _named(variant: Variant) -> str:
     info = variant.info
     if "joint" in info:
         return f"joint {info['joint'] + 1}"
-    return f"axis {'xyz'[info['axis']]}" if "axis" in info else ""
+    return f"axis {info['axis']}" if "axis" in info else ""
 
 
 def _moves(

@@ -21,6 +21,7 @@ from identification.gap.parts import Part, log_joint_between, part_sizes
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
 from identification.gap.readings import reading_all
 from identification.gap.several import in_more_joints, polished
+from identification.gap.shares import measured
 from identification.gap.variants import Variant
 from identification.gap.verdict import weighed
 
@@ -61,6 +62,7 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
         if not front:
             break
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
+    ranked = measured(engine, ranked)
     strange = [lv for lv in engine.levels if lv.eta > _hidden(engine)]
     found = Found(
         engine=engine,

@@ -21,9 +21,12 @@ _HOPELESS = 2000.0  # nats below, from which no other choice of shapes has been 
 
 
 def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> list[Variant]:
-    """Variants of a word that may stand beside other parts: not in a joint where it is already."""
-    taken = {p.variant.info.get("joint") for p in beside if p.word == word}
-    return [v for v in variants if v.word == word and v.info.get("joint", -1) not in taken]
+    """Variants of a word that may stand beside other parts: not in a joint where it is already; and
+    what creeps more than in proportion in one joint does so in all."""
+    same = [p.variant.info for p in beside if p.word == word]
+    taken, bent = {i.get("joint") for i in same}, {bool(i.get("bent")) for i in same}
+    mine = (v for v in variants if v.word == word and v.info.get("joint", -1) not in taken)
+    return [v for v in mine if not bent or bool(v.info.get("bent")) in bent]
 
 
 def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:

@@ -62,7 +62,7 @@ def _threshold(bench: Bench, part: Part, knee: Found) -> Parameter:
         value = float(np.clip(top - mean, radius.min(), min(float(radius.max()), top)))
         variance = float(slope @ knee.cov @ slope)
     shared = bench.data.instruments.force_gain if not bench.imposed else 0.0
-    if part.word == "base_slip" and info["axis"] < 2:
+    if part.word == "base_slip" and info["axis"] != "z":
         shared = float(np.hypot(shared, _depth_sd(bench, np.asarray(info["load"]))))
     return normal(value, max(variance, 0.0) + (shared * value) ** 2, torque_unit(bench))
 

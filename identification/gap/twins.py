@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.base_compliance import DEPTHS_M, moments
+from identification.gap.effects.base_slip import lever_of, places
 from identification.gap.evidence import LEVER_M, Engine
 from identification.gap.forms import Form, Law, Term, law_of, rows_of
 from identification.gap.parts import Part
@@ -76,7 +76,7 @@ def _lever(bench: Bench, law: Law) -> Array:
     c = law.constants
     if "joint" in c:
         return np.asarray(bench.lever[:, c["joint"]])
-    return np.asarray(moments(bench, c["depth"])[:, "xyz".index(c["axis"])])
+    return lever_of(bench, c["axis"], c["depth"])
 
 
 def _places(bench: Bench, word: str) -> Iterator[tuple[dict[str, Any], Array]]:
@@ -84,9 +84,8 @@ def _places(bench: Bench, word: str) -> Iterator[tuple[dict[str, Any], Array]]:
         for j in bench.moving_joints():
             yield {"joint": j}, bench.lever[:, j]
         return
-    for axis in "zxy":
-        for depth in DEPTHS_M if axis != "z" else (0.0,):
-            yield {"axis": axis, "depth": depth}, moments(bench, depth)[:, "xyz".index(axis)]
+    for axis, depth in sorted(places(), key=lambda p: p[0] != "z"):
+        yield {"axis": axis, "depth": depth}, lever_of(bench, axis, depth)
 
 
 def _misfit(engine: Engine, own: Array, columns: Array, eta: float) -> float:

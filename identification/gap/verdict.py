@@ -127,18 +127,24 @@ def _tells_of_three(explanation: Explanation) -> bool:
 
 
 def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
-    """Which effect of an explanation is its main one: each in proportion to its size, since how
-    large an effect is alone is a matter of what else may take its place (of 33 mixtures of the
-    blind check whose two effects were both found, twice as large at most, 22 were in the right
-    order). Without an arm all words speak of one spring, and a second one is mostly more of the
-    first one's law."""
+    """Which effect of an explanation is its main one, an arm's by how far one is larger than the
+    other (`SURER`). Without an arm all words speak of one spring, and a second one is mostly more
+    of the first one's law."""
     if not explanation.parts:
         return {"none": 1.0}
     if not arm:
         return {explanation.parts[0].word: 1.0}
     sizes = dict(explanation.troubles)
-    sizes[explanation.parts[0].word] += 1e-300
-    return {w: size / sum(sizes.values()) for w, size in sizes.items()}
+    largest = max(sizes.values()) or 1.0
+    odds = {w: (size / largest) ** SURER for w, size in sizes.items()}
+    odds[explanation.parts[0].word] += 1e-300
+    return {w: odd / sum(odds.values()) for w, odd in odds.items()}
+
+
+# Of 99 mixtures of the blind check whose effects were both found, the ratio of their sizes was
+# known to a factor of 1.8 (rms), and the larger one was the right one in 84: odds that are the
+# ratio to this power say that best.
+SURER = 3.0
 
 
 def _heir(

@@ -1,12 +1,13 @@
 """The mounting tilts or turns elastically: rotations about axes through, or below, the base.
 
 A moment about axis a gives a rotation `c_a M_a`, and the target moves by the same lever: along the
-direction `c_a (r x n)_a^2` per newton; on rubber feet `c_a (1 + b |M_a|)`, less under a large
-moment, or more. Unseen by encoders. 5e5 to 2e6 Nm/rad.
+direction `c_a (r x n)_a^2` per newton. Rubber feet give less under a large moment; a plate that
+its bolts no longer hold down gives more: the rotation is a curve of the moment, in straight pieces.
+Unseen by encoders. 5e5 to 2e6 Nm/rad.
 
 Size: 5e-7 to 2e-6 rad/Nm; tables and stands up to ten times softer.
 Prior: compliances positive, sd out of SCALES, equally likely; turned axes at 0.5, single ones at
-0.3, feet that bend at 0.3: by BENDS at the largest moment.
+0.3, feet that bend at 0.3: by BENDS at each of BENDS_AT, the slope positive throughout.
 Source: stiffness of bolted mountings of arms, 5e5 to 2e6 Nm/rad.
 """
 
@@ -32,7 +33,8 @@ DEPTHS_M = (
 )  # of tilt axes below the base: flange, table, floor
 COUPLED = 0.6  # sd of what couples two axes, against that of their own compliances
 SCALES = (3e-7, 1e-6, 3e-6)  # rad/Nm
-BENDS = 0.4  # of the compliance without a moment, at the largest one
+BENDS_AT = (0.12, 0.3, 0.55)  # of the largest moment: where feet stiffen, or bolts let go
+BENDS = 0.6  # of the compliance without a moment: what it changes by there
 
 
 def moments(bench: Bench, depth: float) -> Array:
@@ -87,27 +89,31 @@ def _turned(depth: float, columns: list[int], axes: list[int]) -> Variant:
 
 def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
     """The same with compliances that change with the moment about a lying axis, by which feet are
-    pressed; m (n, 3) m."""
+    pressed, or bolts let go of a plate; m (n, 3) m."""
     axes, k = [a for a in stand.info["axes"] if a < 2], len(stand.columns)
-    tops = {a: float(np.abs(m[:, a] * bench.load).max()) or 1.0 for a in axes}
-    bent = [bench.add(bent_column(bench, m[:, a], tops[a])) for a in axes]
+    bends = [(a, share * (float(np.abs(m[:, a] * bench.load).max()) or 1.0))
+             for a in axes for share in BENDS_AT]  # fmt: skip
+    bent = [bench.add(bent_column(bench, m[:, a], at)) for a, at in bends]
     root = np.zeros((k + len(bent), k + len(bent)))
     root[:k, :k] = stand.root
     root[k:, k:] = BENDS * np.eye(len(bent))
     # the slope stays positive up to the largest moment
     within = np.zeros((len(stand.within) + len(bent), len(root)))
     within[: len(stand.within), :k] = stand.within
-    for i in range(len(bent)):
-        own = stand.info["axes"].index(axes[i])
-        within[len(stand.within) + i, [own, k + i]] = 1.0, 2.0
+    for i, (axis, at) in enumerate(bends):
+        row = within[len(stand.within) + i]
+        row[stand.info["axes"].index(axis)] = 1.0
+        row[k:] = [float(a == axis and b <= at) for a, b in bends]
     positive = None if stand.positive is None else np.append(stand.positive, np.zeros(len(bent)))
     return variant(
         WORD, f"{stand.label}, on feet", [*stand.columns, *bent], SCALES, root,
         False if positive is None else positive, prior=0.3,
-        each=stand.each, within=within, **{**stand.info, "at_moment_Nm": tops},
+        each=stand.each, within=within, **{**stand.info, "bends_Nm": bends},
     )  # fmt: skip
 
 
-def bent_column(bench: Bench, m: Array, top: float) -> Array:
-    """Stacked column of a rotation `M |M| / top` about an axis of lever m (n,) m."""
-    return bench.outside_column(m**2 * bench.load * np.abs(m * bench.load) / top)
+def bent_column(bench: Bench, m: Array, beyond: float) -> Array:
+    """Stacked column of a rotation by what a moment exceeds `beyond` Nm, either way, about an axis
+    of lever m (n,) m."""
+    moment = m * bench.load
+    return bench.outside_column(m * np.sign(moment) * np.maximum(np.abs(moment) - beyond, 0.0))

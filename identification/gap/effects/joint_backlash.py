@@ -4,7 +4,8 @@ Net torque = load and, in an upright arm, its own weight. The joint lies at one 
 or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where it was pushed until
 the torque has turned: a play of radius `zone`, or half of it, on the torque, cut at the ends of
 the play, or of 0.7 zones with soft ends; flanks that approach slowly leave `zone / |tau|` of the
-play to be taken up. Gears with play rub too: a stop operator of the zone's strength rides along.
+play to be taken up, of all of it or after an arc tangent. Gears with play rub too: a stop operator
+of the zone's strength rides along.
 Without torque the joint lies anywhere in its play, a free place per setup at its first zero load
 and at later ones, or where the rubbing, or the push before, left it: it is sent to where its
 reading is as commanded, another zero of that reading in every pose. The tool's mass is not known:
@@ -32,10 +33,20 @@ WORD = "joint_backlash"
 KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
 _SOFTER = 2.5  # of soft ends one than the other
 UNEVEN = {"softer up": (_SOFTER, 1.0), "softer down": (1.0, _SOFTER)}
-KINDS = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "rubbing", *KEPT)
+KINDS = (
+    "free",
+    "friction",
+    "friction 1/2",
+    "friction 3",
+    "soft",
+    "slow",
+    "arctan",
+    "rubbing",
+    *KEPT,
+)
 PLACED = ("gap", "held", "dragged")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
-_REFINED, _BENCH_REFINED = ("free", "soft", "slow", *KEPT), ("soft", "slow")
+_REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow")
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
@@ -238,6 +249,7 @@ def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
         "friction 3": [np.tanh(state[:, 1] / zone) / 2, rub],
         "soft": [_ends(x, zone, zone), rub],
         "slow": [x / (np.abs(x) + zone) / 2, rub],
+        "arctan": [np.arctan(x / zone) / np.pi, rub],
         "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
         "kept": [np.clip(kept[:, 0] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
         "kept 1/2": [np.clip(kept[:, 1] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],

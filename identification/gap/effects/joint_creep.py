@@ -71,6 +71,11 @@ def variants(bench: Bench) -> list[Variant]:
             states = retarded(bent(load), spectrum, bench.rows, bench.rest)
             more = [bench.add_joint(j, bench.sense * c * y) for y in states.T]
             out += _pairs(j, BENT, more, spectrum, sizes, 0.2)
+            out.append(
+                variant(WORD, f"joint {j + 1}{BENT} spectrum", more, sizes,
+                        smooth_root(len(more), 0.5), prior=0.2, each=True, joint=j,
+                        times_s=spectrum, bent=True)
+            )  # fmt: skip
     return out
 
 

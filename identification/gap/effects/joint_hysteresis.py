@@ -6,7 +6,8 @@ against it is then a reversal.
 A friction element of strength r carries `S_r(tau) = tau - P_r(tau)` (stop operator; P play): the
 spring feels so much less, and deflects less. A spectrum of strengths makes any loop that obeys
 Masing's rules (Iwan 1967). Friction that does not obey them: an asperity model whose bristles
-bend exponentially (Dahl 1968), one that lets go elastically (Bouc 1967, Wen 1976; beta = gamma).
+bend exponentially (Dahl 1968), one that lets go elastically (Bouc 1967, Wen 1976; beta = gamma);
+of a specimen either in proportion to the load that presses its parts together (Amontons).
 Where the stated spring is that of small loads, which make nothing slip, every element adds its play
 instead (Prandtl 1928). The coefficients are the shares of the joint's compliance that work through
 friction, 0 to 1, or what it has more than was stated.
@@ -42,6 +43,9 @@ NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 _SMALL = 5
 TOOLS_KG = (0.0, 0.5, 1.0, 2.0, 2.5, 3.0)  # beside TOOL_KG, with which it is looked for at first
 EXPONENTIAL, _CLOSER = ("Dahl", "Bouc-Wen"), 6  # laws; reaches of a closer look
+# Leaves, belts, cables and wedges are pressed by what they carry: friction in proportion to that.
+BY_LOAD = tuple(f"{law} by load" for law in EXPONENTIAL)
+LAWS = (*EXPONENTIAL, *BY_LOAD)
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off by more than that
 
@@ -122,7 +126,7 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
 
 def closer(bench: Bench, found: Variant) -> list[Variant]:
     """Exponential laws of the same joint and memory whose reaches lie nearer to each other."""
-    if found.info["law"] not in EXPONENTIAL:
+    if found.info["law"] not in LAWS:
         return []
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
     span = bench.reach_of(bench.true_torque[:, joint])
@@ -197,6 +201,16 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
     return out
 
 
+def _keeps_its_sign(bench: Bench) -> bool:
+    """Whether a specimen's answer never turns against its load: friction in proportion to the load
+    can't do that."""
+    with_load = bench.load * bench.response
+    return not bench.data.arm and bool(with_load.min() >= -_TURNED * with_load.max(initial=0.0))
+
+
+_TURNED = 0.01  # of the largest product of both
+
+
 def _exponential(
     bench: Bench, joint: int, name: str, reaches: Array, fresh: Flags, path: Path | None,
     weight: Array | None,
@@ -204,14 +218,14 @@ def _exponential(
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches (k,) of the range of torque."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
     reach, out = bench.reach_of(torque) * reaches, []
-    for law in EXPONENTIAL:
+    for law in LAWS if _keeps_its_sign(bench) else EXPONENTIAL:
+        elastic = law.startswith("Bouc-Wen")
         if path is None:
-            z = bristles(torque, reach, fresh, elastic=law == "Bouc-Wen", weight=weight)
+            z = bristles(torque, reach, fresh, elastic, weight)
         else:
-            z = bristles(path.load, reach, path.fresh, elastic=law == "Bouc-Wen")[path.kept]
-        columns = [
-            bench.add_joint(joint, -bench.sense * c * reach[k] * z[:, k]) for k in range(len(reach))
-        ]
+            z = bristles(path.load, reach, path.fresh, elastic)[path.kept]
+        held = z * (reach if law in EXPONENTIAL else np.abs(torque)[:, None])
+        columns = [bench.add_joint(joint, -bench.sense * c * h) for h in held.T]
         for k in range(len(reach) - 1):
             out.append(
                 variant(WORD, f"{name} {law} {reaches[k]:.3g}", columns[k : k + 2], SCALES,

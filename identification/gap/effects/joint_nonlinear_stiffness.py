@@ -60,6 +60,8 @@ def variants(bench: Bench) -> list[Variant]:
                         prior=0.1, kinds=(name,), **info)
             )  # fmt: skip
         for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
+            if bench.data.arm and np.mean(hinges[k : k + 2]) < _first_seen(x):
+                continue
             out.append(
                 variant(WORD, f"joint {j + 1} bend {hinges[k]}", [line, *columns[k : k + 2]],
                         SCALES,
@@ -127,6 +129,8 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
     share, out = 0.2 / (len(PLACES) - 1) / len(_ABOUT), []
     for b in (np.mean(places) + close * _ABOUT).tolist():
+        if b < _first_seen(x):
+            continue
         columns = [found.columns[0], bench.add_joint(j, c * hinge(x, b))]
         out.append(
             variant(WORD, f"joint {j + 1} corner {b:.3g}", columns, SCALES, np.eye(2),
@@ -136,6 +140,14 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     return out
 
 
+def _first_seen(x: Array) -> float:
+    """Share of the range from which on a bend shows in x (n,). What bends before the first load
+    that was read is a step where the load begins: lost motion."""
+    return float(_HARDLY * np.abs(x)[np.abs(x) > _NO_LOAD].min(initial=1.0))
+
+
+_NO_LOAD = 0.02  # of the range
+_HARDLY = 1.3  # times the first load: hands set it as exactly as that
 _ABOUT = np.linspace(-0.08, 0.08, 9)  # of the range
 _TOOL_STEPS_KG = np.array([-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4])
 

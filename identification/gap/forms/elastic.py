@@ -129,20 +129,20 @@ def describe_base(_: Bench, v: Variant) -> tuple[Law, Array]:
     what a moment adds."""
     terms = [Term("compliance", {"axis": "xyz"[a]}) for a in v.info["axes"]]
     terms += [Term("compliance_xy")] if v.info["turned"] else []
-    tops = v.info.get("at_moment_Nm", {})
-    terms += [Term("compliance", {"axis": "xyz"[a], "at_moment": tops[a]}) for a in tops]
+    bends = v.info.get("bends_Nm", ())
+    terms += [Term("compliance", {"axis": "xyz"[a], "beyond": at}) for a, at in bends]
     return Law({"depth": float(v.info["depth_m"])}, tuple(terms)), np.ones(len(terms))
 
 
 def base(bench: Bench, law: Law) -> list[Array]:
-    """`(r x n)_a^2` times the load, of a coupling `2 (r x n)_x (r x n)_y`; of what a moment adds
-    times its share of a moment."""
+    """`(r x n)_a^2` times the load, of a coupling `2 (r x n)_x (r x n)_y`; of what is added
+    beyond a moment times what goes beyond it."""
     m, out = moments(bench, law.constants["depth"]), []
     lever = dict(zip("xyz", m.T, strict=True))
     for t in law.terms:
         axis = str(t.shape.get("axis", "xy"))
-        if "at_moment" in t.shape:
-            out.append(bent_column(bench, lever[axis], t.shape["at_moment"]))
+        if "beyond" in t.shape:
+            out.append(bent_column(bench, lever[axis], t.shape["beyond"]))
             continue
         square = lever[axis] ** 2 if axis in lever else 2 * lever["x"] * lever["y"]
         out.append(bench.outside_column(square * bench.load))

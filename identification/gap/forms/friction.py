@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
-from identification.gap.effects import joint_backlash
+from identification.gap.effects import joint_backlash, joint_hysteresis
 from identification.gap.flanks import Flanks, shapes
 from identification.gap.forms.law import ANEW, HUNG, KEPT, LOST, WORKED, Law, Term, fresh_after
 from identification.gap.history import bristles, play, worked_in
@@ -15,7 +15,7 @@ from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant
 _MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
            SET_UP_ANEW.strip(): ANEW}  # fmt: skip
 SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
-FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, "Dahl", "Bouc-Wen")
+FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *joint_hysteresis.LAWS)
 
 
 def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
@@ -31,9 +31,9 @@ def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
 
 
 def hysteresis(bench: Bench, law: Law) -> list[Array]:
-    """What the friction holds back: `S_r(tau)` (stop operator), or reach times bristle state; what
-    slips beside it (Prandtl's law): `P_r(tau)`; of a term without a strength the line of its own
-    spring."""
+    """What the friction holds back: `S_r(tau)` (stop operator), or reach, or load, times bristle
+    state; what slips beside it (Prandtl's law): `P_r(tau)`; of a term without a strength the line
+    of its own spring."""
     c = law.constants
     joint, iwan = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
@@ -50,7 +50,9 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
         state = play(tiled, size, rest, fresh, 0.0 if weight is None else weight[:, None])
         held = (-state if c["law"] == "Prandtl" else load[:, None] - state)[kept]
     else:
-        held = (size * bristles(load, size, fresh, c["law"] == "Bouc-Wen", weight))[kept]
+        z = bristles(load, size, fresh, c["law"].startswith("Bouc-Wen"), weight)
+        by_load = c["law"] in joint_hysteresis.BY_LOAD
+        held = (z * (np.abs(load)[:, None] if by_load else size))[kept]
     lines = [bench.joint_column(joint, torque) for t in law.terms if not t.shape]
     return [*(bench.joint_column(joint, -bench.sense * h) for h in held.T), *lines]
 

@@ -7,7 +7,6 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects import base_slip, joint_yield
-from identification.gap.effects.base_compliance import moments
 from identification.gap.forms.law import (
     ACROSS,
     ANEW,
@@ -39,7 +38,7 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     if info.get("square"):
         constants["flow_exponent"] = _SQUARE
     if v.word == base_slip.WORD:
-        constants |= {"axis": "xyz"[info["axis"]], "depth": float(info["depth_m"])}
+        constants |= {"axis": info["axis"], "depth": float(info["depth_m"])}
         unit = float(v.info["natural"])
     else:
         constants |= {"joint": int(info["joint"])}
@@ -70,7 +69,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     if "joint" in c:
         load = bench.true_torque[:, c["joint"]]
     else:
-        lever = moments(bench, c["depth"])[:, "xyz".index(c["axis"])]
+        lever = base_slip.lever_of(bench, c["axis"], c["depth"])
         load = lever * bench.true_load
     out = []
     for state in _states(bench, law, load):
