@@ -15,6 +15,8 @@ from identification.gap.data import Array, Flags, GapData
 from identification.gap.imposed import approaches
 from identification.gap.loops import lost
 from identification.gap.rows import Rows, passes, turns, way_back
+from identification.gap.snaps import Snaps, let_go
+from identification.gap.wandering import wanders
 
 _MANY = 1000
 _ASIDE = 0.1  # of the largest load: less of the other sign is none
@@ -246,6 +248,16 @@ class Course:
             return False
         noise = self.data.instruments.force * float(np.abs(self.slope).max())
         return self.fall > max(_FALLS, _CLEARLY * noise / float(np.ptp(self.response) or 1.0))
+
+    @cached_property
+    def let_go(self) -> Snaps | None:
+        """Forces that let go of a rig without an arm, None where they don't."""
+        return None if self.data.arm else let_go(self.data)
+
+    @cached_property
+    def wanders(self) -> str | None:
+        """The channel of a rig without an arm that moves while there is no load, where plain."""
+        return None if self.data.arm else wanders(self.data)
 
     @cached_property
     def approaches(self) -> bool:

@@ -29,6 +29,7 @@ from identification.gap.penalties import LEAST_SHARE
 from identification.gap.posterior import parameters_of
 from identification.gap.refine import refine
 from identification.gap.search import force, search
+from identification.gap.snaps import Snaps
 from identification.gap.strain import what_is_strained
 from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
@@ -358,6 +359,15 @@ def _disbelieved(found: Found, verdict: str) -> tuple[str, ...]:
     )
 
 
+def _let_go(snaps: Snaps, span: float) -> str:
+    times = "once" if snaps.count == 1 else f"{snaps.count} times"
+    return (
+        f"The force falls at once while the stroke goes on, {times}, by up to "
+        f"{snaps.largest * span:.3g} N (first at {snaps.first:.4g} s): it sticks and slips, snaps, "
+        "cracks or is torn off, as no effect of the library does."
+    )
+
+
 def _notes(bench: Bench) -> tuple[str, ...]:
     """What these data can't decide, whatever the verdict."""
     data, rows, out = bench.data, bench.rows, list(bench.data.notes)
@@ -375,6 +385,8 @@ def _notes(bench: Bench) -> tuple[str, ...]:
     if bench.course.timeless:
         out.append("No time was recorded: lags, creep and how fast it flowed are left out.")
     out += faults(data)
+    if bench.course.let_go:
+        out.append(_let_go(bench.course.let_go, float(np.ptp(data.force))))
     if bench.noise.raised > NOISY:
         out.append(
             f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "

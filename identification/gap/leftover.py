@@ -18,8 +18,6 @@ from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.hands import open_to_hands
 from identification.gap.noise import UNSURE
-from identification.gap.rests import wanders
-from identification.gap.snaps import let_go
 from identification.gap.strain import LIMIT, strain
 from identification.gap.verdict import weighed
 from identification.gap.words import CURVES, FRICTION
@@ -123,17 +121,17 @@ def _share(left: float, allowed: float) -> float:
 
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
-    data = engine.bench.data
-    if _WANDERING[wanders(data)] in explanation.words:
+    course = engine.bench.course
+    if _WANDERING[course.wanders] in explanation.words:
         e = explanation
         return replace(e, log_weight=e.log_weight - COMES_BACK, log_good=e.log_good - COMES_BACK)
     left = _left(engine, fit(engine, explanation))
     share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
-    fall = engine.bench.course.fall
+    fall = course.fall
     gives = (fall > _FALL and explanation.words & CURVES) or (
         fall > _LOST and explanation.words & FRICTION
     )
-    if let_go(data):
+    if course.let_go:
         share *= LET_GO
     elif gives:
         share *= SNAPS

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData
+from identification.gap.noise import white_noise
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Snaps:
 _WITHIN = 2  # readings in which it falls
 _AROUND = 5  # readings before and after, over which the stroke goes on
 _LEAST = 0.08  # of the range of the force: of less an upper yield point falls, too
-_NOISE = 8.0  # standard uncertainties
+_NOISE = 8.0  # standard deviations
 _FASTER = 4.0  # times what the force mostly changes so near to it: a lag only turns back
 _FEWEST = 60  # readings
 TOGETHER = 0.2  # of the range: what so little lets go is no cause of a gap
@@ -41,7 +42,8 @@ def let_go(data: GapData) -> Snaps | None:
         return None
     fall, steady = _falls(data)
     span = float(np.ptp(data.force))
-    least = max(_LEAST * span, _NOISE * data.instruments.force)
+    noise = max(data.instruments.force, white_noise(data.force))
+    least = max(_LEAST * span, _NOISE * noise)
     at = np.flatnonzero(steady & (fall > np.maximum(least, _FASTER * _usual(data.force))))
     if not at.size:
         return None

@@ -227,6 +227,51 @@ def test_feet_that_stiffen_under_a_large_moment() -> None:
     assert found.after < 1.1 * found.noise
 
 
+def about_base(rows: pd.DataFrame, axis: Array, turns: Callable[[Array], Array]) -> Array:
+    """(n,) m: what a base does that a moment (Nm) about an axis through it turns (rad)."""
+    out, force = np.zeros(len(rows)), rows["force_N"].to_numpy(float)
+    for (pose, direction), mine in rows.groupby(["pose", "direction"]).indices.items():
+        n = np.eye(3)["xyz".index(direction)]
+        arm = float(np.cross(ARM.fk(np.array(Q[str(pose)]), TOOL)[:3, 3], n) @ axis)
+        out[mine] = arm * turns(arm * force[mine])
+    return out
+
+
+def test_a_plate_that_its_bolts_let_go_of() -> None:
+    """Three times as soft about y once the moment has lifted it off, at 30 Nm."""
+
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        def turns(m: Array) -> Array:
+            return np.asarray(1e-6 * (m + 2 * np.sign(m) * np.maximum(np.abs(m) - 30.0, 0.0)))
+
+        return about_base(rows, np.eye(3)[1], turns), np.zeros((len(rows), 6))
+
+    found = diagnosed(law, RICH)
+    assert found.verdict == "base_compliance"
+    assert "on feet" in found.effects[0].label
+    assert found.after < 1.1 * found.noise
+
+
+def test_a_base_that_slips_about_an_axis_between_those_of_the_base() -> None:
+    """Of x and y, at 18 Nm, and comes back over a play of as much."""
+    between = np.array([1.0, 1.0, 0.0]) / 2**0.5
+
+    def slips(m: Array) -> Array:
+        out, last = np.zeros(len(m)), 0.0
+        for i, x in enumerate(m):
+            last = min(max(last, x - 18.0), x + 18.0)
+            out[i] = 4e-6 * last
+        return out
+
+    def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+        return about_base(rows, between, slips), np.zeros((len(rows), 6))
+
+    found = diagnosed(law, RICH)
+    assert found.verdict == "base_slip"
+    assert next(iter(found.effects[0].places)) == "axis x+y"
+    assert found.effects[0].parameters["threshold"].value == pytest.approx(18.0, rel=0.1)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_twice_the_stated_noise_is_no_effect(seed: int) -> None:
     """Of force and displacement: a lag of a third of a sample averages two readings, and a spring
