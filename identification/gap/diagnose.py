@@ -34,7 +34,8 @@ from identification.gap.strain import what_is_strained
 from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
-from identification.gap.words import WORDS
+from identification.gap.verdict import TAKES_TWO_LINEAR
+from identification.gap.words import LINEAR, WORDS
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
 # laws themselves are only families.
@@ -179,7 +180,8 @@ def _chosen(found: Found, verdict: str) -> Explanation:
         return next(e for e in found.explanations if not e.parts)
     mine = [e for e in found.explanations if verdict in e.words]
     first = [e for e in mine if e.parts[0].word == verdict]
-    if first[0].log_weight > mine[0].log_weight - FAR_WORSE:
+    most = TAKES_TWO_LINEAR if mine[0].words <= LINEAR else FAR_WORSE
+    if first and first[0].log_weight > mine[0].log_weight - most:
         mine = first
     held = [e for e in mine if _held(found, e)]
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
