@@ -31,9 +31,12 @@ from identification.gap.verdict import (
     DOUBT,
     EXPLAINED,
     TAKES_THREE,
+    TAKES_TWO,
+    TAKES_TWO_LINEAR,
     THREE,
     _heir,
     _main,
+    _tells_of_three,
     weighed,
 )
 from rig.dataset import load
@@ -274,6 +277,31 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         p = weighed(both, {}).probabilities
         assert p["unknown"] == pytest.approx(unknown, abs=0.1)
         assert (p["thermal_drift"] > 0.9) == (unknown == 0)
+
+
+def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> None:
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    on_arm = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=True)))
+    gain, link, knee = (part(w, [0]) for w in ("force_scale", "link_flexibility", "joint_yield"))
+    for second, most in ((knee, TAKES_TWO), (link, TAKES_TWO_LINEAR)):
+        for worth in (most - 1, most + 1):
+            pair, one = said((gain, second), (3e-5, 3e-6)), said((second,), (1e-5,), -worth)
+            both = replace(found, explanations=(pair, one), unknown=-800.0, alone={})
+            weights = weighed(replace(both, engine=on_arm), {}).probabilities
+            assert (weights[second.word] > 0.99) == (worth < most)
+            assert weighed(both, {}).probabilities["force_scale"] > 0.9  # of a bench
+            shown = _chosen(replace(both, engine=on_arm), second.word)
+            assert shown is (one if worth < most or most == TAKES_TWO else pair)
+
+
+def test_a_play_and_a_curve_of_one_joint_are_one_trouble() -> None:
+    play, drift = part("joint_backlash", [0], joint=1), part("thermal_drift", [0])
+    for joint, curve in ((1, False), (2, True)):
+        bends = part("joint_nonlinear_stiffness", [0], joint=joint)
+        assert _tells_of_three(said((play, bends, drift), (3e-5, 2e-5, 1e-5))) == curve
+    assert _tells_of_three(said((play, bends, drift, part("zero_shift", [0])), (1e-5,) * 4))
 
 
 def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
