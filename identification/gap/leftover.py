@@ -28,8 +28,6 @@ SNAPS, _FALL, _LOST = 0.1, 0.15, 0.6  # share that is kept; falls, of the range:
 LET_GO = 1e-8  # share that is kept where forces let go at once: no law does that
 COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whenever it is let go
 _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
-# A machine that moves by its own displacement reading: what would drift there it takes back.
-HELD = 0.02
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
 SWINGS = 0.03  # share that is kept by a drift that comes and goes,
 _SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
@@ -122,7 +120,7 @@ def _share(left: float, allowed: float) -> float:
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
     course = engine.bench.course
-    if _WANDERING[course.wanders] in explanation.words:
+    if explanation.parts[0].word == _WANDERING[course.wanders]:
         e = explanation
         return replace(e, log_weight=e.log_weight - COMES_BACK, log_good=e.log_good - COMES_BACK)
     left = _left(engine, fit(engine, explanation))
@@ -135,8 +133,6 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
         share *= LET_GO
     elif gives:
         share *= SNAPS
-    elif engine.bench.imposed and explanation.parts[0].word == "thermal_drift":
-        share *= HELD
     else:
         share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
     return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))

@@ -28,6 +28,7 @@ class Snaps:
 
 _WITHIN = 2  # readings in which it falls
 _AROUND = 5  # readings before and after, over which the stroke goes on
+_BESIDE, _PACE = 2, 0.25  # readings next to a fall; of the stroke's mean speed
 _LEAST = 0.08  # of the range of the force: of less an upper yield point falls, too
 _NOISE = 8.0  # standard deviations
 _FASTER = 4.0  # times what the force mostly changes so near to it: a lag only turns back
@@ -59,9 +60,16 @@ def _falls(data: GapData) -> tuple[Array, Flags]:
     u, force = data.displacement, data.force
     i, last = np.arange(len(u)), len(u) - 1
     before, after = np.maximum(i - _AROUND, 0), np.minimum(i + _AROUND + _WITHIN, last)
-    sense = np.sign(u[after] - u[before])
-    on = (u[np.minimum(i + _WITHIN, last)] - u[before]) * sense > 0
-    on &= ((u[after] - u[i]) * sense > 0) & (data.run[after] == data.run[before])
+    way = u[after] - u[before]
+    sense = np.sign(way)
+    # through the fall it goes on at its pace, and it nowhere turns next to it
+    passed = sense * (u[np.minimum(i + _WITHIN, last)] - u[i])
+    on = passed >= _PACE * np.abs(way) * _WITHIN / np.maximum(after - before, 1)
+    noise = _WITHIN * data.instruments.displacement
+    for k in range(-_BESIDE, _WITHIN + _BESIDE):
+        here, there = np.clip(i + k, 0, last), np.clip(i + k + 1, 0, last)
+        on &= sense * (u[there] - u[here]) >= -noise
+    on &= (sense != 0) & (data.run[after] == data.run[before])
     falls = [sense * (force - force[np.minimum(i + k, last)]) for k in range(1, _WITHIN + 1)]
     return np.max(falls, axis=0), np.asarray(on)
 

@@ -60,6 +60,14 @@ def test_what_lets_go_of_next_to_nothing_or_only_turns_back_is_none() -> None:
     assert let_go(stroke(np.random.default_rng(1).normal(0, 1.0, N), u)) is None  # all noise
 
 
+def test_a_force_that_relaxes_or_turns_between_two_readings_is_not_let_go() -> None:
+    """Stretched between two readings and held; strokes of few readings each."""
+    u = np.where(np.arange(N) < 40, 0.0, 1e-3)
+    assert let_go(stroke(30 + 70 * np.exp(-np.maximum(np.arange(N) - 40, 0)) * (u > 0), u)) is None
+    quick = 1e-3 * np.sin(2.5 * np.arange(N))
+    assert let_go(stroke(100 * np.sin(2.5 * np.arange(N) + 0.6), quick)) is None
+
+
 def test_a_force_that_is_driven_is_let_go_by_who_drives_it() -> None:
     data = stroke(*saw(0.4))
     assert let_go(replace(data, imposed="force")) is None
@@ -110,6 +118,8 @@ def test_a_channel_that_comes_back_has_not_drifted() -> None:
     first = next(e for e in ranked if e.words == {"thermal_drift"})
     drift = replace(first, parts=(Part(library(found.bench, ["force_drift"])[0], 1.0),))
     judged = _judged(engine, drift)
+    beside = replace(drift, parts=(first.parts[0], *drift.parts), sizes=(2e-5, 1e-5))
+    assert _judged(engine, beside).log_weight == drift.log_weight  # a little of it may be there
     assert judged.log_weight == pytest.approx(drift.log_weight - COMES_BACK)
     assert judged.log_good == pytest.approx(drift.log_good - COMES_BACK)
     assert _judged(engine, first).log_weight == first.log_weight
