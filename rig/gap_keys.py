@@ -159,7 +159,7 @@ GRAMMAR: dict[str, Grammar] = {
     "joint_yield": Grammar(("joint", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "joint_hysteresis": Grammar(
-        ("joint", "law", "memory", "tool"),
+        ("joint", "law", "memory", "measured_to", "tool"),
         (("compliance", ("strength",)), ("compliance", ("reach",)), ("compliance", ())),
     ),
     "joint_backlash": Grammar(

@@ -8,6 +8,7 @@ crack, a magnet, a grip. No word names that.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -59,17 +60,18 @@ def _falls(data: GapData) -> tuple[Array, Flags]:
     and whether the stroke goes on around there."""
     u, force = data.displacement, data.force
     i, last = np.arange(len(u)), len(u) - 1
-    before, after = np.maximum(i - _AROUND, 0), np.minimum(i + _AROUND + _WITHIN, last)
-    way = u[after] - u[before]
+    at = [np.clip(i + k, 0, last) for k in (-_AROUND, 0, _WITHIN, _WITHIN + _AROUND)]
+    way = u[at[-1]] - u[at[0]]
     sense = np.sign(way)
-    # through the fall it goes on at its pace, and it nowhere turns next to it
-    passed = sense * (u[np.minimum(i + _WITHIN, last)] - u[i])
-    on = passed >= _PACE * np.abs(way) * _WITHIN / np.maximum(after - before, 1)
+    # before, through and after the fall it goes on at its pace, and it nowhere turns next to it
+    on = (sense != 0) & (data.run[at[-1]] == data.run[at[0]])
+    for here, there in pairwise(at):
+        least = _PACE * np.abs(way) * (there - here) / np.maximum(at[-1] - at[0], 1)
+        on &= sense * (u[there] - u[here]) >= least
     noise = _WITHIN * data.instruments.displacement
     for k in range(-_BESIDE, _WITHIN + _BESIDE):
-        here, there = np.clip(i + k, 0, last), np.clip(i + k + 1, 0, last)
-        on &= sense * (u[there] - u[here]) >= -noise
-    on &= (sense != 0) & (data.run[after] == data.run[before])
+        step = u[np.clip(i + k + 1, 0, last)] - u[np.clip(i + k, 0, last)]
+        on &= sense * step >= -noise
     falls = [sense * (force - force[np.minimum(i + k, last)]) for k in range(1, _WITHIN + 1)]
     return np.max(falls, axis=0), np.asarray(on)
 

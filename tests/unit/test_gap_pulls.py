@@ -15,8 +15,6 @@ from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.contact_seating import refined
 from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation
-from identification.gap.leftover import HELD, _judged
 from identification.gap.parts import Part, energies
 from identification.gap.penalties import _same_element
 from identification.gap.priors import prior_of
@@ -133,23 +131,6 @@ def test_no_energy_is_larger_than_the_response() -> None:
     for v in library(engine.bench, ["joint_yield"])[:3]:
         engine.extend()
         assert energies(engine, (Part(v, 14.0),)).max() <= engine.most
-
-
-@pytest.mark.parametrize(("word", "kept"), [("thermal_drift", HELD), ("force_drift", 1.0)])
-def test_a_drift_of_an_imposed_stroke_is_taken_back(word: str, kept: float) -> None:
-    """As long as it is the main effect."""
-    t = np.arange(300) / 300
-    u, wanders = STROKE * np.abs(np.sin(8 * np.pi * t)), 0.2 * STROKE * np.sin(9 * t)
-    engine = pulled(SPRING * (u + wanders), u).engine
-    drift = next(v for v in library(engine.bench, [word]) if v.label == "free path")
-    curve = library(engine.bench, ["joint_nonlinear_stiffness"])[0]
-    engine.extend()
-    parts = (Part(drift, drift.scales[-1]), Part(curve, 0.05))
-    for order, share in ((parts, kept), (parts[::-1], 1.0)):
-        said = Explanation(order, 0.0, 0.0, (1.0, 0.1), -50.0)
-        judged = _judged(engine, said)
-        assert np.exp(judged.log_good) <= share
-        assert np.exp(judged.log_good) > 0.2 * share
 
 
 def test_pulls_that_start_from_zero_again_show_that_a_curve_comes_back() -> None:

@@ -328,7 +328,7 @@ def test_zones_of_a_play_are_closed_in_on_where_no_tool_can_be_wrong() -> None:
         assert len(zones) == 7
         assert zones[3] == pytest.approx(found.info["zone_Nm"])
         kinds = {v.info["kind"] for v in finer}
-        beside = {"free", "soft", "slow", *joint_backlash.KEPT}
+        beside = {"free", "soft", "slow", "arctan", *joint_backlash.KEPT}
         assert kinds == (beside if close > 0.1 else {"free"})
         spans.append(zones[-1] / zones[0])
     assert spans[0] == pytest.approx(2.25)

@@ -46,6 +46,7 @@ EXPONENTIAL, _CLOSER = ("Dahl", "Bouc-Wen"), 6  # laws; reaches of a closer look
 # Leaves, belts, cables and wedges are pressed by what they carry: friction in proportion to that.
 BY_LOAD = tuple(f"{law} by load" for law in EXPONENTIAL)
 LAWS = (*EXPONENTIAL, *BY_LOAD)
+NEARER = 0.4  # times the reaches of others: at the largest load, and shorter below
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off by more than that
 
@@ -201,6 +202,16 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
     return out
 
 
+def by_ratio(load: Array, span: float) -> Array:
+    """Loads (n,) stretched so that a friction in proportion to them turns over a share of them: as
+    they are at the span, ever longer towards none."""
+    whole = (1 + _NONE) * span * np.log1p(np.abs(load) / (_NONE * span))
+    return np.asarray(np.sign(load) * whole)
+
+
+_NONE = 0.05  # of the range: loads below that are as good as none
+
+
 def _keeps_its_sign(bench: Bench) -> bool:
     """Whether a specimen's answer never turns against its load: friction in proportion to the load
     can't do that."""
@@ -217,14 +228,17 @@ def _exponential(
 ) -> list[Variant]:  # fmt: skip
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches (k,) of the range of torque."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
-    reach, out = bench.reach_of(torque) * reaches, []
+    span, out = bench.reach_of(torque), []
     for law in LAWS if _keeps_its_sign(bench) else EXPONENTIAL:
-        elastic = law.startswith("Bouc-Wen")
+        by_load, elastic = law in BY_LOAD, law.startswith("Bouc-Wen")
+        reach = span * reaches * (NEARER if by_load else 1.0)
+        load = torque if path is None else path.load
+        load = by_ratio(load, span) if by_load else load
         if path is None:
-            z = bristles(torque, reach, fresh, elastic, weight)
+            z = bristles(load, reach, fresh, elastic, weight)
         else:
-            z = bristles(path.load, reach, path.fresh, elastic)[path.kept]
-        held = z * (reach if law in EXPONENTIAL else np.abs(torque)[:, None])
+            z = bristles(load, reach, path.fresh, elastic)[path.kept]
+        held = z * (np.abs(torque)[:, None] if by_load else reach)
         columns = [bench.add_joint(joint, -bench.sense * c * h) for h in held.T]
         for k in range(len(reach) - 1):
             out.append(

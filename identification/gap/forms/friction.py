@@ -25,6 +25,8 @@ def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
     if "tool_kg" in v.info:
         constants["tool"] = float(v.info["tool_kg"])
+    if law in joint_hysteresis.BY_LOAD:
+        constants["measured_to"] = bench.reach_of(bench.true_torque[:, joint])
     terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
     terms += (Term("compliance"),) if v.info.get("other_springs") else ()
     return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
@@ -50,8 +52,9 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
         state = play(tiled, size, rest, fresh, 0.0 if weight is None else weight[:, None])
         held = (-state if c["law"] == "Prandtl" else load[:, None] - state)[kept]
     else:
-        z = bristles(load, size, fresh, c["law"].startswith("Bouc-Wen"), weight)
         by_load = c["law"] in joint_hysteresis.BY_LOAD
+        way = joint_hysteresis.by_ratio(load, c["measured_to"]) if by_load else load
+        z = bristles(way, size, fresh, c["law"].startswith("Bouc-Wen"), weight)
         held = (z * (np.abs(load)[:, None] if by_load else size))[kept]
     lines = [bench.joint_column(joint, torque) for t in law.terms if not t.shape]
     return [*(bench.joint_column(joint, -bench.sense * h) for h in held.T), *lines]
