@@ -62,14 +62,12 @@ def _wall(beyond: float) -> float:
 
 
 def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats, a steep wall, for curves of a joint that hardly bend, and for friction with
-    other springs that hardly rubs: a spring is off there. An arm's turning bends its line a little;
-    a bench's line that is far off may bend within the noise of a sample, where that is stated to a
-    factor."""
+    """Penalty in nats, a steep wall, for curves of a joint that hardly bend: a spring is off there.
+    An arm's turning bends its line a little; a bench's line that is far off may bend within the
+    noise of a sample, where that is stated to a factor."""
     noise, penalty = engine.bench.noise, 0.0
     for p, gap, moved in zip(parts, found.gap, found.moved, strict=True):
-        line = "line" in p.variant.info.get("kinds", ()) or "other_springs" in p.variant.info
-        if not line or not moved > 0:
+        if "line" not in p.variant.info.get("kinds", ()) or not moved > 0:
             continue
         least = BENDS * moved
         if not engine.bench.data.arm:

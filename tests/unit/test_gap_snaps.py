@@ -56,6 +56,8 @@ def test_what_lets_go_of_next_to_nothing_or_only_turns_back_is_none() -> None:
     assert let_go(stroke(once, pull)) is None
     lag = np.interp(np.arange(N) + 12.0, np.arange(N), SPRING * u)
     assert let_go(stroke(lag, u)) is None  # the force turns first
+    often = 1e-3 * triangle(N, 15.0)
+    assert let_go(stroke(SPRING * np.roll(often, -9), often)) is None  # as fast as it came
     assert let_go(stroke(SPRING * u, u)) is None
     assert let_go(stroke(np.random.default_rng(1).normal(0, 1.0, N), u)) is None  # all noise
 

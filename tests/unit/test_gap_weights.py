@@ -29,6 +29,7 @@ from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.refine import _places, refine
 from identification.gap.rows import reduce_rows
+from identification.gap.several import family_of
 from identification.gap.variants import variant
 from rig.gap_data import _joint_to_joint, arm_setup
 from rig.model import load_robot
@@ -449,3 +450,37 @@ def test_a_joint_shows_strong_friction_in_a_single_loading_a_specimen_none() -> 
     assert max(v.info["radius"][0] for v in found if " r " in v.label) <= 0.15 * span
     specimen = make_bench(replace(bench.data, arm=False))
     assert not library(specimen, ["joint_hysteresis"])
+
+
+def test_what_bends_before_the_first_load_that_was_read_is_lost_motion() -> None:
+    bench = hanging(UP)  # in steps of a quarter
+    found = library(bench, ["joint_nonlinear_stiffness"])
+    bends = {v.label.split()[-1]: v for v in found if " bend " in v.label}
+    assert "0.2" not in bends
+    assert "0.3" in bends
+    places = [v.info["kinds"][1] for v in joint_nonlinear_stiffness.corners(bench, bends["0.3"])]
+    assert len(places) > 3
+    assert min(places) >= 1.3 * 0.25
+    close = hanging(np.linspace(0.0, 80.0, 17))
+    assert any(v.label.endswith("bend 0.1") for v in library(close, ["joint_nonlinear_stiffness"]))
+
+
+def test_a_play_with_long_flanks_is_taken_up_slowly() -> None:
+    bench = hanging(UP)
+    x = np.array([1.0, 10.0, -10.0]).repeat(12)
+    shape = joint_backlash._shapes(bench, x, 1.0)["arctan"][0]
+    assert shape[[0, 12, 24]] == pytest.approx(
+        [0.25, np.arctan(10) / np.pi, -np.arctan(10) / np.pi]
+    )
+
+
+def test_joints_that_creep_do_so_alike() -> None:
+    bench = make_bench(arm_data())
+    variants = library(bench, ["joint_creep"])
+    for bent in (True, False):
+        one = next(v for v in variants if bool(v.info.get("bent")) == bent)
+        rest = family_of(variants, "joint_creep", (Part(one, 1.0),))
+        assert rest
+        assert {bool(v.info.get("bent")) for v in rest} == {bent}
+        assert one.info["joint"] not in {v.info["joint"] for v in rest}
+    assert len(family_of(variants, "joint_creep", ())) == len(variants)
