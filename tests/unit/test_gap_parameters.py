@@ -19,12 +19,13 @@ from identification.gap.evidence import (
 )
 from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
-from identification.gap.interval import Parameter, Softer
+from identification.gap.interval import NOMINAL, Parameter, Softer
 from identification.gap.parameters import parameters, run_seconds
 from identification.gap.parts import Part
 from identification.gap.posterior import SHARING, _mixture, _stretched, _wider, parameters_of
 from identification.gap.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
 Array = np.ndarray
@@ -432,3 +433,20 @@ def test_friction_is_not_below_zero() -> None:
         assert (friction.value == 0.0) is below
         assert (friction.low == 0.0) is below
         assert 0 <= friction.ci90[0] <= friction.ci90[1] <= friction.high
+
+
+def test_a_threshold_about_a_lying_axis_is_as_uncertain_as_its_depth() -> None:
+    """Yaw knows no depth."""
+    bench = make_bench(arm_data())
+    spread = {}
+    for axis, depth in (("x", 0.35), ("z", 0.0)):
+        v = next(
+            v for v in library(bench, ["base_slip"])
+            if (v.info["axis"], v.info["depth_m"]) == (axis, depth) and v.info["knee"] == "sharp"
+        )  # fmt: skip
+        k = len(v.columns)
+        found = parameters(bench, Part(v, 1.0), np.ones(k), 1e-9 * np.eye(k), NOMINAL)["threshold"]
+        spread[axis] = sd(found) / found.value
+    lever = 0.35 / 12**0.5
+    assert spread["x"] > spread["z"] + 0.02
+    assert spread["x"] == pytest.approx(np.hypot(spread["z"], lever / 0.9), rel=0.6)
