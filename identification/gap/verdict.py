@@ -121,8 +121,7 @@ def _simpler(
     near = (
         f
         for f in ranked
-        if f.words
-        and len(f.words) == many - 1
+        if len(f.words) == many - 1
         and f.words < e.words
         and f.log_weight > e.log_weight - most
         and f.good

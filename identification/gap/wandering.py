@@ -14,11 +14,8 @@ from identification.gap.data import GapData
 
 _NEAR, _BOTH = 0.08, 0.3  # of the ranges: one channel reads next to nothing, and neither much
 _TIMES = 4.0  # times as far: plain
-_FEWEST, _PIECES, _OF = (
-    20,
-    20,
-    5,
-)  # readings; medians of so many pieces of so many readings at least
+_FEWEST = 20  # readings
+_PIECES, _OF = 20, 5  # medians of so many pieces, of so many readings at least
 
 
 def wanders(data: GapData) -> Literal["force", "displacement"] | None:

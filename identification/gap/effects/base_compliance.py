@@ -19,6 +19,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effects.joint_nonlinear_stiffness import hinge
 from identification.gap.variants import Variant, variant
 
 WORD = "base_compliance"
@@ -115,5 +116,4 @@ def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
 def bent_column(bench: Bench, m: Array, beyond: float) -> Array:
     """Stacked column of a rotation by what a moment exceeds `beyond` Nm, either way, about an axis
     of lever m (n,) m."""
-    moment = m * bench.load
-    return bench.outside_column(m * np.sign(moment) * np.maximum(np.abs(moment) - beyond, 0.0))
+    return bench.outside_column(m * hinge(m * bench.load, beyond))

@@ -33,17 +33,8 @@ WORD = "joint_backlash"
 KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
 _SOFTER = 2.5  # of soft ends one than the other
 UNEVEN = {"softer up": (_SOFTER, 1.0), "softer down": (1.0, _SOFTER)}
-KINDS = (
-    "free",
-    "friction",
-    "friction 1/2",
-    "friction 3",
-    "soft",
-    "slow",
-    "arctan",
-    "rubbing",
-    *KEPT,
-)
+_LOOSE = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "arctan")
+KINDS = (*_LOOSE, "rubbing", *KEPT)
 PLACED = ("gap", "held", "dragged")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
 _REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow")
