@@ -53,7 +53,8 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
         held = (-state if c["law"] == "Prandtl" else load[:, None] - state)[kept]
     else:
         by_load = c["law"] in joint_hysteresis.BY_LOAD
-        way = joint_hysteresis.by_ratio(load, c["measured_to"]) if by_load else load
+        span = c.get("measured_to", bench.reach_of(torque))  # a file may lack it
+        way = joint_hysteresis.by_ratio(load, span) if by_load else load
         z = bristles(way, size, fresh, c["law"].startswith("Bouc-Wen"), weight)
         held = (z * (np.abs(load)[:, None] if by_load else size))[kept]
     lines = [bench.joint_column(joint, torque) for t in law.terms if not t.shape]
