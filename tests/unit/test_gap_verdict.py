@@ -1,0 +1,352 @@
+"""What several effects of one explanation owe each other, and what follows for the words."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import Bench, make_bench
+from identification.gap.compare import log_mean
+from identification.gap.diagnose import _chosen, _held
+from identification.gap.effects import library
+from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation, _counted, up_to_likeliest
+from identification.gap.leftover import looked_up
+from identification.gap.parts import Part, Sizes, log_joints
+from identification.gap.penalties import _apart, _on_its_own
+from identification.gap.search import _seeds, _sharpened, search
+from identification.gap.variants import variant
+from identification.gap.verdict import (
+    BENCH_DOUBT,
+    DOUBT,
+    EXPLAINED,
+    TAKES_THREE,
+    TAKES_TWO,
+    TAKES_TWO_LINEAR,
+    THREE,
+    _heir,
+    _main,
+    _tells_of_three,
+    weighed,
+)
+from tests.unit.test_gap_evidence import small_bench, small_engine
+from tests.unit.test_gap_weights import UP, hanging
+
+
+def part(word: str, columns: list[int], **info: object) -> Part:
+    return Part(variant(word, word, columns, (1.0,), **info), 1.0)
+
+
+def said(parts: tuple[Part, ...], sizes: tuple[float, ...], weight: float = 0.0,
+         eta: float = 0.0) -> Explanation:  # fmt: skip
+    return Explanation(parts, weight, eta, sizes, weight)
+
+
+def small_engine_of(bench: Bench) -> Engine:
+    target = bench.observed - prediction(bench)
+    return Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
+
+
+def replace_bench(engine: Engine, bench: Bench) -> Engine:
+    """The engine as it is, of another bench."""
+    other = copy(engine)
+    other.bench = bench
+    return other
+
+
+def test_without_an_arm_a_wrong_spring_counts_by_what_friction_leaves_of_the_gap() -> None:
+    engine = small_engine_of(small_bench())
+    rubs, spring = part("joint_hysteresis", [0]), part("joint_stiffness_error", [1])
+    gap = engine.structural * np.array([0.8, 9.0])
+    sizes = Sizes(gap, np.full(2, 0.9) * engine.most**0.5, 0.0)
+    assert _counted(engine, (rubs, spring), sizes) == pytest.approx(
+        engine.structural * np.array([0.8, 0.6])
+    )
+    far = Sizes(gap, np.array([0.0, 2.0]) * engine.most**0.5, 0.0)  # than was measured
+    assert _counted(engine, (rubs, spring), far)[1] < gap[0]
+    slight = Sizes(np.array([0.2, 9.0]) * engine.structural, far.moved, 0.0)
+    assert _counted(engine, (rubs, spring), slight)[1] < slight.gap[0]
+    bent = part("joint_nonlinear_stiffness", [0])
+    assert _counted(engine, (bent, spring), sizes) is gap  # a curve has its line from the spring
+    toe, knee = part("contact_seating", [0]), part("joint_yield", [1])
+    assert _counted(engine, (toe, knee), sizes) is sizes.moved
+    arm = replace_bench(engine, replace(engine.bench, data=replace(engine.bench.data, arm=True)))
+    assert _counted(arm, (rubs, spring), sizes) is gap
+
+
+def test_the_main_cause_of_two_is_shared_by_what_they_do() -> None:
+    two = (part("joint_yield", [0]), part("thermal_drift", [1]))
+    alike = said(two, (2e-5, 1e-5))
+    assert _main(alike, True) == pytest.approx({"joint_yield": 8 / 9, "thermal_drift": 1 / 9})
+    assert _main(alike, False) == {"joint_yield": 1.0}
+    assert _main(said(two, (0.0, 0.0)), True)["joint_yield"] == 1.0
+    assert _main(said((), ()), True) == {"none": 1.0}
+
+
+def test_what_explains_far_less_inherits_nothing_unless_it_fits_closely() -> None:
+    both = (part("thermal_drift", [0]), part("joint_yield", [1]))
+    failed = said(both, (2e-5, 1e-5), 0.0)
+    for weight, eta, heir in ((-10.0, 9e-6, "thermal_drift"), (-90.0, 9e-6, "unknown"),
+                              (-90.0, 3e-6, "thermal_drift")):  # fmt: skip
+        alone = said(both[:1], (2e-5,), weight, eta)
+        assert _heir(failed, [failed, alone], {failed.words: 0.0}, 2e-6) == heir
+
+
+def test_two_frictions_without_readings_are_apart_in_different_directions() -> None:
+    bench = hanging(UP, poses=(1.0, 1.0))
+    setups = tuple(replace(s, direction=d) for s, d in zip(bench.data.setups, "xy", strict=True))
+    bench = make_bench(replace(bench.data, setups=setups))
+    only = [(bench.rows.setup == s) * 1e-5 * bench.load for s in (0, 1)]
+    for column in (*only, only[0] + only[1]):
+        bench.add(bench.stacked(column))
+    engine = small_engine_of(bench)
+    yields, slips = part("joint_yield", [0], joint=0), part("base_slip", [1], axis="z")
+    assert _apart(engine, yields, slips)
+    assert not _apart(engine, yields, part("base_slip", [2], axis="z"))
+
+
+def test_springs_far_off_stand_on_their_own_beside_a_mechanism() -> None:
+    springs, rubs = part("joint_stiffness_error", [0]), part("joint_hysteresis", [1])
+    far = Sizes(np.zeros(2), np.array([12e-5, 1e-5]), 0.0)
+    near = Sizes(np.zeros(2), np.array([3e-5, 1e-5]), 0.0)
+    assert _on_its_own((springs, rubs), far, 0, 1)
+    assert not _on_its_own((springs, rubs), near, 0, 1)
+    assert not _on_its_own((part("joint_yield", [0]), rubs), far, 0, 1)
+    curves = [part("joint_nonlinear_stiffness", [1], kinds=k) for k in (("line", 0.5), ("even",))]
+    assert [_on_its_own((springs, curve), far, 0, 1) for curve in curves] == [False, True]
+
+
+def test_a_mean_of_evidence_leaves_out_what_weighs_nothing() -> None:
+    assert log_mean([0.0, -2000.0], [0.0, 1.0]) == pytest.approx(-2000.0)
+    assert log_mean([-1.0, -1.0]) == pytest.approx(-1.0)
+
+
+def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
+    bench = small_bench()
+    variants = library(bench, ["joint_creep", "joint_hysteresis"])
+    found = search(small_engine_of(bench), variants)
+    three = tuple(part(w, [0]) for w in ("joint_yield", "thermal_drift", "force_drift"))
+    for parts, least, share in ((three, 0.3, 1 - THREE), (three, 0.05, 0.0), (three[:2], 1, 0.0)):
+        sizes = (1e-5, 0.5e-5, 1e-5 * least)[: len(parts)]
+        one = replace(found, explanations=(said(parts, sizes, 0.0),), unknown=-800.0, alone={})
+        doubted = BENCH_DOUBT * share * max(0.0, 2 * share - 1) / 2  # the other half is `none`'s
+        found_out = weighed(one, {}).probabilities["unknown"]
+        assert found_out == pytest.approx(share - doubted)
+    # two of them explain nearly as much: then they are meant, whatever the third does
+    third = said(three, (1e-5, 1e-5, 5e-6), 0.0)
+    for worth, unknown in ((TAKES_THREE - 1, 0.0), (TAKES_THREE + 1, 0.9)):
+        two = said(three[1:], (2e-5, 1e-6), -worth)
+        both = replace(found, explanations=(third, two), unknown=-800.0, alone={})
+        p = weighed(both, {}).probabilities
+        assert p["unknown"] == pytest.approx(unknown, abs=0.1)
+        assert (p["thermal_drift"] > 0.9) == (unknown == 0)
+
+
+def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> None:
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    on_arm = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=True)))
+    gain, link, knee = (part(w, [0]) for w in ("force_scale", "link_flexibility", "joint_yield"))
+    for second, most in ((knee, TAKES_TWO), (link, TAKES_TWO_LINEAR)):
+        for worth in (most - 1, most + 1):
+            pair, one = said((gain, second), (3e-5, 3e-6)), said((second,), (1e-5,), -worth)
+            both = replace(found, explanations=(pair, one), unknown=-800.0, alone={})
+            weights = weighed(replace(both, engine=on_arm), {}).probabilities
+            assert (weights[second.word] > 0.99) == (worth < most)
+            assert weighed(both, {}).probabilities["force_scale"] > 0.9  # of a bench
+            shown = _chosen(replace(both, engine=on_arm), second.word)
+            assert shown is (one if worth < most or most == TAKES_TWO else pair)
+
+
+def test_a_play_and_a_curve_of_one_joint_are_one_trouble() -> None:
+    play, drift = part("joint_backlash", [0], joint=1), part("thermal_drift", [0])
+    for joint, curve in ((1, False), (2, True)):
+        bends = part("joint_nonlinear_stiffness", [0], joint=joint)
+        assert _tells_of_three(said((play, bends, drift), (3e-5, 2e-5, 1e-5))) == curve
+    assert _tells_of_three(said((play, bends, drift, part("zero_shift", [0])), (1e-5,) * 4))
+
+
+def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    yields, drifts, links = (part(w, [0]) for w in ("joint_yield", "thermal_drift", "force_scale"))
+    two, three, other = (
+        said(parts, (1e-5,) * len(parts))
+        for parts in ((yields, drifts), (yields, drifts, links), (yields, links))
+    )
+    found = replace(found, kept={two.words: 0.1, frozenset({"joint_creep"}): 0.9})
+    assert [_held(found, e) for e in (two, three, other)] == [False, False, True]
+
+
+def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    law, noise = (part("joint_creep", [0]),), bench.noise.stated
+    sure = 1 - 0.5 * BENCH_DOUBT  # on a bench; of two that are doubted, half comes back
+    shares = ((noise, False, None), (1.6 * noise, False, None), (3 * noise, False, sure),
+              (noise, True, 1.0))  # fmt: skip
+    for eta, arm, unknown in shares:
+        data = replace(bench.data, arm=arm)
+        engine = replace_bench(found.engine, replace(bench, data=data))
+        one = said(law, (1e-5,), -20.0, eta)
+        whole = replace(found, engine=engine, explanations=(one,), unknown=0.0, alone={})
+        given = weighed(whole, {}).probabilities
+        if unknown is None:
+            odds = np.log(given["joint_creep"] / given["unknown"])
+            assert odds == pytest.approx(EXPLAINED, abs=0.2)
+        else:
+            assert given["unknown"] == pytest.approx(unknown, abs=1e-6)
+    failed = {frozenset({"joint_creep"}): 0.1}
+    whole = replace(found, explanations=(said(law, (1e-5,), -20.0, noise),), unknown=0.0, alone={})
+    assert weighed(whole, failed).probabilities["unknown"] == pytest.approx(sure, abs=1e-6)
+
+
+def test_a_verdict_that_is_nowhere_the_largest_effect_is_shown_where_it_is_likely() -> None:
+    """One of two alike stands beside it in each; which of them it is nobody can tell."""
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    creep, gain, link = (part(w, [0]) for w in ("joint_creep", "force_scale", "link_flexibility"))
+    beside = [said((large, creep), (2e-5, 1e-5), 0.0) for large in (gain, link)]
+    for weight, shown in ((-40.0, beside[0]), (-5.0, None)):
+        alone = said((creep,), (1e-5,), weight)
+        whole = replace(found, explanations=(*beside, alone), kept={})
+        assert _chosen(whole, "joint_creep") is (shown or alone)
+
+
+@pytest.mark.parametrize(("arm", "most"), [(True, DOUBT), (False, BENCH_DOUBT)])
+def test_a_sure_verdict_gives_a_little_away_on_a_bench_more_of_it(arm: bool, most: float) -> None:
+    assert BENCH_DOUBT == 4 * DOUBT
+    bench = small_bench()
+    variants = library(bench, ["joint_creep", "joint_hysteresis"])
+    found = search(small_engine_of(bench), variants)
+    engine = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=arm)))
+    sure = said((part("joint_creep", [0]),), (1e-5,), 0.0)
+    alone = {"joint_creep": 0.0, "joint_hysteresis": 0.0}
+    one = replace(found, engine=engine, explanations=(sure,), unknown=-800.0, alone=alone)
+    given = weighed(one, {}).probabilities
+    # half of it goes to `unknown`, half to all words alike; on a bench that and `none` are of these
+    each = 0.5 * most / (2 if arm else 4)
+    assert given["joint_creep"] == pytest.approx(1 - most + each)
+    assert given["unknown"] == pytest.approx(0.5 * most + (0.0 if arm else each))
+    nothing = replace(sure, parts=(), sizes=())
+    one = replace(found, engine=engine, explanations=(nothing,), unknown=-800.0, alone=alone)
+    none = weighed(one, {}).probabilities["none"]
+    assert none == pytest.approx(1.0 if arm else 1 - most + each)
+
+
+@pytest.mark.parametrize(("arm", "around"), [(True, 4), (False, 6)])
+def test_pairs_are_looked_for_around_the_best_words(
+    arm: bool, around: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a bench around more of them: two words that belong together may look poor alone there."""
+    bench = small_bench()
+    bench = replace(bench, data=replace(bench.data, arm=arm))
+    words = ["joint_creep", "joint_stiffness_error", "force_scale", "time_lag",
+             "displacement_scale", "zero_shift"]  # fmt: skip
+    engine = small_engine(bench)
+    asked: list[int] = []
+
+    def spy(pool: dict[frozenset[str], Explanation], most: int) -> list[Explanation]:
+        asked.append(most)
+        return []
+
+    monkeypatch.setattr("identification.gap.search._seeds", spy)
+    variants = library(bench, words)
+    engine.extend()
+    search(engine, variants)
+    assert asked == [around]
+    ranked = [replace(said((part(w, [0]),), (3e-5,)), log_weight=-float(i), eta=1e-6)
+              for i, w in enumerate(words)]  # fmt: skip
+    monkeypatch.undo()
+    assert _seeds({e.words: e for e in ranked}, 4) == ranked[:4]
+
+
+def test_what_levels_without_an_arm_really_leave_is_looked_up() -> None:
+    """The grid of imperfections says that too much is left; the rows say that nothing is."""
+    bench = small_bench()
+    bench.add(bench.stacked(1e-4 * (bench.load / np.ptp(bench.load)) ** 2))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    engine = Engine(bench, base, target + bench.columns[0], np.array([0.0, 3e-6]))
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    poor = replace(said((part("joint_creep", [0]),), (3e-5,)), log_good=-30.0)
+    other = replace(said((part("zero_shift", [0]),), (3e-5,), -50.0), log_good=-80.0)
+    one = replace(found, engine=engine, explanations=(poor, other), unknown=-800.0)
+    first, second = looked_up(one).explanations
+    assert first.log_good > -0.1
+    assert second is other  # so far down nobody looks
+
+
+def test_an_arm_s_explanation_that_leaves_much_of_the_gap_in_the_rows_is_none() -> None:
+    """Whatever the levels say; nor are those with fewer of its effects, however far down."""
+    bench = small_bench()
+    bench.add(bench.stacked(1e-4 * (bench.load / np.ptp(bench.load)) ** 2))
+    bench = replace(bench, data=replace(bench.data, arm=True))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    bumps = bench.stacked(1e-4 * np.sin(bench.load / 4.0))
+    column, one = bench.columns[0], part("joint_creep", [0])
+    two = said((one, part("contact_seating", [0])), (3e-5, 1e-5))
+    few, other = said((one,), (3e-5,), -60.0), said((part("zero_shift", [0]),), (3e-5,), -60.0)
+    poor = replace(two, log_good=-30.0)
+    variants = library(bench, ["joint_creep"])
+    searched = search(small_engine_of(bench), variants)
+    for left, kept in ((0.0, True), (1.0, False)):
+        engine = Engine(bench, base, target + column + left * bumps, np.array([0.0, 3e-6]))
+        found = replace(searched, engine=engine, unknown=-800.0)
+        out = looked_up(replace(found, explanations=(two, few, other))).explanations
+        assert [e.good for e in out] == [kept, kept, True]
+        assert out[2] is other  # so far down nobody looks
+        seen = looked_up(replace(found, explanations=(poor,))).explanations[0]
+        assert seen.good is kept  # whatever the levels said
+    left = 0.12 * bumps
+    engine = Engine(bench, base, target + column + left, np.array([0.0, 3e-6]))
+    found = replace(searched, engine=engine, unknown=-800.0)
+    out = looked_up(replace(found, explanations=(two, few))).explanations
+    assert [e.good for e in out] == [False, True]  # two words have to explain better than one
+
+
+def test_explanations_that_matter_are_taken_between_the_levels(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    engine, asked, more = (
+        small_engine(small_bench()),
+        [],
+        {"joint_creep": -10.0, "joint_yield": 1.0},
+    )
+
+    def gains(_: Engine, parts: tuple[Part, ...], __: float) -> float:
+        asked.append(parts[0].word)
+        return more[parts[0].word]
+
+    monkeypatch.setattr("identification.gap.search.gained", gains)
+    words = ("joint_creep", "joint_yield", "joint_hysteresis")
+    ranked = [said((part(w, [0]),), (1e-6,), g) for w, g in zip(words, (0, -4, -50), strict=True)]
+    found = _sharpened(engine, [*ranked, said((), (), -60.0)])
+    assert [e.log_weight for e in found] == [-3.0, -10.0, -50.0, -60.0]
+    assert [e.log_good for e in found] == [-3.0, -10.0, -50.0, -60.0]
+    assert asked == ["joint_creep", "joint_yield"]  # what is hopeless is left as it is
+    more = {"joint_creep": 20.0, "joint_yield": 26.0}  # the first one's gain shuts out nobody
+    found = _sharpened(engine, [*ranked, said((), (), -60.0)])
+    assert [e.log_weight for e in found] == [22.0, 20.0, -50.0, -60.0]
+
+
+def test_another_effect_is_looked_for_at_sizes_that_the_first_one_may_have() -> None:
+    """No law meets a rig to the noise of these data, however well it fits: what is weighed beside
+    it must not be held to less imperfection than it has itself."""
+    bench = small_bench()
+    v = library(bench, ["joint_creep"])[0]
+    effect = bench.columns[v.columns[0]]
+    target = bench.observed - prediction(bench) + 5e-4 * effect / np.abs(effect).max()
+    e = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 2.5e-6, 6e-6, 1.5e-5]))
+    law = (Part(v, 0.6),)
+    assert int(log_joints(e, law).argmax()) == 0
+    levels, _ = up_to_likeliest(e, law)
+    assert [lv.eta for lv in levels] == [0.0, 1e-6]
