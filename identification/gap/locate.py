@@ -9,6 +9,7 @@ import numpy as np
 from identification.gap.data import BRANCH_NAMES, Array, Flags, Ints
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit
+from identification.gap.variants import Variant
 from identification.gap.words import INSTRUMENTS, LINEAR
 
 _SHOWS = 0.15  # an effect shows where it reaches this share of its largest part
@@ -99,6 +100,12 @@ def _joints(engine: Engine, fit: Fit) -> tuple[int, ...]:
             out.append(int(p.variant.info["joint"]) + 1)
         elif "joints" in p.variant.info and p.word == "joint_stiffness_error":
             w, cov = fit.of(i)
-            clear = np.abs(w) > 3 * np.sqrt(np.diag(cov))
-            out += [j + 1 for j, c in zip(p.variant.info["joints"], clear, strict=True) if c]
+            part = np.abs(w) * np.linalg.norm(_moved(engine, p.variant), axis=0)
+            shows = (np.abs(w) > 2 * np.sqrt(np.diag(cov))) & (part >= _SHOWS * part.max())
+            out += [j + 1 for j, s in zip(p.variant.info["joints"], shows, strict=True) if s]
     return tuple(dict.fromkeys(out))
+
+
+def _moved(engine: Engine, variant: Variant) -> Array:
+    """(n, k) what unit coefficients do to the response, without the datum of each setup."""
+    return engine.bench.rows.moved(engine.responses(variant.columns))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from identification.gap.bench import Bench, make_bench
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence import Engine
+from identification.gap.locate import _joints
 from identification.gap.parts import Part, Sizes, _beyond_springs
 from identification.gap.penalties import straight, trifle, within_stated
 from identification.gap.pool import Pool
@@ -157,3 +159,16 @@ def test_at_rest_no_mechanism_far_below_the_noise_is_named(bench: Bench) -> None
     assert charge(["joint_hysteresis"], [0.25]) == 0.0
     assert charge(["link_flexibility", "joint_hysteresis"], [9.0, 0.1]) > 40
     assert charge(["link_flexibility", "force_drift"], [0.01, 0.01]) == 0.0
+
+
+def test_of_many_wrong_springs_those_that_show_are_where_the_gap_lies(bench: Bench) -> None:
+    fresh, variants = of(bench, "joint_stiffness_error")
+    target = fresh.observed - prediction(fresh)
+    engine = Engine(fresh, base_columns(fresh), target, np.array([0.0, 3e-6]))
+    v = variants["all joints"]
+    size = np.linalg.norm(fresh.rows.moved(engine.responses(v.columns)), axis=0)
+    w = np.array([1.0, 0.3, 0.1, 0.3, 0.0])[: len(size)] / size
+    sd = np.array([0.1, 0.1, 0.01, 0.2, 1.0])[: len(size)] / size
+    fit = SimpleNamespace(parts=(Part(v, 1.0),), of=lambda i: (w, np.diag(sd**2)))
+    # the third is clear but small, the fourth may be none
+    assert _joints(engine, fit) == tuple(j + 1 for j in v.info["joints"][:2])

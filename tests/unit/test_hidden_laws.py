@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.worlds.hidden.effect import rounded
+from rig.worlds.hidden.effect import rounded, share_of_joints
 from rig.worlds.hidden.gap import rms, structural_gap
-from rig.worlds.hidden.scene import Scene
+from rig.worlds.hidden.label import _joints
+from rig.worlds.hidden.scene import Change, Scene
 from rig.worlds.hidden.words import EFFECTS
 from tests.unit.hidden_scenes import FORM_NAMES, contribution, effect_of, middle, scene_of
 
@@ -289,3 +290,14 @@ def test_all_words_have_laws_and_most_have_foreign_ones() -> None:
         if word != "joint_stiffness_error":
             assert any(not f.fitted for f in FORMS[word])
     assert len(FORMS["unknown"]) >= 8
+
+
+def test_joints_of_the_answers_are_those_that_bear_a_load(scene: Scene) -> None:
+    """All six springs are wrong alike; joint 6 turns about the tool's axis, and is pushed there."""
+    part = share_of_joints(scene)
+    change = Change(springs=np.full(6, 0.5))
+    shown = _joints(scene, range(1, 7), change)
+    assert 6 not in shown
+    assert int(np.argmax(part)) + 1 in shown
+    only = Change(springs=np.where(np.arange(6) == int(np.argmax(part)), 0.5, 1.0))
+    assert _joints(scene, range(1, 7), only) == [int(np.argmax(part)) + 1]

@@ -11,7 +11,7 @@ from rig.worlds.arm import Array
 from rig.worlds.hidden.effect import Effect, rounded
 from rig.worlds.hidden.gap import along, displacement, rms, structural_gap, tared
 from rig.worlds.hidden.rivals import NO_CASE, accepted, left_over
-from rig.worlds.hidden.scene import BRANCHES, Scene, observe
+from rig.worlds.hidden.scene import BRANCHES, Change, Scene, observe
 from rig.worlds.hidden.words import IN_JOINTS, OUTSIDE_JOINTS
 
 _SHOWS = 0.15  # of the largest: from here on an effect counts as showing somewhere
@@ -94,6 +94,7 @@ def _where(scene: Scene, effects: Sequence[tuple[Effect, float]], gap_mm: Array)
     pose = np.array([s.pose for s in plan.setups])[setup]
     branch = np.array(BRANCHES)[history.branch]
     shows = part > _SHOWS * part.max()
+    shown = [_joints(scene, e.joints, c) for (e, _), c in zip(effects, changes, strict=True)]
     return {
         "directions": _places(direction, part),
         "main_direction": max(
@@ -101,7 +102,7 @@ def _where(scene: Scene, effects: Sequence[tuple[Effect, float]], gap_mm: Array)
         ),
         "poses": _places(pose, part),
         "branches": [b for b in BRANCHES if bool(np.any(shows & (branch == b)))],
-        "joints": sorted({j for effect, _ in effects for j in effect.joints}),
+        "joints": sorted(set().union(*shown)),
         "force_N": {
             d: rounded(
                 [force[shows & (direction == d)].min(), force[shows & (direction == d)].max()]
@@ -112,6 +113,17 @@ def _where(scene: Scene, effects: Sequence[tuple[Effect, float]], gap_mm: Array)
         "onset_N": _onset(effects),
         "seen_by_encoders": _seen(scene, [effect.word for effect, _ in effects]),
     }
+
+
+def _joints(scene: Scene, among: Sequence[int], change: Change) -> list[int]:
+    """Joints (from 1) in which an effect shows: of six wrong springs some bear no load."""
+    setup = scene.history.setup
+    softer = 0.0 if change.springs is None else 1 / change.springs - 1
+    turned = softer * scene.torque / scene.plan.springs
+    turned = turned if change.joints is None else turned + change.joints
+    along = np.einsum("sij,sj->si", scene.levers, scene.unit)[setup]
+    size = np.sqrt(np.mean((along * turned) ** 2, axis=0))
+    return [j for j in among if size[j - 1] > _SHOWS * size.max()]
 
 
 def _never_zero(load: Array) -> Array:
