@@ -18,6 +18,7 @@ from rig.storage.columns import SAMPLE_NUMBER
 
 MM = 1e-3
 _WIDE_STEP_RAD = 1e-3  # of second derivatives
+_STANDS = 0.5  # share of the samples of a run at which its clock stands still
 _STEP_RAD = 1e-5  # central differences of levers: error below 1e-9
 
 
@@ -43,12 +44,17 @@ def gap_data(dataset: Dataset) -> GapData:
     setups = tuple(_setup(dataset, arm, pose, name) for pose, name in keys)
     compliance, relative = _springs(dataset)
     meter = meta.instruments
+    run, session = (
+        _runs(setup, columns["repetition"].astype(np.int64)),
+        _optional(columns, ["session_s"], 1),
+    )
+    time, notes = _clock(np.nan_to_num(columns["time_s"].astype(float)), session, run)
     return GapData(
         arm=arm is not None,
         setups=setups,
-        time=np.nan_to_num(columns["time_s"].astype(float)),
-        session=_optional(columns, ["session_s"], 1),
-        run=_runs(setup, columns["repetition"].astype(np.int64)),
+        time=time,
+        session=session,
+        run=run,
         setup=setup,
         repetition=columns["repetition"].astype(np.int64),
         branch=np.array([BRANCH_NAMES.index(str(b)) for b in columns["branch"]], dtype=np.int64),
@@ -71,6 +77,26 @@ def gap_data(dataset: Dataset) -> GapData:
         tare=meta.tare,
         imposed=meta.imposed,
         timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
+        notes=notes,
+    )
+
+
+def _clock(time: Array, session: Array | None, run: Ints) -> tuple[Array, tuple[str, ...]]:
+    """Seconds since the start of each run; by the session's clock where that of a run stands while
+    this goes on, with a note."""
+    if session is None:
+        return time, ()
+    out, stood = time.copy(), 0
+    for r in range(int(run[-1]) + 1):
+        mine = run == r
+        goes, stands = np.diff(session[mine]) > 0, np.diff(time[mine]) == 0
+        if np.sum(stands & goes) > _STANDS * max(len(goes), 1):
+            out[mine] = session[mine] - session[mine][0]
+            stood += 1
+    if not stood:
+        return time, ()
+    return out, (
+        f"time_s stands still in {stood} of {int(run[-1]) + 1} runs: taken from session_s there.",
     )
 
 

@@ -74,11 +74,14 @@ def bursts(data: GapData) -> bool:
     within = np.arange(len(hold)) - starts[hold]
     settled = np.maximum(_SETTLED, np.bincount(hold)[hold] // 2)
     late = (hold[2:] == hold[:-2]) & (within >= settled)[1:-1]
-    u, t = data.displacement, data.time
+    t = data.time
     share = np.clip((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-300), 0.0, 1.0)
-    away = (u[1:-1] - u[:-2] - share * (u[2:] - u[:-2]))[late]
+    away, pushed = (
+        (v[1:-1] - v[:-2] - share * (v[2:] - v[:-2]))[late] for v in (data.displacement, data.force)
+    )
     if away.size < _FEWEST_STEPS:
         return False
+    away = away - pushed * float(pushed @ away) / max(float(pushed @ pushed), 1e-300)
     usual = max(1.4826 * float(np.median(np.abs(away))), data.instruments.displacement)
     far = np.abs(away) > _BEYOND * usual
     came = np.diff(data.force[starts], prepend=0.0)[hold][1:-1][late]

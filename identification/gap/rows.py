@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from identification.gap.data import ZERO, Array, Flags, GapData, Ints
+from identification.gap.data import CYCLE, ZERO, Array, Flags, GapData, Ints
 
 _ROWS_PER_PASS, _MOST_ROWS = 80, 4000  # memory needs the turning points of every cycle
 CONTINUOUS_ROWS = 500  # bins of a continuous recording; more tells no effect from another
@@ -137,12 +137,12 @@ def reduce_rows(data: GapData) -> Rows:
 
     run, setup, branch, step = map(first, (data.run, data.setup, data.branch, data.step))
     force = mean(data.force)
+    holds = _blocks(run) if continuous else _consecutive(hold[edges])
     level = (
         _continuous_levels(setup, force)
         if continuous
-        else _ids(np.column_stack([setup, branch, step]))
+        else _ids(np.column_stack([setup, branch, step, *_approach(run, branch, holds, force)]))
     )
-    holds = _blocks(run) if continuous else _consecutive(hold[edges])
     zero = (branch == ZERO) & (step <= 0)
     weight = count.astype(float)
     stated = data.instruments.force
@@ -217,9 +217,12 @@ def _steady(hold: Ints, force: Array, weight: Array, sd: float) -> tuple[Flags, 
 
 
 def hold_ids(data: GapData) -> Ints:
-    """(n,) number of the hold of every sample: same run, branch and step, without a pause."""
+    """(n,) number of the hold of every sample: same run, branch and step, without a pause, and on
+    one side of no load: steps of the same size to and fro may bear the same number."""
     keys = np.column_stack([data.run, data.branch, data.step])
     new = np.any(np.diff(keys, axis=0) != 0, axis=1)
+    side = np.where(data.step >= 0, _side(data.force), 0.0)
+    new |= side[1:] * side[:-1] < 0
     return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
 
 
@@ -344,6 +347,24 @@ def _continuous_levels(setup: Ints, force: Array) -> Ints:
     span = np.ptp(force) or 1.0
     number = np.minimum((force - force.min()) / span * _LEVELS, _LEVELS - 1).astype(np.int64)
     return _ids(np.column_stack([setup, rising.astype(np.int64), number]))
+
+
+_SIDE = 0.05  # of the largest force: less is no load
+
+
+def _side(force: Array) -> Array:
+    """Sign of forces (n,), 0 of what is no load."""
+    return np.where(np.abs(force) > _SIDE * np.abs(force).max(initial=0.0), np.sign(force), 0.0)
+
+
+def _approach(run: Ints, branch: Ints, hold: Ints, force: Array) -> tuple[Ints, Ints]:
+    """(n,), (n,): to which side the force of a hold pushes, and, of a cycle, which way it came
+    there: one number may stand for steps of the same size to and fro."""
+    mean = np.bincount(hold, weights=force) / np.bincount(hold)
+    first = np.flatnonzero(_changes(hold))
+    came = np.where(_changes(run[first]), 0.0, np.sign(np.diff(mean, prepend=0.0)))
+    way = np.where(branch[first] == CYCLE, came, 0.0)
+    return _side(mean)[hold].astype(np.int64), way[hold].astype(np.int64)
 
 
 def _session(data: GapData) -> Array:
