@@ -10,7 +10,7 @@ from identification.gap.compare import imperfect, mean_squares
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.factor import factor_of
-from identification.gap.signs import Limits, log_odds
+from identification.gap.signs import Limits, all_kept, log_odds
 from identification.gap.variants import Variant
 from identification.gap.words import LINEAR
 
@@ -104,6 +104,7 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
     roots = np.linalg.solve(factor, root.T)  # of the covariance
     w = roots.T @ np.linalg.solve(factor, root.T @ level.moment[columns])
     out, start = 0.0, 0
+    asked: list[tuple[Array, Array]] = []
     for p in parts:
         s = slice(start, start + len(p.variant.columns))
         start = s.stop
@@ -111,9 +112,10 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
             limits = _limits(level.engine, p.variant)
             before = np.linalg.norm(limits.rows[:, 0] @ p.root, axis=1)
             rows = limits.rows
-            odds = log_odds(limits, _ONE, before, rows @ w[s], rows @ roots[:, s].T)
-            out += min(0.0, float(odds[0]))
-    return out
+            sums, spread = rows @ w[s], rows @ roots[:, s].T
+            out += min(0.0, float(log_odds(limits, _ONE, before, sums, spread)[0]))
+            asked.append((sums[0] - limits.least[0] * (np.arange(len(sums[0])) == 0), spread[0]))
+    return min(out, all_kept(asked)) if len(asked) > 1 else out
 
 
 _ONE = np.zeros(1, dtype=np.intp)

@@ -21,6 +21,7 @@ from identification.gap.data import Array, Flags, Ints
 from identification.gap.variants import Variant
 
 _TINY = 1e-300
+_WRONG = 1.0  # standard deviations
 _NEAR = 1 - 1e-9  # as correlated as two may be
 
 
@@ -96,7 +97,31 @@ def log_odds(limits: Limits, which: Ints, before: Array, sums: Array, roots: Arr
         apart = np.where(asked[far, 1:], _distance(*more, *first, common), 0.0).max(axis=1)
         bound = np.where(apart > 0, log_ndtr(-apart) - share[far], np.inf)
         out[far] = np.minimum(out[far], bound)
+        for i in far[np.sum(z[far] < -_WRONG, axis=1) > 1]:
+            out[i] = min(out[i], all_kept([(centre[i, asked[i]], roots[i, asked[i]])]))
     return np.asarray(out)
+
+
+def all_kept(limits: Sequence[tuple[Array, Array]]) -> float:
+    """log of the largest share that several limits may have together, over the least that they had
+    in the prior, where all were independent: sums (m,) to be positive, and their roots (m, r)."""
+    from scipy.special import log_ndtr
+
+    sums, roots = (np.concatenate(each) for each in zip(*limits, strict=True))
+    size = np.linalg.norm(roots, axis=1) + _TINY
+    return float(log_ndtr(-distance(sums / size, roots / size[:, None])) + len(sums) * np.log(2))
+
+
+def distance(z: Array, unit: Array) -> float:
+    """Mahalanobis distance of a mean from where all its sums are positive: sums z (m,) in standard
+    deviations, with roots unit (m, r) of their correlations. The least-distance problem of Lawson
+    and Hanson (Solving Least Squares Problems, 1974, chapter 23)."""
+    from scipy.optimize import nnls
+
+    E = np.vstack([unit.T, -z])
+    f = np.append(np.zeros(unit.shape[1]), 1.0)
+    left = E @ nnls(E, f)[0] - f
+    return float(np.linalg.norm(left[:-1]) / max(-left[-1], _TINY))
 
 
 def _distance(a: Array, aa: Array, b: Array, bb: Array, ab: Array) -> Array:
