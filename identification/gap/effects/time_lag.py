@@ -53,10 +53,7 @@ _STEPS = np.array([-3, -2, -1, 0, 1, 2, 3])
 
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
-    """Lags of the same channel about one that was found; in a running recording the grid will do,
-    whose loops any lag might be. close: share of the steps."""
-    if bench.rows.continuous:
-        return []
+    """Lags of the same channel about one that was found. close: share of the steps."""
     out, longest = [], float(found.info["lag_s"]) / sampling_time(bench.rows)
     for step in _STEPS:
         multiple = longest * _STEP ** (close * step)
