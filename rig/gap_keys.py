@@ -53,6 +53,7 @@ CONSTANTS: dict[str, Key] = {
     "crossing": Key("crossing", "text", options=("weight", "load")),
     "kind": Key("kind", "text", options=joint_backlash.KINDS),
     "tool": Key("tool_kg"),
+    "preload": Key("preload_Nm"),
     "way": Key("kind", "text", options=(*time_lag.KINDS, "window")),
     "measured_to": Key("measured_to_Nm", "positive"),
     "channel": Key("channel", "text", options=("displacement", "force")),
@@ -163,7 +164,7 @@ GRAMMAR: dict[str, Grammar] = {
         (("compliance", ("strength",)), ("compliance", ("reach",)), ("compliance", ())),
     ),
     "joint_backlash": Grammar(
-        ("joint", "zone", "crossing", "kind", "tool"),
+        ("joint", "zone", "crossing", "kind", "tool", "preload"),
         (
             ("width", ()),
             ("rub", ()),

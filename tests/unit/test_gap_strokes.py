@@ -153,11 +153,20 @@ def test_the_search_closes_in_on_a_lag_between_those_of_the_grid(
     assert best.log_evidence > max(s.log_evidence for s in first) + gained
 
 
-def test_loops_of_a_running_recording_are_no_reason_to_look_closer_at_lags() -> None:
-    load = 100 * np.sin(np.arange(300) / 15)
-    bench = make_bench(running(load, load / SPRING))
-    found = library(bench, ["time_lag"])[0]
-    assert time_lag.refined(bench, found) == []
+def test_lags_of_a_running_recording_are_closed_in_on() -> None:
+    """A camera 2.35 samples late: between two lags of the grid."""
+    at, true = np.arange(400.0), 2.35
+    force, shown = (50 - 50 * np.cos(np.maximum(at - 9 - d, 0) / 15) for d in (0.0, true))
+    bench = make_bench(running(force, shown / SPRING, imposed="force"))
+    target = bench.observed - prediction(bench)
+    variants = library(bench, ["time_lag"])
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-7, 5e-7, 2e-6]))
+    first = score(engine, engine.levels, variants)
+    finer = refine(engine, first)
+    engine.extend()
+    best = max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence)
+    assert best.variant.info["lag_s"] == pytest.approx(true * bench.rows.time[1], rel=0.02)
+    assert best.log_evidence > max(s.log_evidence for s in first)
 
 
 def test_flanks_that_approach_slowly_are_a_shape_of_a_play() -> None:

@@ -175,9 +175,34 @@ def test_a_threshold_is_the_net_torque_and_knows_no_more_of_it_than_of_the_tool(
 def test_plays_cross_where_some_tool_balances_the_weights() -> None:
     bench = hanging(UP)
     found = [v for v in library(bench, ["joint_backlash"]) if v.info["crossing"] == "weight"]
-    assert {v.info["tool_kg"] for v in found} == set(TOOLS_KG)
-    too_heavy = hanging(UP, gravity=-300.0)
-    assert not [v for v in library(too_heavy, ["joint_backlash"]) if v.info["crossing"] == "weight"]
+    assert {v.info["tool_kg"] for v in found if not v.info["preload_Nm"]} == set(TOOLS_KG)
+    too_heavy = library(hanging(UP, gravity=-300.0), ["joint_backlash"])
+    assert all(v.info["preload_Nm"] for v in too_heavy if v.info["crossing"] == "weight")
+
+
+def test_a_preload_puts_the_crossing_where_no_tool_does() -> None:
+    bench = hanging(UP)
+    x, per_kg = bench.true_torque[:, 0] + bench.weight(0), bench.weight_per_kg(0)
+    preloads = {v.info["preload_Nm"] for v in library(bench, ["joint_backlash"])} - {0.0}
+    assert preloads
+    assert all(x.min() < -p < x.max() for p in preloads)  # a load overcomes it
+    assert min(map(abs, preloads)) >= 1.5 * np.abs(per_kg).min()  # a tool is off by so much
+
+
+def test_a_preload_is_found_to_a_percent() -> None:
+    bench = hanging(
+        np.concatenate([np.arange(0, 80.5, 0.5), np.arange(80, -0.5, -0.5)]), gravity=-5.0
+    )
+    x = bench.true_torque[:, 0] + bench.weight(0) - 22.3
+    play = bench.joint_column(0, 4e-4 * joint_backlash._shapes(bench, x, 1.0)["free"][0])
+    variants = library(bench, ["joint_backlash"])
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    engine = Engine(bench, base, target + play, np.array([0.0, 1e-7, 2.5e-7]))
+    finer = refine(engine, score(engine, engine.levels, variants))
+    engine.extend()
+    best = max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence).variant.info
+    assert best["preload_Nm"] == pytest.approx(-22.3, rel=0.01)
+    assert best["zone_Nm"] == pytest.approx(1.0, rel=0.1)
 
 
 def test_a_joint_lies_in_its_play_where_the_push_before_left_it() -> None:

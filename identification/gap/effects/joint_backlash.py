@@ -9,7 +9,8 @@ of the zone's strength rides along.
 Without torque the joint lies anywhere in its play, a free place per setup at its first zero load
 and at later ones, or where the rubbing, or the push before, left it: it is sent to where its
 reading is as commanded, another zero of that reading in every pose. The tool's mass is not known:
-the torque at which the weights are balanced is sought among masses of 0 to 3 kg.
+the torque at which the weights are balanced is sought among masses of 0 to 3 kg. Hoses and cables
+may preload a joint besides, by any torque that a load overcomes.
 Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
 force: such plays are placed by the data (flanks.py), with the springs that they bring.
 
@@ -20,6 +21,7 @@ Source: lost motion in catalogues of strain wave gears.
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -40,11 +42,15 @@ PLACED = ("gap", "held", "dragged")
 _REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow")
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
+_PRELOADS = 8  # over the range of the net torque
+_PRELOAD_PRIOR = 0.25  # of all together, against the weights alone
 CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
 _FINE_PRIOR = 8.0  # of all finer shapes together, however often it is looked closer
 _CLOSER = 0.6  # power of the share: zones need not be known as well as masses
 _TOOL_STEPS_KG = np.linspace(-0.7, 0.7, 9)
+_PRELOAD_STEPS = np.linspace(-0.6, 0.6, 9)  # of the steps between preloads
 ZONES = (0.004, 0.012, 0.03, 0.07)  # of the joint's range of torque
+_PRELOADED = (("free", "friction"), (0.012, 0.05))  # kinds and zones at first
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 _VISITED = 0.45  # of the play from an end: nearer than the middle
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
@@ -69,9 +75,10 @@ def variants(bench: Bench) -> list[Variant]:
         for name, kg, x, share in _crossings(bench, j, span):
             for zone in ZONES:
                 info: dict[str, Any] = {"joint": j, "zone_Nm": zone * span, "crossing": name,
-                                        "tool_kg": kg}  # fmt: skip
+                                        "tool_kg": kg, "preload_Nm": 0.0}  # fmt: skip
                 label = f"joint {j + 1} {name}" + (f" tool {kg:g} kg" if share < 1 else "")
                 out += _zone(bench, x, kinds, label, f"{zone:g}", share, info, places)
+        out += _preloaded(bench, j, span, places) if bench.data.arm else []
         if not bench.data.arm and bench.rows.continuous:
             flanks = placed(bench, torque)
             out += [] if flanks is None else _placed(bench, j, flanks)
@@ -93,11 +100,29 @@ def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Arra
     return out
 
 
-def net(bench: Bench, j: int, crossing: str, kg: float) -> Array:
+def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]) -> list[Variant]:
+    """Crossings wherever a preload may put them, and no tool does."""
+    plain, kinds, zones = net(bench, j, "weight", TOOL_KG), *_PRELOADED
+    by_tool = float(np.abs(bench.weight_per_kg(j)).min()) * (max(TOOLS_KG) - TOOL_KG)
+    low, high = float(plain.min()), float(plain.max())
+    step, out = (high - low) / _PRELOADS, list[Variant]()
+    for preload in -(low + (np.arange(_PRELOADS) + 0.5) * step):
+        if abs(preload) < by_tool:
+            continue
+        for zone in zones:
+            info = {"joint": j, "zone_Nm": zone * span, "crossing": "weight", "tool_kg": TOOL_KG,
+                    "preload_Nm": float(preload), "step_Nm": step}  # fmt: skip
+            label = f"joint {j + 1} preload {preload:.3g} Nm"
+            share = _PRELOAD_PRIOR / _PRELOADS
+            out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
+    return out
+
+
+def net(bench: Bench, j: int, crossing: str, kg: float, preload: float = 0.0) -> Array:
     """(n,) Nm whose zero the play is passed at: of the load, or with the weights and a tool of that
-    mass."""
+    mass; with a preload (Nm)."""
     torque = bench.true_torque[:, j]
-    return torque + bench.weight(j, kg) if crossing == "weight" else torque
+    return preload + (torque + bench.weight(j, kg) if crossing == "weight" else torque)
 
 
 def unreached(bench: Bench, variant: Variant) -> float:
@@ -106,7 +131,8 @@ def unreached(bench: Bench, variant: Variant) -> float:
     info = variant.info
     if info["kind"] in PLACED:
         return 0.0
-    x = net(bench, int(info["joint"]), str(info["crossing"]), float(info["tool_kg"]))
+    x = net(bench, int(info["joint"]), str(info["crossing"]), float(info["tool_kg"]),
+            float(info["preload_Nm"]))  # fmt: skip
     place = _shapes(bench, x, float(info["zone_Nm"]))[info["kind"]][0]
     left = [0.5 - float(place.max()), 0.5 + float(place.min())]
     return sum(v for v in left if v < _VISITED or info["kind"] in HELD)
@@ -140,10 +166,11 @@ def _finer(
 ) -> list[Variant]:
     """Variants of these kinds about one that was found; zones (k,) Nm: others than about it."""
     info, j = dict(found.info), int(found.info["joint"])
-    torque = bench.true_torque[:, j]
-    weighty = info["crossing"] == "weight" and np.any(bench.weight_per_kg(j))
-    steps = _TOOL_STEPS_KG if weighty else np.zeros(1)
-    masses = float(info["tool_kg"]) + close * steps
+    torque, preload = bench.true_torque[:, j], float(info["preload_Nm"])
+    by_kg = info["crossing"] == "weight" and not preload and np.any(bench.weight_per_kg(j))
+    weighty = bool(by_kg or preload)
+    kg = float(info["tool_kg"]) + close * (_TOOL_STEPS_KG if by_kg else np.zeros(1))
+    Nm = preload + close * (_PRELOAD_STEPS * info["step_Nm"] if preload else np.zeros(1))
     if zones is None:
         ratios = np.array([1 / 1.5, 1.0, 1.5]) if weighty else np.geomspace(1 / 1.5, 1.5, 7)
         zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
@@ -151,14 +178,15 @@ def _finer(
         widest = ZONES[-1] / (_SOFTER if kinds[0] in UNEVEN else 1.0) * bench.reach_of(torque)
         zones = np.unique(np.minimum(zones, widest))
     out: list[Variant] = []
-    share = _FINE_PRIOR / (1 + len(CLOSE)) / (len(masses) * len(zones) * len(kinds))
+    share = _FINE_PRIOR / (1 + len(CLOSE)) / (len(kg) * len(Nm) * len(zones) * len(kinds))
+    share *= _PRELOAD_PRIOR if preload else 1.0
     places: dict[bytes, list[int]] = {}
-    for kg in masses:
-        x = net(bench, j, info["crossing"], kg)
-        for zone in zones:
-            exact = info | {"zone_Nm": float(zone), "tool_kg": float(kg), "closely": True}
-            label = f"joint {j + 1} {info['crossing']} tool {kg:.2f} kg"
-            out += _zone(bench, x, kinds, label, f"{zone:.3g} Nm fine", share, exact, places)
+    for mass, more, zone in product(kg.tolist(), Nm.tolist(), zones.tolist()):
+        x = net(bench, j, info["crossing"], mass, more)
+        exact = info | {"zone_Nm": zone, "tool_kg": mass, "preload_Nm": more, "closely": True}
+        label = f"joint {j + 1} {info['crossing']} tool {mass:.2f} kg"
+        label = f"joint {j + 1} preload {more:.3g} Nm" if preload else label
+        out += _zone(bench, x, kinds, label, f"{zone:.3g} Nm fine", share, exact, places)
     return out
 
 
@@ -170,7 +198,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
     scales = tuple(s * bench.reach for s in _SHARES)
     info: dict[str, Any] = {
         "joint": j, "zone_Nm": flanks.zone, "crossing": "load", "tool_kg": TOOL_KG,
-        "kind": flanks.kind, "flanks": flanks, "span": float(np.ptp(torque)),
+        "preload_Nm": 0.0, "kind": flanks.kind, "flanks": flanks, "span": float(np.ptp(torque)),
     }  # fmt: skip
     root = np.diag([1.0, FRICTION, 1.0])
     return [

@@ -9,6 +9,8 @@ runs. w in units of the joint's elastic compliance: 1/w is the ratio of hardenin
 
 Size: slope beyond the knee 0.3 to 100 times the joint's compliance; thresholds anywhere in the
 range of load.
+A specimen may soften for a while beyond its knee (polymers, Lueders): it is never stiffer than at
+first, that is all.
 Prior: sum of coefficients positive, sd out of SCALES, equally likely; rounded, lasting and flowing
 forms weighted as below.
 Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manuals (thresholds).
@@ -136,7 +138,8 @@ def _knees(
             place = [*inside, *extra]
             kept = [*inside.values(), *[_HARDENS] * len(extra)]
             exact = {**info, "radius": radius[place], "centre": radius[k],
-                     "back": [] if knee == "round" and arm else back, "knee": knee}  # fmt: skip
+                     "back": [] if knee == "round" and arm else back, "knee": knee,
+                     "softens": not arm}  # fmt: skip
             at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
             out += _with_back(word, at, chosen, kept, share / 4, exact)
     return out
@@ -201,14 +204,26 @@ def _with_back(
 ) -> list[Variant]:
     """A knee as it is, and with Bauschinger's effect: once it has yielded, metal flows back early
     when unloaded."""
-    back = info["back"]
-    ones = np.ones(len(columns))
-    plain = variant(word, label, columns, SCALES, np.diag(root), ones, prior, LEAST, True, **info)
-    if not back:
-        return [plain]
-    both, knee = np.diag([*root, *[_RETURNS] * len(back)]), np.append(ones, np.zeros(len(back)))
-    label, every = f"{label}, flows back", [*columns, *back]
-    return [plain, variant(word, label, every, SCALES, both, knee, prior, LEAST, True, **info)]
+    out, back = [], info["back"]
+    for more, name in ([], ""), *([(back, ", flows back")] if back else []):
+        k, n = len(columns), len(columns) + len(more)
+        each, within = _signs(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
+        out.append(
+            variant(word, label + name, [*columns, *more], SCALES,
+                    np.diag([*root, *[_RETURNS] * len(more)]), np.repeat([1.0, 0.0], [k, n - k]),
+                    prior, LEAST, each, within, **info)
+        )  # fmt: skip
+    return out
+
+
+def _signs(radius: Array, n: int) -> tuple[tuple[bool, ...], Array]:
+    """What softens beyond its knee: of n coefficients those of the radii (k,) are positive in sum
+    up to any radius, the further ones each."""
+    k = len(radius)
+    each = (*(False,) * k, *(True,) * (n - k))
+    sums = np.zeros((k, n))
+    sums[:, :k] = radius <= radius[:, None]
+    return each, sums[radius < radius.max()]  # that of all is asked anyway
 
 
 LEAST = 0.15  # of the elastic compliance: what bends less does not give way

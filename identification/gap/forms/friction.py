@@ -70,6 +70,7 @@ def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
         "crossing": str(info["crossing"]),
         "kind": str(info["kind"]),
         "tool": float(info["tool_kg"]),
+        "preload": float(info["preload_Nm"]),
     }
     if info["kind"] in joint_backlash.PLACED:
         flanks = info["flanks"]
@@ -121,7 +122,8 @@ def backlash(bench: Bench, law: Law) -> list[Array]:
 
 def _net(bench: Bench, law: Law) -> Array:
     c = law.constants
-    return joint_backlash.net(bench, c["joint"], c["crossing"], c.get("tool", TOOL_KG))
+    tool, preload = c.get("tool", TOOL_KG), c.get("preload", 0.0)  # a file may lack them
+    return joint_backlash.net(bench, c["joint"], c["crossing"], tool, preload)
 
 
 def _places(bench: Bench, law: Law) -> list[tuple[int, bool]]:
