@@ -46,6 +46,17 @@ def test_what_comes_late_all_the_time_is_no_burst() -> None:
     assert bursts(bench_data(20.0 * level, shaken, step=step, branch=branch))
 
 
+def test_a_hand_that_trembles_is_no_burst() -> None:
+    """What the displacement does the force does as well, now and then."""
+    step = np.repeat(np.arange(40), 10)
+    rng = np.random.default_rng(4)
+    shaken = np.where(rng.random(400) < 0.06, rng.normal(0, 8.0, 400), 0.0)
+    force = 20.0 * step + shaken
+    u = force / SPRING + rng.normal(0, 1e-6, 400)
+    assert not bursts(bench_data(force, u, step=step))
+    assert bursts(bench_data(20.0 * step, u, step=step))  # the laser alone
+
+
 def test_a_line_read_at_odd_times_is_no_burst() -> None:
     steps = np.where(np.arange(200) % 20 == 7, 30.0, 1.0)
     t = np.concatenate([[0.0], np.cumsum(steps)])

@@ -14,7 +14,7 @@ from identification.gap.effects import joint_yield, library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
 from identification.gap.products import White
-from identification.gap.rows import reduce_rows, swing_within
+from identification.gap.rows import hold_ids, reduce_rows, swing_within
 from identification.gap.variants import Variant
 from rig.dataset import load
 from rig.gap_data import gap_data
@@ -99,6 +99,51 @@ def test_one_reading_a_level_in_a_single_pull_shows_no_creep() -> None:
                                   step=np.repeat(np.arange(10), 2) + 1))  # fmt: skip
     assert not twice.course.never_held
     assert library(twice, ["joint_creep"])
+
+
+def test_steps_to_and_fro_of_one_number_are_other_holds_and_levels() -> None:
+    """A cycle by hand: 0, 1, 2, 1, then on through zero to the other side, steps by their size."""
+    force = np.repeat([0.0, 40, 80, 40, -40, -80, -40, 0.0], 3)
+    step = np.repeat([0, 1, 2, 1, 1, 2, 1, 0], 3)
+    data = bench_data(force, force / 1e5, step=step, branch=np.full(24, 3))
+    assert hold_ids(data).tolist() == np.repeat(np.arange(8), 3).tolist()
+    rows = reduce_rows(data)
+    first = rows.level[rows.hold_starts]
+    assert len(set(first[1:7].tolist())) == 6  # coming and going, on both sides
+    twice = np.concatenate([force, force])
+    again = bench_data(twice, twice / 1e5, step=np.tile(step, 2), branch=np.full(48, 3),
+                       run=np.repeat([0, 1], 24), repetition=np.repeat([1, 2], 24))  # fmt: skip
+    rows = reduce_rows(again)
+    first = rows.level[rows.hold_starts]
+    assert first[:8].tolist() == first[8:].tolist()  # and the same in every repetition
+
+
+@pytest.mark.parametrize("branch", [1, 3])
+def test_a_way_there_counts_in_cycles_alone(branch: int) -> None:
+    """What is called loading goes one way, however a hand got there."""
+    force = np.repeat([0.0, 40, 80, 60, 80], 2)
+    step = np.repeat([0, 1, 3, 2, 3], 2)
+    rows = reduce_rows(bench_data(force, force / 1e5, step=step, branch=np.full(10, branch)))
+    first = rows.level[rows.hold_starts]
+    assert first[2] == first[4]
+    assert len(set(first.tolist())) == 4
+
+
+CLOCKS = """time_s,session_s,repetition,branch,step,force_N,displacement_mm
+"""
+
+
+def test_a_run_whose_clock_stands_goes_by_the_session(tmp_path: Path) -> None:
+    rows = [
+        f"{7 * s + k if r == 1 else 21},{100 * r + 7 * s + k},{r},loading,{s},{20 * s},{0.2 * s}"
+        for r in (1, 2) for s in range(4) for k in range(3)
+    ]  # fmt: skip
+    (tmp_path / "t.csv").write_text(CLOCKS + "\n".join(rows) + "\n", encoding="utf-8")
+    (tmp_path / "m.yaml").write_text(META, encoding="utf-8")
+    import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
+    data = gap_data(load(tmp_path / "d.h5"))
+    assert data.time[:12].tolist() == data.time[12:].tolist()
+    assert data.notes == ("time_s stands still in 1 of 2 runs: taken from session_s there.",)
 
 
 def test_levels_on_a_plateau_were_set_by_the_displacement() -> None:

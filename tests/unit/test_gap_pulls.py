@@ -85,6 +85,21 @@ def test_a_polymer_that_softens_beyond_its_knee_and_then_flows_has_yielded() -> 
     assert found.after < 0.1 * found.before
 
 
+@pytest.mark.parametrize("back", [False, True])
+def test_what_is_pulled_once_may_soften_what_comes_back_may_not(back: bool) -> None:
+    u = STROKE * np.linspace(0, 1, 120)
+    u = np.concatenate([u, u[::-1]]) if back else u
+    bench = make_bench(running(voce(u), u, imposed="displacement"))
+    knees = [v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "round"]
+    assert knees
+    for v in knees:
+        k = len(v.columns)
+        assert v.each == (back,) * k
+        softens = np.append(np.ones(k - 1), -0.5)  # a force that falls, and then stays
+        assert np.all(v.within @ softens[np.argsort(np.argsort(v.info["radius"]))] > 0)
+        assert len(v.within) == (0 if back else k - 1)
+
+
 def test_every_word_is_said_in_words() -> None:
     assert set(meanings(arm=True)) == set(meanings(arm=False)) == set(WORDS)
     assert "torque" in meanings(arm=True)["joint_yield"]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from scipy.special import log_ndtr
 
 from bench.dense_model import dense
@@ -18,7 +19,7 @@ from identification.gap.evidence import Engine
 from identification.gap.finer import gained
 from identification.gap.imperfection import least_size, log_share
 from identification.gap.parts import Part, log_joint_between, log_joints, signs_kept
-from identification.gap.signs import Limits, log_odds
+from identification.gap.signs import Limits, all_kept, log_odds
 from identification.gap.variants import Variant, variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 
@@ -83,6 +84,33 @@ def test_every_coefficient_with_the_wrong_sign_is_charged() -> None:
     found = odds(mean, covariance, 9 * np.eye(4), each=True)
     one = log_ndtr(-2.0) - np.log(0.5)
     assert found == pytest.approx(3 * one + np.log(2), abs=0.15)  # log 2: the sum is kept
+
+
+def test_limits_that_two_by_two_are_near_may_be_far_together() -> None:
+    """Data see the sum of three alone: any two can be above zero, all three can't."""
+    ones = np.ones(3) / 3**0.5
+    covariance = np.eye(3) - (1 - 1e-4) * np.outer(ones, ones)
+    mean = np.full(3, -1.2)
+    found = odds(mean, covariance, np.eye(3), each=True, positive=np.array([1.0, 0, 0]))
+    assert found == pytest.approx(log_ndtr(-minimum(mean, covariance)) + 4 * np.log(2))
+    assert found < -1000.0
+
+
+def minimum(mean: Array, covariance: Array) -> float:
+    """Mahalanobis distance of the mean from the positive orthant, by another way."""
+    precision = np.linalg.inv(covariance)
+    best = minimize(lambda w: (w - mean) @ precision @ (w - mean), np.ones(3),
+                    jac=lambda w: 2 * precision @ (w - mean), bounds=[(0, None)] * 3,
+                    options={"ftol": 1e-15, "gtol": 1e-12})  # fmt: skip
+    return float(best.fun**0.5)
+
+
+def test_parts_that_keep_their_limits_alone_may_not_together() -> None:
+    """Two parts share a sum: one can be positive, or the other."""
+    off = -0.5 * np.ones(1)
+    limits = [(off, np.array([[1.0, 0.0]])), (off, np.array([[-1.0, 0.01]]))]
+    assert min(all_kept([one]) for one in limits) > -2.0
+    assert all_kept(limits) < -1000.0
 
 
 def test_a_place_lies_within_its_play() -> None:

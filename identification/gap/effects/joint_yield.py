@@ -9,8 +9,8 @@ runs. w in units of the joint's elastic compliance: 1/w is the ratio of hardenin
 
 Size: slope beyond the knee 0.3 to 100 times the joint's compliance; thresholds anywhere in the
 range of load.
-A specimen may soften for a while beyond its knee (polymers, Lueders): it is never stiffer than at
-first, that is all.
+A specimen that is pulled once may soften for a while beyond its knee (polymers, Lueders): it is
+never stiffer than at first, that is all.
 Prior: sum of coefficients positive, sd out of SCALES, equally likely; rounded, lasting and flowing
 forms weighted as below.
 Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manuals (thresholds).
@@ -91,7 +91,7 @@ def _under_weight(
         back = [column(s) for s in kept]
         states = bench.plays(load, radius, fresh, weight)
         label = f"joint {joint + 1}{memory}"
-        out += _knees(WORD, label, [column(s) for s in states.T], radius, back, info, True)
+        out += _knees(bench, WORD, label, [column(s) for s in states.T], radius, back, info)
     return out
 
 
@@ -119,18 +119,19 @@ def knee_variants(
         back = [column(s) for s in after_yield(bench, load, top, fresh)]
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
         exact = {**info, "memory": memory, "flow_s": 0.0, "load": load, "column": column}
-        out += _knees(word, f"{name}{memory}", columns, radius, back, exact,
-                      bench.data.arm)  # fmt: skip
+        out += _knees(bench, word, f"{name}{memory}", columns, radius, back, exact)
     return out
 
 
 def _knees(
-    word: str, label: str, columns: list[int], radius: Array, back: list[int], info: dict[str, Any],
-    arm: bool,
+    bench: Bench, word: str, label: str, columns: list[int], radius: Array, back: list[int],
+    info: dict[str, Any],
 ) -> list[Variant]:  # fmt: skip
     """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them. What
-    begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`."""
-    share = 0.7 / len(radius) * _LIKELY[info["memory"]]
+    begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`. What is
+    pulled once, without an arm, may soften."""
+    arm, share = bench.data.arm, 0.7 / len(radius) * _LIKELY[info["memory"]]
+    softens = not arm and not bench.course.unloads
     extra, out = list(range(len(THRESHOLDS), len(radius))), []
     for k in range(_FIRST, len(THRESHOLDS)):
         for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
@@ -139,7 +140,7 @@ def _knees(
             kept = [*inside.values(), *[_HARDENS] * len(extra)]
             exact = {**info, "radius": radius[place], "centre": radius[k],
                      "back": [] if knee == "round" and arm else back, "knee": knee,
-                     "softens": not arm}  # fmt: skip
+                     "softens": softens}  # fmt: skip
             at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
             out += _with_back(word, at, chosen, kept, share / 4, exact)
     return out
