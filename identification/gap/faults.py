@@ -1,7 +1,7 @@
 """Readings that nothing on a rig makes: faults of an instrument, which no effect explains.
 
 A laser on a loose mount rings in spells; a camera loses its target, and hands out its last number;
-a dial is misread by a whole turn; a specimen has long been broken.
+a dial is misread by a whole turn; an amplifier is full; a specimen has long been broken.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import Array, GapData
+from identification.gap.data import LOADING, Array, GapData
 from identification.gap.ends import after_break
 from identification.gap.rows import hold_ids, is_continuous
 
@@ -45,6 +45,12 @@ def faults(data: GapData) -> tuple[str, ...]:
             f"The displacement jumps to one and the same number, {1e3 * stuck:.6g} mm, and back "
             f"again and again ({share:.0%} of the readings) while the force stands: what a sensor, "
             "or its converter, says when it has nothing to say. See to it."
+        )
+    full = saturates(data)
+    if full is not None:
+        out.append(
+            f"From step to step the force stays at {full:.4g} N, while the displacement goes on as "
+            "before: an amplifier that is full, or a range that is too small. See to it."
         )
     broken = after_break(data)
     if broken.any():
@@ -111,6 +117,34 @@ def goes_back(data: GapData) -> int | None:
         wrong = np.flatnonzero(same & grows & (np.diff(way) < -far))
         if wrong.size:
             return int(first[at[wrong[0] + 1]])
+    return None
+
+
+_SAME_FORCE, _GOES_ON = 3.0, 0.3  # standard uncertainties; of the usual way from step to step
+_SATURATED = 2  # steps
+
+
+def saturates(data: GapData) -> float | None:
+    """Force (N), the largest of its run, that holds of ascending steps share while the displacement
+    goes on; None where there is none. Of an arm: its steps are steps of the force."""
+    hold = hold_ids(data)
+    if not data.arm or is_continuous(data, hold):
+        return None
+    first, count = np.flatnonzero(np.diff(hold, prepend=-1)), np.bincount(hold)
+    force, u = (np.add.reduceat(v, first) / count for v in (data.force, data.displacement))
+    same, seen = _SAME_FORCE * data.instruments.force, 0
+    for run in np.unique(data.run):
+        at = np.flatnonzero((data.run[first] == run) & (data.branch[first] == LOADING))
+        ways, steps = np.diff(u[at]), np.diff(data.step[first][at])
+        goes_on = ways > max(
+            _CLEARLY * data.instruments.displacement,
+            _GOES_ON * float(np.median(np.abs(ways))) if ways.size else 0.0,
+        )
+        stays = (np.abs(np.diff(force[at])) < same) & (steps > 0) & goes_on
+        stays &= np.abs(force[at][1:] - force[at].max(initial=0.0)) < same
+        seen += int(stays.sum())
+        if seen >= _SATURATED and stays.any():
+            return float(force[at].max())
     return None
 
 

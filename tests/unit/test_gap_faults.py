@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.faults import bursts, faults, frozen_since, goes_back, jumps_to
+from identification.gap.faults import (
+    bursts,
+    faults,
+    frozen_since,
+    goes_back,
+    jumps_to,
+    saturates,
+)
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_levels import creeping, one_hold
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
@@ -195,3 +205,19 @@ def test_a_number_that_is_met_again_for_a_reason_is_one(what: str) -> None:
         u[20:30] = u[60:70] = 4e-4
     run = np.arange(90) // 6 if what == "runs" else np.zeros(90, dtype=np.int64)
     assert jumps_to(bench_data(force, u, step=np.arange(90), run=run)) is None
+
+
+def test_a_force_that_stays_from_step_to_step_while_all_goes_on_is_an_amplifier_that_is_full() -> (
+    None
+):
+    data = arm_data()
+    assert saturates(data) is None
+    full = replace(data, force=np.minimum(data.force, 85.0))  # of steps of 40 N: 80, 85, 85
+    assert saturates(full) == pytest.approx(85.0)
+    (note,) = faults(full)
+    assert "stays at 85 N" in note
+    still = np.where(full.step > 3, full.displacement[full.step == 3].mean(), full.displacement)
+    assert saturates(replace(full, displacement=still)) is None  # nothing was turned on
+    top = replace(data, force=np.where(data.step == 4, 121.0, data.force))
+    assert saturates(top) is None  # a last step of 1 N was asked for
+    assert saturates(replace(full, arm=False)) is None  # a specimen may flow
