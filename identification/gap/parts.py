@@ -115,7 +115,7 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
             sums, spread = rows @ w[s], rows @ roots[:, s].T
             out += min(0.0, float(log_odds(limits, _ONE, before, sums, spread)[0]))
             asked.append((sums[0] - limits.least[0] * (np.arange(len(sums[0])) == 0), spread[0]))
-    return min(out, all_kept(asked)) if len(asked) > 1 else out
+    return min(out, all_kept(asked)) if asked else out
 
 
 _ONE = np.zeros(1, dtype=np.intp)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import log
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,8 @@ from numpy.typing import NDArray
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.variants import Variant
 
-_TINY = 1e-300
-_WRONG = 1.0  # standard deviations
+_TINY, _LOG_2 = 1e-300, log(2)
+_WRONG = 1.0  # standard deviations of two limits at least
 _NEAR = 1 - 1e-9  # as correlated as two may be
 
 
@@ -97,31 +98,47 @@ def log_odds(limits: Limits, which: Ints, before: Array, sums: Array, roots: Arr
         apart = np.where(asked[far, 1:], _distance(*more, *first, common), 0.0).max(axis=1)
         bound = np.where(apart > 0, log_ndtr(-apart) - share[far], np.inf)
         out[far] = np.minimum(out[far], bound)
-        for i in far[np.sum(z[far] < -_WRONG, axis=1) > 1]:
-            out[i] = min(out[i], all_kept([(centre[i, asked[i]], roots[i, asked[i]])]))
     return np.asarray(out)
+
+
+def log_odds_together(limits: Limits, which: Ints, sums: Array, roots: Array) -> Array:
+    """(n,) what the same can't exceed by all limits at once; inf where it is not worth a look."""
+    asked, centre = limits.asked[which], sums.copy()
+    centre[:, 0] -= limits.least[which]
+    size = np.where(asked, np.linalg.norm(roots, axis=2) + _TINY, 1.0)
+    z, unit = centre / size, roots / size[:, :, None]
+    out = np.full(len(z), np.inf)
+    for i in np.flatnonzero(np.sum((z < -_WRONG) & asked, axis=1) > 1):
+        out[i] = _largest(z[i, asked[i]], unit[i, asked[i]])
+    return out
 
 
 def all_kept(limits: Sequence[tuple[Array, Array]]) -> float:
     """log of the largest share that several limits may have together, over the least that they had
     in the prior, where all were independent: sums (m,) to be positive, and their roots (m, r)."""
-    from scipy.special import log_ndtr
-
     sums, roots = (np.concatenate(each) for each in zip(*limits, strict=True))
     size = np.linalg.norm(roots, axis=1) + _TINY
-    return float(log_ndtr(-distance(sums / size, roots / size[:, None])) + len(sums) * np.log(2))
+    return _largest(sums / size, roots / size[:, None])
+
+
+def _largest(z: Array, unit: Array) -> float:
+    """The same of sums (m,) in standard deviations, with roots (m, r) of their correlations."""
+    from scipy.special import log_ndtr
+
+    return float(log_ndtr(-distance(z, unit))) + len(z) * _LOG_2
 
 
 def distance(z: Array, unit: Array) -> float:
-    """Mahalanobis distance of a mean from where all its sums are positive: sums z (m,) in standard
-    deviations, with roots unit (m, r) of their correlations. The least-distance problem of Lawson
-    and Hanson (Solving Least Squares Problems, 1974, chapter 23)."""
+    """Mahalanobis distance of a mean from where all its sums z (m,) are positive. The
+    least-distance problem of Lawson and Hanson (Solving Least Squares Problems, 1974, chapter
+    23)."""
     from scipy.optimize import nnls
 
-    E = np.vstack([unit.T, -z])
-    f = np.append(np.zeros(unit.shape[1]), 1.0)
-    left = E @ nnls(E, f)[0] - f
-    return float(np.linalg.norm(left[:-1]) / max(-left[-1], _TINY))
+    m, r = unit.shape
+    both, last = np.empty((r + 1, m)), np.zeros(r + 1)
+    both[:-1], both[-1], last[-1] = unit.T, -z, 1.0
+    left = both @ nnls(both, last)[0] - last
+    return float(np.sqrt(left[:-1] @ left[:-1])) / max(float(-left[-1]), _TINY)
 
 
 def _distance(a: Array, aa: Array, b: Array, bb: Array, ab: Array) -> Array:

@@ -17,9 +17,10 @@ import numpy as np
 from identification.gap.data import Array, Flags, Ints
 from identification.gap.evidence import Engine, Level
 from identification.gap.imperfection import log_level
-from identification.gap.signs import Limits, log_odds, padded
+from identification.gap.signs import Limits, log_odds, log_odds_together, padded
 
 _COUNTS = 40.0  # nats below the best: what lies further down adds nothing; limits add four at most
+_NEAR = 12.0  # nats below the best: what is looked at closely
 # Nats by which no variant has been seen to catch up at another level: of 90 diagnoses none changed
 # by 1e-6, with 40 nats one did.
 _HOPELESS = 60.0
@@ -94,17 +95,20 @@ class Table:
 
     def limit(self) -> None:
         """Takes away what the limits cost that physics sets, where it counts among the shapes of
-        the word."""
+        the word; what all of them together cost only near the best."""
         done = np.zeros(self.logs.shape, dtype=bool)
         done[:, ~self._limits.asked[:, 0]] = True
+        closely = done.copy()
         while True:
-            top = self._of_word(self.logs.max(axis=(0, 2)))
-            todo = (self.logs > top[:, None] - _COUNTS) & ~done
+            top = self._of_word(self.logs.max(axis=(0, 2)))[:, None]
+            rough = (self.logs > top - _COUNTS) & ~done
+            close = (self.logs > top - _NEAR) & ~closely
+            todo = rough if rough.any() else close
             level, which, scale = np.nonzero(todo)
             if not len(which):
                 return
-            self.logs[todo] += self._odds(level, which, scale)
-            done |= todo
+            self.logs[todo] += self._odds(level, which, scale, closely=not rough.any())
+            done, closely = done | rough, closely if rough.any() else closely | close
             self.look()
 
     def _make(self, i: int, which: Ints) -> None:
@@ -151,9 +155,9 @@ class Table:
         self._most[:i, which] = np.minimum(self._most[:i, which], below)
         self._most[i + 1 :, which] = np.minimum(self._most[i + 1 :, which], above)
 
-    def _odds(self, level: Ints, which: Ints, scale: Ints) -> Array:
+    def _odds(self, level: Ints, which: Ints, scale: Ints, *, closely: bool) -> Array:
         """log odds (w,) that coefficients of variants `which`, at their levels and scales, keep the
-        limits."""
+        limits; closely: what is to be added to that because they must keep all at once."""
         new = np.append(True, (np.diff(level) != 0) | (np.diff(which) != 0))
         place = np.cumsum(new) - 1  # scales of one variant at one level share the rest
         rows = self._limits.rows[which[new]] @ self._root[which[new]]  # (u, m, k), of unit
@@ -161,4 +165,8 @@ class Table:
         rows = (rows @ self._vectors[level[new], which[new]])[place]  # and along the eigenvectors
         sums = np.einsum("wmk,wk->wm", rows, self._mean[level, which, scale])
         rows *= np.sqrt(self._variance[level, which, scale])[:, None]
-        return log_odds(self._limits, which, before, sums, rows)
+        odds = log_odds(self._limits, which, before, sums, rows)
+        if not closely:
+            return odds
+        most = log_odds_together(self._limits, which, sums, rows)
+        return np.minimum(most - odds, 0.0)

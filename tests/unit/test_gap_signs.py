@@ -19,7 +19,7 @@ from identification.gap.evidence import Engine
 from identification.gap.finer import gained
 from identification.gap.imperfection import least_size, log_share
 from identification.gap.parts import Part, log_joint_between, log_joints, signs_kept
-from identification.gap.signs import Limits, all_kept, log_odds
+from identification.gap.signs import Limits, all_kept, log_odds, log_odds_together
 from identification.gap.variants import Variant, variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 
@@ -91,7 +91,10 @@ def test_limits_that_two_by_two_are_near_may_be_far_together() -> None:
     ones = np.ones(3) / 3**0.5
     covariance = np.eye(3) - (1 - 1e-4) * np.outer(ones, ones)
     mean = np.full(3, -1.2)
-    found = odds(mean, covariance, np.eye(3), each=True, positive=np.array([1.0, 0, 0]))
+    v = variant("joint_yield", "v", [0, 1, 2], (1.0,), each=True, positive=np.array([1.0, 0, 0]))
+    limits = Limits.of([v])
+    roots = limits.rows @ np.linalg.cholesky(covariance)
+    found = log_odds_together(limits, np.zeros(1, int), limits.rows @ mean, roots)[0]
     assert found == pytest.approx(log_ndtr(-minimum(mean, covariance)) + 4 * np.log(2))
     assert found < -1000.0
 
