@@ -30,8 +30,7 @@ AXES: dict[str, tuple[float, float, float]] = {
     "x+y": (_HALF, _HALF, 0.0),
     "x-y": (_HALF, -_HALF, 0.0),
 }
-DEPTHS_M = (0.0, 0.35, 0.7)  # coarser than elastic ones: a knee is told by where it bends,
-OBLIQUE_M = (0.35,)  # and an edge by its direction
+DEPTHS_M = (0.0, 0.35, 0.7)  # coarser than elastic ones: a knee is told by where it bends
 # m/N at the target beyond the threshold, which the scales of the knees (0.07 to 56) multiply: on a
 # lever of 0.75 m 0.5e-6 to 4e-4 rad/Nm. Said of the target, not of the moment: axes at several
 # depths whose moments run in proportion have the same knees then, and need not be told apart.
@@ -41,7 +40,7 @@ _BEYOND = 0.75**2 / 1.5e5
 def places() -> Iterator[tuple[str, float]]:
     """Axes (of `AXES`) and their depths in m; the yaw axis knows none."""
     for axis in AXES:
-        for depth in (0.0,) if axis == "z" else DEPTHS_M if axis in "xy" else OBLIQUE_M:
+        for depth in (0.0,) if axis == "z" else DEPTHS_M:
             yield axis, depth
 
 

@@ -112,7 +112,7 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
         for zone in zones:
             info = {"joint": j, "zone_Nm": zone * span, "crossing": "weight", "tool_kg": TOOL_KG,
                     "preload_Nm": float(preload), "step_Nm": step}  # fmt: skip
-            label = f"joint {j + 1} preload {preload:.3g} Nm"
+            label = f"joint {j + 1} preload {preload / (high - low):.2g}"
             share = _PRELOAD_PRIOR / _PRELOADS
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
     return out
