@@ -114,7 +114,8 @@ def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
             rows = limits.rows
             sums, spread = rows @ w[s], rows @ roots[:, s].T
             out += min(0.0, float(log_odds(limits, _ONE, before, sums, spread)[0]))
-            asked.append((sums[0] - limits.least[0] * (np.arange(len(sums[0])) == 0), spread[0]))
+            sums[0, 0] -= limits.least[0]
+            asked.append((sums[0], spread[0]))
     return min(out, all_kept(asked)) if asked else out
 
 

@@ -221,7 +221,8 @@ def hold_ids(data: GapData) -> Ints:
     one side of no load: steps of the same size to and fro may bear the same number."""
     keys = np.column_stack([data.run, data.branch, data.step])
     new = np.any(np.diff(keys, axis=0) != 0, axis=1)
-    side = np.where(data.step >= 0, _side(data.force), 0.0)
+    loaded = (data.step > 0) & (np.abs(data.force) > _LOADED * data.instruments.force)
+    side = np.where(loaded, _side(data.force), 0.0)
     new |= side[1:] * side[:-1] < 0
     return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
 
@@ -349,7 +350,8 @@ def _continuous_levels(setup: Ints, force: Array) -> Ints:
     return _ids(np.column_stack([setup, rising.astype(np.int64), number]))
 
 
-_SIDE = 0.05  # of the largest force: less is no load
+_SIDE = 0.05  # of the largest force: less is no load, nor
+_LOADED = 10.0  # standard uncertainties of one sample
 
 
 def _side(force: Array) -> Array:

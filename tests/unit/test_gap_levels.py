@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification.gap.bench import displacement_imposed, make_bench
-from identification.gap.data import Array
+from identification.gap.data import Array, Instruments
 from identification.gap.effects import joint_yield, library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
@@ -116,6 +116,14 @@ def test_steps_to_and_fro_of_one_number_are_other_holds_and_levels() -> None:
     rows = reduce_rows(again)
     first = rows.level[rows.hold_starts]
     assert first[:8].tolist() == first[8:].tolist()  # and the same in every repetition
+
+
+def test_noise_about_no_load_ends_no_hold() -> None:
+    force = np.tile([1.0, -1.0], 12)
+    for step, u, holds in ((0, 0.01, 1), (1, 0.2, 1), (1, 0.01, 24)):  # 5 uncertainties are noise
+        data = bench_data(force, force / 1e5, step=np.full(24, step),
+                          instruments=Instruments(u, 1e-6, 0.005, 0.003))  # fmt: skip
+        assert hold_ids(data)[-1] + 1 == holds
 
 
 @pytest.mark.parametrize("branch", [1, 3])
