@@ -18,8 +18,9 @@ from identification.gap.evidence import (
     run_columns,
 )
 from identification.gap.explanation import Explanation
-from identification.gap.parts import Part, block
+from identification.gap.parts import Part
 from identification.gap.rows import rises
+from identification.gap.variants import block
 
 _LATER = 3  # rows of a hold from here on count as one
 

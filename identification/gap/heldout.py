@@ -19,7 +19,8 @@ from identification.gap.data import Array, Flags, Ints
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
-from identification.gap.parts import Part, block
+from identification.gap.parts import Part
+from identification.gap.variants import block
 
 BLOCKS = 5
 ALWAYS_IN = -1  # number of the fold of rows that are never withheld

@@ -11,7 +11,7 @@ from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.factor import factor_of
 from identification.gap.signs import Limits, all_kept, log_odds
-from identification.gap.variants import Variant
+from identification.gap.variants import Variant, block
 from identification.gap.words import LINEAR
 
 
@@ -169,15 +169,3 @@ def _together(parts: tuple[Part, ...], gram: Array, moment: Array, log_base: Arr
     left = np.linalg.solve(factor, (moment @ root)[..., None])[..., 0]
     lost = np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(axis=-1)
     return np.asarray(log_base + 0.5 * np.sum(left**2, axis=-1) - lost)
-
-
-def block(roots: list[Array]) -> Array:
-    """The roots along the diagonal."""
-    size = sum(r.shape[0] for r in roots)
-    out = np.zeros((size, size))
-    at = 0
-    for r in roots:
-        k = r.shape[0]
-        out[at : at + k, at : at + k] = r
-        at += k
-    return out

@@ -96,3 +96,15 @@ def smooth_root(k: int, alike: float = 0.7, common: float = 0.0) -> Array:
     distance = np.abs(np.arange(k)[:, None] - np.arange(k))
     covariance = (1 - common) * alike**distance + common
     return np.linalg.cholesky(covariance + 1e-9 * np.eye(k))
+
+
+def block(roots: list[Array]) -> Array:
+    """The roots along the diagonal."""
+    size = sum(r.shape[0] for r in roots)
+    out = np.zeros((size, size))
+    at = 0
+    for r in roots:
+        k = r.shape[0]
+        out[at : at + k, at : at + k] = r
+        at += k
+    return out

@@ -106,6 +106,8 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
     by_tool = float(np.abs(bench.weight_per_kg(j)).min()) * (max(TOOLS_KG) - TOOL_KG)
     low, high = float(plain.min()), float(plain.max())
     step, out = (high - low) / _PRELOADS, list[Variant]()
+    if not step > 0:
+        return []
     for preload in -(low + (np.arange(_PRELOADS) + 0.5) * step):
         if abs(preload) < by_tool:
             continue

@@ -36,6 +36,8 @@ from identification.gap.variants import (
     TAKEN_BACK,
     UNDER_WEIGHT,
     Variant,
+    block,
+    smooth_root,
     variant,
 )
 
@@ -50,6 +52,7 @@ _FIRST = 2  # lower ones only round off the knees above them
 # Bauschinger's effect: after a reversal metal yields earlier than at first.
 _SHARP = {0: 1.0, 1: 0.5}
 _ROUND = {-6: 0.1, -4: 0.15, -2: 0.25, -1: 0.5, 0: 1.0, 1: 0.5, 2: 0.25}
+_SLOW = 0.25  # prior of what gives way more and more, of no one knee
 SCALES = (0.07, 0.25, 0.9, 3.5, 14.0, 56.0)
 
 
@@ -128,8 +131,9 @@ def _knees(
     info: dict[str, Any],
 ) -> list[Variant]:  # fmt: skip
     """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them. What
-    begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`. What is
-    pulled once, without an arm, may soften."""
+    begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`; what
+    holds small loads firmly, and then more and more gives way, is not (Ramberg and Osgood 1943).
+    What is pulled once, without an arm, may soften."""
     arm, share = bench.data.arm, 0.7 / len(radius) * _LIKELY[info["memory"]]
     softens = not arm and not bench.course.unloads
     extra, out = list(range(len(THRESHOLDS), len(radius))), []
@@ -142,7 +146,13 @@ def _knees(
                      "back": [] if knee == "round" and arm else back, "knee": knee,
                      "softens": softens}  # fmt: skip
             at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
-            out += _with_back(word, at, chosen, kept, share / 4, exact)
+            out += _with_back(word, at, chosen, np.diag(kept), share / 4, exact)
+    if arm and bench.course.unloads:
+        exact = {**info, "radius": radius, "centre": radius[0], "back": [],
+                 "knee": "slow", "softens": False}  # fmt: skip
+        at, likely = f"{label} at {THRESHOLDS[0]:g} and on", _SLOW * _LIKELY[info["memory"]]
+        root = smooth_root(len(radius), 0.6, 0.3)
+        out += _with_back(word, at, columns, root, likely, exact)
     return out
 
 
@@ -201,7 +211,7 @@ def grown(load: Array, radius: Array, fresh: Flags) -> Array:
 
 
 def _with_back(
-    word: str, label: str, columns: list[int], root: list[float], prior: float, info: dict[str, Any]
+    word: str, label: str, columns: list[int], root: Array, prior: float, info: dict[str, Any]
 ) -> list[Variant]:
     """A knee as it is, and with Bauschinger's effect: once it has yielded, metal flows back early
     when unloaded."""
@@ -211,7 +221,7 @@ def _with_back(
         each, within = _signs(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
         out.append(
             variant(word, label + name, [*columns, *more], SCALES,
-                    np.diag([*root, *[_RETURNS] * len(more)]), np.repeat([1.0, 0.0], [k, n - k]),
+                    block([root, _RETURNS * np.eye(len(more))]), np.repeat([1.0, 0.0], [k, n - k]),
                     prior, LEAST, each, within, **info)
         )  # fmt: skip
     return out
@@ -264,8 +274,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
             kinds = {"": slice(k, k + 1), " rounded": slice(max(k - 2, 0), k + 3)}
             for kind, place in kinds.items():
                 exact["radius"] = radius[place]
-                ones = [1.0] * len(radius[place])
-                out += _with_back(found.word, label + kind, columns[place], ones, share, exact)
+                root = np.eye(len(radius[place]))
+                out += _with_back(found.word, label + kind, columns[place], root, share, exact)
     return out
 
 
