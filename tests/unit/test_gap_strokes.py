@@ -7,7 +7,8 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
-from identification.gap.compare import score
+from identification.gap.compare import by_word, closest, marginal, score
+from identification.gap.data import Array
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library, time_lag
 from identification.gap.effects.joint_backlash import variants as plays
@@ -197,3 +198,35 @@ def test_growing_presses_of_a_tip_yield_from_the_first_load_on() -> None:
     labels = [v.label for v in library(once, ["joint_yield"])]
     assert any("hardened beyond 0.18" in label for label in labels)
     assert not any(label.endswith("hardened beyond 0.01") for label in labels)
+
+
+def power_law(torque: Array, power: float) -> Array:
+    """(n,) path `x^power` of torques, at the largest 1, and back along the same curve twice as
+    large (Ramberg and Osgood 1943, Masing 1926): sliders of all strengths, ever more of them."""
+    top = np.abs(torque).max()
+    strength = np.linspace(top / 400, top, 400)
+    weight, last, out = strength ** (power - 2), np.zeros(400), np.zeros(len(torque))
+    for i, x in enumerate(torque):
+        last = np.clip(last, x - strength, x + strength)
+        out[i] = weight @ last
+    return np.asarray(out / (weight @ (top - strength)))
+
+
+@pytest.mark.parametrize(("power", "word"), [(5.0, "joint_yield"), (1.3, "joint_hysteresis")])
+def test_what_holds_small_loads_firmly_yields_what_slips_from_the_first_on_rubs(
+    power: float, word: str
+) -> None:
+    steps = np.concatenate([np.arange(0, 101, 5.0), np.arange(95, -1, -5.0)])
+    bench = hanging(steps, gravity=0.0)
+    torque = bench.true_torque[:, 0]
+    path = 0.3 * float(np.ptp(bench.elastic[:, 0])) * power_law(torque, power)
+    variants = library(bench, ["joint_yield", "joint_hysteresis"])
+    target = bench.observed - prediction(bench) + bench.stacked(path)
+    engine = Engine(
+        bench, base_columns(bench), target, eta_levels(bench, base_columns(bench), target)
+    )
+    scored = by_word(score(engine, engine.levels, variants))
+    evidence = {w: marginal(s) for w, s in scored.items()}
+    assert max(evidence, key=lambda w: evidence[w]) == word
+    if word == "joint_yield":
+        assert closest(scored[word]).variant.info["knee"] == "slow"
