@@ -351,7 +351,7 @@ def _continuous_levels(setup: Ints, force: Array) -> Ints:
 
 
 _SIDE = 0.05  # of the largest force: less is no load, nor
-_LOADED = 10.0  # standard uncertainties of one sample
+_LOADED = 5.0  # standard uncertainties of one sample
 
 
 def _side(force: Array) -> Array:

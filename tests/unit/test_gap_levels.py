@@ -120,7 +120,7 @@ def test_steps_to_and_fro_of_one_number_are_other_holds_and_levels() -> None:
 
 def test_noise_about_no_load_ends_no_hold() -> None:
     force = np.tile([1.0, -1.0], 12)
-    for step, u, holds in ((0, 0.01, 1), (1, 0.2, 1), (1, 0.01, 24)):  # 5 uncertainties are noise
+    for step, u, holds in ((0, 0.01, 1), (1, 0.25, 1), (1, 0.01, 24)):  # four of noise
         data = bench_data(force, force / 1e5, step=np.full(24, step),
                           instruments=Instruments(u, 1e-6, 0.005, 0.003))  # fmt: skip
         assert hold_ids(data)[-1] + 1 == holds
