@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -97,6 +98,28 @@ def test_limits_that_two_by_two_are_near_may_be_far_together() -> None:
     found = log_odds_together(limits, np.zeros(1, int), limits.rows @ mean, roots)[0]
     assert found == pytest.approx(log_ndtr(-minimum(mean, covariance)) + 4 * np.log(2))
     assert found < -1000.0
+    more = Limits(limits.rows, np.array([0.5]), limits.asked)
+    sums = limits.rows @ mean
+    assert log_odds_together(more, np.zeros(1, int), sums, roots)[0] < found - 10.0
+
+
+def test_parts_are_asked_what_they_keep_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[tuple[Array, Array]]] = []
+
+    def kept(limits: list[tuple[Array, Array]]) -> float:
+        asked.append(limits)
+        return -1e6
+
+    monkeypatch.setattr("identification.gap.parts.all_kept", kept)
+    engine = small_engine(small_bench())
+    parts = [Part(variant("joint_creep", "v", [k], (1.0,), least=k + 0.5), 1.0) for k in (0, 1)]
+    free = Part(variant("joint_creep", "free", [1], (1.0,), positive=False), 1.0)
+    assert signs_kept(engine.levels[0], (parts[0], parts[1])) == -1e6
+    below = [replace(p, variant=replace(p.variant, least=0.0)) for p in parts]
+    signs_kept(engine.levels[0], (below[0], below[1]))
+    first, second = ([float(sums[0]) for sums, _ in limits] for limits in asked)
+    assert np.subtract(second, first) == pytest.approx([0.5, 1.5])
+    assert signs_kept(engine.levels[0], (free,)) == 0.0
 
 
 def minimum(mean: Array, covariance: Array) -> float:

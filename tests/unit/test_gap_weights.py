@@ -23,6 +23,7 @@ from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, 
 from identification.gap.effects.joint_yield import is_sharp
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
+from identification.gap.forms.friction import _net, describe_backlash
 from identification.gap.history import bristles, flowing_play, play
 from identification.gap.interval import TWO_SIDED, Softer
 from identification.gap.parameters import parameters
@@ -202,6 +203,8 @@ def test_a_preload_is_found_to_a_percent() -> None:
     engine.extend()
     best = max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence).variant.info
     assert best["preload_Nm"] == pytest.approx(-22.3, rel=0.01)
+    law, _ = describe_backlash(bench, next(v for v in finer if v.info == best))
+    np.testing.assert_allclose(_net(bench, law), x, atol=0.3)
     assert best["zone_Nm"] == pytest.approx(1.0, rel=0.1)
 
 
