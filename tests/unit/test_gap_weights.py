@@ -194,7 +194,7 @@ def test_a_preload_is_found_to_a_percent() -> None:
     bench = hanging(
         np.concatenate([np.arange(0, 80.5, 0.5), np.arange(80, -0.5, -0.5)]), gravity=-5.0
     )
-    x = bench.true_torque[:, 0] + bench.weight(0) - 22.3
+    x = bench.true_torque[:, 0] + bench.weight(0) - 26.3
     play = bench.joint_column(0, 4e-4 * joint_backlash._shapes(bench, x, 1.0)["free"][0])
     variants = library(bench, ["joint_backlash"])
     base, target = base_columns(bench), bench.observed - prediction(bench)
@@ -202,7 +202,7 @@ def test_a_preload_is_found_to_a_percent() -> None:
     finer = refine(engine, score(engine, engine.levels, variants))
     engine.extend()
     best = max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence).variant.info
-    assert best["preload_Nm"] == pytest.approx(-22.3, rel=0.01)
+    assert best["preload_Nm"] == pytest.approx(-26.3, rel=0.01)
     law, _ = describe_backlash(bench, next(v for v in finer if v.info == best))
     np.testing.assert_allclose(_net(bench, law), x, atol=0.3)
     assert best["zone_Nm"] == pytest.approx(1.0, rel=0.1)
