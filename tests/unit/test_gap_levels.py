@@ -128,7 +128,7 @@ def test_noise_about_no_load_ends_no_hold() -> None:
 
 @pytest.mark.parametrize(("branch", "levels"), [(1, 4), (3, 5)])
 def test_a_way_there_counts_in_cycles_alone(branch: int, levels: int) -> None:
-    """What is called loading goes one way, however a hand got there: 80 N from below, from above."""
+    """What is called loading goes one way, however a hand got there: 80 N from both sides."""
     force = np.repeat([0.0, 40, 80, 100, 80], 2)
     step = np.repeat([0, 1, 2, 3, 2], 2)
     rows = reduce_rows(bench_data(force, force / 1e5, step=step, branch=np.full(10, branch)))
