@@ -135,8 +135,7 @@ def test_a_way_there_counts_in_cycles_alone(branch: int, levels: int) -> None:
     assert len(set(rows.level[rows.hold_starts].tolist())) == levels
 
 
-CLOCKS = """time_s,session_s,repetition,branch,step,force_N,displacement_mm
-"""
+CLOCKS = "time_s,session_s,repetition,branch,step,force_N,displacement_mm\n"
 
 
 def test_a_run_whose_clock_stands_goes_by_the_session(tmp_path: Path) -> None:

@@ -12,18 +12,15 @@ from identification.gap.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
 from identification.gap.compare import Scored, score
 from identification.gap.data import Array, Setup
 from identification.gap.effects import (
-    joint_backlash,
     joint_hysteresis,
     joint_nonlinear_stiffness,
     joint_yield,
     library,
 )
-from identification.gap.effects.joint_backlash import TOOLS_KG
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.joint_yield import is_sharp
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
-from identification.gap.forms.friction import _net, describe_backlash
 from identification.gap.history import bristles, flowing_play, play
 from identification.gap.interval import TWO_SIDED, Softer
 from identification.gap.parameters import parameters
@@ -173,56 +170,6 @@ def test_a_threshold_is_the_net_torque_and_knows_no_more_of_it_than_of_the_tool(
     assert net.high - net.value == pytest.approx(wide, rel=1e-6)
 
 
-def test_plays_cross_where_some_tool_balances_the_weights() -> None:
-    bench = hanging(UP)
-    found = [v for v in library(bench, ["joint_backlash"]) if v.info["crossing"] == "weight"]
-    assert {v.info["tool_kg"] for v in found if not v.info["preload_Nm"]} == set(TOOLS_KG)
-    too_heavy = library(hanging(UP, gravity=-300.0), ["joint_backlash"])
-    assert all(v.info["preload_Nm"] for v in too_heavy if v.info["crossing"] == "weight")
-
-
-def test_a_preload_puts_the_crossing_where_no_tool_does() -> None:
-    bench = hanging(UP)
-    x, per_kg = bench.true_torque[:, 0] + bench.weight(0), bench.weight_per_kg(0)
-    preloads = {v.info["preload_Nm"] for v in library(bench, ["joint_backlash"])} - {0.0}
-    assert preloads
-    assert all(x.min() < -p < x.max() for p in preloads)  # a load overcomes it
-    assert min(map(abs, preloads)) >= 1.5 * np.abs(per_kg).min()  # a tool is off by so much
-
-
-def test_a_preload_is_found_to_a_percent() -> None:
-    bench = hanging(
-        np.concatenate([np.arange(0, 80.5, 0.5), np.arange(80, -0.5, -0.5)]), gravity=-5.0
-    )
-    x = bench.true_torque[:, 0] + bench.weight(0) - 26.3
-    play = bench.joint_column(0, 4e-4 * joint_backlash._shapes(bench, x, 1.0)["free"][0])
-    variants = library(bench, ["joint_backlash"])
-    base, target = base_columns(bench), bench.observed - prediction(bench)
-    engine = Engine(bench, base, target + play, np.array([0.0, 1e-7, 2.5e-7]))
-    finer = refine(engine, score(engine, engine.levels, variants))
-    engine.extend()
-    best = max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence).variant.info
-    assert best["preload_Nm"] == pytest.approx(-26.3, rel=0.01)
-    law, _ = describe_backlash(bench, next(v for v in finer if v.info == best))
-    np.testing.assert_allclose(_net(bench, law), x, atol=0.3)
-    assert best["zone_Nm"] == pytest.approx(1.0, rel=0.1)
-
-
-def test_a_joint_lies_in_its_play_where_the_push_before_left_it() -> None:
-    """Whichever way it is pushed next, until the arm goes to another pose."""
-    there = make_bench(arm_data())
-    x = there.true_torque[:, 0]  # of the pushes along y
-    zone = 0.02 * float(np.abs(x).max())
-    shapes = joint_backlash._shapes(there, x, zone)
-    turned = np.flatnonzero(there.rebuilt & ~there.moved)
-    for k in np.flatnonzero(there.rebuilt):
-        assert shapes["friction"][0][k] == pytest.approx(0.0, abs=0.01)
-        left = 0.0 if there.moved[k] else shapes["kept"][0][k - 1]
-        assert shapes["kept"][0][k] == pytest.approx(left, abs=0.01)  # noise of the force
-    assert len(turned) == 2
-    assert np.abs(shapes["kept"][0][turned]).max() > 0.4
-
-
 def test_thresholds_answer_to_the_load_without_the_drift_of_its_reading() -> None:
     """3 N of drift over the run, plain at zero load before and after."""
     levels = np.array([0, 20, 40, 60, 80, 60, 40, 20, 0.0])
@@ -307,7 +254,7 @@ def test_creep_with_the_square_counts_as_its_straight_line() -> None:
     assert found["creep_fraction"].value == pytest.approx(0.75 * 0.1 * k)
 
 
-def test_curves_and_plays_are_refined_for_tools_in_between_and_no_wider_than_a_play() -> None:
+def test_curves_are_refined_for_tools_in_between() -> None:
     bench = hanging(UP)
     odd = next(v for v in library(bench, ["joint_nonlinear_stiffness"]) if "odd" in v.label)
     finer = joint_nonlinear_stiffness.refined(bench, odd)
@@ -321,58 +268,6 @@ def test_curves_and_plays_are_refined_for_tools_in_between_and_no_wider_than_a_p
     assert not joint_nonlinear_stiffness.refined(
         make_bench(replace(bench.data, setups=tuple(weightless))), odd
     )
-    plays = [v for v in library(bench, ["joint_backlash"]) if not v.info["preload_Nm"]]
-    wide = [v for v in plays if v.info["crossing"] == "weight"][-1]
-    widest = max(v.info["zone_Nm"] for v in joint_backlash.refined(bench, wide))
-    assert widest == pytest.approx(joint_backlash.ZONES[-1] * bench.reach_of(bench.load))
-
-
-def test_the_tool_is_found_to_a_few_grams_where_a_narrow_play_crosses() -> None:
-    """A zone of 1 Nm, and 5 Nm for every kilogram: the mass decides where it is passed."""
-    bench = hanging(
-        np.concatenate([np.arange(0, 40.5, 0.5), np.arange(40, -0.5, -0.5)]), gravity=-20.0
-    )
-    x = bench.true_torque[:, 0] + bench.weight(0, 0.845)
-    play = bench.joint_column(0, 4e-4 * joint_backlash._shapes(bench, x, 1.0)["free"][0])
-    variants = library(bench, ["joint_backlash"])
-    base, target = base_columns(bench), bench.observed - prediction(bench)
-    engine = Engine(bench, base, target + play, np.array([0.0, 1e-7, 2.5e-7]))
-    finer = refine(engine, score(engine, engine.levels, variants))
-    engine.extend()
-    best = max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence).variant.info
-    assert best["tool_kg"] == pytest.approx(0.845, abs=0.005)
-    assert best["zone_Nm"] == pytest.approx(1.0, rel=0.05)
-
-
-def test_zones_of_a_play_are_closed_in_on_where_no_tool_can_be_wrong() -> None:
-    bench = hanging(np.concatenate([UP, -UP]), gravity=0.0)
-    still = [replace(s, tool_gravity=np.zeros(1)) for s in bench.data.setups]
-    bench = make_bench(replace(bench.data, setups=tuple(still)))
-    found = next(
-        v for v in library(bench, ["joint_backlash"]) if v.label.endswith("free zone 0.012")
-    )
-    spans = []
-    for close in (1.0, *joint_backlash.CLOSE):
-        finer = joint_backlash.refined(bench, found, close)
-        zones = sorted({v.info["zone_Nm"] for v in finer if v.info["kind"] == "free"})
-        assert len(zones) == 7
-        assert zones[3] == pytest.approx(found.info["zone_Nm"])
-        kinds = {v.info["kind"] for v in finer}
-        beside = {"free", "soft", "slow", "arctan", *joint_backlash.KEPT}
-        assert kinds == (beside if close > 0.1 else {"free"})
-        spans.append(zones[-1] / zones[0])
-    assert spans[0] == pytest.approx(2.25)
-    assert spans == sorted(spans, reverse=True)
-    assert 1.03 < spans[-1] < 1.15  # not so near as masses
-    # nobody looked for uneven ends before: from scratch
-    first = joint_backlash.uneven(bench, found)
-    assert {v.info["kind"] for v in first} == set(joint_backlash.UNEVEN)
-    zones = sorted({v.info["zone_Nm"] for v in first})
-    assert zones[-1] / zones[0] == pytest.approx(0.07 / 0.004)
-    closer = joint_backlash.uneven(bench, first[0], joint_backlash.CLOSE[-1])
-    assert {v.info["kind"] for v in closer} == {first[0].info["kind"]}
-    specimen = make_bench(replace(bench.data, arm=False))
-    assert not any("kept" in v.label for v in library(specimen, ["joint_backlash"]))
 
 
 def test_friction_under_weight_is_refined_for_other_tools() -> None:
@@ -492,14 +387,6 @@ def test_what_bends_before_the_first_load_that_was_read_is_lost_motion() -> None
     assert min(places) >= 1.3 * 0.25
     close = hanging(np.linspace(0.0, 80.0, 17))
     assert any(v.label.endswith("bend 0.1") for v in library(close, ["joint_nonlinear_stiffness"]))
-
-
-def test_a_play_with_long_flanks_is_taken_up_slowly() -> None:
-    bench = hanging(UP)
-    x = np.resize([1.0, 10.0, -10.0], bench.rows.n)
-    shape = joint_backlash._shapes(bench, x, 1.0)["arctan"][0]
-    far = np.arctan(10) / np.pi
-    assert shape[:3] == pytest.approx([0.25, far, -far])
 
 
 def test_joints_that_creep_do_so_alike() -> None:

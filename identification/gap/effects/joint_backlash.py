@@ -186,9 +186,9 @@ def _finer(
     for mass, more, zone in product(kg.tolist(), Nm.tolist(), zones.tolist()):
         x = net(bench, j, info["crossing"], mass, more)
         exact = info | {"zone_Nm": zone, "tool_kg": mass, "preload_Nm": more, "closely": True}
-        label = f"joint {j + 1} {info['crossing']} tool {mass:.2f} kg"
-        label = f"joint {j + 1} preload {more:.3g} Nm" if preload else label
-        out += _zone(bench, x, kinds, label, f"{zone:.3g} Nm fine", share, exact, places)
+        where = f"preload {more:.3g} Nm" if preload else f"{info['crossing']} tool {mass:.2f} kg"
+        label, size = f"joint {j + 1} {where}", f"{zone:.3g} Nm fine"
+        out += _zone(bench, x, kinds, label, size, share, exact, places)
     return out
 
 
