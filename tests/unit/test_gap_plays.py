@@ -1,0 +1,134 @@
+"""Plays: where the net torque passes them, and how closely they are looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import Bench, make_bench
+from identification.gap.compare import score
+from identification.gap.data import Array
+from identification.gap.effects import joint_backlash, library
+from identification.gap.effects.joint_backlash import TOOLS_KG
+from identification.gap.evidence import Engine
+from identification.gap.forms.friction import _net, describe_backlash
+from identification.gap.refine import refine
+from identification.gap.variants import Variant
+from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_weights import UP, hanging
+
+
+def closed_in(bench: Bench, x: Array, zone: float) -> Variant:
+    """What the search finds of a play of 0.4 mrad, of that zone (Nm), passed where x (n,) is 0."""
+    play = bench.joint_column(0, 4e-4 * joint_backlash._shapes(bench, x, zone)["free"][0])
+    variants = library(bench, ["joint_backlash"])
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    engine = Engine(bench, base, target + play, np.array([0.0, 1e-7, 2.5e-7]))
+    finer = refine(engine, score(engine, engine.levels, variants))
+    engine.extend()
+    return max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence).variant
+
+
+def test_plays_cross_where_some_tool_balances_the_weights() -> None:
+    bench = hanging(UP)
+    found = [v for v in library(bench, ["joint_backlash"]) if v.info["crossing"] == "weight"]
+    assert {v.info["tool_kg"] for v in found if not v.info["preload_Nm"]} == set(TOOLS_KG)
+    too_heavy = library(hanging(UP, gravity=-300.0), ["joint_backlash"])
+    assert all(v.info["preload_Nm"] for v in too_heavy if v.info["crossing"] == "weight")
+
+
+def test_a_preload_puts_the_crossing_where_no_tool_does() -> None:
+    bench = hanging(UP)
+    x, per_kg = bench.true_torque[:, 0] + bench.weight(0), bench.weight_per_kg(0)
+    preloads = {v.info["preload_Nm"] for v in library(bench, ["joint_backlash"])} - {0.0}
+    assert preloads
+    assert all(x.min() < -p < x.max() for p in preloads)  # a load overcomes it
+    assert min(map(abs, preloads)) >= 1.5 * np.abs(per_kg).min()  # a tool is off by so much
+
+
+def test_a_preload_is_found_to_a_percent() -> None:
+    bench = hanging(
+        np.concatenate([np.arange(0, 80.5, 0.5), np.arange(80, -0.5, -0.5)]), gravity=-5.0
+    )
+    x = bench.true_torque[:, 0] + bench.weight(0) - 26.3
+    found = closed_in(bench, x, 1.0)
+    assert found.info["preload_Nm"] == pytest.approx(-26.3, rel=0.01)
+    law, _ = describe_backlash(bench, found)
+    np.testing.assert_allclose(_net(bench, law), x, atol=0.3)
+    assert found.info["zone_Nm"] == pytest.approx(1.0, rel=0.1)
+
+
+def test_a_joint_lies_in_its_play_where_the_push_before_left_it() -> None:
+    """Whichever way it is pushed next, until the arm goes to another pose."""
+    there = make_bench(arm_data())
+    x = there.true_torque[:, 0]  # of the pushes along y
+    zone = 0.02 * float(np.abs(x).max())
+    shapes = joint_backlash._shapes(there, x, zone)
+    turned = np.flatnonzero(there.rebuilt & ~there.moved)
+    for k in np.flatnonzero(there.rebuilt):
+        assert shapes["friction"][0][k] == pytest.approx(0.0, abs=0.01)
+        left = 0.0 if there.moved[k] else shapes["kept"][0][k - 1]
+        assert shapes["kept"][0][k] == pytest.approx(left, abs=0.01)  # noise of the force
+    assert len(turned) == 2
+    assert np.abs(shapes["kept"][0][turned]).max() > 0.4
+
+
+def test_the_tool_is_found_to_a_few_grams_where_a_narrow_play_crosses() -> None:
+    """A zone of 1 Nm, and 5 Nm for every kilogram: the mass decides where it is passed."""
+    bench = hanging(
+        np.concatenate([np.arange(0, 40.5, 0.5), np.arange(40, -0.5, -0.5)]), gravity=-20.0
+    )
+    x = bench.true_torque[:, 0] + bench.weight(0, 0.845)
+    found = closed_in(bench, x, 1.0)
+    assert found.info["tool_kg"] == pytest.approx(0.845, abs=0.005)
+    assert found.info["zone_Nm"] == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_play_is_refined_to_no_more_than_the_widest() -> None:
+    bench = hanging(UP)
+    plays = [v for v in library(bench, ["joint_backlash"]) if not v.info["preload_Nm"]]
+    wide = [v for v in plays if v.info["crossing"] == "weight"][-1]
+    widest = max(v.info["zone_Nm"] for v in joint_backlash.refined(bench, wide))
+    assert widest == pytest.approx(joint_backlash.ZONES[-1] * bench.reach_of(bench.load))
+
+
+def test_zones_of_a_play_are_closed_in_on_where_no_tool_can_be_wrong() -> None:
+    bench = hanging(np.concatenate([UP, -UP]), gravity=0.0)
+    still = [replace(s, tool_gravity=np.zeros(1)) for s in bench.data.setups]
+    bench = make_bench(replace(bench.data, setups=tuple(still)))
+    found = next(
+        v for v in library(bench, ["joint_backlash"]) if v.label.endswith("free zone 0.012")
+    )
+    spans = []
+    for close in (1.0, *joint_backlash.CLOSE):
+        finer = joint_backlash.refined(bench, found, close)
+        zones = sorted({v.info["zone_Nm"] for v in finer if v.info["kind"] == "free"})
+        assert len(zones) == 7
+        assert zones[3] == pytest.approx(found.info["zone_Nm"])
+        kinds = {v.info["kind"] for v in finer}
+        beside = {"free", "soft", "slow", "arctan", *joint_backlash.KEPT}
+        assert kinds == (beside if close > 0.1 else {"free"})
+        spans.append(zones[-1] / zones[0])
+    assert spans[0] == pytest.approx(2.25)
+    assert spans == sorted(spans, reverse=True)
+    assert 1.03 < spans[-1] < 1.15  # not so near as masses
+    # nobody looked for uneven ends before: from scratch
+    first = joint_backlash.uneven(bench, found)
+    assert {v.info["kind"] for v in first} == set(joint_backlash.UNEVEN)
+    zones = sorted({v.info["zone_Nm"] for v in first})
+    assert zones[-1] / zones[0] == pytest.approx(0.07 / 0.004)
+    closer = joint_backlash.uneven(bench, first[0], joint_backlash.CLOSE[-1])
+    assert {v.info["kind"] for v in closer} == {first[0].info["kind"]}
+    specimen = make_bench(replace(bench.data, arm=False))
+    assert not any("kept" in v.label for v in library(specimen, ["joint_backlash"]))
+
+
+def test_a_play_with_long_flanks_is_taken_up_slowly() -> None:
+    bench = hanging(UP)
+    x = np.resize([1.0, 10.0, -10.0], bench.rows.n)
+    shape = joint_backlash._shapes(bench, x, 1.0)["arctan"][0]
+    far = np.arctan(10) / np.pi
+    assert shape[:3] == pytest.approx([0.25, far, -far])
