@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.gap.compare import Scored, by_word, closest, marginal, score
 from identification.gap.effects import (
+    base_slip,
     contact_seating,
     joint_backlash,
     joint_hysteresis,
@@ -31,6 +32,7 @@ _LEADING = 6  # words that are refined
 _STEPS = 2  # to the springs beside what goes through them
 _CLOSE = 0.2  # of the first look's steps
 _LOOKS = 6  # at most, at one share of the steps
+_FAR = 60.0  # nats below the best of them
 _WINDOW = 12.0  # nats above `none` that a word must have to be refined
 
 
@@ -92,11 +94,13 @@ def _elsewhere(word: _Word, finer: list[Variant]) -> list[Variant]:
     found = sorted(_scored_beside(word.engine, word.families, word.ranked, able), key=_evidence)
     out = []
     for v in (s.variant for s in found[-_ELSEWHERE:]):
-        out += [
-            joint_yield.elsewhere(bench, v, there)
+        places = [
+            (joint_yield.place_in(there.label), there.info)
             for (memory, place), there in others.items()
             if memory == v.info["memory"] and place != _axle(v)
         ]
+        places += base_slip.between(bench, v) if v.word == base_slip.WORD else []
+        out += [joint_yield.elsewhere(bench, v, *place) for place in places]
     return [v for v in out if v is not None]
 
 
@@ -247,7 +251,8 @@ def _closing_in(
 ) -> list[Variant]:  # fmt: skip
     """Finer shapes about those that were found, and finer ones still about the best of these. What
     is best moves along narrow valleys (a zone is as wide as the crossing is far): every look but
-    the closest is moved after it until it stays, and the last one is kept."""
+    the closest is moved after it until it stays, and the last one is kept. What was seen to be far
+    worse is left out."""
     engine = word.engine
     fresh = [v for s in starts for v in refined(engine.bench, s.variant)]
     finer, found = list(fresh), list[Scored]()
@@ -261,7 +266,9 @@ def _closing_in(
                 break
             fresh = refined(engine.bench, best, share)
         finer += fresh
-    return finer
+    best_of = max(map(_evidence, found), default=0.0)
+    far = {s.variant for s in found if s.log_evidence < best_of - _FAR}
+    return [v for v in finer if v not in far]
 
 
 def _scored_beside(

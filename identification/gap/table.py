@@ -66,7 +66,7 @@ class Table:
         self._edges = np.cumsum([0, *(len(s.columns) for s in stacks)]).tolist()
         v, k = self._columns.shape
         size = len(levels), v, self._scales.shape[1]
-        self.logs = np.full(size, -np.inf)
+        self.logs, self._best = np.full(size, -np.inf), np.full(v, -np.inf)
         self._seen = np.zeros(size[:2], dtype=bool)
         self._ceiling = np.array([lv.log_base + 0.5 * lv.misfit for lv in levels])
         self._most = np.repeat(self._ceiling[:, None], v, axis=1)
@@ -76,40 +76,54 @@ class Table:
     def look(self) -> None:
         """Makes what may count beside the best level and scale of its own variant: from the level
         that fits the base best down, then up."""
+        if not self._open(slice(None)).any():
+            return
         start = int(np.argmax([lv.log_base for lv in self._levels]))
-        best = self.logs.max(axis=(0, 2))
         for i in (*range(start, -1, -1), *range(start + 1, len(self._levels))):
-            counts = (self._most[i] > best - _COUNTS) & ~self._hopeless(best)
-            which = np.flatnonzero(~self._seen[i] & counts)
+            which = np.flatnonzero(self._open(i))
             if which.size:
                 self._make(i, which)
-                best[which] = np.maximum(best[which], self.logs[i, which].max(axis=1))
 
-    def _hopeless(self, best: Array) -> Flags:
+    def _open(self, i: int | slice) -> Flags:
+        """(v,), or (l, v): what was not made at a level and may count there."""
+        counts = (self._most[i] > self._best - _COUNTS) & ~self._seen[i]
+        return np.asarray(counts & ~self._hopeless())
+
+    def _hopeless(self) -> Flags:
         """Variants that were looked at and lie far below the best one of their word."""
-        return (best > -np.inf) & (best < self._of_word(best) - _HOPELESS)
+        best = self._best
+        return (best > -np.inf) & (best < self._of_word() - _HOPELESS)
 
-    def _of_word(self, best: Array) -> Array:
+    def _of_word(self) -> Array:
         """(v,) the best of each one's word."""
-        return np.repeat(np.maximum.reduceat(best, self._edges[:-1]), np.diff(self._edges))
+        best = np.maximum.reduceat(self._best, self._edges[:-1])
+        return np.repeat(best, np.diff(self._edges))
 
     def limit(self) -> None:
         """Takes away what the limits cost that physics sets, where it counts among the shapes of
         the word; what all of them together cost only near the best."""
-        done = np.zeros(self.logs.shape, dtype=bool)
-        done[:, ~self._limits.asked[:, 0]] = True
-        closely = done.copy()
+        done = {closely: np.zeros(self.logs.shape, dtype=bool) for closely in (False, True)}
+        closely = False
         while True:
-            top = self._of_word(self.logs.max(axis=(0, 2)))[:, None]
-            rough = (self.logs > top - _COUNTS) & ~done
-            close = (self.logs > top - _NEAR) & ~closely
-            todo = rough if rough.any() else close
-            level, which, scale = np.nonzero(todo)
-            if not len(which):
+            found = self._near(_NEAR if closely else _COUNTS, done[closely])
+            if found[1].size:
+                done[closely][found] = True
+                self.logs[found] += self._odds(*found, closely=closely)
+                which = np.unique(found[1])
+                self._best[which] = self.logs[:, which].max(axis=(0, 2))
+                self.look()
+            elif closely:
                 return
-            self.logs[todo] += self._odds(level, which, scale, closely=not rough.any())
-            done, closely = done | rough, closely if rough.any() else closely | close
-            self.look()
+            closely = not found[1].size
+
+    def _near(self, nats: float, done: Flags) -> tuple[Ints, Ints, Ints]:
+        """Levels, variants with limits, and scales that are so near to the best of their word, but
+        for what is done (l, v, s)."""
+        floor = self._of_word() - nats
+        some = np.flatnonzero(self._limits.asked[:, 0] & (self._best > floor))
+        todo = (self.logs[:, some] > floor[some, None]) & ~done[:, some]
+        level, place, scale = np.nonzero(todo)
+        return level, some[place], scale
 
     def _make(self, i: int, which: Ints) -> None:
         level, root = self._levels[i], self._root[which]
@@ -129,6 +143,7 @@ class Table:
         self.logs[i, which] = level.log_base + fit + log_level(self._engine.etas, i, energy)
         self._vectors[i, which], self._mean[i, which] = vectors, mean
         self._variance[i, which] = s2 / gain
+        self._best[which] = np.maximum(self._best[which], self.logs[i, which].max(axis=1))
         self._seen[i, which] = True
         self._bound(i, which, fit.max(axis=1), level.misfit - taken.max(axis=1))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.gap.bench import TOOL_SD_KG, Bench
 from identification.gap.data import Array
-from identification.gap.effects.base_slip import DEPTHS_M
+from identification.gap.effects.base_slip import BETWEEN_M
 from identification.gap.interval import TWO_SIDED, Found, Parameter, Softer, normal
 from identification.gap.parts import Part
 
@@ -102,9 +102,9 @@ def _moved(p: Parameter, shift: float, half: float) -> Parameter:
 
 
 def _depth_sd(bench: Bench, moment: Array) -> float:
-    """Relative sd of a moment (n,) about a lying axis whose depth is known to a step of its grid:
-    the moment is the force times height over the axis."""
+    """Relative sd of a moment (n,) about a lying axis whose depth is known to a step of those that
+    are looked at: the moment is the force times height over the axis."""
     loaded = np.abs(bench.load) > 0.5 * np.abs(bench.load).max()
     lever = float(np.median(np.abs(moment[loaded] / bench.load[loaded])))
-    step = DEPTHS_M[1] - DEPTHS_M[0]
+    step = BETWEEN_M[1] - BETWEEN_M[0]
     return step / 12**0.5 / max(lever, step)

@@ -7,15 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
+from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import Scored, score
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import joint_yield, library
+from identification.gap.effects import base_slip, joint_yield, library
 from identification.gap.refine import refine
-from identification.gap.variants import place_of
+from identification.gap.variants import Variant, place_of
 from tests.unit.test_gap_closer import assert_lawful, engine_with
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_running import SPRING, running
+
+
+def elsewhere(bench: Bench, found: Variant, there: Variant) -> Variant | None:
+    name = joint_yield.place_in(there.label)
+    return joint_yield.elsewhere(bench, found, name, there.info)
 
 
 @pytest.mark.parametrize("word", ["joint_yield", "base_slip"])
@@ -29,7 +34,7 @@ def test_a_knee_elsewhere_begins_at_the_same_load_of_the_rig(word: str, flow_s: 
         if v.info["flow_s"] == flow_s and v.label.endswith("flows back")
     )  # fmt: skip
     others = {place_of(v): v for v in reversed(sharp)}
-    moved = {k: joint_yield.elsewhere(bench, found, v) for k, v in others.items()}
+    moved = {k: elsewhere(bench, found, v) for k, v in others.items()}
     made = {k: v for k, v in moved.items() if v is not None}
     assert len(made) > 1
     most = int(np.abs(found.info["load"]).argmax())
@@ -45,11 +50,38 @@ def test_a_knee_elsewhere_begins_at_the_same_load_of_the_rig(word: str, flow_s: 
     assert_lawful(bench, list(made.values()))
 
 
+def test_the_axis_of_a_slip_is_looked_for_between_the_depths_of_the_grid() -> None:
+    bench = make_bench(arm_data())
+    load, column, _ = base_slip._about(bench, "x", 0.35)
+    assert 0.35 not in base_slip.DEPTHS_M
+    slip = column(bench.plays(load, np.array([0.5 * np.abs(load).max()]), bench.moved)[:, 0])
+    variants = library(bench, ["base_slip"])
+    engine = engine_with(bench, bench.columns[slip])
+    finer = refine(engine, score(engine, engine.levels, variants))
+    engine.extend()
+    best = max(score(engine, engine.levels, [*variants, *finer]), key=lambda s: s.log_evidence)
+    assert (best.variant.info["axis"], best.variant.info["depth_m"]) == ("x", 0.35)
+    assert_lawful(bench, [best.variant])
+
+
+def test_what_is_far_worse_beside_the_best_is_not_looked_at_again() -> None:
+    bench = make_bench(arm_data())
+    variants = library(bench, ["joint_yield"])
+    found = next(v for v in variants if v.label == "joint 4 at 0.68 sharp")
+    engine = engine_with(bench, 10 * bench.columns[found.columns[0]])
+    finer = refine(engine, score(engine, engine.levels, variants))
+    engine.extend()
+    there = [v for v in finer if v.info["joint"] == 3]
+    logs = [s.log_evidence for s in score(engine, engine.levels, there)]
+    assert 0 < len(there) < len(joint_yield.refined(bench, found))
+    assert max(logs) - min(logs) < 61.0  # 60, and what priors do
+
+
 def test_a_place_without_load_has_no_knee() -> None:
     bench = make_bench(arm_data(directions="x"))
     sharp = [v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp"]
     idle = replace(sharp[-1], info={**sharp[-1].info, "load": np.zeros(bench.rows.n)})
-    assert joint_yield.elsewhere(bench, sharp[0], idle) is None
+    assert elsewhere(bench, sharp[0], idle) is None
 
 
 def test_without_readings_a_joint_is_not_named_for_having_been_looked_at_closely() -> None:

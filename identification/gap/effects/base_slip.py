@@ -11,14 +11,15 @@ Source: Coulomb friction in the bolted joint of the mounting, effective radius a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.base_compliance import moments
-from identification.gap.effects.joint_yield import knee_variants
+from identification.gap.effects.joint_yield import knee_at, knee_variants
 from identification.gap.variants import Variant
 
 WORD = "base_slip"
@@ -30,11 +31,15 @@ AXES: dict[str, tuple[float, float, float]] = {
     "x+y": (_HALF, _HALF, 0.0),
     "x-y": (_HALF, -_HALF, 0.0),
 }
-DEPTHS_M = (0.0, 0.35, 0.7)  # coarser than elastic ones: a knee is told by where it bends
+# Coarser than elastic ones: a knee is told by where it bends, and looked at between them where one
+# is found.
+DEPTHS_M = (0.0, 0.7)
+BETWEEN_M = (0.175, 0.35, 0.525)
 # m/N at the target beyond the threshold, which the scales of the knees (0.07 to 56) multiply: on a
 # lever of 0.75 m 0.5e-6 to 4e-4 rad/Nm. Said of the target, not of the moment: axes at several
 # depths whose moments run in proportion have the same knees then, and need not be told apart.
 _BEYOND = 0.75**2 / 1.5e5
+_SHORTEST = 0.02  # m: levers
 
 
 def places() -> Iterator[tuple[str, float]]:
@@ -53,16 +58,39 @@ def variants(bench: Bench) -> list[Variant]:
     """Per axis and depth of the axis."""
     out = []
     for axis, depth in places():
-        lever = lever_of(bench, axis, depth)
-        if np.abs(lever).max() < 0.02:
-            continue
-
-        natural = float(_BEYOND / np.abs(lever).max() ** 2)  # rad/Nm
-
-        def column(state: Array, lever: Array = natural * lever) -> int:
-            return bench.add(bench.outside_column(lever * state))
-
-        name = f"axis {axis} {depth:g} m below"
-        info = {"axis": axis, "depth_m": depth, "natural": natural}
-        out += knee_variants(bench, lever * bench.true_load, column, WORD, name, info)
+        load, column, info = _about(bench, axis, depth)
+        if np.abs(load).max() > 0:
+            out += knee_variants(bench, load, column, WORD, _name(info), info)
     return out
+
+
+def between(bench: Bench, found: Variant) -> list[tuple[str, dict[str, Any]]]:
+    """A lying axis about which it slips, between the depths of the grid: name, and what
+    `joint_yield.elsewhere` wants to know of a place."""
+    axis = str(found.info["axis"])
+    out = []
+    for depth in BETWEEN_M if axis != "z" else ():
+        load, column, info = _about(bench, axis, depth)
+        at = knee_at(bench, load, column, found.info["memory"])
+        out.append((_name(info) + found.info["memory"], info | at))
+    return out
+
+
+def _about(
+    bench: Bench, axis: str, depth: float
+) -> tuple[Array, Callable[[Array], int], dict[str, Any]]:
+    """Moment (n,) Nm about an axis, zero where hardly any lever is left; pool index of what a state
+    (n,) of it does; and its place."""
+    lever = lever_of(bench, axis, depth)
+    longest = float(np.abs(lever).max())
+    natural = _BEYOND / max(longest, _SHORTEST) ** 2  # rad/Nm
+
+    def column(state: Array) -> int:
+        return bench.add(bench.outside_column(natural * lever * state))
+
+    load = lever * bench.true_load * (longest >= _SHORTEST)
+    return load, column, {"axis": axis, "depth_m": depth, "natural": natural}
+
+
+def _name(info: dict[str, Any]) -> str:
+    return f"axis {info['axis']} {info['depth_m']:g} m below"

@@ -19,7 +19,7 @@ Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manu
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -110,20 +110,32 @@ def knee_variants(
     info: dict[str, Any],
 ) -> list[Variant]:
     """Variants of a threshold on `load` (n,); `column` turns a state (n,) into a pool index."""
-    top = float(np.abs(load).max())
-    if not top > 0:
-        return []
-    top *= bench.reach_of(load) / float(np.ptp(np.append(load, 0.0)))
+    top = _range(bench, load)
     if not top > 0:
         return []
     radius = bench.radii(load, top * np.array(THRESHOLDS))
     out = _hardened(bench, load, radius, column, word, name, info)
     for memory, fresh in _memories(bench).items():
-        back = [column(s) for s in after_yield(bench, load, top, fresh)]
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
-        exact = {**info, "memory": memory, "flow_s": 0.0, "load": load, "column": column}
-        out += _knees(bench, word, f"{name}{memory}", columns, radius, back, exact)
+        exact = {**info, **knee_at(bench, load, column, memory), "flow_s": 0.0}
+        out += _knees(bench, word, f"{name}{memory}", columns, radius, exact["back"], exact)
     return out
+
+
+def knee_at(
+    bench: Bench, load: Array, column: Callable[[Array], int], memory: str
+) -> dict[str, Any]:
+    """What knees on a load (n,) have in common at a place: memory, load, column, and `back`, the
+    columns of what flows back."""
+    back = after_yield(bench, load, _range(bench, load), _fresh(bench, memory))
+    columns = [column(s) for s in back]
+    return {"memory": memory, "load": load, "column": column, "back": columns}
+
+
+def _range(bench: Bench, load: Array) -> float:
+    """Largest size of a load (n,), as far as data reach."""
+    top = float(np.abs(load).max())
+    return top * bench.reach_of(load) / float(np.ptp(np.append(load, 0.0))) if top > 0 else 0.0
 
 
 def _knees(
@@ -263,7 +275,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     alone = 0.0 if weight is None else float(np.abs(weight).max())
     radius = alone + (float(info["centre"]) - alone) * (1 + close * np.linspace(-0.16, 0.2, FINE))
     fresh = _fresh(bench, info["memory"])
-    name, out = _place_in(found.label), []
+    name, out = place_in(found.label), []
     for (flow, square), states in _flowing(bench, ways, info["load"], radius, fresh, weight):
         columns = [info["column"](s) for s in states.T]
         share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S) + len(SQUARE_S))
@@ -279,11 +291,11 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     return out
 
 
-def elsewhere(bench: Bench, found: Variant, there: Variant) -> Variant | None:
-    """A knee that was found, at the place (joint, or axis) of another variant of the same memory,
-    where it begins at the same load of the rig: its thresholds in proportion to what loads the two
+def elsewhere(bench: Bench, found: Variant, name: str, there: Mapping[str, Any]) -> Variant | None:
+    """A knee that was found, at another place (joint, or axis; `knee_at`) of the same memory, where
+    it begins at the same load of the rig: its thresholds in proportion to what loads the two
     places. None where nothing loads the other one then."""
-    info, other = found.info, there.info
+    info, other = found.info, there
     most = int(np.abs(info["load"]).argmax())
     factor = float(np.abs(other["load"][most]) / np.abs(info["load"][most]))
     if not factor > 0:
@@ -297,12 +309,12 @@ def elsewhere(bench: Bench, found: Variant, there: Variant) -> Variant | None:
     exact = {**other, "radius": radius, "centre": factor * float(info["centre"]), "flow_s": flow,
              "square": bool(info.get("square")), "knee": info["knee"]}  # fmt: skip
     start, end = found.label.rsplit(" at ", 1)
-    how = start.removeprefix(_place_in(found.label)) + f" at {exact['centre']:.4g}"
-    label = " ".join([_place_in(there.label) + how, *end.split(" ")[1:]])
+    how = start.removeprefix(place_in(found.label)) + f" at {exact['centre']:.4g}"
+    label = " ".join([name + how, *end.split(" ")[1:]])
     return replace(found, label=label, columns=tuple(columns), info=exact)
 
 
-def _place_in(label: str) -> str:
+def place_in(label: str) -> str:
     """Joint or axis, and memory, with which a knee's label begins."""
     return re.split(" at | flow", label, maxsplit=1)[0]
 
