@@ -116,7 +116,6 @@ class Engine:
         ]
         self.levels = [self._grown(*each) for each in zip(self.levels, beside, strict=True)]
         self._gathered.put(parts)
-        self._rows.clear()
 
     def columns(self, numbers: Iterable[int]) -> Array:
         """(size, k) stacked columns of the pool."""
@@ -152,17 +151,25 @@ class Engine:
         return self._squares[columns]
 
     def beside(self, columns: tuple[int, ...], number: int) -> list[Array]:
-        """Per level, of the first `number` at least, (k, p): rows of the Gram matrix, kept until
-        the pool grows. Those of many levels at once take little longer than of one."""
+        """Per level, of the first `number` at least, (k, p): rows of the Gram matrix, kept for the
+        next time; of a pool that has grown only what is new. Those of many levels at once take
+        little longer than of one."""
         known = self._rows.setdefault(columns, [])
+        if known and len(known[0].T) < len(self._gathered.white):
+            fresh = self._products(columns, slice(len(known)), len(known[0].T))
+            known[:] = [np.hstack(both) for both in zip(known, fresh, strict=True)]
         if len(known) < number:
-            at, missing = np.array(columns, dtype=np.intp), slice(len(known), number)
-            white = self._gathered.white
-            made = white.picked(at).between(white, self._weights[missing])
-            for base, rows in zip(self._bases[missing], made, strict=True):
-                np.subtract(rows, base.pool.values[at] @ base.pool.values.T, out=rows)
-            known += made
+            known += self._products(columns, slice(len(known), number), 0)
         return known
+
+    def _products(self, columns: tuple[int, ...], levels: slice, start: int) -> list[Array]:
+        """Per level (k, p - start): products of columns (k,) with those of the pool from one on."""
+        at, white = np.array(columns, dtype=np.intp), self._gathered.white
+        others = white.picked(np.arange(start, len(white))) if start else white
+        made = white.picked(at).between(others, self._weights[levels])
+        for base, rows in zip(self._bases[levels], made, strict=True):
+            np.subtract(rows, base.pool.values[at] @ base.pool.values[start:].T, out=rows)
+        return made
 
     def between(self, eta: float, columns: Sequence[int]) -> tuple[Array, Array, float]:
         """For an imperfection that is none of the levels: Gram matrix (k, k) and moment (k,) of
