@@ -78,7 +78,7 @@ def variants(bench: Bench) -> list[Variant]:
                                         "tool_kg": kg, "preload_Nm": 0.0}  # fmt: skip
                 label = f"joint {j + 1} {name}" + (f" tool {kg:g} kg" if share < 1 else "")
                 out += _zone(bench, x, kinds, label, f"{zone:g}", share, info, places)
-        out += _preloaded(bench, j, span, places) if bench.data.arm else []
+        out += _preloaded(bench, j, span, places)
         if not bench.data.arm and bench.rows.continuous:
             flanks = placed(bench, torque)
             out += [] if flanks is None else _placed(bench, j, flanks)
@@ -102,6 +102,8 @@ def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Arra
 
 def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]) -> list[Variant]:
     """Crossings wherever a preload may put them, and no tool does."""
+    if not bench.data.arm and bench.rows.continuous:
+        return []  # those are placed by the data
     plain, kinds, zones = net(bench, j, "weight", TOOL_KG), *_PRELOADED
     by_tool = float(np.abs(bench.weight_per_kg(j)).min()) * (max(TOOLS_KG) - TOOL_KG)
     low, high = float(plain.min()), float(plain.max())
