@@ -18,7 +18,7 @@ from identification.gap.course import Course
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
 from identification.gap.imposed import displacement_simpler, on_plateau
-from identification.gap.noise import Noise, estimate_noise, standing
+from identification.gap.noise import Noise, driven, estimate_noise
 from identification.gap.pool import Pool
 from identification.gap.rows import Rows, hold_ids, is_continuous, reduce_rows
 
@@ -323,13 +323,12 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     slope = lever**2 @ c
     stated = lever**2 @ data.compliance
     imposed = displacement_imposed(data)
-    meter = data.instruments
+    load = driven(data, rows, imposed)
     if imposed:
-        driven = standing(rows, rows.displacement, meter.displacement)
-        load, response = driven / stated, rows.measured_force * stated
+        load, response = load / stated, rows.measured_force * stated
         scatter, trend = rows.force_scatter * stated**2, rows.force_trend * stated
     else:
-        load, response = standing(rows, rows.force, meter.force), rows.displacement
+        response = rows.displacement
         scatter, trend = rows.displacement_scatter, rows.displacement_trend
     torque = lever * load[:, None]
     layout = _layout(data, rows, imposed)
@@ -369,11 +368,13 @@ def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:
 
 
 def displacement_imposed(data: GapData) -> bool:
-    """Whether the rig drove the displacement: as stated, else as the data show (imposed.py). A rig
-    that rests at levels of force, or an arm, is loaded through its screw and read at rest."""
+    """Whether force is predicted from the displacement: where the rig drove that, as stated, else
+    as the data show (imposed.py). The joints of an arm that is read at rest bear the force that was
+    read, whatever its screw holds: the displacement is linear in what they give way, the force is
+    not. So it is with a rig that rests at levels of force."""
+    hold = hold_ids(data)
+    if data.arm and not (data.imposed and is_continuous(data, hold)):
+        return False
     if data.imposed is not None:
         return data.imposed == "displacement"
-    if data.arm:
-        return False
-    hold = hold_ids(data)
     return displacement_simpler(data) if is_continuous(data, hold) else on_plateau(data, hold)

@@ -396,4 +396,7 @@ def _notes(bench: Bench) -> tuple[str, ...]:
         )
     if bench.imposed:
         out.append("The displacement is imposed: force is predicted from it.")
+    elif bench.data.imposed == "displacement":
+        out.append("The displacement is imposed; at rest the joints bear the force that was read: "
+                   "displacement is predicted from it.")  # fmt: skip
     return tuple(out)

@@ -6,8 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import Array, GapData, Ints
-from identification.gap.rows import ENOUGH, Rows, hold_ids, scatter_within, swing_within
+from identification.gap.data import Array, Flags, GapData, Ints
+from identification.gap.rows import (
+    ENOUGH,
+    Rows,
+    hold_ids,
+    noise_in_holds,
+    scatter_within,
+    steady_in,
+    swing_within,
+)
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -58,9 +66,12 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     common = np.where(rows.steady, steep * meter.force / np.sqrt(rows.hold_weight), 0.0)
     if rows.continuous:
         per_sample, common = _running(data, rows, slope, imposed), np.zeros(rows.n)
-    elif imposed:  # the force answers, and what is driven is taken as it was read
-        common, answer = np.zeros(rows.n), scatter_within(data.force, hold) or meter.force
-        per_sample = np.hypot(slope * max(answer, 0.33 * meter.force), meter.displacement)
+    elif imposed:  # the force answers
+        answer = scatter_within(data.force, hold) or meter.force
+        still = _stands(data, rows, hold)[0]
+        per_sample = np.hypot(slope * max(answer, 0.33 * meter.force),
+                              np.where(still, 0.0, meter.displacement))  # fmt: skip
+        common = np.where(still, meter.displacement / np.sqrt(rows.hold_weight), 0.0)
     else:
         alone = np.where(rows.steady, meter.displacement, fallback)
         per_sample = _white(data, rows, alone, slope, hold)
@@ -175,12 +186,33 @@ _BAND, _TREND = 3.0, 1.5  # of the rows' noise: how far it strays there, and run
 _GOES, _SLOWLY = 20.0, 10.0  # of that: in all, and over _REACH rows to either side at the most
 
 
+def driven(data: GapData, rows: Rows, imposed: bool) -> Array:
+    """(n,) the displacement (m) if that is imposed, or the force (N), with its mean wherever it
+    stands still within its noise: a model that is driven by noise answers with noise that the rig
+    never showed."""
+    meter = data.instruments
+    if rows.continuous:
+        if imposed:
+            return standing(rows, rows.displacement, meter.displacement)
+        return standing(rows, rows.force, meter.force)
+    if not imposed:
+        return rows.force
+    still, mean = _stands(data, rows, hold_ids(data))
+    return np.where(still, mean, rows.displacement)
+
+
+def _stands(data: GapData, rows: Rows, hold: Ints) -> tuple[Flags, Array]:
+    """Whether the displacement of a row's hold stands still within its noise, and its mean."""
+    sd = noise_in_holds(data.displacement, hold, data.instruments.displacement)
+    still, mean, _ = steady_in(rows.hold, rows.displacement, rows.weight, sd)
+    return still, mean
+
+
 def standing(rows: Rows, driven: Array, stated: float) -> Array:
-    """What is driven (n,) with the mean of every stretch in which it stands still within its noise:
-    a model that is driven by noise answers with noise that the rig never showed. Of what goes so
-    slowly all the time that a few rows hardly tell it from standing, the mean about every row. Of
-    rows that rest in holds `rows.force` is that already."""
-    if not rows.continuous or rows.n <= _LONG:
+    """What is driven (n,) with the mean of every stretch of a running recording in which it stands.
+    Of what goes so slowly all the time that a few rows hardly tell it from standing, the mean about
+    every row."""
+    if rows.n <= _LONG:
         return driven
     sd = min(float(np.median(np.abs(np.diff(driven, 2)))) / 0.6745 / 6**0.5, 3 * stated)
     before, after = _about(rows, _REACH)

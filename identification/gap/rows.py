@@ -146,8 +146,8 @@ def reduce_rows(data: GapData) -> Rows:
     zero = (branch == ZERO) & (step <= 0)
     weight = count.astype(float)
     stated = data.instruments.force
-    sd = stated if continuous else _noise_in_holds(data.force, hold, stated)
-    steady, mean_force, hold_weight = _steady(holds, force, weight, sd)
+    sd = stated if continuous else noise_in_holds(data.force, hold, stated)
+    steady, mean_force, hold_weight = steady_in(holds, force, weight, sd)
     session = mean(_session(data))
     return Rows(
         time=mean(data.time), session=session, clock=data.session is not None, run=run, setup=setup,
@@ -201,17 +201,18 @@ def swing_within(values: Array, hold: Ints) -> float:
 _SWINGS = 5  # samples of a hold
 
 
-def _noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
+def noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
     """What values (n,) scatter in their holds: as stated, or more as far as that may be wrong."""
     return min(max(stated, scatter_within(values, hold) or 0.0), _MISJUDGED * stated)
 
 
-def _steady(hold: Ints, force: Array, weight: Array, sd: float) -> tuple[Flags, Array, Array]:
-    """Whether the force of a row's hold stands still within its noise, its mean, its samples."""
+def steady_in(hold: Ints, driven: Array, weight: Array, sd: float) -> tuple[Flags, Array, Array]:
+    """Whether what is driven (n,) stands still within its noise in a row's hold, its mean there,
+    samples."""
     total = np.bincount(hold, weights=weight)
-    mean = np.bincount(hold, weights=weight * force) / total
+    mean = np.bincount(hold, weights=weight * driven) / total
     rows = np.bincount(hold)
-    square = np.bincount(hold, weights=weight * (force - mean[hold]) ** 2) / sd**2
+    square = np.bincount(hold, weights=weight * (driven - mean[hold]) ** 2) / sd**2
     steady = square <= _STEADY_PER_ROW * rows + _STEADY_ONCE
     return steady[hold], mean[hold], total[hold].astype(float)
 

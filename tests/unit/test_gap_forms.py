@@ -262,7 +262,7 @@ def test_a_known_effect_leaves_every_channel(bench: Bench, known: Form) -> None:
     assert np.abs(left.q).max() < 1e-12
     np.testing.assert_allclose(left.force, plain.force, atol=1e-9)
     with pytest.raises(ValueError, match="displacement is imposed"):
-        less_known(replace(made, imposed="displacement"), [known])
+        less_known(replace(made, imposed="displacement", step=made.step - 99), [known])
 
 
 @pytest.mark.parametrize("readings", [True, False])

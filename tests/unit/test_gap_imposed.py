@@ -10,7 +10,9 @@ import pytest
 
 from identification.gap.bench import displacement_imposed
 from identification.gap.data import Array, GapData
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.imposed import _Channel, _slides, displacement_simpler
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
 NOISE = 3e-4  # of the range
@@ -259,3 +261,11 @@ def test_strokes_slide_however_finely_they_are_read_in_noise() -> None:
     noisy = u + 0.02 * np.random.default_rng(8).standard_normal(1000)
     time = np.arange(1000.0)
     assert _slides(_Channel(time, rubs, 0.001), _Channel(time, noisy, 0.02))
+
+
+def test_an_arm_that_is_read_at_rest_answers_the_force_that_was_read() -> None:
+    """Whatever its screw holds: the displacement is linear in what the springs give way."""
+    data = replace(arm_data(), imposed="displacement")
+    assert not displacement_imposed(data)
+    assert any("at rest the joints bear the force" in n for n in diagnose_gap(data).notes)
+    assert displacement_imposed(replace(data, step=np.full(len(data.step), -1)))

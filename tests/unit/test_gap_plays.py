@@ -18,6 +18,7 @@ from identification.gap.forms.friction import _net, describe_backlash
 from identification.gap.refine import refine
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_running import SPRING, running
 from tests.unit.test_gap_weights import UP, hanging
 
 
@@ -132,3 +133,13 @@ def test_a_play_with_long_flanks_is_taken_up_slowly() -> None:
     shape = joint_backlash._shapes(bench, x, 1.0)["arctan"][0]
     far = np.arctan(10) / np.pi
     assert shape[:3] == pytest.approx([0.25, far, -far])
+
+
+def test_a_preload_puts_a_play_into_a_recording_from_one_side() -> None:
+    """Of a force that runs; what is slack where a displacement begins is a seat."""
+    force = np.concatenate([np.linspace(0, 60, 200), np.linspace(60, 0, 200)])
+    u = force / SPRING + 2e-5 * np.tanh((force - 24.0) / 1.3)
+    found = library(make_bench(running(force, u, imposed="force")), ["joint_backlash"])
+    assert found
+    assert all(v.info["preload_Nm"] for v in found)
+    assert not library(make_bench(running(force, u, imposed="displacement")), ["joint_backlash"])

@@ -60,10 +60,11 @@ _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Per joint: zone, with and without friction, crossing where weight and load balance; none on
-    a recording that runs on from one side: what is slack there is a seat."""
-    if not bench.data.arm and bench.rows.continuous and bench.course.one_sided:
-        return []
+    """Per joint: zone, with and without friction, crossing where weight and load balance, or a
+    preload; in a recording that runs on from one side nowhere else: what is slack at its ends is a
+    seat."""
+    running = not bench.data.arm and bench.rows.continuous
+    inside = running and bench.course.one_sided
     # a bench is pushed along one direction after another, each on a part of its own
     kinds, out = tuple(k for k in KINDS if bench.data.arm or k not in KEPT), []
     for j in bench.moving_joints():
@@ -72,14 +73,14 @@ def variants(bench: Bench) -> list[Variant]:
         if not span > 0:
             continue
         places: dict[bytes, list[int]] = {}
-        for name, kg, x, share in _crossings(bench, j, span):
+        for name, kg, x, share in () if inside else _crossings(bench, j, span):
             for zone in ZONES:
                 info: dict[str, Any] = {"joint": j, "zone_Nm": zone * span, "crossing": name,
                                         "tool_kg": kg, "preload_Nm": 0.0}  # fmt: skip
                 label = f"joint {j + 1} {name}" + (f" tool {kg:g} kg" if share < 1 else "")
                 out += _zone(bench, x, kinds, label, f"{zone:g}", share, info, places)
         out += _preloaded(bench, j, span, places)
-        if not bench.data.arm and bench.rows.continuous:
+        if running and not inside:
             flanks = placed(bench, torque)
             out += [] if flanks is None else _placed(bench, j, flanks)
     return out
@@ -102,21 +103,22 @@ def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Arra
 
 def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]) -> list[Variant]:
     """Crossings wherever a preload may put them, and no tool does."""
-    if not bench.data.arm and bench.rows.continuous:
+    if bench.imposed:
         return []  # those are placed by the data
     plain, kinds, zones = net(bench, j, "weight", TOOL_KG), *_PRELOADED
     by_tool = float(np.abs(bench.weight_per_kg(j)).min()) * (max(TOOLS_KG) - TOOL_KG)
     low, high = float(plain.min()), float(plain.max())
+    start, way = (low, 1.0) if high > -low else (high, -1.0)  # pushed as pulled
     step, out = (high - low) / _PRELOADS, list[Variant]()
     if not step > 0:
         return []
-    for preload in -(low + (np.arange(_PRELOADS) + 0.5) * step):
+    for preload in -(start + way * (np.arange(_PRELOADS) + 0.5) * step):
         if abs(preload) < by_tool:
             continue
         for zone in zones:
             info = {"joint": j, "zone_Nm": zone * span, "crossing": "weight", "tool_kg": TOOL_KG,
                     "preload_Nm": float(preload), "step_Nm": step}  # fmt: skip
-            label = f"joint {j + 1} preload {preload / (high - low):.2g}"
+            label = f"joint {j + 1} preload {way * preload / (high - low):.2g}"
             share = _PRELOAD_PRIOR / _PRELOADS
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
     return out
