@@ -57,7 +57,8 @@ DESIGNS = {
     "rich": Design(("P1", "P2"), repetitions=2, steps=5, hold=8, components=True),
     "medium": Design(),
     "paper": Design(steps=10, hold=1, unload=False, readings=False, clock=False),
-    "arm imposed": Design(steps=6, imposed="displacement"),
+    # read at rest, an arm answers the force that was read
+    "arm imposed": Design(steps=6, imposed="displacement", continuous=True),
     "bench": Design(directions=("x",), arm=False, hold=3),
     "bench imposed": Design(directions=("x",), arm=False, imposed="displacement", continuous=True),
 }

@@ -18,7 +18,7 @@ from identification.gap.imperfection import PATH
 from identification.gap.parts import Part
 from rig.gap_data import gap_data
 from tests.conformance.effect_benches import of, quick_engine
-from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, linear, meta, noisy
+from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, meta, noisy
 from tests.conformance.test_effect_recovery import typical
 
 LATE_S = 1.3
@@ -94,7 +94,8 @@ def test_a_recording_that_runs_on_shows_the_way() -> None:
 
 def test_where_the_displacement_is_imposed_it_is_the_force_that_scatters() -> None:
     """Levels of a stroke: each row answers with a force, of its uncertainty over the stiffness."""
-    plain, rng = linear("arm imposed"), np.random.default_rng(4)
+    design, rng = replace(DESIGNS["bench"], imposed="displacement"), np.random.default_rng(4)
+    plain = gap_data(imported(noisy(design), meta(design)))
     coarse = replace(plain.instruments, force=2.0)
     force = plain.force + rng.normal(0, coarse.force, len(plain.force))
     bench = make_bench(replace(plain, force=force, instruments=coarse))
