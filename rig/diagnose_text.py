@@ -69,6 +69,12 @@ LOOKS_LIKE = {
     "bumps, cross-talk or a damaged instrument; to be sure, measure between these levels",
     "jumps": "the displacement jumps between holds, elsewhere in every run: see to what sticks and "
     "lets go, and to the laser's mounting; to be sure, hold one load for long",
+    "jerks": "it jumps at a few places, and stays there: a grip that slips, a part that cracks, a "
+    "counter that loses pulses; to be sure, look at the curve there, and repeat the run",
+    "damage": "it gets softer for good, the further it was loaded: fibres or bonds that break; to "
+    "be sure, load it again, half as far",
+    "softening": "below the largest load so far it is softer than it was on the way there, as "
+    "rubber is (Mullins); to be sure, load it to one top three times, then further",
 }
 _SURE = 3  # periods
 

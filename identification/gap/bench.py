@@ -372,9 +372,9 @@ def displacement_imposed(data: GapData) -> bool:
     as the data show (imposed.py). The joints of an arm that is read at rest bear the force that was
     read, whatever its screw holds: the displacement is linear in what they give way, the force is
     not. So it is with a rig that rests at levels of force."""
-    hold = hold_ids(data)
-    if data.arm and not (data.imposed and is_continuous(data, hold)):
+    if data.imposed == "force" or (data.arm and data.imposed is None):
         return False
+    hold = hold_ids(data)
     if data.imposed is not None:
-        return data.imposed == "displacement"
+        return not data.arm or is_continuous(data, hold)
     return displacement_simpler(data) if is_continuous(data, hold) else on_plateau(data, hold)

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
+from identification.gap.breaks import strangers, told
 from identification.gap.compare import score
 from identification.gap.data import GapData, Ints
 from identification.gap.discriminate import NextMeasurement, Others, next_measurement
@@ -133,7 +134,12 @@ def explain_gap(
         variants += finer
         engine.extend()
         singles += score(engine, engine.levels, finer)
-    found = with_strangers(search(engine, variants, singles))
+    nameless = strangers(bench, base, target)
+    if nameless:
+        variants += nameless
+        engine.extend()
+        singles += score(engine, engine.levels, nameless)
+    found = with_strangers(told(search(engine, variants, singles)))
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])

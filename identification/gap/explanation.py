@@ -90,9 +90,9 @@ def _together(parts: tuple[Part, ...], sizes: Iterable[float]) -> dict[str, floa
 
 @dataclass(frozen=True)
 class Likeness:
-    """What an unknown gap looks like. kind: slopes, swings, waves, rough or jumps; period: s of a
-    swing, m of a wave, None of others; log_evidence: of the kind, nats; wanders: slopes that change
-    within runs too."""
+    """What an unknown gap looks like. kind: slopes, swings, waves, rough or jumps; of a recording
+    that runs on jerks, damage or softening; period: s of a swing, m of a wave, None of others;
+    log_evidence: of the kind, nats; wanders: slopes that change within runs too."""
 
     kind: str
     period: float | None
@@ -105,7 +105,8 @@ class Found:
     """What the search found: explanations (best first), evidence of the words alone (nats, against
     none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
     gap that no law explains, what share of its weight withheld data leave an explanation, and what
-    a gap that no law explains looks like, if like anything."""
+    a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
+    that no word names, best first."""
 
     engine: Engine
     explanations: tuple[Explanation, ...]
@@ -116,6 +117,7 @@ class Found:
     unknown_eta: float
     kept: Mapping[frozenset[str], float] = field(default_factory=dict)
     looks_like: Likeness | None = None
+    nameless: tuple[Explanation, ...] = ()
 
 
 def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:
@@ -157,10 +159,11 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
     simulated may be its first slope: a spring that is off beside it counts by what the friction
     leaves of the gap, and for less than the friction where it would move more than was measured
     and the friction takes it back. A toe and a knee count as they move: what a spring would hide of
-    either, the other shows."""
+    either, the other shows; but a ball on a plate is no toe, and goes on like a spring."""
     if engine.bench.data.arm:
         return sizes.gap
-    if frozenset(p.word for p in parts) == TOE_AND_KNEE:
+    goes_on = any(p.variant.info.get("goes_on") for p in parts)
+    if frozenset(p.word for p in parts) == TOE_AND_KNEE and not goes_on:
         return sizes.moved
     rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
     if not rubs.any():

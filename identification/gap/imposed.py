@@ -81,12 +81,13 @@ def approaches(data: GapData, mine: Ints) -> bool:
     back = way_back(path) > _NO_FORCE * float(path.max())
     if early or back or not force[end] > none:
         return False
-    went = float(path[end] / path.max()) if path.max() > 0 else 0.0
+    last = max(end - 1, 0)  # with the first force that is felt a rig gives way at once
+    went = float(path[last] / path.max()) if path.max() > 0 else 0.0
     if data.imposed == "displacement":
-        before = force[:end][path[:end] < _WELL_BEFORE * path[end]]
+        before = force[:end][path[:end] < _WELL_BEFORE * path[last]]
         return went > _APPROACH and before.max(initial=0.0) < _NOTHING * data.instruments.force
     time = _clock(data, mine)
-    spent = (time[end] - time[0]) / (time[-1] - time[0] or 1.0)
+    spent = (time[last] - time[0]) / (time[-1] - time[0] or 1.0)
     return bool(went > max(_APPROACH, _FAST * spent))
 
 

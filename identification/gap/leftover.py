@@ -43,8 +43,7 @@ def looked_up(found: Found) -> Found:
         doubted = [replace(e, log_good=e.log_good + log(FAULTY)) for e in found.explanations]
         return weighed(replace(found, explanations=tuple(doubted)), found.kept)
     judge = _still_good if engine.bench.data.arm else _judged
-    best = found.explanations[0].log_weight
-    first = [e for e in found.explanations[:_LOOKED_AT] if e.log_weight > best - _WITHIN]
+    first = _near(found.explanations)
     done = {e.words: judge(engine, e) for e in first if e.parts}
     if engine.bench.data.arm:  # what these lose goes to those with fewer of their effects
         for none in (e for e in first if not e.parts):
@@ -52,9 +51,17 @@ def looked_up(found: Found) -> Found:
         lost = [e.words for e in done.values() if not e.good]
         heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
         done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
-    seen = (done.get(e.words, e) for e in found.explanations)
-    out = tuple(sorted(seen, key=lambda e: -e.log_weight))
-    return weighed(replace(found, explanations=out), found.kept)
+    done |= {e.words: judge(engine, e) for e in _near(found.nameless)}
+    out, nameless = (
+        tuple(sorted((done.get(e.words, e) for e in each), key=lambda e: -e.log_weight))
+        for each in (found.explanations, found.nameless)
+    )
+    return weighed(replace(found, explanations=out, nameless=nameless), found.kept)
+
+
+def _near(ranked: tuple[Explanation, ...]) -> list[Explanation]:
+    """Explanations that matter, of some that are ranked."""
+    return [e for e in ranked[:_LOOKED_AT] if e.log_weight > ranked[0].log_weight - _WITHIN]
 
 
 def _still_good(engine: Engine, explanation: Explanation) -> Explanation:

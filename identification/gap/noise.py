@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +12,7 @@ from identification.gap.rows import (
     ENOUGH,
     Rows,
     hold_ids,
-    noise_in_holds,
     scatter_within,
-    steady_in,
     swing_within,
 )
 
@@ -68,10 +67,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         per_sample, common = _running(data, rows, slope, imposed), np.zeros(rows.n)
     elif imposed:  # the force answers
         answer = scatter_within(data.force, hold) or meter.force
-        still = _stands(data, rows, hold)[0]
         per_sample = np.hypot(slope * max(answer, 0.33 * meter.force),
-                              np.where(still, 0.0, meter.displacement))  # fmt: skip
-        common = np.where(still, meter.displacement / np.sqrt(rows.hold_weight), 0.0)
+                              np.where(rows.rests, 0.0, meter.displacement))  # fmt: skip
+        common = np.where(rows.rests, meter.displacement / np.sqrt(rows.hold_weight), 0.0)
     else:
         alone = np.where(rows.steady, meter.displacement, fallback)
         per_sample = _white(data, rows, alone, slope, hold)
@@ -151,12 +149,14 @@ _TOLD, _MOVING, _FARTHEST = 5.0, 0.9, 8
 def _steepness(rows: Rows, driven: Array, answer: Array, sd: float, simulated: Array) -> Array:
     """(n,) how much the answer changes per unit of what is driven, about a row within its run, over
     as many rows as tell its motion from its noise; changes of what is driven below three standard
-    deviations count as that much. Where its motion drowns, at least what is simulated (n,)."""
+    deviations count as that much. Where its motion drowns, at least what is simulated (n,); where
+    it stands, no more than that: what goes on meanwhile is no answer."""
     reach = _reach(rows, driven, sd)
     a, b = _about(rows, reach or _REACH)
     way = np.maximum(np.abs(driven[b] - driven[a]), max(3 * sd, 1e-300))
     steep = np.abs(answer[b] - answer[a]) / way
-    return np.asarray(steep if reach else np.maximum(steep, simulated))
+    steep = steep if reach else np.maximum(steep, simulated)
+    return np.where(_stands(rows, driven, sd), np.minimum(steep, simulated), steep)
 
 
 def _reach(rows: Rows, driven: Array, sd: float) -> int:
@@ -183,7 +183,8 @@ def _about(rows: Rows, reach: int) -> tuple[Ints, Ints]:
 
 _LONG = 8  # rows of a stretch in which a channel stands
 _BAND, _TREND = 3.0, 1.5  # of the rows' noise: how far it strays there, and runs
-_GOES, _SLOWLY = 20.0, 10.0  # of that: in all, and over _REACH rows to either side at the most
+_GOES, _SLOWLY = 20.0, 10.0  # of that: in all, and over _REACH rows to either side at the most;
+_BENDS = 12.0  # it bends over these: five times what the noise alone does
 
 
 def driven(data: GapData, rows: Rows, imposed: bool) -> Array:
@@ -195,40 +196,62 @@ def driven(data: GapData, rows: Rows, imposed: bool) -> Array:
         if imposed:
             return standing(rows, rows.displacement, meter.displacement)
         return standing(rows, rows.force, meter.force)
-    if not imposed:
-        return rows.force
-    still, mean = _stands(data, rows, hold_ids(data))
-    return np.where(still, mean, rows.displacement)
-
-
-def _stands(data: GapData, rows: Rows, hold: Ints) -> tuple[Flags, Array]:
-    """Whether the displacement of a row's hold stands still within its noise, and its mean."""
-    sd = noise_in_holds(data.displacement, hold, data.instruments.displacement)
-    still, mean, _ = steady_in(rows.hold, rows.displacement, rows.weight, sd)
-    return still, mean
+    return rows.rested if imposed else rows.force
 
 
 def standing(rows: Rows, driven: Array, stated: float) -> Array:
     """What is driven (n,) with the mean of every stretch of a running recording in which it stands.
-    Of what goes so slowly all the time that a few rows hardly tell it from standing, the mean about
-    every row."""
+    Of what goes so slowly all the time that a few rows hardly tell it from standing, or goes
+    straight on, the mean about every row."""
     if rows.n <= _LONG:
         return driven
-    sd = min(float(np.median(np.abs(np.diff(driven, 2)))) / 0.6745 / 6**0.5, 3 * stated)
+    sd = _jitter(driven, stated)
     before, after = _about(rows, _REACH)
     way = np.abs(driven[after] - driven[before])
-    if np.ptp(driven) > _GOES * sd and way.max() < _SLOWLY * sd:
+    bend = np.abs(driven[after] - 2 * driven + driven[before])
+    slow_or_straight = way.max() < _SLOWLY * sd or bend.max() < _BENDS * sd
+    if np.ptp(driven) > _GOES * sd and slow_or_straight:
         return _means(rows, driven, _reach(rows, driven, sd))
-    out, ends = driven.copy(), np.append(np.flatnonzero(rows.starts)[1:], rows.n)
+    out = driven.copy()
+    for mine in _stretches(rows, driven, sd):
+        out[mine] = driven[mine].mean()
+    return out
+
+
+def _stands(rows: Rows, driven: Array, stated: float) -> Flags:
+    """(n,) whether what is driven is in a stretch in which it stands."""
+    out = np.zeros(rows.n, dtype=bool)
+    for mine in _stretches(rows, driven, _jitter(driven, stated)):
+        out[mine] = True
+    return out
+
+
+def _stretches(rows: Rows, driven: Array, sd: float) -> Iterator[slice]:
+    """Rows over which what is driven stands still within its noise."""
+    ends = np.append(np.flatnonzero(rows.starts)[1:], rows.n)
     for a, b in zip(np.flatnonzero(rows.starts), ends, strict=True):
         first = int(a)
         while first < b:
             last = _stretch(driven[first:b], _BAND * sd) + first
             mine = slice(first, last)
             if last - first >= _LONG and _run(driven[mine]) <= _TREND * sd:
-                out[mine] = driven[mine].mean()
+                yield mine
             first = last
-    return out
+
+
+def _jitter(driven: Array, stated: float) -> float:
+    """Noise of the rows of what is driven: as they scatter, no more than is stated by far, and no
+    less than steps of the reading make."""
+    steps = np.abs(np.diff(driven))
+    if len(steps) < 2:
+        return 0.0
+    scatter = float(np.median(np.abs(np.diff(driven, 2)))) / 0.6745 / 6**0.5
+    coarse = float(np.mean(steps == 0)) > _REPEATED
+    step = float(steps[steps > 0].min(initial=np.inf)) if coarse else 0.0
+    return max(min(scatter, 3 * stated), step / 12**0.5 if np.isfinite(step) else 0.0)
+
+
+_REPEATED = 0.3  # of the readings are the one before again
 
 
 def _means(rows: Rows, values: Array, reach: int) -> Array:

@@ -8,7 +8,8 @@ What they mean, whatever shape was fitted, so that shapes can be compared and mi
   what the push alone brings then;
 - slope beyond, creep: against the elastic compliance as it was found, not as it was simulated;
 - creep_fraction: late share of the elastic deflection in the end, as far as the times of the law
-  reach; creep_fraction_of_run: when a load has stood as long as a run lasts;
+  reach, and of what flows after one session; creep_fraction_of_run: when a load has stood as long
+  as a run lasts;
 - width: of the whole play, in whose middle the joint rests when its weights are balanced;
 - depth (of a seat): at the largest load;
 - lag: mean delay; factor: read over true along the straight line through zero.
@@ -24,6 +25,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.contact_seating import LAWS
 from identification.gap.effects.joint_backlash import unreached
+from identification.gap.effects.joint_creep import in_session
 from identification.gap.effects.joint_hysteresis import BY_LOAD
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from identification.gap.effects.time_lag import KINDS
@@ -101,6 +103,7 @@ def _curve(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 
 def _creep(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     times, seconds = np.asarray(part.variant.info["times_s"]), run_seconds(bench)
+    whole = in_session(bench, times)
     power = np.maximum(found.w, 0.0)
     mean = (
         float(np.exp(power @ np.log(times) / power.sum())) if power.sum() > 0 else float(times[0])
@@ -109,7 +112,9 @@ def _creep(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     line = _BENT if part.variant.info.get("bent") else 1.0
     return {
         "creep_fraction": found.per_spring(np.full(len(times), line), joint),
-        "creep_fraction_of_run": found.per_spring(-line * np.expm1(-seconds / times), joint),
+        "creep_fraction_of_run": found.per_spring(
+            -line * whole * np.expm1(-seconds / times), joint
+        ),
         "run": Parameter(seconds, seconds, seconds, "s"),
         "retardation_time": Parameter(mean, mean / 3, mean * 3, "s"),
     }

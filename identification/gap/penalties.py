@@ -62,15 +62,18 @@ def _wall(beyond: float) -> float:
 
 
 def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats, a steep wall, for curves of a joint that hardly bend: a spring is off there.
-    An arm's turning bends its line a little; a bench's line that is far off may bend within the
-    noise of a sample, where that is stated to a factor."""
-    noise, penalty = engine.bench.noise, 0.0
+    """Penalty in nats, a steep wall, for curves of a joint that hardly bend, and for seats of a
+    bench that go on like a spring: a spring is off there. An arm's turning bends its line a little;
+    a bench's line that is far off may bend within the noise of a sample, where that is stated to a
+    factor."""
+    noise, arm, penalty = engine.bench.noise, engine.bench.data.arm, 0.0
     for p, gap, moved in zip(parts, found.gap, found.moved, strict=True):
-        if "line" not in p.variant.info.get("kinds", ()) or not moved > 0:
+        info = p.variant.info
+        line = "line" in info.get("kinds", ()) or (info.get("goes_on") and not arm)
+        if not line or not moved > 0:
             continue
         least = BENDS * moved
-        if not engine.bench.data.arm:
+        if not arm:
             hidden = not noise.sure and moved > _FAR_MORE * gap
             least = noise.stated if hidden else 0.0
         penalty += _wall(max(least, 1e-300) / max(float(gap), 1e-6 * float(moved)))

@@ -13,10 +13,11 @@ from typing import NamedTuple
 
 from identification.gap.bench import Bench
 from identification.gap.course import Course
-from identification.gap.words import CURVES, WORDS
+from identification.gap.words import CURVES, NAMELESS, WORDS
 
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
 LOG_ONE = log(0.37)
+LOG_SHAPED = log(0.5)  # share of what is unknown whose shapes are known
 LOG_MORE = log(0.05)
 # A bolted stand slips less often than a joint or its controller gives way.
 LOG_RARE = {"base_slip": log(0.5)}
@@ -65,7 +66,9 @@ def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
     rare = sum(LOG_RARE.get(w, 0.0) for w in words)
     if bench is not None:
         rare += _of_course(words, bench.course) + _by_calibration(words, bench)
-    return LOG_ONE + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(words))) + rare
+    named = words - frozenset(NAMELESS)
+    first = LOG_ONE if named == words else LOG_UNKNOWN + LOG_SHAPED - log(len(NAMELESS))
+    return first + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(named))) + rare
 
 
 def _of_course(words: frozenset[str], course: Course) -> float:

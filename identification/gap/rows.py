@@ -28,9 +28,10 @@ class Rows:
     repetition to repetition shares a level. session (n,) s is always there: `clock` says whether
     it was recorded. force: of a hold whose samples scatter by no more than their noise, the mean
     of the hold in all its rows (its noise would else pass for a small friction or a lag);
-    measured_force: as it is. steady (n,): such holds. hold_weight (n,): samples of the
-    row's hold; force_scatter, displacement_scatter (n,): mean squares of the samples about their
-    row, N^2 and m^2; of rows of holds also spread (n,) s^2: of their times; force_trend,
+    measured_force: as it is. steady (n,): such holds. rested (n,) m: the displacement with its
+    mean likewise; rests (n,): such holds. hold_weight (n,): samples of the row's hold;
+    force_scatter, displacement_scatter (n,): mean squares of the samples about their row, N^2 and
+    m^2; of rows of holds also spread (n,) s^2: of their times; force_trend,
     displacement_trend (n,): mean products of time and channel about the row, N s and m s.
     """
 
@@ -48,12 +49,14 @@ class Rows:
     force: Array
     measured_force: Array
     displacement: Array
+    rested: Array
     tangential: Array | None
     q: Array | None
     temperature: Array | None
     simulated: Array | None
     zero: Flags
     steady: Flags
+    rests: Flags
     hold_weight: Array
     force_scatter: Array
     displacement_scatter: Array
@@ -145,17 +148,23 @@ def reduce_rows(data: GapData) -> Rows:
     )
     zero = (branch == ZERO) & (step <= 0)
     weight = count.astype(float)
-    stated = data.instruments.force
-    sd = stated if continuous else noise_in_holds(data.force, hold, stated)
-    steady, mean_force, hold_weight = steady_in(holds, force, weight, sd)
+
+    def steady_in(values: Array, stated: float) -> tuple[Array, Flags]:
+        """A channel with its mean in holds in which it stands still within its noise; these."""
+        sd = stated if continuous else _noise_in_holds(values, hold, stated)
+        return _steadied(holds, mean(values), weight, sd)
+
+    meter = data.instruments
+    steadied, steady = steady_in(data.force, meter.force)
+    rested, rests = steady_in(data.displacement, meter.displacement)
     session = mean(_session(data))
     return Rows(
         time=mean(data.time), session=session, clock=data.session is not None, run=run, setup=setup,
         repetition=first(data.repetition), branch=branch, step=step, hold=holds, level=level,
-        weight=weight, force=np.where(steady, mean_force, force), measured_force=force,
-        steady=steady,
-        hold_weight=hold_weight, force_scatter=scatter(data.force),
-        displacement_scatter=scatter(data.displacement), displacement=mean(data.displacement),
+        weight=weight, force=steadied, measured_force=force, steady=steady,
+        displacement=mean(data.displacement), rested=rested, rests=rests,
+        hold_weight=np.bincount(holds, weights=weight)[holds].astype(float),
+        force_scatter=scatter(data.force), displacement_scatter=scatter(data.displacement),
         spread=trend(data.time), force_trend=trend(data.force),
         displacement_trend=trend(data.displacement),
         tangential=None if data.tangential is None else mean(data.tangential),
@@ -201,20 +210,17 @@ def swing_within(values: Array, hold: Ints) -> float:
 _SWINGS = 5  # samples of a hold
 
 
-def noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
+def _noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
     """What values (n,) scatter in their holds: as stated, or more as far as that may be wrong."""
     return min(max(stated, scatter_within(values, hold) or 0.0), _MISJUDGED * stated)
 
 
-def steady_in(hold: Ints, driven: Array, weight: Array, sd: float) -> tuple[Flags, Array, Array]:
-    """Whether what is driven (n,) stands still within its noise in a row's hold, its mean there,
-    samples."""
-    total = np.bincount(hold, weights=weight)
-    mean = np.bincount(hold, weights=weight * driven) / total
-    rows = np.bincount(hold)
-    square = np.bincount(hold, weights=weight * (driven - mean[hold]) ** 2) / sd**2
-    steady = square <= _STEADY_PER_ROW * rows + _STEADY_ONCE
-    return steady[hold], mean[hold], total[hold].astype(float)
+def _steadied(hold: Ints, values: Array, weight: Array, sd: float) -> tuple[Array, Flags]:
+    """Values (n,) with their mean in holds in which they stand still within noise; these (n,)."""
+    mean = np.bincount(hold, weights=weight * values) / np.bincount(hold, weights=weight)
+    square = np.bincount(hold, weights=weight * (values - mean[hold]) ** 2) / sd**2
+    steady = (square <= _STEADY_PER_ROW * np.bincount(hold) + _STEADY_ONCE)[hold]
+    return np.where(steady, mean[hold], values), steady
 
 
 def hold_ids(data: GapData) -> Ints:

@@ -24,6 +24,7 @@ from identification.gap.several import in_more_joints, polished
 from identification.gap.shares import measured
 from identification.gap.variants import Variant
 from identification.gap.verdict import weighed
+from identification.gap.words import NAMELESS
 
 # Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
 # factor of two.
@@ -63,13 +64,15 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
             break
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
     ranked = measured(engine, ranked)
+    named = tuple(e for e in ranked if not e.words & frozenset(NAMELESS))
     strange = [lv for lv in engine.levels if lv.eta > _hidden(engine)]
     found = Found(
         engine=engine,
-        explanations=tuple(ranked),
-        alone={w: v - none for w, v in alone.items()},
+        explanations=named,
+        nameless=tuple(e for e in ranked if e not in named),
+        alone={w: v - none for w, v in alone.items() if w not in NAMELESS},
         probabilities={},
-        best=ranked[0],
+        best=named[0],
         unknown=log_mean([lv.log_base for lv in strange]) + LOG_UNKNOWN,
         unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
     )

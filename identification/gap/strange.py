@@ -49,6 +49,8 @@ def with_strangers(found: Found) -> Found:
     on theirs; and what the gap looks like, where one of them is plain."""
     engine = found.engine
     variants = strangers(engine.bench, engine.base, engine.target)
+    if not variants:
+        return found
     engine.extend()
     alike = likenesses(engine, variants)
     none = found.unknown - LOG_UNKNOWN

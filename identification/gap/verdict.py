@@ -44,12 +44,14 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     weight that it keeps, where withheld data were looked at. What it loses, and what leaves a large
     remainder, goes to its heir."""
     ranked = found.explanations
-    unknown = _of_the_strange(found, kept)
-    top = max(ranked[0].log_weight, unknown)
+    explained = _explained(found, kept)
+    unknown = min(found.unknown, explained)
+    nameless = found.nameless if explained == np.inf else ()
+    top = max(unknown, *(e.log_weight for e in (*ranked[:1], *nameless[:1])))
     mass = dict.fromkeys([*WORDS, "none", "unknown"], 0.0)
     mass["unknown"] = float(np.exp(unknown - top))
     arm = found.engine.bench.data.arm
-    for e in ranked:
+    for e in (*ranked, *nameless):
         whole, good = float(np.exp(e.log_weight - top)), float(np.exp(e.log_good - top))
         good *= kept.get(e.words, 1.0)
         if not e.parts and found.engine.bench.noise.misjudged:
@@ -57,7 +59,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
         said = _simpler(e, ranked, kept, arm) or e
         many = THREE if _tells_of_three(said) else 1.0
         for word, share in _main(said, arm).items():
-            mass[word] += many * share * good
+            mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
         mass[_heir(e, ranked, kept, found.engine.bench.noise.stated)] += whole - good
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
@@ -70,14 +72,15 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     return replace(found, probabilities=probabilities, kept=kept)
 
 
-def _of_the_strange(found: Found, kept: Mapping[frozenset[str], float]) -> float:
-    """log weight of a gap that no law explains. A short table any smooth path passes as well as the
-    law that made it; but where a law leaves no more than the noise, it does explain. A drift that
-    takes any path is no such law."""
+def _explained(found: Found, kept: Mapping[frozenset[str], float]) -> float:
+    """Above which log weight a gap is not said to be one that no law explains: of a rig without an
+    arm just below a law that leaves no more than the noise, infinite where none does. A short table
+    any smooth path passes as well as the law that made it; a drift that takes any path is no such
+    law."""
     bench = found.engine.bench
     if bench.data.arm:
-        return found.unknown
-    explains = [
+        return np.inf
+    laws = (
         e.log_good - EXPLAINED
         for e in found.explanations
         if e.parts
@@ -85,8 +88,8 @@ def _of_the_strange(found: Found, kept: Mapping[frozenset[str], float]) -> float
         and e.good
         and e.eta <= (1.0 if bench.noise.sure else UNSURE) * bench.noise.stated
         and kept.get(e.words, 1.0) > 0.5
-    ]
-    return min([found.unknown, *explains[:1]])
+    )
+    return next(laws, np.inf)
 
 
 EXPLAINED = 1.0  # nats

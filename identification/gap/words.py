@@ -52,3 +52,7 @@ STANDING = words_of("standing")
 CURVES = words_of("curve")
 FRICTION = words_of("friction")
 DRIFTS = words_of("drift")
+
+# Troubles of running recordings that no word names (breaks.py): what they explain is `unknown`.
+JERKS, DAMAGE, SOFTENING = "jerks", "damage", "softening"
+NAMELESS = (JERKS, DAMAGE, SOFTENING)

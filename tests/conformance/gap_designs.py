@@ -60,6 +60,7 @@ DESIGNS = {
     # read at rest, an arm answers the force that was read
     "arm imposed": Design(steps=6, imposed="displacement", continuous=True),
     "bench": Design(directions=("x",), arm=False, hold=3),
+    "bench levels imposed": Design(directions=("x",), arm=False, hold=3, imposed="displacement"),
     "bench imposed": Design(directions=("x",), arm=False, imposed="displacement", continuous=True),
 }
 ARMS = tuple(name for name, d in DESIGNS.items() if d.arm)

@@ -19,6 +19,7 @@ from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
+from identification.gap.variants import Variant
 from identification.gap.words import WORDS
 from tests.conformance.effect_benches import (
     IN_JOINTS,
@@ -212,6 +213,11 @@ def more_newtons(data: GapData, a: float) -> GapData:
     )  # fmt: skip
 
 
+def prior_columns(columns: Array, v: Variant) -> Array:
+    """What one standard deviation of its prior does to the channels: of the first size."""
+    return np.asarray(columns[:, list(v.columns)] @ v.root * v.scales[0])
+
+
 @pytest.mark.parametrize(("word", "design"), PAIRS)
 def test_another_unit_of_force_changes_nothing_but_units(word: str, design: str) -> None:
     """Prior columns (scale x column) stay in metres and radians, and grow as newtons do."""
@@ -225,9 +231,9 @@ def test_another_unit_of_force_changes_nothing_but_units(word: str, design: str)
     force[bench.layout.q.stop :] = a
     for v, w in list(zip(variants, others, strict=True))[:: max(1, len(variants) // 60)]:
         assert v.columns == w.columns
-        expected = columns[:, list(v.columns)] * v.scales[0] * force[:, None] * grows
+        expected = prior_columns(columns, v) * force[:, None] * grows
         np.testing.assert_allclose(
-            scaled[:, list(w.columns)] * w.scales[0], expected, rtol=1e-9,
+            prior_columns(scaled, w), expected, rtol=1e-9,
             atol=1e-12 * (np.abs(expected).max() or 1.0),
         )  # fmt: skip
 
@@ -245,8 +251,8 @@ def test_another_unit_of_length_changes_nothing_but_units(word: str, design: str
     length = np.ones(bench.layout.size)
     length[: bench.rows.n] = b
     for v, w in zip(variants, others, strict=True):
-        expected = columns[:, list(v.columns)] * v.scales[0] * length[:, None]
+        expected = prior_columns(columns, v) * length[:, None]
         np.testing.assert_allclose(
-            np.column_stack(other.columns)[:, list(w.columns)] * w.scales[0], expected, rtol=1e-9,
+            prior_columns(np.column_stack(other.columns), w), expected, rtol=1e-9,
             atol=1e-12 * (np.abs(expected).max() or 1.0),
         )  # fmt: skip

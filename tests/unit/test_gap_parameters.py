@@ -110,6 +110,30 @@ def test_creep_is_what_comes_late_in_the_end_and_in_a_run() -> None:
     assert found["run"].value == 52.0
 
 
+def test_what_flows_counts_by_what_it_does_in_one_session() -> None:
+    """A dashpot goes on under load, and does not come back without it (Burgers 1935)."""
+    bench = make_bench(arm_data())
+    rows, span = bench.rows, bench.course.session_span
+    v = of(bench, "joint_creep", "joint 2 spectrum")
+    times = np.asarray(v.info["times_s"])
+    assert times[-1] == pytest.approx(10 * span)
+    assert times[-2] < span / 3 + 1
+    flows = bench.columns[v.columns[-1]][: rows.n]
+    load = bench.lever[:, 1] * bench.compliance[1] * bench.true_torque[:, 1]
+    upward = np.concatenate([[0.0], np.diff(rows.session) * 0.5 * (load[1:] + load[:-1])])
+    upward[rows.starts] = 0.0
+    mine = rows.run == 0  # unloaded within it: what has flown stays
+    expected = np.cumsum(upward[mine]) / span
+    np.testing.assert_allclose(flows[mine], expected, atol=0.12 * np.abs(expected).max())
+    assert flows[mine][-1] > 0.9 * np.abs(flows[mine]).max()
+    w = np.zeros(len(times))
+    w[-1] = 0.3
+    found = parameters(bench, Part(v, 1.0), w, no_spread(w))
+    assert found["creep_fraction"].value == pytest.approx(0.3)
+    in_run = 0.3 * run_seconds(bench) / span
+    assert found["creep_fraction_of_run"].value == pytest.approx(in_run, rel=0.02)
+
+
 def test_creep_is_counted_against_the_spring_as_it_is() -> None:
     """A spring 25 % softer than simulated, known to 10 %: against draws."""
     bench = up_and_down()
@@ -448,4 +472,5 @@ def test_a_threshold_about_a_lying_axis_is_as_uncertain_as_its_depth() -> None:
         found = parameters(bench, Part(v, 1.0), np.ones(k), 1e-9 * np.eye(k), NOMINAL)["threshold"]
         spread[axis] = sd(found) / found.value
     lever = 0.175 / 12**0.5
+    assert spread["x"] > spread["z"] + 0.02
     assert spread["x"] == pytest.approx(np.hypot(spread["z"], lever / 1.2), rel=0.2)

@@ -143,3 +143,24 @@ def test_a_preload_puts_a_play_into_a_recording_from_one_side() -> None:
     assert found
     assert all(v.info["preload_Nm"] for v in found)
     assert not library(make_bench(running(force, u, imposed="displacement")), ["joint_backlash"])
+
+
+@pytest.mark.parametrize("runs_on", [True, False])
+def test_a_play_within_a_load_from_one_side_is_seldom_and_sharp(runs_on: bool) -> None:
+    """What is smooth there is a seat, or a curve."""
+    force, step = np.concatenate([UP, UP[::-1]]), np.arange(2 * len(UP))
+    coarse, fine = {}, {}
+    for both in (False, True):
+        load = np.where(step % 10 < 5, force, -force) if both else force
+        changes = {} if runs_on else {"step": step, "branch": np.ones(len(step), dtype=int)}
+        data = replace(running(load, load / SPRING, imposed="force"), **changes)
+        bench = make_bench(data)
+        assert bench.rows.continuous is runs_on
+        assert bench.course.one_sided is not both
+        plays = [v for v in library(bench, ["joint_backlash"]) if v.info["preload_Nm"]]
+        closer = joint_backlash.refined(bench, plays[0])
+        assert {v.info["kind"] for v in closer} == ({"free", "soft", "slow"} if both else {"free"})
+        coarse[both], fine[both] = (sum(v.prior for v in vs) for vs in (plays, closer))
+    odds = np.exp(-20.0) if runs_on else 0.05
+    assert coarse[False] == pytest.approx(odds * coarse[True])
+    assert fine[False] == pytest.approx(odds * fine[True])

@@ -33,6 +33,7 @@ from identification.gap.verdict import (
     _tells_of_three,
     weighed,
 )
+from identification.gap.words import JERKS
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_weights import UP, hanging
 
@@ -206,6 +207,40 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
     failed = {frozenset({"joint_creep"}): 0.1}
     whole = replace(found, explanations=(said(law, (1e-5,), -20.0, noise),), unknown=0.0, alone={})
     assert weighed(whole, failed).probabilities["unknown"] == pytest.approx(sure, abs=1e-6)
+
+
+def test_what_no_word_names_is_unknown_unless_a_word_explains_it_as_well() -> None:
+    """A word that is the larger one beside it keeps its weight; one that leaves no more than the
+    noise keeps all."""
+    bench = small_bench()
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    creep, jerks, noise = part("joint_creep", [0]), part(JERKS, [1]), bench.noise.stated
+    for parts, eta, main in (((jerks,), 3 * noise, "unknown"),
+                             ((jerks, creep), 3 * noise, "unknown"),
+                             ((creep, jerks), 3 * noise, "joint_creep"),
+                             ((jerks,), noise, "joint_creep")):  # fmt: skip
+        word = said((creep,), (1e-5,), -20.0, eta)
+        odd = said(parts, (1e-5, 0.5e-5)[: len(parts)], 20.0, 0.0)
+        whole = replace(found, explanations=(word,), nameless=(odd,), unknown=-90.0, alone={})
+        given = weighed(whole, {}).probabilities
+        assert max(given, key=lambda w: given[w]) == main
+        assert given.keys() == found.probabilities.keys()
+
+
+def test_what_no_word_names_is_looked_up_as_well() -> None:
+    """A mechanism beside it that leaves too much is no more believed than it is alone."""
+    bench = small_bench()
+    bench.add(bench.stacked(1e-4 * (bench.load / np.ptp(bench.load)) ** 2))
+    variants = library(bench, ["joint_creep"])
+    found = search(small_engine_of(bench), variants)
+    creep, jerks = part("joint_creep", [0]), part(JERKS, [0])
+    poor = replace(said((creep, jerks), (3e-5, 1e-5), -10.0), log_good=-30.0)
+    far = said((jerks,), (1e-5,), -80.0)
+    one = replace(found, explanations=(said((creep,), (3e-5,)),), nameless=(poor, far))
+    first, second = looked_up(one).nameless
+    assert first.log_good != poor.log_good
+    assert second is far
 
 
 def test_a_verdict_that_is_nowhere_the_largest_effect_is_shown_where_it_is_likely() -> None:

@@ -67,6 +67,10 @@ def test_creep_is_that_of_a_load_that_stood_as_long_as_a_run(scene: Scene) -> No
         answers = drawn.parameters(0.2)
         assert answers["run_s"] == run_seconds(scene)
         assert ("creep_fraction" in answers) == (form == "standard_solid")
+    burgers = effect_of(scene, "joint_creep", "burgers").parameters(0.2)
+    seconds, time_s = burgers["run_s"], burgers["time_s"]
+    after = -np.expm1(-seconds / time_s) + seconds / burgers["viscous_s"]
+    assert burgers["creep_fraction_of_run"] == pytest.approx(0.2 * after, rel=1e-6)
     drawn = effect_of(scene, "joint_creep", "standard_solid")
     answers = drawn.parameters(0.2)
     time = np.array([0.0, 1e-9, run_seconds(scene)])

@@ -36,6 +36,7 @@ SEATED = ("exponential", "hyperbolic")
 # Of an arm, whose other directions tell a seat that goes on and on from a curved spring, and a gap
 # that closes on a weak spring from a knee.
 BESIDES = ("logarithmic", "slack")
+GOES_ON = ("logarithmic", "Hertz")  # over all of the load, like a spring
 # How much of the depth is gone at x times the force scale, or at x times the stroke of a slack: of
 # one that is taken up bit by bit the stiffness grows in proportion to the stroke.
 LAWS: dict[str, Callable[[Array], Array]] = {
@@ -63,8 +64,8 @@ def variants(bench: Bench) -> list[Variant]:
             out.append(_seated(bench, law, share * top, scales))
             if law == "exponential":
                 columns += out[-1].columns
-    if bench.data.arm:  # a ball on a plate has no force of its own
-        out.append(_seated(bench, "Hertz", HERTZ_AT * top, scales))
+    # a ball on a plate has no force of its own
+    out.append(_seated(bench, "Hertz", HERTZ_AT * top, scales))
     out.append(
         variant(
             WORD,
@@ -87,7 +88,7 @@ def _seated(
     size, sign = pressed(bench)
     column = bench.add(bench.outside_column(sign * LAWS[law](size / f0)))
     return variant(WORD, f"{law} {share:.3g}", [column], scales, force_N=f0, laws=((law, f0),),
-                   prior=prior)  # fmt: skip
+                   goes_on=law in GOES_ON, prior=prior)  # fmt: skip
 
 
 def pressed(bench: Bench) -> tuple[Array, Array]:

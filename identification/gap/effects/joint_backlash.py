@@ -22,6 +22,7 @@ Source: lost motion in catalogues of strain wave gears.
 from __future__ import annotations
 
 from itertools import product
+from math import exp
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,8 @@ _REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 _PRELOADS = 8  # over the range of the net torque
-_PRELOAD_PRIOR = 0.25  # of all together, against the weights alone
+_PRELOAD_PRIOR = 0.25
+_SELDOM = (0.05, exp(-20.0))  # of levels; of what runs on, whose evidence is tempered
 CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
 _FINE_PRIOR = 8.0  # of all finer shapes together, however often it is looked closer
 _CLOSER = 0.6  # power of the share: zones need not be known as well as masses
@@ -64,7 +66,7 @@ def variants(bench: Bench) -> list[Variant]:
     preload; in a recording that runs on from one side nowhere else: what is slack at its ends is a
     seat."""
     running = not bench.data.arm and bench.rows.continuous
-    inside = running and bench.course.one_sided
+    inside = running and _pressed(bench)
     # a bench is pushed along one direction after another, each on a part of its own
     kinds, out = tuple(k for k in KINDS if bench.data.arm or k not in KEPT), []
     for j in bench.moving_joints():
@@ -84,6 +86,17 @@ def variants(bench: Bench) -> list[Variant]:
             flanks = placed(bench, torque)
             out += [] if flanks is None else _placed(bench, j, flanks)
     return out
+
+
+def _pressed(bench: Bench) -> bool:
+    """A rig without an arm that is loaded from one side: a play within its load is seldom, and as
+    sharp as it was found; what is smooth there is a seat, or a curve."""
+    return not bench.data.arm and bench.course.one_sided
+
+
+def _by_preload(bench: Bench) -> float:
+    """Prior of all preloads together, against the weights alone."""
+    return _PRELOAD_PRIOR * (_SELDOM[bench.rows.continuous] if _pressed(bench) else 1.0)
 
 
 def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Array, float]]:
@@ -119,7 +132,7 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
             info = {"joint": j, "zone_Nm": zone * span, "crossing": "weight", "tool_kg": TOOL_KG,
                     "preload_Nm": float(preload), "step_Nm": step}  # fmt: skip
             label = f"joint {j + 1} preload {way * preload / (high - low):.2g}"
-            share = _PRELOAD_PRIOR / _PRELOADS
+            share = _by_preload(bench) / _PRELOADS
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
     return out
 
@@ -151,7 +164,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     kind = found.info["kind"]
     if kind in PLACED:
         return []
-    beside = _REFINED if bench.data.arm else _BENCH_REFINED
+    beside = _REFINED if bench.data.arm else () if _pressed(bench) else _BENCH_REFINED
     kinds = tuple(dict.fromkeys([kind, *(beside if close >= CLOSE[0] else ())]))
     return _finer(bench, found, kinds, close)
 
@@ -185,7 +198,7 @@ def _finer(
         zones = np.unique(np.minimum(zones, widest))
     out: list[Variant] = []
     share = _FINE_PRIOR / (1 + len(CLOSE)) / (len(kg) * len(Nm) * len(zones) * len(kinds))
-    share *= _PRELOAD_PRIOR if preload else 1.0
+    share *= _by_preload(bench) if preload else 1.0
     places: dict[bytes, list[int]] = {}
     for mass, more, zone in product(kg.tolist(), Nm.tolist(), zones.tolist()):
         x = net(bench, j, info["crossing"], mass, more)

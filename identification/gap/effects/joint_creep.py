@@ -1,9 +1,10 @@
 """Deflection that grows while the load is held (or force that relaxes), and recovers after it.
 
 Kelvin-Voigt elements behind a joint's spring: `T z' = tau - z`; any linear creep compliance is a
-spectrum of retardation times (Prony series, power and log laws included; Findley 1976). Large
-stresses creep more than in proportion: the same of the squared torque. The coefficients are
-compliances in units of the joint's own: polymers, grease and gears 1 to 50 %.
+spectrum of retardation times (Prony series, power and log laws included; Findley 1976), the last
+of them so long that it flows and does not come back (Burgers 1935). Large stresses creep more than
+in proportion: the same of the squared torque. The coefficients are compliances in units of the
+joint's own, of what flows over one session: polymers, grease and gears 1 to 50 %.
 
 Size: 1 to 50 % of the elastic deflection: polymers, grease, gears.
 Prior: shares positive in sum, sd out of SCALES, equally likely; half of it on the whole spectrum.
@@ -21,12 +22,13 @@ from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_creep"
 SCALES = (0.02, 0.06, 0.2, 0.6)
+VISCOUS = 10.0  # times the session: what gives way as slowly flows, and does not come back
 
 
 def times(bench: Bench) -> np.ndarray:
-    """Retardation times s: from one sample to a third of the session, by factors of three; of a
-    recording that runs on, or a bench's, to three times its length, by when a viscous flow looks
-    like a line."""
+    """Retardation times s: from one sample to a third of the session, by factors of three, and of
+    an arm one that flows; of a recording that runs on, or a bench's, to three times its length, by
+    when a viscous flow looks like a line."""
     inner = np.diff(bench.rows.time)
     step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 1.0
     longest = min(bench.course.session_span / 3, 1000.0 * max(step, 1.0))
@@ -36,7 +38,14 @@ def times(bench: Bench) -> np.ndarray:
         longest = 3 * bench.course.session_span
     first = max(step * 3 if bench.course.always_moves else step, 1e-6)
     count = max(2, int(np.ceil(np.log(max(longest / first, 3.0)) / np.log(3))))
-    return np.asarray(first * 3.0 ** np.arange(count))
+    out = np.asarray(first * 3.0 ** np.arange(count))
+    return np.append(out, VISCOUS * bench.course.session_span) if bench.data.arm else out
+
+
+def in_session(bench: Bench, times_s: Array) -> Array:
+    """(k,) in how many units of its coefficient an element of a time (k,) s ends: what flows counts
+    by what it does under a load that stands for one session."""
+    return np.where(times_s < VISCOUS * bench.course.session_span, 1.0, VISCOUS)
 
 
 def scales(bench: Bench) -> tuple[float, ...]:
@@ -56,12 +65,13 @@ def variants(bench: Bench) -> list[Variant]:
     if bench.course.never_held or bench.course.timeless:
         return []
     spectrum = times(bench)
+    whole = in_session(bench, spectrum)
     out, sizes = [], scales(bench)
     for j in bench.moving_joints():
         load = np.tile(bench.true_torque[:, j][:, None], (1, len(spectrum)))
         z = retarded(load, spectrum, bench.rows, bench.rest)
         c = bench.compliance[j]
-        columns = [bench.add_joint(j, bench.sense * c * z[:, k]) for k in range(len(spectrum))]
+        columns = [bench.add_joint(j, bench.sense * c * y) for y in (whole * z).T]
         out.append(
             variant(WORD, f"joint {j + 1} spectrum", columns, sizes,
                     smooth_root(len(columns), 0.5), prior=0.5, each=True, joint=j, times_s=spectrum)
@@ -69,7 +79,7 @@ def variants(bench: Bench) -> list[Variant]:
         out += _pairs(j, "", columns, spectrum, sizes, 0.3 if bench.data.arm else 0.5)
         if bench.data.arm:
             states = retarded(bent(load), spectrum, bench.rows, bench.rest)
-            more = [bench.add_joint(j, bench.sense * c * y) for y in states.T]
+            more = [bench.add_joint(j, bench.sense * c * y) for y in (whole * states).T]
             out += _pairs(j, BENT, more, spectrum, sizes, 0.2)
             out.append(
                 variant(WORD, f"joint {j + 1}{BENT} spectrum", more, sizes,

@@ -12,6 +12,7 @@ from identification.gap.data import Array, Setup
 from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import bent_column, moments
 from identification.gap.effects.contact_seating import LAWS, pressed
+from identification.gap.effects.joint_creep import in_session
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.effects.load_misalignment import Shape, across, pulled
@@ -69,8 +70,9 @@ def describe_creep(bench: Bench, v: Variant) -> tuple[Law, Array]:
     name = "compliance"
     if v.info.get("bent"):
         name, unit = "compliance_quadratic", unit / float(np.abs(bench.true_torque[:, joint]).max())
-    terms = tuple(Term(name, {"retardation_time": float(t)}) for t in v.info["times_s"])
-    return Law({"joint": joint}, terms), np.full(len(terms), unit)
+    times = np.asarray(v.info["times_s"])
+    terms = tuple(Term(name, {"retardation_time": float(t)}) for t in times)
+    return Law({"joint": joint}, terms), unit * in_session(bench, times)
 
 
 def creep(bench: Bench, law: Law) -> list[Array]:

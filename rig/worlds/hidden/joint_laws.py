@@ -222,7 +222,7 @@ def creep(law: str) -> Callable[[Scene, Generator], Drawn]:
         path = memory.retarded(scene.history.time, load, times, weights)
         seconds = run_seconds(scene)
         after = part * float(weights @ -np.expm1(-seconds / times))  # of a load that stands so long
-        ends = law not in ("power", "logarithmic")
+        ends = law not in ("power", "logarithmic", "burgers")
 
         def parameters(size: float) -> dict[str, Any]:
             found = {"creep_fraction_of_run": size * after, "run_s": seconds, "law_size": size}
@@ -246,6 +246,10 @@ def _spectrum(law: str, random: Generator) -> tuple[Array, Array, dict[str, Any]
         edges = np.log(np.array([2.0, 8.0, 60.0, 400.0])[[0, 1, 3] if count == 2 else slice(None)])
         times = np.exp(random.uniform(edges[:-1], edges[1:]))
         return times, random.dirichlet(np.full(count, 3.0)), {}
+    if law == "burgers":  # a Kelvin element, and a dashpot that never comes back
+        time, viscous = np.exp(random.uniform(np.log([3.0, 300.0]), np.log([60.0, 3000.0])))
+        share = {"time_s": float(time), "viscous_s": float(viscous)}
+        return np.array([time, _NEVER_S]), np.array([1.0, _NEVER_S / viscous]), share
     times = np.geomspace(0.1, 3e4, 30)
     if law == "power":  # J = (t / 100 s)^n has a spectrum that grows as T^n
         power = random.uniform(0.1, 0.5)
@@ -253,6 +257,9 @@ def _spectrum(law: str, random: Generator) -> tuple[Array, Array, dict[str, Any]
         return times, weights / 100.0**power, {"power": power}
     start = random.uniform(0.5, 10.0)  # J = log(1 + t / start): even from `start` on
     return times, 0.2 * np.exp(-start / times) * np.log(times[1] / times[0]), {"start_s": start}
+
+
+_NEVER_S = 1e9
 
 
 # curved elasticity
@@ -412,6 +419,7 @@ FORMS: dict[str, tuple[Form, ...]] = {
         Form("power_law", False, creep("power")),
         Form("logarithmic", False, creep("logarithmic")),
         Form("stress_dependent", False, creep("stress_dependent")),
+        Form("burgers", False, creep("burgers")),
     ),
     "joint_nonlinear_stiffness": (
         Form("k1k2k3", True, curved("k1k2k3")),

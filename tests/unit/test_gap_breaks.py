@@ -1,0 +1,141 @@
+"""Troubles of running recordings that no word names: jerks, damage, softening."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import erf
+
+from identification.gap.base import base_columns, prediction
+from identification.gap.bench import Bench, make_bench
+from identification.gap.breaks import jump_rows, strangers
+from identification.gap.data import Array, GapData
+from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.priors import LOG_UNKNOWN, prior_of
+from identification.gap.words import JERKS, NAMELESS, WORDS
+from rig.diagnose_text import LOOKS_LIKE
+from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_operators import bench_data
+from tests.unit.test_gap_running import SPRING, running, triangle
+
+N = 900
+NOISE_N = 0.1
+# Strokes from one side, three of each height: what lasts shows against what comes again.
+STROKE = 1e-3 * np.repeat([0.4, 0.7, 1.0], N // 3) * triangle(N, 9)
+LARGEST = np.maximum.accumulate(STROKE)
+
+
+def pulled(force: Array, seed: int = 1) -> GapData:
+    """A specimen whose stroke is driven; N of force answer."""
+    noise = np.random.default_rng(seed).normal(0, NOISE_N, N)
+    return running(force + noise, STROKE, imposed="displacement")
+
+
+def slips() -> Array:
+    """A grip lets go of the specimen at three moments, wherever the stroke is."""
+    at = np.arange(N)
+    return SPRING * (STROKE - 4e-5 * (at > 210) - 7e-5 * (at > 455) - 3e-5 * (at > 770))
+
+
+def breaking_fibres() -> Array:
+    """Fibres of Weibull strength, of which those that have broken no longer carry (Daniels)."""
+    return SPRING * STROKE * np.exp(-((LARGEST / 1.6e-3) ** 3))
+
+
+def rubber() -> Array:
+    """Ogden and Roxburgh 1999: softer by an error function of the work below the largest so far."""
+    below = LARGEST**2 - STROKE**2
+    return SPRING * STROKE * (1 - 0.35 * erf(below / (0.3e-3 * (1e-3 + LARGEST))))
+
+
+def looked_for(data: GapData) -> tuple[Bench, list[int]]:
+    bench = make_bench(data)
+    return bench, jump_rows(bench, base_columns(bench), bench.observed - prediction(bench), 3)
+
+
+def test_rows_of_jumps_are_found_one_after_the_other() -> None:
+    bench, rows = looked_for(pulled(slips()))
+    first = np.searchsorted(bench.rows.time, np.array([211, 456, 771]) - 0.5)
+    assert sorted(rows) == pytest.approx(first.tolist(), abs=1)
+    assert abs(rows[0] - first[1]) <= 1  # the largest
+
+
+def test_no_jump_is_looked_for_where_a_run_begins() -> None:
+    data = replace(pulled(slips()), run=(np.arange(N) > 455).astype(int))
+    bench, rows = looked_for(data)
+    assert not np.any(bench.rows.starts[rows])
+
+
+@pytest.mark.parametrize(
+    ("force", "kind"), [(slips, "jerks"), (breaking_fibres, "damage"), (rubber, "softening")]
+)
+def test_what_no_word_names_is_unknown_and_told(force: object, kind: str) -> None:
+    assert callable(force)
+    found = diagnose_gap(pulled(force()))
+    assert found.verdict == "unknown"
+    assert found.probabilities["unknown"] > 0.7
+    assert found.looks_like is not None
+    assert found.looks_like.kind == kind
+    assert kind in LOOKS_LIKE
+    assert found.effects == ()
+
+
+def sticking(stiffness: float, limit: float) -> Array:
+    """Spring and Coulomb slider in series."""
+    out, held = np.empty(N), 0.0
+    for i, step in enumerate(np.diff(STROKE, prepend=0.0)):
+        held = float(np.clip(held + stiffness * step, -limit, limit))
+        out[i] = held
+    return out
+
+
+@pytest.mark.parametrize(
+    ("force", "word"),
+    [
+        (0.6 * SPRING * STROKE + sticking(0.4 * SPRING, 6.0), "joint_hysteresis"),
+        (sticking(SPRING, 45.0) + 0.1 * SPRING * STROKE, "joint_yield"),
+        (SPRING * STROKE * (1 + 400 * STROKE), "joint_nonlinear_stiffness"),
+    ],
+)
+def test_what_a_word_names_is_not_taken_for_them(force: Array, word: str) -> None:
+    found = diagnose_gap(pulled(force))
+    assert found.verdict == word
+    assert found.looks_like is None
+    assert {e.name for e in found.effects} <= set(WORDS)
+
+
+def named(found: GapResult) -> set[str]:
+    return set().union(*(e.words for e in found.found.explanations))
+
+
+def test_a_word_beside_which_a_smaller_one_stands_stays_the_main_cause() -> None:
+    """A curved spring whose grip slipped once, by less."""
+    curve = SPRING * STROKE * (1 + 400 * STROKE) - 2.0 * (np.arange(N) > 600)
+    found = diagnose_gap(pulled(curve))
+    assert found.verdict == "joint_nonlinear_stiffness"
+    assert {JERKS, "joint_nonlinear_stiffness"} in [e.words for e in found.found.nameless]
+    assert not named(found) & set(NAMELESS)
+    assert {e.name for e in found.effects} <= set(WORDS)
+
+
+def test_only_recordings_that_run_on_without_an_arm_are_looked_at() -> None:
+    def of(data: GapData) -> list[str]:
+        bench = make_bench(data)
+        target = bench.observed - prediction(bench)
+        return sorted({v.word for v in strangers(bench, base_columns(bench), target)})
+
+    assert of(pulled(slips())) == sorted(NAMELESS)
+    assert of(arm_data()) == []
+    levels = np.repeat(np.arange(10.0), 5)
+    assert of(bench_data(levels, levels / SPRING, step=np.repeat(np.arange(10), 5))) == []
+    still = np.random.default_rng(2).normal(0, 0.1, N)
+    assert of(running(still, np.zeros(N), imposed="force")) == []
+
+
+def test_half_of_what_is_unknown_has_these_shapes() -> None:
+    each = [np.exp(prior_of(frozenset([kind]))) for kind in NAMELESS]
+    assert sum(each) == pytest.approx(0.5 * np.exp(LOG_UNKNOWN))
+    pair = prior_of(frozenset([JERKS, "force_drift"])) - prior_of(frozenset([JERKS]))
+    assert np.exp(pair) == pytest.approx(0.05 / len(WORDS))
