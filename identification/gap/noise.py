@@ -241,14 +241,14 @@ def _stretches(rows: Rows, driven: Array, sd: float) -> Iterator[slice]:
 
 def _jitter(driven: Array, stated: float) -> float:
     """Noise of the rows of what is driven: as they scatter, no more than is stated by far, and no
-    less than steps of the reading make."""
+    less than steps of the reading make, if what is stated has room for them."""
     steps = np.abs(np.diff(driven))
     if len(steps) < 2:
         return 0.0
     scatter = float(np.median(np.abs(np.diff(driven, 2)))) / 0.6745 / 6**0.5
     coarse = float(np.mean(steps == 0)) > _REPEATED
-    step = float(steps[steps > 0].min(initial=np.inf)) if coarse else 0.0
-    return max(min(scatter, 3 * stated), step / 12**0.5 if np.isfinite(step) else 0.0)
+    step = float(steps[steps > 0].min(initial=np.inf)) / 12**0.5
+    return max(min(scatter, 3 * stated), step if coarse and step <= stated else 0.0)
 
 
 _REPEATED = 0.3  # of the readings are the one before again

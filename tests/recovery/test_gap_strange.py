@@ -17,6 +17,7 @@ from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Likeness
 from identification.gap.strange import KINDS as KINDS_OF_STRANGERS
 from identification.gap.strange import likenesses, square_of, strangers
+from identification.gap.words import NAMELESS
 from rig.diagnose_text import LOOKS_LIKE, looks_like, render
 from rig.gap_data import gap_data
 from tests.conformance.gap_designs import (
@@ -177,7 +178,8 @@ def test_every_kind_has_its_words() -> None:
     for kind in LOOKS_LIKE:
         like = Likeness("slopes" if kind == "wanders" else kind, 0.01, 0.0, kind == "wanders")
         assert looks_like(like)
-    assert len(LOOKS_LIKE) == KINDS_OF_STRANGERS + 1
+    assert len(LOOKS_LIKE) == KINDS_OF_STRANGERS + 1 + len(NAMELESS)
+    assert set(NAMELESS) < set(LOOKS_LIKE)
 
 
 def test_what_periods_take_is_what_least_squares_takes() -> None:

@@ -216,3 +216,10 @@ def test_a_creep_rack_is_driven_by_its_weight_and_creeps() -> None:
     found = diagnose_gap(data)
     assert found.verdict == "joint_creep"
     assert found.after < 0.1 * found.before
+
+
+def test_steps_that_what_is_stated_has_no_room_for_are_steps() -> None:
+    """Levels that were set, not read: each stands as it was set."""
+    force = np.repeat(np.arange(0.0, 100.0, 5.0), 12)
+    rows = reduce_rows(running(force, force / SPRING, imposed="force"))
+    assert np.array_equal(standing(rows, force, 0.5), force)
