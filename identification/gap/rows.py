@@ -150,9 +150,11 @@ def reduce_rows(data: GapData) -> Rows:
     weight = count.astype(float)
 
     def steady_in(values: Array, stated: float) -> tuple[Array, Flags]:
-        """A channel with its mean in holds in which it stands still within its noise; these."""
-        sd = stated if continuous else _noise_in_holds(values, hold, stated)
-        return _steadied(holds, mean(values), weight, sd)
+        """A channel with its mean in holds in which it stands still within its noise; these. What
+        runs has none: a slow pull would be read as stairs."""
+        if continuous:
+            return mean(values), np.zeros(len(edges), dtype=bool)
+        return _steadied(holds, mean(values), weight, _noise_in_holds(values, hold, stated))
 
     meter = data.instruments
     steadied, steady = steady_in(data.force, meter.force)
