@@ -157,7 +157,9 @@ _PATHS = (
     ("drift_per_kelvin", ("sensor",)),
 )
 GRAMMAR: dict[str, Grammar] = {
-    "joint_yield": Grammar(("joint", "memory", "flow_time", "flow_exponent"), _PLAYS),
+    "joint_yield": Grammar(
+        ("joint", "memory", "flow_time", "flow_exponent"), (*_PLAYS, ("compliance", ()))
+    ),
     "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "joint_hysteresis": Grammar(
         ("joint", "law", "memory", "measured_to", "tool"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -94,6 +94,29 @@ class Found:
         square += ratio**2 * self.softer.variance[joint]
         square -= 2 * ratio * float(functional @ self.softer.cross[joint])
         return normal(ratio, max(square, 0.0) / softer**2, unit)
+
+    def first(self, k: int) -> Found:
+        """The first k coefficients alone."""
+        s = self.softer
+        cross = {j: c[:k] for j, c in s.cross.items()}
+        return Found(self.w[:k], self.cov[:k, :k], Softer(s.value, s.variance, cross))
+
+    def without_line(self, joint: int) -> Found:
+        """All coefficients but the last, which is what the joint's spring has more."""
+        k, s = len(self.w) - 1, self.softer
+        value, variance, cross = dict(s.value), dict(s.variance), dict(s.cross)
+        if joint in value:
+            value[joint] += float(self.w[k])
+            variance[joint] += float(self.cov[k, k] + 2 * s.cross[joint][k])
+            cross[joint] = s.cross[joint] + self.cov[k]
+        return replace(self, softer=Softer(value, variance, cross)).first(k)
+
+    def of_spring(self, joint: int) -> tuple[float, float]:
+        """The spring that was found over that simulated, compliances or, of what is imposed as a
+        displacement, stiffnesses; and its variance."""
+        s = self.softer
+        ratio = max(1 + s.value.get(joint, 0.0), _LEAST_COMPLIANCE)
+        return ratio, s.variance.get(joint, 0.0)
 
 
 _LEAST_COMPLIANCE = 0.1  # of the simulated one

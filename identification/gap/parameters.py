@@ -52,7 +52,8 @@ def _hysteresis(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Of the strengths that slip within the range; of friction in proportion to the load, at the
     largest one."""
     radius, joint = np.asarray(part.variant.info["radius"]), int(part.variant.info["joint"])
-    found = _beside_line(found, len(radius), joint)
+    if part.variant.info.get("other_springs"):
+        found = found.without_line(joint)
     slips = (radius < float(np.ptp(np.append(bench.torque[:, joint], 0.0)))).astype(float)
     if part.variant.info["law"] in BY_LOAD:
         radius = np.full(len(radius), float(np.abs(bench.torque[:, joint]).max()))
@@ -68,20 +69,6 @@ def from_zero(p: Parameter) -> Parameter:
         return p
     value, low, high, *inner = (max(v, 0.0) for v in (p.value, p.low, p.high, *p.ci90))
     return Parameter(value, low, high, p.unit, (inner[0], inner[1]))
-
-
-def _beside_line(found: Found, k: int, joint: int) -> Found:
-    """The first k coefficients; a further one is what the joint's spring has more."""
-    if len(found.w) == k:
-        return found
-    softer, w, cov = found.softer, found.w, found.cov
-    value, variance = dict(softer.value), dict(softer.variance)
-    cross = {j: c[:k] for j, c in softer.cross.items()}
-    if joint in value:
-        value[joint] += float(w[k])
-        variance[joint] += float(cov[k, k] + 2 * softer.cross[joint][k])
-        cross[joint] = cross[joint] + cov[k, :k]
-    return Found(w[:k], cov[:k, :k], Softer(value, variance, cross))
 
 
 def _backlash(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:

@@ -17,6 +17,7 @@ from identification.gap.effects import (
     joint_nonlinear_stiffness,
     joint_yield,
     pose_error,
+    specimens,
     time_lag,
 )
 from identification.gap.evidence import Engine
@@ -76,7 +77,8 @@ def _knees(word: _Word) -> list[Variant]:
         return []
     places = _places(word.alone, word.beside, joint_yield.is_sharp)
     finer = _closing_in(word, joint_yield.refined, places, joint_yield.CLOSE)
-    return finer + _elsewhere(word, finer)
+    flat = [v for s in places for v in specimens.plateaus(word.engine.bench, s.variant)]
+    return finer + flat + _elsewhere(word, finer)
 
 
 def _elsewhere(word: _Word, finer: list[Variant]) -> list[Variant]:

@@ -14,7 +14,7 @@ import numpy as np
 from identification.gap.bench import TOOL_SD_KG, Bench
 from identification.gap.data import Array
 from identification.gap.effects.base_slip import BETWEEN_M
-from identification.gap.interval import TWO_SIDED, Found, Parameter, Softer, normal
+from identification.gap.interval import TWO_SIDED, Found, Parameter, normal
 from identification.gap.parts import Part
 
 _GRID_STEP = 0.03  # between finely spaced thresholds, as their share
@@ -28,10 +28,9 @@ def torque_unit(bench: Bench) -> str:
 def of_knee(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Threshold, slope beyond and flow time of `joint_yield` and `base_slip`."""
     info = part.variant.info
-    k = len(info["radius"])  # the rest flows back
-    cross = {j: c[:k] for j, c in found.softer.cross.items()}
-    softer = Softer(found.softer.value, found.softer.variance, cross)
-    knee = Found(found.w[:k], found.cov[:k, :k], softer)
+    if info.get("other_springs"):
+        found = found.without_line(int(info["joint"]))
+    knee = found.first(len(info["radius"]))  # the rest flows back
     # of the sharp knee that ends where the curve ends: a radius that the load hardly passed, or
     # never, says nothing of the slope
     threshold, top = _threshold(bench, part, knee), _top(info)
@@ -39,6 +38,8 @@ def of_knee(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     slope = knee.per_spring(beyond / max(top - threshold.value, 1e-9 * top), info.get("joint"))
     least = part.variant.least  # what bends less does not give way
     value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
+    if bench.imposed and not bench.data.arm:
+        threshold = _carried(threshold, *found.of_spring(int(info["joint"])))
     out = _with_weight(bench, part, threshold)
     out["slope_beyond_over_elastic"] = Parameter(value, low, high, "1")
     if info["flow_s"]:
@@ -65,6 +66,15 @@ def _threshold(bench: Bench, part: Part, knee: Found) -> Parameter:
     if part.word == "base_slip" and info["axis"] != "z":
         shared = float(np.hypot(shared, _depth_sd(bench, np.asarray(info["load"]))))
     return normal(value, max(variance, 0.0) + (shared * value) ** 2, torque_unit(bench))
+
+
+def _carried(way: Parameter, stiffer: float, variance: float) -> Parameter:
+    """What the spring really carries where a stroke reaches what the simulated one would carry."""
+    about = float(abs(way.value) * TWO_SIDED * variance**0.5)
+    low, high = (stiffer * abs(end - way.value) for end in (way.low, way.high))
+    value = stiffer * way.value
+    ends = value - float(np.hypot(low, about)), value + float(np.hypot(high, about))
+    return Parameter(value, *ends, way.unit)
 
 
 def _top(info: Mapping[str, Any]) -> float:

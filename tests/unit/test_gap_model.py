@@ -4,6 +4,7 @@ along a procedure's path."""
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -19,6 +20,7 @@ from identification.gap.effects import library
 from identification.gap.forms import Form, Law, Term, describe, realise
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
+from identification.gap.variants import Variant
 from identification.gap.words import WORDS
 from rig.errors import InputError
 from rig.gap_forms import FormError, effects_of, from_entry, to_entry
@@ -76,10 +78,15 @@ def assert_survives(bench: Bench, word: str) -> None:
     variants = library(fresh, (word,))
     # one of every kind
     kinds = {end: v for v in variants for end in (v.label.split()[0], v.label.split()[-1])}
-    for v in kinds.values():
+    survive(fresh, kinds.values())
+
+
+def survive(fresh: Bench, variants: Iterable[Variant]) -> None:
+    """What shapes do, written to a file and read again."""
+    for v in variants:
         w = 0.01 * np.arange(1.0, len(v.columns) + 1)
         form = describe(fresh, Part(v, 1.0), w, np.diag(w**2))
-        entry = json.loads(json.dumps(to_entry(form, {"name": word})))
+        entry = json.loads(json.dumps(to_entry(form, {"name": v.word})))
         back = from_entry(entry)
         np.testing.assert_allclose(
             realise(fresh, back), realise(fresh, form), rtol=1e-9, atol=1e-18

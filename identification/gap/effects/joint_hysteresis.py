@@ -26,6 +26,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effects.specimens import with_other_springs
 from identification.gap.history import Path, bristles, play, worked_in
 from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, smooth_root, variant
 
@@ -90,17 +91,11 @@ WORKED_IN = " worked in"
 def _with_other_springs(bench: Bench, found: list[Variant]) -> list[Variant]:
     """A specimen's friction brings its own mean stiffness: what was simulated may be its first
     slope, or the mean one."""
+    if bench.data.arm:
+        return []
     out = []
-    for v in found if not bench.data.arm else ():
-        joint, k = int(v.info["joint"]), len(v.columns)
-        line = bench.add_joint(joint, bench.elastic[:, joint])
-        root = np.zeros((k + 1, k + 1))
-        root[:k, :k], root[k, k] = v.root, _MORE
-        out.append(
-            variant(WORD, f"{v.label}, other springs", [*v.columns, line], OTHER_SCALES, root,
-                    np.append(np.ones(k), 0.0), 0.5 * v.prior, each=(True,) * k,
-                    **{**v.info, "other_springs": True})
-        )  # fmt: skip
+    for v in found:
+        out += with_other_springs(bench, int(v.info["joint"]), [v], OTHER_SCALES, _MORE)
     return out
 
 

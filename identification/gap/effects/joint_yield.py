@@ -28,6 +28,13 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags, Ints
+from identification.gap.effects.specimens import (
+    OWN,
+    off,
+    own_stiffness,
+    softening,
+    with_other_springs,
+)
 from identification.gap.history import flowing_play
 from identification.gap.rows import way_back
 from identification.gap.variants import (
@@ -67,9 +74,24 @@ def variants(bench: Bench) -> list[Variant]:
 
         load = bench.true_torque[:, j]
         out += knee_variants(bench, load, column, WORD, f"joint {j + 1}", {"joint": j})
+        out += _of_own_spring(bench, load, column, j)
         if bench.feels_weight(j):
             out += _under_weight(bench, load, column, j)
     return out
+
+
+def _of_own_spring(
+    bench: Bench, load: Array, column: Callable[[Array], int], joint: int
+) -> list[Variant]:
+    """Of a specimen that is far stiffer, or softer, than simulated: thresholds where its own spring
+    carries what those of the others are of the largest force."""
+    stiffness = own_stiffness(bench)
+    if not off(stiffness):
+        return []
+    carried = float(np.ptp(np.append(bench.rows.measured_force, 0.0)))
+    top = min(float(np.abs(load).max()), carried / stiffness)
+    found = knee_variants(bench, load, column, WORD, f"joint {joint + 1}", {"joint": joint}, top)
+    return with_other_springs(bench, joint, found, SCALES, OWN)
 
 
 def _under_weight(
@@ -88,7 +110,7 @@ def _under_weight(
     for memory in (UNDER_WEIGHT, *taken_back):
         fresh = _fresh(bench, memory)
         info = {"joint": joint, "memory": memory, "flow_s": 0.0, "load": load, "column": column,
-                "weight": weight}  # fmt: skip
+                "top": top, "weight": weight}  # fmt: skip
         # what a controller takes back it had clamped: no metal that flows back
         kept = after_yield(bench, load, top, fresh) if memory == UNDER_WEIGHT else []
         back = [column(s) for s in kept]
@@ -108,28 +130,30 @@ def knee_variants(
     word: str,
     name: str,
     info: dict[str, Any],
+    top: float | None = None,
 ) -> list[Variant]:
-    """Variants of a threshold on `load` (n,); `column` turns a state (n,) into a pool index."""
-    top = _range(bench, load)
+    """Variants of a threshold on `load` (n,); `column` turns a state (n,) into a pool index. top:
+    what the thresholds are shares of; left out: the largest load."""
+    top = _range(bench, load) if top is None else top
     if not top > 0:
         return []
     radius = bench.radii(load, top * np.array(THRESHOLDS))
     out = _hardened(bench, load, radius, column, word, name, info)
     for memory, fresh in _memories(bench).items():
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
-        exact = {**info, **knee_at(bench, load, column, memory), "flow_s": 0.0}
+        exact = {**info, **knee_at(bench, load, column, memory, top), "flow_s": 0.0}
         out += _knees(bench, word, f"{name}{memory}", columns, radius, exact["back"], exact)
     return out
 
 
 def knee_at(
-    bench: Bench, load: Array, column: Callable[[Array], int], memory: str
+    bench: Bench, load: Array, column: Callable[[Array], int], memory: str, top: float | None = None
 ) -> dict[str, Any]:
-    """What knees on a load (n,) have in common at a place: memory, load, column, and `back`, the
-    columns of what flows back."""
-    back = after_yield(bench, load, _range(bench, load), _fresh(bench, memory))
-    columns = [column(s) for s in back]
-    return {"memory": memory, "load": load, "column": column, "back": columns}
+    """What knees on a load (n,) have in common at a place: memory, load, column, `top` of what
+    flows back, and `back`, its columns."""
+    top = _range(bench, load) if top is None else top
+    columns = [column(s) for s in after_yield(bench, load, top, _fresh(bench, memory))]
+    return {"memory": memory, "load": load, "column": column, "top": top, "back": columns}
 
 
 def _range(bench: Bench, load: Array) -> float:
@@ -230,23 +254,13 @@ def _with_back(
     out, back = [], info["back"]
     for more, name in ([], ""), *([(back, ", flows back")] if back else []):
         k, n = len(columns), len(columns) + len(more)
-        each, within = _signs(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
+        each, within = softening(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
         out.append(
             variant(word, label + name, [*columns, *more], SCALES,
                     block([root, _RETURNS * np.eye(len(more))]), np.repeat([1.0, 0.0], [k, n - k]),
                     prior, LEAST, each, within, **info)
         )  # fmt: skip
     return out
-
-
-def _signs(radius: Array, n: int) -> tuple[tuple[bool, ...], Array]:
-    """What softens beyond its knee: of n coefficients those of the radii (k,) are positive in sum
-    up to any radius, the further ones each."""
-    k = len(radius)
-    each = (*(False,) * k, *(True,) * (n - k))
-    sums = np.zeros((k, n))
-    sums[:, :k] = radius <= radius[:, None]
-    return each, sums[radius < radius.max()]  # that of all is asked anyway
 
 
 LEAST = 0.15  # of the elastic compliance: what bends less does not give way
@@ -288,6 +302,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
                 exact["radius"] = radius[place]
                 root = np.eye(len(radius[place]))
                 out += _with_back(found.word, label + kind, columns[place], root, share, exact)
+    if info.get("other_springs"):
+        return with_other_springs(bench, int(info["joint"]), out, SCALES, OWN)
     return out
 
 

@@ -32,7 +32,8 @@ _SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: plays (threshold), and what flows back once the threshold `after` was passed."""
+    """Terms: plays (threshold), what flows back once the threshold `after` was passed, and a spring
+    of its own."""
     info = v.info
     constants = {"memory": _MEMORY[info["memory"]], "flow_time": float(info["flow_s"])}
     if info.get("square"):
@@ -46,25 +47,22 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     radius = [float(r) for r in info["radius"]]
     begins = "grows_beyond" if info["memory"] == joint_yield.HARDENED else "threshold"
     terms = [Term("compliance", {begins: r}) for r in radius]
-    if len(v.columns) > len(radius):
-        top = _range(bench, np.asarray(info["load"]))
+    own = bool(info.get("other_springs"))
+    if len(v.columns) > len(radius) + own:
+        top = float(info["top"])
         terms += [
             Term("compliance", {"returns_beyond": f * top, "after": joint_yield.BACK_FROM * top})
             for f in joint_yield.BACK
         ]
         unit_ratchet = {"ratchets_beyond": joint_yield.RATCHET_FROM * top}
         terms.append(Term("compliance", unit_ratchet | {"after": joint_yield.BACK_FROM * top}))
+    terms += [Term("compliance")] * own
     return Law(constants, tuple(terms)), np.full(len(terms), unit)
 
 
-def _range(bench: Bench, load: Array) -> float:
-    """Largest load that the rig carried: what the library's grid is relative to."""
-    top = float(np.abs(load).max())
-    return top * bench.reach_of(load) / float(np.ptp(np.append(load, 0.0)))
-
-
 def columns(bench: Bench, law: Law) -> list[Array]:
-    """Column of every play: state of radius `threshold` on the torque (or moment), lagging."""
+    """Column of every play: state of radius `threshold` on the torque (or moment), lagging; of a
+    term without one the line of its own spring."""
     c = law.constants
     if "joint" in c:
         load = bench.true_torque[:, c["joint"]]
@@ -77,7 +75,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
             out.append(bench.joint_column(c["joint"], bench.sense * state))
         else:
             out.append(bench.outside_column(lever * state))
-    return out
+    return out + [bench.joint_column(c["joint"], load) for t in law.terms if not t.shape]
 
 
 def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
