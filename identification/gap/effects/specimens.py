@@ -19,7 +19,6 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.variants import Variant, block, variant
 
-OTHER_SPRINGS = ", other springs"
 OWN = 1.5  # a spring of its own, in the scales of what gives way: stiffer by as much as it loses
 # Of the largest force: the first way from here to these, the steepest, as some have yielded before;
 _FROM, _TO, _FEWEST = 0.1, (0.2, 0.3, 0.45), 4  # and rows there
@@ -28,8 +27,8 @@ _OFF = 1.5  # times: as much as a simulated stiffness is off before thresholds m
 PLATEAU = " plateau to"
 _ENDS, _NEAREST, _FARTHEST = 24, 1.3, 0.9  # of plateaus: of the knee, and of the range
 _ABOUT = (0.87, 1.0, 1.2, 1.6)  # the knee: up, and down to the lower yield point
-PLATEAU_SCALES = (0.25, 0.9, 3.5, 14.0)
 _BEYOND = (0.93, 1.0, 1.1, 1.3, 1.7, 2.4, 3.6, 5.5, 9.0)  # the plateau's end: how it hardens there
+_SCALES = (0.25, 0.9, 3.5, 14.0)  # of all these
 
 
 def own_stiffness(bench: Bench) -> float:
@@ -64,7 +63,7 @@ def with_other_springs(
         assert v.positive is not None
         info = {**v.info, "other_springs": True}
         out.append(
-            replace(v, label=f"{v.label}{OTHER_SPRINGS}", columns=(*v.columns, line), scales=scales,
+            replace(v, label=f"{v.label}, other springs", columns=(*v.columns, line), scales=scales,
                     root=block([v.root, more * np.eye(1)]), positive=np.append(v.positive, 0.0),
                     each=(*v.each, False), within=np.pad(v.within, ((0, 0), (0, 1))),
                     prior=0.5 * v.prior, info=info)
@@ -88,11 +87,11 @@ def plateaus(bench: Bench, found: Variant) -> list[Variant]:
         exact = {**info, "radius": radius, "back": [], "knee": "plateau"}
         out.append(
             variant(found.word, f"joint {info['joint'] + 1} at {knee:.4g}{PLATEAU} {end:.4g}",
-                    columns, PLATEAU_SCALES, None, True, 0.25 / _ENDS, found.least, each, within,
+                    columns, _SCALES, None, True, 0.25 / _ENDS, found.least, each, within,
                     **exact)
         )  # fmt: skip
     if info.get("other_springs"):
-        return with_other_springs(bench, int(info["joint"]), out, PLATEAU_SCALES, OWN)
+        return with_other_springs(bench, int(info["joint"]), out, _SCALES, OWN)
     return out
 
 
