@@ -86,7 +86,7 @@ class Bench:
 
     @property
     def has_zero_force(self) -> bool:
-        """Force at zero load is a channel; where the displacement is imposed, it is a response."""
+        """Force at zero load is a channel; where the displacement is imposed, there is no such."""
         zero = self.layout.zero_force
         return bool(zero.stop > zero.start)
 
@@ -362,7 +362,8 @@ def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:
     n, m, h = rows.n, data.joints, int(rows.hold_starts.sum())
     q = h * m if data.q is not None and data.output_encoder else 0
     t = 0 if rows.tangential is None else 2 * h
-    z = 0 if imposed else int(rows.zero.sum())
+    # what is held at no displacement may still be pressed, or pulled
+    z = 0 if imposed or data.imposed == "displacement" else int(rows.zero.sum())
     return Layout(n, m, slice(n, n + q), slice(n + q, n + q + t),
                   slice(n + q + t, n + q + t + z), n + q + t + z)  # fmt: skip
 

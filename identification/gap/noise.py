@@ -82,10 +82,17 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
         raised=_raised(data) if rows.continuous else 1.0,
-        swings=swing_within(data.displacement, hold) / meter.displacement if data.arm else 0.0,
+        swings=_swings(data, rows, hold),
         sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),
     )  # fmt: skip
+
+
+def _swings(data: GapData, rows: Rows, hold: Ints) -> float:
+    """What an arm's displacement swings about its holds, over what is stated; 0 where it runs."""
+    if rows.continuous or not data.arm:
+        return 0.0
+    return swing_within(data.displacement, hold) / data.instruments.displacement
 
 
 def _encoders(data: GapData, rows: Rows, hold: Ints) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import displacement_imposed
+from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.imposed import _Channel, _slides, displacement_simpler
@@ -269,3 +269,27 @@ def test_an_arm_that_is_read_at_rest_answers_the_force_that_was_read() -> None:
     assert not displacement_imposed(data)
     assert any("at rest the joints bear the force" in n for n in diagnose_gap(data).notes)
     assert displacement_imposed(replace(data, step=np.full(len(data.step), -1)))
+
+
+def test_what_is_held_at_no_displacement_may_still_be_pulled() -> None:
+    """A tip that is gripped, and a joint that has slipped: no amplifier drifts there."""
+    data = arm_data()
+    assert make_bench(data).has_zero_force
+    gripped = replace(data, imposed="displacement")
+    assert not make_bench(gripped).has_zero_force
+    late = (data.step == 0) & (data.time > data.time.mean())
+    pulled = np.where(late, -5.0, data.force)
+    moved = np.where(late, data.displacement - 5.0 * 1.1e-5, data.displacement)
+    found = diagnose_gap(replace(gripped, force=pulled, displacement=moved))
+    assert "force_drift" not in [e.name for e in found.effects]
+
+
+def test_a_ramp_is_no_vibration() -> None:
+    """An arm whose load runs has no holds about which it could swing."""
+    data = arm_data()
+    ramp = np.abs(1 - (2 * data.time / data.time.max()) % 2)
+    runs_on = replace(data, step=np.full(len(data.step), -1), force=160 * ramp,
+                      displacement=160 * 1.1e-5 * ramp)  # fmt: skip
+    noise = make_bench(runs_on).noise
+    assert noise.swings == 0
+    assert not noise.misjudged
