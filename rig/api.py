@@ -211,7 +211,7 @@ class Run:
         from rig.catalogue import remember_result
 
         if self.dataset.path is not None:
-            remember_result(self.dataset.path, result)
+            remember_result(self.dataset.path, result.to_json())
 
     def _path(self) -> Path:
         from rig.errors import InputError

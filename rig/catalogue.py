@@ -71,9 +71,9 @@ def remember(kind: str, values: Mapping[str, Any]) -> None:
             db.executemany("INSERT OR REPLACE INTO found VALUES (?, ?, ?, ?)", rows)
 
 
-def remember_result(dataset: Path, result: Any) -> None:
-    """Keeps what `rig list` shows of an analysis or a diagnosis made with default options, unless a
-    journal says that the file is not the last word."""
+def remember_result(dataset: Path, found: Mapping[str, Any]) -> None:
+    """Keeps what `rig list` shows of the JSON of an analysis or a diagnosis made with default
+    options, unless a journal says that the file is not the last word."""
     from rig.journal import journal_path
     from rig.storage.seal import seal_of
 
@@ -81,7 +81,6 @@ def remember_result(dataset: Path, result: Any) -> None:
         if journal_path(dataset).exists():
             return
         digest = seal_of(dataset)
-        found = result.to_json()
         if found["schema"] == "rig.analysis/1":
             remember("stiffness", {digest: stiffness_of(found)})
         elif found["schema"] == "rig.diagnosis/1":

@@ -42,6 +42,7 @@ def report(
     json_file: JsonOption = None,
 ) -> None:
     """One page with figures and tables; several data sets are compared with the first."""
+    from rig.catalogue import remember_result
     from rig.report import report as reports
     from rig.terminal import terminal_progress
 
@@ -56,6 +57,10 @@ def report(
         )
         result = reports.make(datasets, wishes, progress)
     give(result, json_file)
+    for session in result.gathered.sessions:
+        for found in (session.analysis.to_json(), session.diagnosed.json):
+            if found is not None:
+                remember_result(session.path, found)
     reports.write_html(result, page)
     list_written([page])
     if pdf is not None:

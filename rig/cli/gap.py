@@ -95,7 +95,7 @@ def diagnose(
     if not (model or simulation or add or withhold):
         from rig.catalogue import remember_result
 
-        remember_result(dataset, result)
+        remember_result(dataset, result.to_json())
     _write(result, measured, write_model, next_file)
     if figures is not None:
         from rig.gap_figures import draw

@@ -80,7 +80,7 @@ def analyze(
     if options == analysis.Options():
         from rig.catalogue import remember_result
 
-        remember_result(dataset, result)
+        remember_result(dataset, result.to_json())
     if figures is not None:
         from rig.figures import draw
 

@@ -120,6 +120,18 @@ def test_an_analysis_with_other_choices_is_not_remembered(folder: Path) -> None:
     assert verdict["word"] == "none"
 
 
+def test_what_a_report_found_is_remembered(folder: Path) -> None:
+    path, page = str(folder / "old/specimen.h5"), str(folder / "page.html")
+    CliRunner().invoke(cli.app, ["report", path, "-o", page, "--no-gap"])
+    entry = list_folder(folder).entries[-1]
+    assert entry.stiffness is not None
+    assert entry.verdict is None  # nobody asked
+    CliRunner().invoke(cli.app, ["report", path, "-o", page])
+    verdict = list_folder(folder).entries[-1].verdict
+    assert verdict is not None
+    assert verdict["word"] == "none"
+
+
 def test_an_open_run_is_never_taken_from_the_catalogue(folder: Path) -> None:
     path = folder / "arm.h5"
     list_folder(folder, analyze=True)
