@@ -116,6 +116,7 @@ _COEFFICIENTS: dict[str, Key] = {
     "over_nominal": Key("compliance_over_nominal"),
     "depth": Key("depth_mm", factor=1e3),
     "tangent": Key("tangent"),
+    "gives": Key("compliance_across_over_nominal_times_tangent"),
     "offset": Key("offset_mm", factor=1e3),
     "angle": Key("angle_rad"),
     "turn": Key("turn_rad"),
@@ -149,6 +150,7 @@ _PLAYS = (
     ("compliance", ("returns_beyond", "after")),
     ("compliance", ("ratchets_beyond", "after")),
 )
+_GOES = ((), ("at_load",), ("at_load", "power"), ("drags_over",), ("at_load", "drags_over"))
 _PATHS = (
     ("drift", ("time_constant",)),
     ("drift_rate", ()),
@@ -202,17 +204,8 @@ GRAMMAR: dict[str, Grammar] = {
     "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
     "load_misalignment": Grammar(
         ("about",),
-        tuple(
-            ("tangent", ("along", "across", *more))
-            for more in (
-                (),
-                ("at_load",),
-                ("at_load", "power"),
-                ("drags_over",),
-                ("at_load", "drags_over"),
-                ("run",),
-            )
-        ),
+        tuple(("tangent", ("along", "across", *more)) for more in (*_GOES, ("run",)))
+        + tuple(("gives", ("along", *more)) for more in _GOES),
     ),
     "pose_error": Grammar(
         ("about", "about_offset", "about_angles", "about_turn", "reads"),

@@ -25,7 +25,7 @@ KINDS: dict[str, tuple[Kind, ...]] = {
     "base_compliance": ("linear", "arm"),
     "base_slip": ("mechanism", "friction", "arm"),
     "contact_seating": ("mechanism", "curve"),
-    "load_misalignment": ("linear", "instrument", "arm"),
+    "load_misalignment": ("linear", "instrument"),
     "force_drift": ("instrument", "drift", "standing"),
     "force_scale": ("linear", "instrument"),
     "displacement_scale": ("linear",),

@@ -59,7 +59,7 @@ DESIGNS = {
     "paper": Design(steps=10, hold=1, unload=False, readings=False, clock=False),
     # read at rest, an arm answers the force that was read
     "arm imposed": Design(steps=6, imposed="displacement", continuous=True),
-    "bench": Design(directions=("x",), arm=False, hold=3),
+    "bench": Design(directions=("x",), arm=False, hold=3, components=True),
     "bench levels imposed": Design(directions=("x",), arm=False, hold=3, imposed="displacement"),
     "bench imposed": Design(directions=("x",), arm=False, imposed="displacement", continuous=True),
 }

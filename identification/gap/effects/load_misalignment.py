@@ -3,6 +3,8 @@
 The target then moves along the direction by `F n' C t`; recorded force components grow with the
 load by t F. Screws on floors and stands are set up within 1 to 15 degrees. A tip that drags on its
 pad pulls the other way when the load goes back; one that is let go between runs finds another seat.
+Nothing is known of how a rig without an arm gives way across: it is spoken of only where the force
+across was recorded, and what was moves the target by about as much as the same force along.
 
 Size: 1 to 15 degrees, tangents of 0.02 to 0.25.
 Prior: tangents of either sign, sd out of SCALES, equally likely.
@@ -41,20 +43,23 @@ class Shape(NamedTuple):
 def variants(bench: Bench) -> list[Variant]:
     """Two tangents per direction: constant, turning as the load grows, soon or late, or dragging;
     one direction, and all."""
+    if not bench.data.arm and bench.rows.tangential is None:
+        return []
     known: dict[str, list[_Known]] = {}
     for name in dict.fromkeys(s.direction for s in bench.data.setups):
         mine = np.array([s.direction == name for s in bench.data.setups])[bench.rows.setup]
         known[name] = [
-            _Known(label, shapes, _columns(bench, shapes, mine), share)
+            _Known(label, shapes, _columns(bench, shapes, mine), share, _read(bench, shapes, mine))
             for label, shapes, share in _kinds(bench, float(np.abs(bench.load[mine]).max()) or 1.0)
         ]
     groups = [([name], f"direction {name}", 0.3) for name in known]
     if len(groups) > 1:
         groups.append((list(known), "all directions", _ALL))
     out = [
-        variant(WORD, label + each[0].label, [c for k in each for c in k.columns], SCALES,
+        variant(WORD, label + each[0].label,
+                [c for k in each for c in k.columns] + _given(bench, names, each), SCALES,
                 positive=False, prior=prior * each[0].share, directions=names,
-                shapes=[k.shapes for k in each])
+                shapes=[k.shapes for k in each], read=[k.read for k in each])
         for names, label, prior in groups
         for each in zip(*(known[name] for name in names), strict=True)
     ]  # fmt: skip
@@ -73,16 +78,18 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
     root = np.diag([1.0] * len(common) + [_BETWEEN_RUNS] * len(own))
     return [variant(WORD, "each run", [*common, *own], SCALES, root, positive=False,
                     prior=_ALL * _EACH_RUN_SHARE, directions=list(straight), shapes=shapes,
-                    runs=runs.tolist())]  # fmt: skip
+                    read=[()] * len(shapes), runs=runs.tolist())]  # fmt: skip
 
 
 class _Known(NamedTuple):
-    """A kind of misalignment of one direction, with its columns, and its share of the prior."""
+    """A kind of misalignment of one direction, with its columns, its share of the prior, and about
+    how large tangents the readings of a rig without an arm show of each shape."""
 
     label: str
     shapes: tuple[Shape, ...]
     columns: list[int]
     share: float
+    read: tuple[float, ...]
 
 
 def _kinds(bench: Bench, top: float) -> list[tuple[str, tuple[Shape, ...], float]]:
@@ -104,6 +111,32 @@ def _columns(bench: Bench, shapes: tuple[Shape, ...], mine: Flags) -> list[int]:
     return [bench.add(pulled(bench, load, each)) for load in loads for each in both]
 
 
+def _read(bench: Bench, shapes: tuple[Shape, ...], mine: Flags) -> tuple[float, ...]:
+    across_it = bench.rows.tangential
+    if bench.data.arm or across_it is None:
+        return ()
+    loads = np.column_stack([across(bench, shape)[mine] for shape in shapes])
+    tangents = np.linalg.lstsq(loads, across_it[mine], rcond=_RCOND)[0]
+    return tuple(np.linalg.norm(tangents, axis=1).tolist())
+
+
+_RCOND = 1e-3  # shapes that are alike share what is read
+
+
+def _given(bench: Bench, names: list[str], each: tuple[_Known, ...]) -> list[int]:
+    """Columns of what a rig without an arm gives way; of a tangent of USUAL as read."""
+    out = []
+    for name, known in zip(names, each, strict=True):
+        mine = np.array([s.direction == name for s in bench.data.setups])[bench.rows.setup]
+        for shape, tangent in zip(known.shapes, known.read, strict=False):
+            load = np.where(mine, across(bench, shape), 0.0)
+            out.append(bench.add(tangent / USUAL * gives(bench, load)))
+    return out
+
+
+USUAL = 0.1  # so that the prior of what is given is that of as stiff a rig across as along
+
+
 def across(bench: Bench, shape: Shape) -> Array:
     """(n,) N across, of a tangent of 1."""
     load = np.sign(bench.load) * shape.at_N * np.abs(bench.load / shape.at_N) ** shape.power
@@ -122,3 +155,9 @@ def pulled(bench: Bench, load: Array, shares: Array) -> Array:
     q = lever * bench.compliance * load[:, None]
     tangential = shares[bench.rows.setup] * load[:, None]
     return bench.stacked(np.sum(bench.lever * q, axis=1), q, tangential)
+
+
+def gives(bench: Bench, load: Array) -> Array:
+    """Stacked column of what a rig without an arm, as stiff across as along, gives way under a load
+    (n,) N across."""
+    return bench.outside_column(bench.stated_slope * load)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,13 @@ from identification.gap.effects.contact_seating import LAWS, pressed
 from identification.gap.effects.joint_creep import in_session
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
-from identification.gap.effects.load_misalignment import Shape, across, pulled
+from identification.gap.effects.load_misalignment import (
+    USUAL,
+    Shape,
+    across,
+    gives,
+    pulled,
+)
 from identification.gap.forms.law import Law, Term, along, scaled
 from identification.gap.history import retarded
 from identification.gap.variants import Variant
@@ -170,24 +175,34 @@ def seating(bench: Bench, law: Law) -> list[Array]:
 
 def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
-    shares reached at a load, in proportion to it or to a power of it; shares that drag; shares of
-    single runs (numbers from 0) beyond these."""
-    terms = []
-    for name, shapes in zip(v.info["directions"], v.info["shapes"], strict=True):
-        s = next(s for s in bench.data.setups if s.direction == name)
-        for how, k in product(shapes, range(2)):
-            shape = _sideways(s, k)
-            if how.power != 1:
-                shape["at_load"] = how.at_N
-            if how.power > 2:
-                shape["power"] = float(how.power - 1)
-            if how.drags_N:
-                shape["drags_over"] = how.drags_N
-            terms.append(Term("tangent", shape))
+    shares reached at a load, in proportion to it or to a power of it; shares that drag; what a rig
+    without an arm gives way under these; shares of single runs (numbers from 0) beyond these."""
+    setups = [next(s for s in bench.data.setups if s.direction == d) for d in v.info["directions"]]
+    terms, given = [], []
+    for s, shapes in zip(setups, v.info["shapes"], strict=True):
+        terms += [Term("tangent", _sideways(s, k) | _goes(how)) for how in shapes for k in range(2)]
+    for s, shapes, read in zip(setups, v.info["shapes"], v.info["read"], strict=True):
+        along_it = {"along": _triple(s.unit_vector)}
+        given += [
+            (Term("gives", along_it | _goes(how)), tangent / USUAL)
+            for how, tangent in zip(shapes, read, strict=False)
+        ]
     for run in v.info.get("runs", ()):
         s = bench.data.setups[bench.rows.setup[int(np.argmax(bench.rows.run == run))]]
         terms += [Term("tangent", _sideways(s, k) | {"run": int(run)}) for k in range(2)]
-    return Law({}, tuple(terms)), np.ones(len(terms))
+    units = [1.0] * len(terms) + [unit for _, unit in given]
+    return Law({}, (*terms, *(term for term, _ in given))), scaled(units)
+
+
+def _goes(how: Shape) -> dict[str, Any]:
+    shape: dict[str, Any] = {}
+    if how.power != 1:
+        shape["at_load"] = how.at_N
+    if how.power > 2:
+        shape["power"] = float(how.power - 1)
+    if how.drags_N:
+        shape["drags_over"] = how.drags_N
+    return shape
 
 
 def _sideways(setup: Setup, k: int) -> dict[str, Any]:
@@ -205,6 +220,9 @@ def misalignment(bench: Bench, law: Law) -> list[Array]:
         if "run" in t.shape:
             there &= bench.rows.run == t.shape["run"]
         load = np.where(there, across(bench, how), 0.0)
+        if t.coefficient == "gives":
+            out.append(gives(bench, load))
+            continue
         shares = np.stack([s.tangents @ np.array(t.shape["across"]) for s in bench.data.setups])
         out.append(pulled(bench, load, shares))
     return out

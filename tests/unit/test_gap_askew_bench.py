@@ -1,0 +1,70 @@
+"""Loads that act askew on rigs without an arm: only the force across tells of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import make_bench
+from identification.gap.data import Array, GapData
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects import library
+from identification.gap.forms import law_of, rows_of
+from tests.unit.test_gap_operators import bench_data
+
+STEPS, RUNS, HOLD = 9, 3, 6
+ACROSS = 0.4  # compliance across over that along
+
+
+def pressed(tangent: float, turns: bool = True, bends: float = 0.0, seed: int = 4) -> GapData:
+    """Steps up and down, three times, with force across of a tangent at the top that comes as the
+    square of the load where it turns, and gives way; bends: of a curve of its own, no slant."""
+    rng = np.random.default_rng(seed)
+    levels = np.concatenate([np.arange(STEPS), np.arange(STEPS)[-2::-1]])
+    load = np.tile(np.repeat(levels, HOLD), RUNS) * 25.0
+    n, top = len(load), 25.0 * (STEPS - 1)
+    across = tangent * (load**2 / top if turns else load)
+    step = np.tile(np.repeat(levels, HOLD), RUNS)
+    branches = np.where(levels == 0, 0, np.where(np.arange(len(levels)) < STEPS, 1, 2))
+    branch = np.tile(np.repeat(branches, HOLD), RUNS)
+    run = np.repeat(np.arange(RUNS), n // RUNS)
+    moved = 1e-5 * (load + ACROSS * across) + bends * 1e-5 * load**2 / top
+    return bench_data(
+        load + rng.normal(0, 0.1, n), moved + rng.normal(0, 1e-6, n), step=step, branch=branch,
+        run=run, repetition=run + 1, session=np.arange(n, dtype=float), imposed="force",
+        tangential=np.column_stack([across, 0.3 * across]) + rng.normal(0, 0.1, (n, 2)),
+    )  # fmt: skip
+
+
+def test_a_slant_that_turns_is_seen_by_the_force_across() -> None:
+    found = diagnose_gap(pressed(0.15))
+    assert found.verdict == "load_misalignment"
+    tangents = [found.effects[0].parameters[f"tangent_x_{k}"].value for k in (1, 2)]
+    assert np.abs(tangents) == pytest.approx([0.15, 0.045], rel=0.1)
+    assert found.after < 1.2 * found.noise
+
+
+def test_a_curve_is_no_slant_where_nothing_acts_across() -> None:
+    """Cross-talk shows across; what is given goes with what is read there."""
+    assert diagnose_gap(pressed(0.004, turns=False, bends=0.06)).verdict == (
+        "joint_nonlinear_stiffness"
+    )
+
+
+def test_without_components_nobody_speaks_of_a_slant() -> None:
+    mute = replace(pressed(0.15), tangential=None)
+    assert library(make_bench(mute), ["load_misalignment"]) == []
+    assert diagnose_gap(mute).verdict != "load_misalignment"
+
+
+def test_its_law_makes_the_same_columns() -> None:
+    bench = make_bench(pressed(0.15))
+    every = library(bench, ["load_misalignment"])
+    assert {v.label for v in every} >= {"direction x", "direction x, turning", "each run"}
+    for v in every:
+        law, unit = law_of(bench, v)
+        columns: Array = np.column_stack([bench.columns[c] for c in v.columns])
+        np.testing.assert_allclose(rows_of(bench, v.word, law) * unit, columns,
+                                   atol=1e-9 * np.abs(columns).max())  # fmt: skip
