@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import Array, GapData, Ints
+from identification.gap.data import ZERO, Array, GapData, Ints
 from identification.gap.rows import way_back
 
 _POINTS = 1000  # bins of a recording: more do not tell the path better
@@ -59,6 +59,9 @@ def displacement_simpler(data: GapData) -> bool:
     )
     if any(stands) or len(mine) < _FEWEST:
         return stands == (False, True)
+    back = _comes_back(data, mine, force), _comes_back(data, mine, moved)
+    if any(back) and not all(back):
+        return back[1]
     channels = _channels(
         _clock(data, mine), (force, moved), (instruments.force, instruments.displacement)
     )
@@ -109,6 +112,23 @@ def on_plateau(data: GapData, hold: Ints) -> bool:
 
 
 _SAME, _OTHER = 0.01, 0.03  # of the ranges of force and displacement
+
+
+def _comes_back(data: GapData, mine: Ints, values: Array) -> bool:
+    """Whether a channel (m,) of samples mine is in every run where it was in the first, at rest and
+    at its furthest: as what is driven, whatever drifts or slips in the other one."""
+    run, rests = data.run[mine], data.branch[mine] == ZERO
+    near = _SAME_PLACE * float(np.ptp(values))
+    places = []
+    for r in np.unique(run):
+        at_rest, all_of_it = values[(run == r) & rests], values[run == r]
+        if not at_rest.size:
+            return False
+        places.append([float(at_rest.mean()), float(all_of_it.min()), float(all_of_it.max())])
+    return len(places) >= _RUNS and bool(np.all(np.ptp(places, axis=0) < near))
+
+
+_SAME_PLACE, _RUNS = 0.01, 3  # of the range
 
 
 def _slides(force: _Channel, moved: _Channel) -> bool:

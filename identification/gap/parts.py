@@ -12,7 +12,7 @@ from identification.gap.evidence import Engine, Level
 from identification.gap.factor import factor_of
 from identification.gap.signs import Limits, all_kept, log_odds
 from identification.gap.variants import Variant, block
-from identification.gap.words import LINEAR
+from identification.gap.words import DRIFTS, LINEAR
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,8 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
         else:
             mine = slice(start, start + k)
             structural = float(part @ plain[mine, mine] @ part) / precision
-            sizes.append(min(max(structural, 0.0) ** 0.5, moves[-1]))
+            own = _beyond_scatter(engine, moved) if p.word in _BETWEEN_RUNS else 0.0
+            sizes.append(min(max(structural**0.5 if structural > 0 else 0.0, own), moves[-1]))
         energy += rows.rms(faulty) ** 2
         start += k
         limit = p.variant.positive
@@ -93,6 +94,21 @@ def _beyond_springs(engine: Engine, moved: Array) -> float:
 
 
 _COUNTS = 0.03
+
+
+def _beyond_scatter(engine: Engine, moved: Array) -> float:
+    """rms (m) of what moves whole runs beyond three standard deviations of their scatter: however
+    many samples say so, no scatter takes that over."""
+    rows = engine.bench.rows
+    runs = np.bincount(rows.run, rows.weight * moved) / np.bincount(rows.run, rows.weight)
+    most = float(np.abs(runs).max()) / engine.bench.noise.run
+    if engine.bench.data.datum == "repetition" or not most > _SCATTERS:
+        return 0.0
+    return (1 - _SCATTERS / most) * rows.rms(moved)
+
+
+_SCATTERS = 3.0
+_BETWEEN_RUNS = DRIFTS | {"zero_shift"}
 
 
 def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:

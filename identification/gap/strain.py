@@ -116,12 +116,13 @@ def _of_the_gap(engine: Engine, contribution: Array) -> float:
 
 def _jumps(engine: Engine, part: Part, pulls: Array) -> Array:
     """The largest step (paths,) of every free path against its other ones, by the normal deviate
-    that is as seldom: where steps are of one size, however large, none stands out."""
-    pieces = int(part.variant.info["pieces"])
+    that is as seldom: where steps are of one size, however large, none stands out. A steady path
+    comes with a place and a rate; steps are what it turns by."""
+    pieces, first = int(part.variant.info["pieces"]), 2 * bool(part.variant.info["steady"])
     seen = np.any(engine.columns(part.variant.columns)[: engine.bench.rows.n] != 0, axis=0)
     out = []
     for steps, there in zip(pulls.reshape(-1, pieces), seen.reshape(-1, pieces), strict=True):
-        size = np.sort(steps[there])
+        size = np.sort(steps[first:][there[first:]])
         if len(size) < _STEPS:
             continue
         rest = float(np.sqrt(np.mean(size[:-1] ** 2)))

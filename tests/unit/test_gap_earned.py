@@ -13,7 +13,7 @@ from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import WORTH_OF_THIRD, diagnose_gap
 from identification.gap.diagnose import _chosen as chosen_of
 from identification.gap.earned import earned
-from identification.gap.effects.drift import free_path, path_root
+from identification.gap.effects.drift import FreePath, free_path, free_variant
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
 from identification.gap.faults import bursts
@@ -291,8 +291,7 @@ def test_a_drift_that_comes_and_goes_is_no_drift(cycles: float, swings: bool) ->
     columns = [bench.add(bench.stacked(hats[:, k])) for k in range(pieces)]
     target = bench.observed - prediction(bench)
     e = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6]))
-    v = variant("thermal_drift", "path", columns, (1e-5,), path_root(pieces), positive=False,
-                path="free", pieces=pieces)  # fmt: skip
+    v = free_variant("thermal_drift", "path", FreePath(pieces), columns, (1e-5,), ("",))
     law = Explanation((Part(v, 1e-5),), 0.0, 0.0, (7e-6,), 0.0)
     jump = explained(columns[:1], "zero_shift", 0.0).parts
     beside = Explanation((*jump, *law.parts), 0.0, 0.0, (9e-6, 7e-6), 0.0)

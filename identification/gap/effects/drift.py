@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.variants import Variant, variant
 
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
 # Pieces of a free smooth path: slower than a run, as slow as an air conditioner's swing. In a
@@ -76,16 +79,31 @@ def _loaded(bench: Bench) -> bool:
 SMALL = 2
 
 
-def free_paths(bench: Bench) -> dict[str, int]:
-    """Pieces of the free smooth paths, by name; none where time and load go together. Several rates
-    at once are as free as a short one of these."""
+class FreePath(NamedTuple):
+    """pieces: of its length. steady: whether its rate wanders, rather than the path itself."""
+
+    pieces: int
+    steady: bool = False
+
+    def root(self, paths: int = 1) -> Array:
+        """Root of the covariance of so many such paths, free where they start."""
+        one = steady_root(self.pieces) if self.steady else path_root(self.pieces)
+        return np.asarray(np.kron(np.eye(paths), one), dtype=float)
+
+
+def free_paths(bench: Bench) -> dict[str, FreePath]:
+    """The free smooth paths, by name; none where time and load go together. Several rates at once
+    are as free as a short one of these. What heats up or cools down goes on between two runs as it
+    went at the end of one and goes at the start of the next: such a path is steady."""
     if not own_clock(bench):
         return {}
     if not bench.rows.continuous:
-        return PIECES
+        return {label: FreePath(pieces) for label, pieces in PIECES.items()}
     most = RESTING_PIECES if bench.course.rests else LONG_PIECES
     pieces = min(3 * (bench.course.passes - 3), most)
-    return {"free path": pieces} if pieces >= LEAST_PIECES else {}
+    if pieces < LEAST_PIECES:
+        return {}
+    return {"free path": FreePath(pieces), "steady path": FreePath(pieces, True)}
 
 
 def free_path(bench: Bench, pieces: int) -> Array:
@@ -95,8 +113,29 @@ def free_path(bench: Bench, pieces: int) -> Array:
     return np.asarray(np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (pieces - 1)))
 
 
+def free_variant(
+    word: str, label: str, path: FreePath, columns: list[int], scales: tuple[float, ...],
+    names: tuple[str, ...], prior: float = 2.0,
+) -> Variant:  # fmt: skip
+    """Drifts along such a path each, called names; columns: path by path."""
+    return variant(word, label, columns, scales, path.root(len(names)), positive=False, prior=prior,
+                   path="free", names=names, pieces=path.pieces, steady=path.steady)  # fmt: skip
+
+
 def path_root(pieces: int) -> Array:
     """Root of a random walk's covariance over the pieces, free where it starts."""
     at = np.linspace(0.15, 1, pieces)
     covariance = np.minimum(at[:, None], at) + 1e-9 * np.eye(len(at))
     return np.asarray(np.linalg.cholesky(covariance), dtype=float)
+
+
+def steady_root(pieces: int) -> Array:
+    """Root of the covariance of a random walk's integral over the pieces, of any place and rate
+    where it starts; of a deviation of about 1."""
+    t = np.linspace(0, 1, pieces)
+    low, high = np.minimum(t[:, None], t), np.maximum(t[:, None], t)
+    covariance = _PLACE + t[:, None] * t + _TURNS * low**2 * (high / 2 - low / 6)
+    return np.asarray(np.linalg.cholesky(covariance + 1e-9 * np.eye(pieces)), dtype=float)
+
+
+_PLACE, _TURNS = 0.15, 30.0  # variance where it starts; of its rate at the end, over that at first

@@ -15,9 +15,10 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
+    FreePath,
     free_path,
     free_paths,
-    path_root,
+    free_variant,
     paths,
     shares,
 )
@@ -56,27 +57,24 @@ def variants(bench: Bench) -> list[Variant]:
     rates = [c for label, c in common.items() if label != "root"]
     out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
-    for label, pieces in free.items():
-        hats, root = free_path(bench, pieces), path_root(pieces)
-        columns = [column(hats[:, k]) for k in range(pieces)]
-        out.append(variant(WORD, label, columns, scales, root, positive=False, prior=2.0,
-                           path="free", names=("",), pieces=pieces))  # fmt: skip
+    for label, way in free.items():
+        columns = [column(hat) for hat in free_path(bench, way.pieces).T]
+        out.append(free_variant(WORD, label, way, columns, scales, ("",)))
         if len(axes) > 1:
-            out.append(_each_component(bench, axes, label, min(pieces, EACH_PIECES), scales))
+            fewer = way._replace(pieces=min(way.pieces, EACH_PIECES))
+            out.append(_each_component(bench, axes, label, fewer, scales))
     return out
 
 
 def _each_component(
-    bench: Bench, axes: dict[str, tuple[float, float, float]], label: str, pieces: int,
+    bench: Bench, axes: dict[str, tuple[float, float, float]], label: str, way: FreePath,
     scales: tuple[float, ...],
 ) -> Variant:  # fmt: skip
     """A free path of every amplifier's own."""
-    hats = free_path(bench, pieces)
-    columns = [bench.add(component(bench, axis, hats[:, k]))
-               for axis in axes.values() for k in range(pieces)]  # fmt: skip
-    root: Array = np.kron(np.eye(len(axes)), path_root(pieces)).astype(float)
-    return variant(WORD, f"{label}, each component", columns, scales, root, positive=False,
-                   path="free", names=tuple(axes), pieces=pieces)  # fmt: skip
+    hats = free_path(bench, way.pieces)
+    columns = [bench.add(component(bench, axis, hat)) for axis in axes.values() for hat in hats.T]
+    named = f"{label}, each component"
+    return free_variant(WORD, named, way, columns, scales, tuple(axes), prior=1.0)
 
 
 EACH_PIECES = 20  # at most, of one component's path

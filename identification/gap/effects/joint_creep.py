@@ -77,7 +77,7 @@ def variants(bench: Bench) -> list[Variant]:
                     smooth_root(len(columns), 0.5), prior=0.5, each=True, joint=j, times_s=spectrum)
         )  # fmt: skip
         out += _pairs(j, "", columns, spectrum, sizes, 0.3 if bench.data.arm else 0.5)
-        if bench.data.arm:
+        if bench.data.arm or not bench.rows.continuous:
             states = retarded(bent(load), spectrum, bench.rows, bench.rest)
             more = [bench.add_joint(j, bench.sense * c * y) for y in (whole * states).T]
             out += _pairs(j, BENT, more, spectrum, sizes, 0.2)

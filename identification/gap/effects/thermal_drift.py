@@ -18,7 +18,7 @@ from identification.gap.effects.drift import (
     by_direction,
     free_path,
     free_paths,
-    path_root,
+    free_variant,
     paths,
     shares,
 )
@@ -44,13 +44,10 @@ def variants(bench: Bench) -> list[Variant]:
     every = [c for columns in zip(*rates, strict=True) for c in columns]
     out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
                        names=named))  # fmt: skip
-    for label, pieces in free.items():
-        hats = free_path(bench, pieces)
-        columns = [bench.add(bench.outside_column(m * hats[:, k])) for m in masks
-                   for k in range(pieces)]  # fmt: skip
-        root: Array = np.kron(np.eye(len(masks)), path_root(pieces)).astype(float)
-        out.append(variant(WORD, label, columns, scales, root, positive=False, prior=2.0,
-                           path="free", names=named, pieces=pieces))  # fmt: skip
+    for label, way in free.items():
+        hats = free_path(bench, way.pieces)
+        columns = [bench.add(bench.outside_column(m * hat)) for m in masks for hat in hats.T]
+        out.append(free_variant(WORD, label, way, columns, scales, named))
     return out
 
 
