@@ -26,6 +26,8 @@ Stiffnesses = tuple[
     PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat
 ]
 RelativeSd = Annotated[float, Field(ge=0, le=1)]
+# A simulated spring may be off several times; beyond that a percentage is meant.
+SpringSd = Annotated[float, Field(ge=0, le=5)]
 PositiveFinite = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 # Joints of the arm turn by one full turn to either side; more is an angle in degrees.
@@ -105,9 +107,9 @@ class Simulation(_Part):
     """What the simulator believed before the measurement: six joints, or a spring a direction."""
 
     joint_stiffness_Nm_per_rad: Stiffnesses | None = None
-    joint_stiffness_relative_sd: RelativeSd = 0.1
+    joint_stiffness_relative_sd: SpringSd = 0.1
     stiffness_N_per_mm: dict[Name, PositiveFinite] | None = None
-    stiffness_relative_sd: RelativeSd = 0.1
+    stiffness_relative_sd: SpringSd = 0.1
 
 
 class Meta(_Part):

@@ -7,6 +7,8 @@ import pytest
 
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
+from identification.gap.effects import library
+from identification.gap.effects.flow_back import BACK_FROM
 from identification.gap.history import play
 from identification.gap.loops import lost
 from identification.gap.priors import prior_of
@@ -113,3 +115,21 @@ def test_loops_count_for_friction_and_against_it() -> None:
     both = ("joint_yield", "joint_hysteresis")
     assert prior(rubs, *both) > prior(flows, *both) + 10.0
     assert prior(rubs, "joint_creep") == prior(flows, "joint_creep")
+
+
+def test_what_never_yielded_flows_not_back() -> None:
+    """Small cycles before larger ones: a threshold that only the larger pass explains no loop of
+    the small ones."""
+    turn = np.sin(np.linspace(0, 4 * np.pi, 400, endpoint=False))
+    force = np.concatenate([30 * turn, 60 * turn, 100 * turn])
+    bench = make_bench(running(force, force / SPRING, imposed="force"))
+    found = [v for v in library(bench, ["joint_yield"]) if v.label.endswith("flows back")]
+    assert {v.info["back_from"] for v in found} == set(BACK_FROM)
+    for v in found:
+        radius, top = v.info["radius"], v.info["top"]
+        threshold = v.info["back_from"] * top
+        assert threshold <= max(radius.min(), BACK_FROM[0] * top) + 1e-9
+        own = [bench.columns[c] for c in v.columns[len(radius) :]]
+        size = np.abs(np.column_stack(own)).max(axis=1)
+        before = np.cumsum(np.abs(bench.load) > threshold) == 0
+        assert size[: bench.rows.n][before].max() == 0.0 < size.max()

@@ -29,6 +29,14 @@ def test_defaults() -> None:
     assert meta(META.replace(", tcp_xyz_mm: [0, 0, 50]", "")).poses["P1"].tcp_xyz_mm == (0, 0, 0)
 
 
+def test_simulated_springs_may_be_off_several_times() -> None:
+    said = "joint_stiffness_relative_sd: 0.1"
+    assert said in META
+    found = meta(META.replace(said, said.replace("0.1", "1.5"))).simulation
+    assert found is not None
+    assert found.joint_stiffness_relative_sd == 1.5
+
+
 def test_directions_come_out_as_unit_vectors() -> None:
     vector = meta(META.replace("[0, 1, 0]", "[0.7071, -0.7071, 0]")).directions["y"]
     assert sum(c * c for c in vector) == pytest.approx(1, abs=1e-15)
@@ -52,6 +60,8 @@ REFUSED = [
     ("joint_stiffness_Nm_per_rad: [37000, 57000, 18000, 7100, 7500, 8000]",
      "stiffness_N_per_mm: {x: 1, y: 1}", "simulation of ur10e wants joint_stiffness_Nm_per_rad"),
     ("gain_relative_sd: 0.005", "gain_relative_sd: 1.5", "instruments.force.gain_relative_sd"),
+    ("joint_stiffness_relative_sd: 0.1", "joint_stiffness_relative_sd: 10",
+     "joint_stiffness_relative_sd: 10 is not allowed; wanted: a number from 0 to 5."),
     ("gain_relative_sd: 0.005", "gain_sd: 0.005", 'Did you mean "gain_relative_sd"?'),
 ]  # fmt: skip
 REFUSED_SPECIMEN = [

@@ -27,7 +27,8 @@ from typing import Any
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array, Flags, Ints
+from identification.gap.data import Array, Flags
+from identification.gap.effects.flow_back import flowing_back, yielded_from
 from identification.gap.effects.specimens import (
     OWN,
     off,
@@ -109,14 +110,13 @@ def _under_weight(
     taken_back = [BACK_UNDER_WEIGHT] if TAKEN_BACK in _memories(bench) else []
     for memory in (UNDER_WEIGHT, *taken_back):
         fresh = _fresh(bench, memory)
-        info = {"joint": joint, "memory": memory, "flow_s": 0.0, "load": load, "column": column,
-                "top": top, "weight": weight}  # fmt: skip
         # what a controller takes back it had clamped: no metal that flows back
-        kept = after_yield(bench, load, top, fresh) if memory == UNDER_WEIGHT else []
-        back = [column(s) for s in kept]
+        kept = flowing_back(bench, load, column, top, fresh) if memory == UNDER_WEIGHT else {}
+        info = {"joint": joint, "memory": memory, "flow_s": 0.0, "load": load, "column": column,
+                "top": top, "back": kept, "weight": weight}  # fmt: skip
         states = bench.plays(load, radius, fresh, weight)
         label = f"joint {joint + 1}{memory}"
-        out += _knees(bench, WORD, label, [column(s) for s in states.T], radius, back, info)
+        out += _knees(bench, WORD, label, [column(s) for s in states.T], radius, info)
     return out
 
 
@@ -142,7 +142,7 @@ def knee_variants(
     for memory, fresh in _memories(bench).items():
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
         exact = {**info, **knee_at(bench, load, column, memory, top), "flow_s": 0.0}
-        out += _knees(bench, word, f"{name}{memory}", columns, radius, exact["back"], exact)
+        out += _knees(bench, word, f"{name}{memory}", columns, radius, exact)
     return out
 
 
@@ -150,10 +150,10 @@ def knee_at(
     bench: Bench, load: Array, column: Callable[[Array], int], memory: str, top: float | None = None
 ) -> dict[str, Any]:
     """What knees on a load (n,) have in common at a place: memory, load, column, `top` of what
-    flows back, and `back`, its columns."""
+    flows back, and `back`, its columns by the share of `top` beyond which it has yielded."""
     top = _range(bench, load) if top is None else top
-    columns = [column(s) for s in after_yield(bench, load, top, _fresh(bench, memory))]
-    return {"memory": memory, "load": load, "column": column, "top": top, "back": columns}
+    back = flowing_back(bench, load, column, top, _fresh(bench, memory))
+    return {"memory": memory, "load": load, "column": column, "top": top, "back": back}
 
 
 def _range(bench: Bench, load: Array) -> float:
@@ -163,9 +163,8 @@ def _range(bench: Bench, load: Array) -> float:
 
 
 def _knees(
-    bench: Bench, word: str, label: str, columns: list[int], radius: Array, back: list[int],
-    info: dict[str, Any],
-) -> list[Variant]:  # fmt: skip
+    bench: Bench, word: str, label: str, columns: list[int], radius: Array, info: dict[str, Any]
+) -> list[Variant]:
     """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them. What
     begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`; what
     holds small loads firmly, and then more and more gives way, is not (Ramberg and Osgood 1943).
@@ -179,12 +178,12 @@ def _knees(
             place = [*inside, *extra]
             kept = [*inside.values(), *[_HARDENS] * len(extra)]
             exact = {**info, "radius": radius[place], "centre": radius[k],
-                     "back": [] if knee == "round" and arm else back, "knee": knee,
+                     "back": {} if knee == "round" and arm else info["back"], "knee": knee,
                      "softens": softens}  # fmt: skip
             at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
             out += _with_back(word, at, chosen, np.diag(kept), share / 4, exact)
     if arm and bench.course.unloads:
-        exact = {**info, "radius": radius, "centre": radius[0], "back": [],
+        exact = {**info, "radius": radius, "centre": radius[0], "back": {},
                  "knee": "slow", "softens": False}  # fmt: skip
         at, likely = f"{label} at {THRESHOLDS[0]:g} and on", _SLOW * _LIKELY[info["memory"]]
         root = smooth_root(len(radius), 0.6, 0.3)
@@ -224,7 +223,7 @@ def _hardened(
     for k in range(len(radius)):
         root = np.diag([1.0, *[_HARDENS] * (len(radius) - k - 1)])
         exact = {**info, "memory": HARDENED, "flow_s": 0.0, "radius": radius[k:],
-                 "centre": radius[k], "load": load, "column": column, "back": [],
+                 "centre": radius[k], "load": load, "column": column, "back": {},
                  "knee": "hardened"}  # fmt: skip
         label = f"{name}{HARDENED} beyond {radius[k] / top:.3g}"
         out.append(
@@ -251,7 +250,8 @@ def _with_back(
 ) -> list[Variant]:
     """A knee as it is, and with Bauschinger's effect: once it has yielded, metal flows back early
     when unloaded."""
-    out, back = [], info["back"]
+    out, share = [], yielded_from(info)
+    back, info = info["back"].get(share, []), {**info, "back_from": share}
     for more, name in ([], ""), *([(back, ", flows back")] if back else []):
         k, n = len(columns), len(columns) + len(more)
         each, within = softening(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
@@ -267,10 +267,6 @@ LEAST = 0.15  # of the elastic compliance: what bends less does not give way
 FINE = 13  # radii about a threshold that was found on the grid, from 0.84 to 1.2 of it
 FLOWS_S = (1.2, 2.5, 5.0, 10.0, 25.0)  # in proportion to the overstress,
 SQUARE_S = (2.5, 6.0, 15.0)  # or with its square
-BACK = (0.1, 0.2, 0.3, 0.42, 0.56)  # radii of what flows back after a reversal, of the range
-RATCHET_FROM = 0.6  # of the range
-RATCHETS = 0.3  # of a cycle's path beyond that: creeps on so much slower than it flows
-BACK_FROM = 0.25  # of the range: a load from which on a joint may have yielded
 
 
 def is_sharp(v: Variant) -> bool:
@@ -310,7 +306,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
 def elsewhere(bench: Bench, found: Variant, name: str, there: Mapping[str, Any]) -> Variant | None:
     """A knee that was found, at another place (joint, or axis; `knee_at`) of the same memory, where
     it begins at the same load of the rig: its thresholds in proportion to what loads the two
-    places. None where nothing loads the other one then."""
+    places. None where nothing loads the other one then, or nothing flows back there."""
     info, other = found.info, there
     most = int(np.abs(info["load"]).argmax())
     factor = float(np.abs(other["load"][most]) / np.abs(info["load"][most]))
@@ -321,9 +317,12 @@ def elsewhere(bench: Bench, found: Variant, name: str, there: Mapping[str, Any])
     moved = states(bench, other["load"], radius, flow, fresh, square=bool(info.get("square")))
     columns = [other["column"](s) for s in moved.T]
     if len(found.columns) > len(radius):
-        columns += other["back"]
-    exact = {**other, "radius": radius, "centre": factor * float(info["centre"]), "flow_s": flow,
-             "square": bool(info.get("square")), "knee": info["knee"]}  # fmt: skip
+        columns += other["back"].get(info["back_from"], [])
+    if len(columns) != len(found.columns):
+        return None
+    exact = {**other, "back_from": info["back_from"], "radius": radius, "flow_s": flow,
+             "centre": factor * float(info["centre"]), "square": bool(info.get("square")),
+             "knee": info["knee"]}  # fmt: skip
     start, end = found.label.rsplit(" at ", 1)
     how = start.removeprefix(place_in(found.label)) + f" at {exact['centre']:.4g}"
     label = " ".join([name + how, *end.split(" ")[1:]])
@@ -336,36 +335,6 @@ def place_in(label: str) -> str:
 
 
 _RETURNS = 0.4  # coefficients of what flows back, against those of the knee
-_REVERSED = 0.05  # of the largest load: so far back it is a reversal
-
-
-def after_yield(bench: Bench, load: Array, top: float, fresh: Flags) -> list[Array]:
-    """States (n,) of what yielding leaves behind: smaller plays from the first reversal on, zero
-    before (the first loading has a knee as sharp as it likes), and a ratchet; empty where nothing
-    is reversed. A specimen that is only let go takes back what is elastic: where more comes back,
-    a curve or friction does that. top: range of the load."""
-    peak_of = peaks(load, BACK_FROM * top, fresh)
-    after = peak_of >= 0
-    if not after.any() or (not bench.data.arm and bench.course.one_sided):
-        return []
-    states = bench.plays(load, top * np.array(BACK), fresh)
-    back = [np.where(after, s - s[peak_of], 0.0) for s in states.T]
-    return [*back, RATCHETS * np.where(after, ratchet(load, RATCHET_FROM * top, fresh), 0.0)]
-
-
-def peaks(load: Array, threshold: float, fresh: Flags) -> Ints:
-    """(n,) row of the largest load before a row, -1 where nothing beyond the threshold has been
-    reversed since the memory was last fresh."""
-    size = np.abs(load)
-    edges = np.append(np.flatnonzero(fresh | (np.arange(len(load)) == 0)), len(load))
-    peak_of = np.full(len(load), -1)
-    for a, b in pairwise(edges):
-        peak = np.maximum.accumulate(size[a:b])
-        turned = (peak > threshold) & (size[a:b] < peak - _REVERSED * size.max())
-        if turned.any():
-            first = a + int(turned.argmax())
-            peak_of[first:b] = a + int(size[a:first].argmax())
-    return peak_of
 
 
 def _memories(bench: Bench) -> dict[str, Flags]:
@@ -429,14 +398,3 @@ def _flowing(
         every = flowing_play(load, np.tile(radius, len(slow)), times, bench.rows, fresh, weight,
                              square)  # fmt: skip
         yield from zip(slow, np.split(every, len(slow), axis=1), strict=True)
-
-
-def ratchet(load: Array, threshold: float, fresh: Flags) -> Array:
-    """(n,) path on which the size of the load has grown beyond the threshold, with its sign, since
-    the memory was fresh: what creeps on with every cycle is in proportion to it."""
-    size = np.maximum(np.abs(load) - threshold, 0.0)
-    step = np.maximum(np.diff(size, prepend=size[0]), 0.0) * np.sign(load)
-    total = np.cumsum(step)
-    start = np.flatnonzero(fresh | (np.arange(len(load)) == 0))
-    group = np.cumsum(fresh | (np.arange(len(load)) == 0)) - 1
-    return np.asarray(total - (total - step)[start][group])

@@ -84,7 +84,7 @@ def plateaus(bench: Bench, found: Variant) -> list[Variant]:
         radius = np.concatenate([about[about < beyond[0]], beyond[beyond < span]])
         columns = [info["column"](s) for s in bench.plays(info["load"], radius, bench.moved).T]
         each, within = softening(radius, len(radius))
-        exact = {**info, "radius": radius, "back": [], "knee": "plateau"}
+        exact = {**info, "radius": radius, "back": {}, "knee": "plateau"}
         out.append(
             variant(found.word, f"joint {info['joint'] + 1} at {knee:.4g}{PLATEAU} {end:.4g}",
                     columns, _SCALES, None, True, 0.25 / _ENDS, found.least, each, within,

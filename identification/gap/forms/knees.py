@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects import base_slip, joint_yield
+from identification.gap.effects import base_slip, flow_back, joint_yield
 from identification.gap.forms.law import (
     ACROSS,
     ANEW,
@@ -50,12 +50,10 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     own = bool(info.get("other_springs"))
     if len(v.columns) > len(radius) + own:
         top = float(info["top"])
-        terms += [
-            Term("compliance", {"returns_beyond": f * top, "after": joint_yield.BACK_FROM * top})
-            for f in joint_yield.BACK
-        ]
-        unit_ratchet = {"ratchets_beyond": joint_yield.RATCHET_FROM * top}
-        terms.append(Term("compliance", unit_ratchet | {"after": joint_yield.BACK_FROM * top}))
+        after = {"after": info["back_from"] * top}
+        terms += [Term("compliance", {"returns_beyond": f * top} | after) for f in flow_back.BACK]
+        ratchet = {"ratchets_beyond": flow_back.RATCHET_FROM * top}
+        terms.append(Term("compliance", ratchet | after))
     terms += [Term("compliance")] * own
     return Law(constants, tuple(terms)), np.full(len(terms), unit)
 
@@ -92,10 +90,10 @@ def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     for term in law.terms:
         if "after" not in term.shape:
             continue
-        peak = joint_yield.peaks(load, term.shape["after"], fresh)
+        peak = flow_back.peaks(load, term.shape["after"], fresh)
         if "ratchets_beyond" in term.shape:
-            path = joint_yield.ratchet(load, term.shape["ratchets_beyond"], fresh)
-            state = joint_yield.RATCHETS * path
+            path = flow_back.ratchet(load, term.shape["ratchets_beyond"], fresh)
+            state = flow_back.RATCHETS * path
         else:
             state = bench.plays(load, np.array([term.shape["returns_beyond"]]), fresh)[:, 0]
             state = state - state[peak]
