@@ -43,6 +43,7 @@ _SIDES = ("x", "y", "z")
 CONSTANTS: dict[str, Key] = {
     "joint": Key("joint", "count"),
     "memory": _MEMORY,
+    "forgets": Key("memory", "text", options=(ANEW,)),
     "flow_time": Key("flow_time_s", "size"),
     "flow_exponent": Key("flow_exponent", "positive"),
     "axis": Key("axis", "text", options=tuple(base_slip.AXES)),
@@ -132,7 +133,7 @@ for _name, _unit in _DRIFTS.items():
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
 
 
-MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent", "placed")
+MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent", "placed", "forgets")
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,7 @@ GRAMMAR: dict[str, Grammar] = {
         ),
     ),
     "joint_creep": Grammar(
-        ("joint",),
+        ("joint", "forgets"),
         (
             ("compliance", ("retardation_time",)),
             ("compliance_quadratic", ("retardation_time",)),

@@ -185,6 +185,7 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     if verdict in ("none", "unknown"):
         return next(e for e in found.explanations if not e.parts)
     mine = [e for e in found.explanations if verdict in e.words]
+    mine = [e for e in mine if not _needless(found, e)] or mine
     first = [e for e in mine if e.parts[0].word == verdict]
     most = TAKES_TWO_LINEAR if mine[0].words <= LINEAR else FAR_WORSE
     if first and first[0].log_weight > mine[0].log_weight - most:
@@ -199,6 +200,12 @@ def _chosen(found: Found, verdict: str) -> Explanation:
     least = min(LEAST_SHARE * max(troubles.values()), BELOW_NOISE * noise_of(found.engine.bench))
     petty = {w for w, size in troubles.items() if size < least} - FREE
     return next((e for e in simpler if best.words - e.words <= petty), best)
+
+
+def _needless(found: Found, explanation: Explanation) -> bool:
+    """Whether fewer of its effects foretell withheld data as well, which no drift lets itself."""
+    simpler = found.foretold.get(explanation.words)
+    return simpler is not None and not (explanation.words - simpler.words) & FREE
 
 
 def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:

@@ -106,7 +106,8 @@ class Found:
     none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
     gap that no law explains, what share of its weight withheld data leave an explanation, and what
     a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
-    that no word names, best first."""
+    that no word names, best first. foretold: words of an explanation -> one with fewer of its
+    effects that foretells withheld data as well, and speaks for it."""
 
     engine: Engine
     explanations: tuple[Explanation, ...]
@@ -118,6 +119,7 @@ class Found:
     kept: Mapping[frozenset[str], float] = field(default_factory=dict)
     looks_like: Likeness | None = None
     nameless: tuple[Explanation, ...] = ()
+    foretold: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
 
 
 def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:

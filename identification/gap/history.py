@@ -151,10 +151,12 @@ def _phases(rows: Rows, rest: Flags) -> _Phases:
     return _Phases(step, pause, np.maximum(ease - stands - pause, 0.0), stands)
 
 
-def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
+def retarded(
+    load: Array, times: Array, rows: Rows, rest: Flags, fresh: Flags | None = None
+) -> Array:
     """First-order lag `T z' = x - z` of a load (n, k) with times (k,), or one (1,) for all:
     deflection of a Kelvin-Voigt element per unit of its compliance. Exact for a load that ramps
-    between rows and then stands."""
+    between rows and then stands. fresh: rows (n,), after a rest, before which it is forgotten."""
     before = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
     before[rest] = 0.0
     phases = _phases(rows, rest)
@@ -169,6 +171,8 @@ def retarded(load: Array, times: Array, rows: Rows, rest: Flags) -> Array:
     ramped = load * (1 - share) + before * (share - during)  # of a ramp, z = 0 before it
     decayed = np.exp(-phases.step[:, None] / times)
     keep = held * during * np.where(rest[:, None], decayed, paused)
+    if fresh is not None:
+        keep[fresh] = 0.0
     stood = during * before * (1 - paused)
     return _prefix(keep, held * (ramped + stood) + load * (1 - held))
 

@@ -56,7 +56,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
         good *= kept.get(e.words, 1.0)
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
-        said = _simpler(e, ranked, kept, arm) or e
+        said = found.foretold.get(e.words) or _simpler(e, ranked, kept, arm) or e
         many = THREE if _tells_of_three(said) else 1.0
         for word, share in _main(said, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good

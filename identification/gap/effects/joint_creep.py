@@ -6,6 +6,9 @@ of them so long that it flows and does not come back (Burgers 1935). Large stres
 in proportion: the same of the squared torque. The coefficients are compliances in units of the
 joint's own, of what flows over one session: polymers, grease and gears 1 to 50 %.
 
+What crept goes back between two runs, as the session's clock tells; or nothing is left of it where
+the rig is turned to another direction, which may take hours that no clock counts.
+
 Size: 1 to 50 % of the elastic deflection: polymers, grease, gears.
 Prior: shares positive in sum, sd out of SCALES, equally likely; half of it on the whole spectrum.
 Source: Findley 1976.
@@ -13,12 +16,14 @@ Source: Findley 1976.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array
+from identification.gap.data import Array, Flags
 from identification.gap.history import half_sample, retarded
-from identification.gap.variants import Variant, smooth_root, variant
+from identification.gap.variants import SET_UP_ANEW, Variant, smooth_root, variant
 
 WORD = "joint_creep"
 SCALES = (0.02, 0.06, 0.2, 0.6)
@@ -65,41 +70,55 @@ def variants(bench: Bench) -> list[Variant]:
     if bench.course.never_held or bench.course.timeless:
         return []
     spectrum = times(bench)
-    whole = in_session(bench, spectrum)
     out, sizes = [], scales(bench)
     for j in bench.moving_joints():
-        load = np.tile(bench.true_torque[:, j][:, None], (1, len(spectrum)))
-        z = retarded(load, spectrum, bench.rows, bench.rest)
-        c = bench.compliance[j]
-        columns = [bench.add_joint(j, bench.sense * c * y) for y in (whole * z).T]
-        out.append(
-            variant(WORD, f"joint {j + 1} spectrum", columns, sizes,
-                    smooth_root(len(columns), 0.5), prior=0.5, each=True, joint=j, times_s=spectrum)
-        )  # fmt: skip
-        out += _pairs(j, "", columns, spectrum, sizes, 0.3 if bench.data.arm else 0.5)
+        for memory, fresh in _memories(bench).items():
+            columns = _elements(bench, j, spectrum, fresh)
+            info = {"joint": j, "memory": memory.strip(), "bent": False}
+            name, likely = f"joint {j + 1}{memory}", _LIKELY[memory]
+            pairs = (0.3 if bench.data.arm else 0.5) * likely
+            out += _family(name, columns, spectrum, sizes, 0.5 * likely, pairs, info)
         if bench.data.arm or not bench.rows.continuous:
-            states = retarded(bent(load), spectrum, bench.rows, bench.rest)
-            more = [bench.add_joint(j, bench.sense * c * y) for y in (whole * states).T]
-            out += _pairs(j, BENT, more, spectrum, sizes, 0.2)
-            out.append(
-                variant(WORD, f"joint {j + 1}{BENT} spectrum", more, sizes,
-                        smooth_root(len(more), 0.5), prior=0.2, each=True, joint=j,
-                        times_s=spectrum, bent=True)
-            )  # fmt: skip
+            columns = _elements(bench, j, spectrum, None, is_bent=True)
+            info = {"joint": j, "memory": "", "bent": True}
+            out += _family(f"joint {j + 1}{BENT}", columns, spectrum, sizes, 0.2, 0.2, info)
     return out
 
 
-def _pairs(
-    joint: int, name: str, columns: list[int], times_s: Array, sizes: tuple[float, ...],
-    prior: float,
+_LIKELY = {"": 1.0, SET_UP_ANEW: 0.5}
+
+
+def _memories(bench: Bench) -> dict[str, Flags | None]:
+    """When nothing is left of what crept before: never, or when the rig is set up anew."""
+    out: dict[str, Flags | None] = {"": None}
+    if np.sum(bench.rebuilt) > 1:
+        out[SET_UP_ANEW] = bench.rebuilt
+    return out
+
+
+def _elements(
+    bench: Bench, joint: int, times_s: Array, fresh: Flags | None, *, is_bent: bool = False
+) -> list[int]:
+    """Column of an element of every time (k,)."""
+    load = np.tile(bench.true_torque[:, joint][:, None], (1, len(times_s)))
+    z = retarded(bent(load) if is_bent else load, times_s, bench.rows, bench.rest, fresh)
+    unit = bench.sense * bench.compliance[joint] * in_session(bench, times_s)
+    return [bench.add_joint(joint, y) for y in (unit * z).T]
+
+
+def _family(
+    name: str, columns: list[int], times_s: Array, sizes: tuple[float, ...], spectrum: float,
+    pairs: float, info: dict[str, Any],
 ) -> list[Variant]:  # fmt: skip
-    """Each time with its neighbour."""
-    return [
-        variant(WORD, f"joint {joint + 1}{name} T {times_s[k]:.3g} s", columns[k : k + 2], sizes,
-                prior=prior / (len(columns) - 1), each=True, joint=joint,
-                times_s=times_s[k : k + 2], bent=bool(name))
-        for k in range(len(columns) - 1)
-    ]  # fmt: skip
+    """The whole spectrum, and each time with its neighbour, of these priors."""
+    out = [variant(WORD, f"{name} spectrum", columns, sizes, smooth_root(len(columns), 0.5),
+                   prior=spectrum, each=True, times_s=times_s, **info)]  # fmt: skip
+    for k in range(len(columns) - 1):
+        out.append(
+            variant(WORD, f"{name} T {times_s[k]:.3g} s", columns[k : k + 2], sizes,
+                    prior=pairs / (len(columns) - 1), each=True, times_s=times_s[k : k + 2], **info)
+        )  # fmt: skip
+    return out
 
 
 BENT = " more than in proportion"

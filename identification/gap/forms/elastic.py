@@ -21,7 +21,7 @@ from identification.gap.effects.load_misalignment import (
     gives,
     pulled,
 )
-from identification.gap.forms.law import Law, Term, along, scaled
+from identification.gap.forms.law import ANEW, Law, Term, along, scaled
 from identification.gap.history import retarded
 from identification.gap.variants import Variant
 
@@ -77,7 +77,8 @@ def describe_creep(bench: Bench, v: Variant) -> tuple[Law, Array]:
         name, unit = "compliance_quadratic", unit / float(np.abs(bench.true_torque[:, joint]).max())
     times = np.asarray(v.info["times_s"])
     terms = tuple(Term(name, {"retardation_time": float(t)}) for t in times)
-    return Law({"joint": joint}, terms), unit * in_session(bench, times)
+    forgets = {"forgets": ANEW} if v.info["memory"] else {}
+    return Law({"joint": joint} | forgets, terms), unit * in_session(bench, times)
 
 
 def creep(bench: Bench, law: Law) -> list[Array]:
@@ -87,7 +88,8 @@ def creep(bench: Bench, law: Law) -> list[Array]:
     bent = np.array([t.coefficient == "compliance_quadratic" for t in law.terms])
     torque = bench.true_torque[:, joint][:, None]
     load = np.where(bent, torque * np.abs(torque), torque)
-    z = retarded(load, times, bench.rows, bench.rest)
+    fresh = bench.rebuilt if law.constants.get("forgets") == ANEW else None
+    z = retarded(load, times, bench.rows, bench.rest, fresh)
     return [bench.joint_column(joint, bench.sense * column) for column in z.T]
 
 
