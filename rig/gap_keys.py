@@ -79,6 +79,7 @@ SHAPES: dict[str, Key] = {
     "after": Key("after_Nm", "positive"),
     "strength": Key("friction_Nm", "positive"),
     "reach": Key("reach_Nm", "positive"),
+    "grows_to": Key("grows_with_net_torque_to_Nm", "positive"),
     "beyond": Key("beyond_Nm", "positive"),
     "net_above": Key("net_torque_above_Nm"),
     "net_beyond": Key("net_torque_beyond_Nm", "positive"),
@@ -166,7 +167,12 @@ GRAMMAR: dict[str, Grammar] = {
     "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "joint_hysteresis": Grammar(
         ("joint", "law", "memory", "measured_to", "tool"),
-        (("compliance", ("strength",)), ("compliance", ("reach",)), ("compliance", ())),
+        (
+            ("compliance", ("strength",)),
+            ("compliance", ("reach",)),
+            ("compliance", ("reach", "grows_to")),
+            ("compliance", ()),
+        ),
     ),
     "joint_backlash": Grammar(
         ("joint", "zone", "crossing", "kind", "tool", "preload"),
@@ -244,7 +250,7 @@ def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[tuple[str,
             fits = coefficient in ("drift", "drift_rate")
         if constants.get("path") == "each run":
             fits = coefficient == "drift" and shape == ("run", "along")
-        if shape in (("strength",), ("reach",)):
+        if shape[:1] in (("strength",), ("reach",)):
             fits = (law in SLIP_AT_A_STRENGTH) == (shape == ("strength",))
         if fits:
             yield coefficient, shape

@@ -203,7 +203,7 @@ def _chosen(found: Found, verdict: str) -> Explanation:
 
 
 def _needless(found: Found, explanation: Explanation) -> bool:
-    """Whether fewer of its effects foretell withheld data as well, which no drift lets itself."""
+    """Whether fewer of its effects foretell withheld data better; what drifts nothing foretells."""
     simpler = found.foretold.get(explanation.words)
     return simpler is not None and not (explanation.words - simpler.words) & FREE
 

@@ -4,7 +4,7 @@ An explanation is fitted without a repetition and judged on it. One that is far 
 this session and nothing that repeats: it loses weight, softly about the limit, to one with fewer of
 the same effects, or to `unknown`.
 
-Of a rig without an arm, one of two effects may foretell what was withheld as well as both do: then
+Of a rig without an arm, one of two effects may foretell what was withheld better than both do: then
 the other one is freedom of its law, and it speaks for both.
 """
 
@@ -36,10 +36,11 @@ def earned(found: Found) -> Found:
     """The posterior after a look at withheld data; as it was where there are none."""
     ways = folds(found.engine)
     if ways and not found.engine.bench.data.arm:
-        found = replace(found, foretold=_foretold(found, *next(iter(ways.items()))))
+        simpler = _foretold(found, *next(iter(ways.items())))
+        found = weighed(replace(found, foretold=simpler), found.kept) if simpler else found
     fold = ways.get("repetition")
     if fold is None:
-        return weighed(found, found.kept)
+        return found
     kept: dict[frozenset[str], float] = {}
     for _ in range(_LOOKED_AT):
         todo = [e for e in _weighty(found, kept) if e.words not in kept]
@@ -50,23 +51,23 @@ def earned(found: Found) -> Found:
 
 
 def _foretold(found: Found, name: str, fold: Ints) -> dict[frozenset[str], Explanation]:
-    """Of explanations with two effects that matter, the one effect that foretells withheld data as
-    well. What a drift does nothing foretells: where it is the larger one, another has to be
-    plainly better to speak for both."""
+    """Of explanations with two effects that matter, the one effect that foretells withheld data
+    better than both: words that stand for each other foretell the same. What a drift does nothing
+    foretells: where it is the larger one, another has to be plainly better to speak for both."""
     first, out = found.explanations[0].log_weight, {}
     pairs = [e for e in found.explanations[:_PAIRS] if e.log_weight > first - _NEAR]
     for both in (e for e in pairs if len(e.words) == _TWO):
         drifts = both.parts[0].word in FREE
-        best = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else 1.0)
+        best = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
         for one in (e for e in found.explanations if e.parts and e.words < both.words):
             after = held_out(found.engine, one, name, fold).after
-            if after <= best:
+            if after < best:
                 best, out[both.words] = after, one
     return out
 
 
 _TWO, _PAIRS, _NEAR = 2, 3, 25.0  # so many of the best, and nats below the first, are looked at
-_PLAINLY = 0.5
+_BETTER, _PLAINLY = 0.98, 0.5
 
 
 def _weighty(found: Found, kept: dict[frozenset[str], float]) -> list[Explanation]:

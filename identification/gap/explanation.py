@@ -107,7 +107,7 @@ class Found:
     gap that no law explains, what share of its weight withheld data leave an explanation, and what
     a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
     that no word names, best first. foretold: words of an explanation -> one with fewer of its
-    effects that foretells withheld data as well, and speaks for it."""
+    effects that foretells withheld data better, and speaks for it."""
 
     engine: Engine
     explanations: tuple[Explanation, ...]

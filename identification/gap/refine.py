@@ -158,6 +158,7 @@ def _friction(word: _Word) -> list[Variant]:
     bench, out = word.engine.bench, []
     for s in _places(word.alone, word.beside):
         out += joint_hysteresis.closer(bench, s.variant)
+        out += joint_hysteresis.growing(bench, s.variant)
     for s in _places(word.alone, word.beside, joint_hysteresis.hangs):
         out += joint_hysteresis.refined(bench, s.variant)
     return out

@@ -58,6 +58,33 @@ def test_spectra_have_no_reach_and_a_specimen_keeps_its_other_springs() -> None:
     assert sum(v.label.endswith("other springs") for v in finer) == len(finer) / 2
 
 
+@pytest.mark.parametrize("memory", ["", "worked in", "under weight", "rested"])
+def test_friction_may_grow_with_what_the_gear_carries(memory: str) -> None:
+    """Half as strong where half the net torque is carried, push and weights together."""
+    bench = make_bench(arm_data())
+    grid = library(bench, ["joint_hysteresis"])
+    found = next(v for v in grid if v.info["memory"] == memory and v.info["joint"] == 1)
+    finer = joint_hysteresis.growing(bench, found)
+    assert {v.info["law"] for v in finer} == set(EXPONENTIAL)
+    assert_lawful(bench, finer)
+    net = np.abs(bench.true_torque[:, 1] + bench.weight(1))
+    n = bench.rows.n
+    for v in finer:
+        assert (v.info["joint"], v.info["memory"]) == (1, memory)
+        same, grows = (bench.columns[c][:n] for c in v.columns)
+        np.testing.assert_allclose(grows, same * net / net.max(), atol=1e-12 * np.abs(same).max())
+    assert joint_hysteresis.growing(bench_without_arm(), found) == []
+
+
+def test_friction_that_grows_is_looked_at_where_a_joint_rubs() -> None:
+    bench = make_bench(arm_data())
+    grid = library(bench, ["joint_hysteresis"])
+    truth = joint_hysteresis.growing(bench, next(v for v in grid if v.info["joint"] == 1))[2]
+    engine = engine_with(bench, bench.columns[truth.columns[1]])
+    finer = refine(engine, score(engine, engine.levels, grid))
+    assert any("grows_to" in v.info and v.info["joint"] == 1 for v in finer)
+
+
 def test_flow_times_close_in_between_those_of_the_grid() -> None:
     bench = make_bench(arm_data())
     sharp = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")

@@ -214,6 +214,28 @@ def test_a_drift_and_a_jump_of_the_datum_foresee_nothing_either() -> None:
     assert after.kept[both.words] == 1.0
 
 
+@pytest.mark.parametrize(
+    ("second", "needed"), [("joint_creep", False), ("joint_creep", True), ("thermal_drift", False)]
+)
+def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: bool) -> None:
+    """The larger effect of two is either half of what repeats, or goes one way in one run and back
+    in the next. Of a drift, which nothing foretells, that is no reason to leave it out."""
+    e = engine(np.full(REPETITIONS, BUMP))
+    n = e.bench.rows.n
+    other = e.bench.stacked(np.exp(-(((e.bench.load - 120) / 15) ** 2)))
+    way = np.array([0, 1.0, 1, 1 if needed else -1])[e.bench.rows.repetition]
+    e.bench.add(other)
+    e.target[:n] += 2 * BUMP * way * other[:n]
+    e.extend()
+    bump = explained([0], "joint_nonlinear_stiffness", -40.0)
+    more = explained([4], second, -60.0)
+    both = Explanation(more.parts + bump.parts, 0.0, 0.0, (2 * BUMP / 3, BUMP / 3), 0.0)
+    after = earned(found(e, both, bump, more))
+    spoken = after.foretold.get(both.words)
+    assert spoken is (None if needed or second == "thermal_drift" else bump)
+    assert chosen_of(after, "joint_nonlinear_stiffness" if spoken else second) is (spoken or both)
+
+
 @pytest.mark.parametrize(("share", "named"), [(0.05, 2), (0.3, 3)])
 def test_a_third_effect_that_hardly_moves_anything_is_not_named(share: float, named: int) -> None:
     e = engine(np.full(REPETITIONS, BUMP))

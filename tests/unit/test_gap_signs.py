@@ -103,6 +103,21 @@ def test_limits_that_two_by_two_are_near_may_be_far_together() -> None:
     assert log_odds_together(more, np.zeros(1, int), sums, roots)[0] < found - 10.0
 
 
+@pytest.mark.parametrize(("first", "looks"), [(-6.0, True), (-2.0, False)])
+def test_one_limit_that_is_far_off_may_ask_others_to_be_so(first: float, looks: bool) -> None:
+    """Data see the difference of two alone: the first is far below zero, the second just above, and
+    can follow it no further than to there."""
+    apart = np.array([1.0, -1.0]) / 2**0.5
+    covariance = np.eye(2) - (1 - 1e-4) * np.outer(apart, apart)
+    mean = np.array([first, 0.2])
+    v = variant("joint_yield", "v", [0, 1], (1.0,), each=True, positive=np.array([0.0, 1]))
+    limits = Limits.of([v])
+    roots = limits.rows @ np.linalg.cholesky(covariance)
+    found = log_odds_together(limits, np.zeros(1, int), limits.rows @ mean, roots)[0]
+    assert np.isfinite(found) == looks
+    assert not looks or found < -15.0
+
+
 def test_parts_are_asked_what_they_keep_together(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[list[tuple[Array, Array]]] = []
 

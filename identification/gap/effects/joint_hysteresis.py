@@ -3,6 +3,8 @@
 A joint that carries the arm's weight has slipped under it before the rig pushes: the first push
 against it is then a reversal.
 
+Gears rub the more the more they carry: part of a friction may grow with the net torque.
+
 A friction element of strength r carries `S_r(tau) = tau - P_r(tau)` (stop operator; P play): the
 spring feels so much less, and deflects less. A spectrum of strengths makes any loop that obeys
 Masing's rules (Iwan 1967). Friction that does not obey them: an asperity model whose bristles
@@ -126,15 +128,52 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
         return []
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
     span = bench.reach_of(bench.true_torque[:, joint])
-    how = next(h for m, h in _memories(bench, joint).items() if m.strip() == memory)
     low, high = found.info["radius"]
     reach = np.geomspace(0.9 * float(low), 1.1 * float(high), _CLOSER)
-    name = f"joint {joint + 1}{' ' * bool(memory)}{memory}"
+    name, how = _as_found(bench, found)
     out = [
         replace(v, label=f"{v.label} fine", info={**v.info, "memory": memory})
         for v in _exponential(bench, joint, name, reach / span, *how)
     ]
     return out + _with_other_springs(bench, out)
+
+
+def _as_found(bench: Bench, found: Variant) -> tuple[str, _How]:
+    """Joint and memory of a friction that was found: what labels begin with, and how."""
+    joint, memory = int(found.info["joint"]), str(found.info["memory"])
+    how = next(h for m, h in _memories(bench, joint).items() if m.strip() == memory)
+    return f"joint {joint + 1}{' ' * bool(memory)}{memory}", how
+
+
+def growing(bench: Bench, found: Variant) -> list[Variant]:
+    """Exponential laws of the joint and memory of a friction that was found, part of which grows in
+    proportion to what the gear carries, push and weights together: teeth and bearings rub the more
+    the harder they are pressed (Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134,
+    2012). Of arms."""
+    if not bench.data.arm or bench.course.once:
+        return []
+    joint, memory = int(found.info["joint"]), str(found.info["memory"])
+    name, (fresh, path, weight) = _as_found(bench, found)
+    torque, unit = bench.true_torque[:, joint], -bench.sense * bench.compliance[joint]
+    carries = np.abs(torque + bench.weight(joint))
+    top, out = float(carries.max()), []
+    reach = bench.reach_of(torque) * np.geomspace(REACHES[0], REACHES[-1], _GROWING)
+    for law in EXPONENTIAL:
+        load, anew = (torque, fresh) if path is None else (path.load, path.fresh)
+        z = bristles(load, reach, anew, law.startswith("Bouc-Wen"), weight)
+        held = reach * (z if path is None else z[path.kept])
+        both = zip(held.T, (held * carries[:, None] / top).T, strict=True)
+        for r, states in zip(reach, both, strict=True):
+            columns = [bench.add_joint(joint, unit * h) for h in states]
+            out.append(
+                variant(WORD, f"{name} {law} {r:.3g} Nm grows", columns, SCALES, each=True,
+                        prior=0.25 / (2 * _GROWING), joint=joint, radius=np.array([r, r]), law=law,
+                        memory=memory, grows_to=top)
+            )  # fmt: skip
+    return out
+
+
+_GROWING = 6  # reaches
 
 
 def _laws(

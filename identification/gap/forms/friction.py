@@ -28,6 +28,8 @@ def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
     if law in joint_hysteresis.BY_LOAD:
         constants["measured_to"] = bench.reach_of(bench.true_torque[:, joint])
     terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
+    if "grows_to" in v.info:
+        terms = terms[0], Term("compliance", {**terms[1].shape, "grows_to": v.info["grows_to"]})
     terms += (Term("compliance"),) if v.info.get("other_springs") else ()
     return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
 
@@ -57,8 +59,18 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
         way = joint_hysteresis.by_ratio(load, span) if by_load else load
         z = bristles(way, size, fresh, c["law"].startswith("Bouc-Wen"), weight)
         held = (z * (np.abs(load)[:, None] if by_load else size))[kept]
+        held = held * np.column_stack([_grown(bench, law, t) for t in law.terms if t.shape])
     lines = [bench.joint_column(joint, torque) for t in law.terms if not t.shape]
     return [*(bench.joint_column(joint, -bench.sense * h) for h in held.T), *lines]
+
+
+def _grown(bench: Bench, law: Law, term: Term) -> Array:
+    """(n,) 1, or the net torque that a joint carries over that to which the friction grows."""
+    if "grows_to" not in term.shape:
+        return np.ones(bench.rows.n)
+    joint = law.constants["joint"]
+    net = bench.true_torque[:, joint] + bench.weight(joint)
+    return np.asarray(np.abs(net) / term.shape["grows_to"])
 
 
 def describe_backlash(bench: Bench, v: Variant) -> tuple[Law, Array]:
