@@ -57,6 +57,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     rows = engine.bench.rows
     precision = float(np.sum(1 / engine.sigma[: rows.n] ** 2))
     sizes, moves, signed, energy, start = [], [], [], 0.0, 0
+    between = sum(p.word in _BETWEEN_RUNS for p in parts)  # of two, one may undo the other
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
@@ -68,8 +69,10 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
         else:
             mine = slice(start, start + k)
             structural = float(part @ plain[mine, mine] @ part) / precision
-            own = _beyond_scatter(engine, moved) if p.word in _BETWEEN_RUNS else 0.0
-            sizes.append(min(max(structural**0.5 if structural > 0 else 0.0, own), moves[-1]))
+            size = max(structural, 0.0) ** 0.5
+            if p.word in _BETWEEN_RUNS and between == 1:
+                size = max(size, _beyond_scatter(engine, moved))
+            sizes.append(min(size, moves[-1]))
         energy += rows.rms(faulty) ** 2
         start += k
         limit = p.variant.positive

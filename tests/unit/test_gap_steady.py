@@ -88,6 +88,10 @@ def test_offsets_far_beyond_the_scatter_of_runs_count_as_they_move() -> None:
     engine.extend()
     sizes = part_sizes(engine, (Part(found, 10 * NOISE),), 0)
     assert sizes.gap[0] > 0.6 * sizes.moved[0]
+    drift = next(v for v in library(bench, ["thermal_drift"]) if v.label == "steady path")
+    engine.extend()
+    undone = part_sizes(engine, (Part(found, 10 * NOISE), Part(drift, 10 * NOISE)), 0)
+    assert undone.gap[0] < 0.5 * undone.moved[0]
     small = np.linspace(-1, 1, RUNS)[bench.rows.run] * bench.noise.run
     assert _beyond_scatter(engine, small) == 0.0
     assert _beyond_scatter(engine, 30 * small) == pytest.approx(0.9 * 30 * bench.rows.rms(small))
