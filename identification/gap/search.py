@@ -18,13 +18,14 @@ from identification.gap.explanation import (
 from identification.gap.finer import LOG_STEP, PARTS, gained
 from identification.gap.noise import UNSURE
 from identification.gap.parts import Part, log_joint_between, part_sizes
+from identification.gap.penalties import joints_of
 from identification.gap.priors import LOG_NONE, LOG_UNKNOWN
 from identification.gap.readings import reading_all
 from identification.gap.several import in_more_joints, polished
 from identification.gap.shares import measured
 from identification.gap.variants import Variant
 from identification.gap.verdict import weighed
-from identification.gap.words import NAMELESS
+from identification.gap.words import MECHANISMS, NAMELESS
 
 # Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
 # factor of two.
@@ -37,6 +38,7 @@ _PROMISING = 7  # further words of an explanation that are looked at closely
 # poor alone, where the spring is wrong as well.
 _SEEDS, _BENCH_SEEDS = 4, 6
 _READING = 6  # explanations whose instruments are looked at beside what else moves
+SPRINGS = "joint_stiffness_error"
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 
 
@@ -187,14 +189,28 @@ def _with_one_more(
     found_words = by_word(score(engine, levels, others, energy))
     promising = sorted(found_words, key=lambda w: -marginal(found_words[w]))[:_PROMISING]
     for word in promising:
-        scored = found_words[word]
         words = start.words | {word}
-        top = closest(scored)
-        parts = (*start.parts, Part(top.variant, top.scale))
-        found = explain(engine, parts, marginal(scored))
-        if words not in known or known[words].log_weight < found.log_weight:
-            out[words] = found
+        for scored in (found_words[word], _elsewhere(start, found_words[word])):
+            if not scored:
+                continue
+            top = closest(scored)
+            parts = (*start.parts, Part(top.variant, top.scale))
+            found = explain(engine, parts, marginal(scored))
+            better = out.get(words, known.get(words))
+            if better is None or better.log_weight < found.log_weight:
+                out[words] = found
     return out
+
+
+def _elsewhere(start: Explanation, scored: list[Scored]) -> list[Scored]:
+    """Of springs beside a mechanism, or a mechanism beside springs, those in other joints: a law
+    brings the mean stiffness of its own joint, which is no second trouble."""
+    words = start.words | {scored[0].variant.word}
+    if not (SPRINGS in words and words & MECHANISMS):
+        return []
+    taken = {j for p in start.parts for j in joints_of(p)}
+    apart = [s for s in scored if not taken & joints_of(Part(s.variant, s.scale))]
+    return apart if len(apart) < len(scored) else []
 
 
 def _reading_all(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:

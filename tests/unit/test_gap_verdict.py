@@ -10,7 +10,7 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import log_mean
+from identification.gap.compare import Scored, log_mean
 from identification.gap.diagnose import _chosen, _held
 from identification.gap.effects import library
 from identification.gap.evidence import Engine
@@ -18,7 +18,7 @@ from identification.gap.explanation import Explanation, _counted, up_to_likelies
 from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes, log_joints
 from identification.gap.penalties import _apart, _on_its_own
-from identification.gap.search import _seeds, _sharpened, search
+from identification.gap.search import SPRINGS, _elsewhere, _seeds, _sharpened, search
 from identification.gap.variants import variant
 from identification.gap.verdict import (
     BENCH_DOUBT,
@@ -183,6 +183,23 @@ def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
     )
     found = replace(found, kept={two.words: 0.1, frozenset({"joint_creep"}): 0.9})
     assert [_held(found, e) for e in (two, three, other)] == [False, False, True]
+
+
+def test_springs_beside_a_mechanism_are_looked_for_in_other_joints_too() -> None:
+    """All springs are no second trouble where the mechanism's own joint is among them."""
+
+    def scored(word: str, *joints: int) -> Scored:
+        return Scored(part(word, [0], joints=list(joints)).variant, 0.0, 1.0, 0)
+
+    def beside(word: str, *joints: int) -> Explanation:
+        return said((part(word, [0], joints=list(joints)),), (1e-5,))
+
+    springs = [scored(SPRINGS, 0, 1, 2), scored(SPRINGS, 1, 2), scored(SPRINGS, 1)]
+    assert _elsewhere(beside("joint_backlash", 0), springs) == springs[1:]
+    assert _elsewhere(beside("joint_backlash", 3), springs) == []  # all of them are
+    assert _elsewhere(beside("force_scale", 0), springs) == []
+    plays = [scored("joint_backlash", 0), scored("joint_backlash", 3)]
+    assert _elsewhere(beside(SPRINGS, 0, 1), plays) == plays[1:]
 
 
 def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
