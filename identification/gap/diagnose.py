@@ -10,10 +10,11 @@ import numpy as np
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.breaks import strangers, told
+from identification.gap.choice import chosen_of
 from identification.gap.compare import score
 from identification.gap.data import GapData, Ints
 from identification.gap.discriminate import NextMeasurement, Others, next_measurement
-from identification.gap.earned import FREE, earned, noise_of, sample_rms
+from identification.gap.earned import earned, noise_of, sample_rms
 from identification.gap.effects import library
 from identification.gap.ends import without_ends
 from identification.gap.evidence import Engine, eta_levels
@@ -26,8 +27,7 @@ from identification.gap.interval import Parameter
 from identification.gap.leftover import looked_up
 from identification.gap.locate import Where, locate
 from identification.gap.noise import NOISY, SWINGS
-from identification.gap.penalties import LEAST_SHARE
-from identification.gap.posterior import parameters_of
+from identification.gap.posterior import Known, settled
 from identification.gap.refine import refine
 from identification.gap.search import force, search
 from identification.gap.snaps import Snaps
@@ -35,8 +35,7 @@ from identification.gap.strain import what_is_strained
 from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
 from identification.gap.variants import Variant
-from identification.gap.verdict import TAKES_TWO_LINEAR
-from identification.gap.words import LINEAR, WORDS
+from identification.gap.words import WORDS
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
 # laws themselves are only families.
@@ -146,8 +145,9 @@ def explain_gap(
     if forced:
         chosen = force(engine, variants, found.explanations, forced)
     else:
-        chosen = _chosen(found, verdict)
-    result = _with_twins(_result(found, variants, verdict, chosen), chosen, out)
+        chosen = chosen_of(found, verdict)
+    chosen, known = settled(engine, variants, chosen, found.explanations)
+    result = _with_twins(_result(found, verdict, chosen, known), chosen, out)
 
     def whole() -> GapResult:
         tell("what to measure next", 0.9)
@@ -169,66 +169,7 @@ def check_words(words: set[str] | frozenset[str]) -> None:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
 
 
-FAR_WORSE = 12.0  # nats
-WORTH = 3.0  # nats that one effect more has to bring before it is named;
-# a third one more: what it does to some channel may be how far the other two's laws are off.
-WORTH_OF_THIRD = 10.0
-# A third effect that moves less than this of the noise, and a small share of what the largest does,
-# is how far the other two's laws are off, however plainly a channel without noise shows it; but a
-# drift, or a jump of the datum, shows without load, where no law is off.
-BELOW_NOISE = 0.6
-
-
-def _chosen(found: Found, verdict: str) -> Explanation:
-    """The best explanation with the verdict as its largest effect; where that is far worse than
-    those with a larger one beside it, which then is one of several alike, the best of these."""
-    if verdict in ("none", "unknown"):
-        return next(e for e in found.explanations if not e.parts)
-    mine = [e for e in found.explanations if verdict in e.words]
-    mine = [e for e in mine if not _needless(found, e)] or mine
-    first = [e for e in mine if e.parts[0].word == verdict]
-    most = TAKES_TWO_LINEAR if mine[0].words <= LINEAR else FAR_WORSE
-    if first and first[0].log_weight > mine[0].log_weight - most:
-        mine = first
-    held = [e for e in mine if _held(found, e)]
-    best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
-    simpler = [e for e in held if e.good and e.words < best.words]
-    best = _worthwhile(best, simpler)
-    if len(best.words) < 3:
-        return best
-    troubles = best.troubles
-    least = min(LEAST_SHARE * max(troubles.values()), BELOW_NOISE * noise_of(found.engine.bench))
-    petty = {w for w, size in troubles.items() if size < least} - FREE
-    return next((e for e in simpler if best.words - e.words <= petty), best)
-
-
-def _needless(found: Found, explanation: Explanation) -> bool:
-    """Whether fewer of its effects foretell withheld data better; what drifts nothing foretells."""
-    simpler = found.foretold.get(explanation.words)
-    return simpler is not None and not (explanation.words - simpler.words) & FREE
-
-
-def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:
-    """With no effect that brings less than it has to."""
-    while True:
-        worth = WORTH if len(best.words) < 3 else WORTH_OF_THIRD
-        fewer = [e for e in simpler if e.words < best.words and len(e.words) == len(best.words) - 1]
-        near = [e for e in fewer if e.log_weight > best.log_weight - worth]
-        if not near:
-            return best
-        best = max(near, key=lambda e: e.log_weight)
-
-
-def _held(found: Found, explanation: Explanation) -> bool:
-    """Whether it foresees withheld repetitions; where nobody looked, whether nothing that failed is
-    contained in it: what is added to a failure does not mend it."""
-    kept = found.kept.get(explanation.words)
-    if kept is not None:
-        return kept > 0.5
-    return not any(k <= 0.5 and w <= explanation.words for w, k in found.kept.items())
-
-
-def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explanation) -> GapResult:
+def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known]) -> GapResult:
     engine, bench = found.engine, found.engine.bench
     n = bench.rows.n
     fitted = fit(engine, chosen)
@@ -240,7 +181,7 @@ def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explana
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,
-        effects=_effects(found, variants, chosen),
+        effects=_effects(found, chosen, known),
         where=locate(engine, fitted, structural),
         noise=noise_of(bench),
         before=sample_rms(bench, stated_prediction(engine)),
@@ -258,13 +199,12 @@ def _result(found: Found, variants: list[Variant], verdict: str, chosen: Explana
     )
 
 
-def _effects(found: Found, variants: list[Variant], chosen: Explanation) -> tuple[Effect, ...]:
+def _effects(found: Found, chosen: Explanation, known: list[Known]) -> tuple[Effect, ...]:
     weights = np.array([e.log_weight for e in found.explanations])
     share = np.exp(weights - weights.max())
     total = float(share.sum())
     squares = np.array(chosen.sizes) ** 2 if chosen.sizes else np.zeros(0)
     power = float(squares.sum())
-    read = parameters_of(found.engine, variants, chosen, found.explanations)
     out = []
     for i, part in enumerate(chosen.parts):
         present = sum(
@@ -275,8 +215,8 @@ def _effects(found: Found, variants: list[Variant], chosen: Explanation) -> tupl
                 name=part.word,
                 label=part.variant.label,
                 probability=min(1.0, present / total),
-                parameters=read[i].parameters,
-                places=read[i].places if found.engine.bench.data.arm else {},
+                parameters=known[i].parameters,
+                places=known[i].places if found.engine.bench.data.arm else {},
                 indistinguishable_from=_alike(found, chosen, part.word),
                 share_of_gap=float(squares[i] / power) if power > 0 else 1.0 / len(squares),
                 size=float(chosen.sizes[i]),

@@ -21,6 +21,7 @@ from identification.gap.parts import Part, energies, log_joints, signs_kept
 from identification.gap.penalties import SAME_JOINT
 from identification.gap.readings import as_moved
 from identification.gap.several import family_of
+from identification.gap.shares import sized
 from identification.gap.variants import Variant, place_of
 from identification.gap.words import LINEAR
 
@@ -49,7 +50,31 @@ def parameters_of(
     sit where the explanation says. What names its joint or axis is mixed over the shapes that have
     it. By how much a value moves with the shapes of the effects beside it, and with which effects
     these are (rivals: other explanations, by their weights), adds to its variance."""
-    each = [_Shapes(engine, variants, chosen, i) for i in range(len(chosen.parts))]
+    return _known(engine, chosen, _all_shapes(engine, variants, chosen), rivals)
+
+
+def settled(
+    engine: Engine, variants: list[Variant], chosen: Explanation, rivals: Iterable[Explanation] = ()
+) -> tuple[Explanation, list[Known]]:
+    """The explanation with its effects at their likeliest joints or axes, and what is known of
+    them: a grid's best shape may sit where few others do."""
+    each = _all_shapes(engine, variants, chosen)
+    for shapes in each:
+        better = shapes.elsewhere()
+        if better is not None:
+            chosen = sized(engine, better) if len(better.words) > 1 else better
+            each = _all_shapes(engine, variants, chosen)
+            break
+    return chosen, _known(engine, chosen, each, rivals)
+
+
+def _all_shapes(engine: Engine, variants: list[Variant], chosen: Explanation) -> list[_Shapes]:
+    return [_Shapes(engine, variants, chosen, i) for i in range(len(chosen.parts))]
+
+
+def _known(
+    engine: Engine, chosen: Explanation, each: list[_Shapes], rivals: Iterable[Explanation]
+) -> list[Known]:
     likely = _likely(rivals, chosen)
     others = [(_by_word(e, _read(engine, e)), weight) for e, weight in likely]
     out = []
@@ -126,6 +151,17 @@ class _Shapes:
                 out[name] = out.get(name, 0.0) + float(share)
         ranked = sorted(out.items(), key=lambda item: -item[1])
         return {name: share for name, share in ranked if share > _LEAST_SHARE}
+
+    def elsewhere(self) -> Explanation | None:
+        """The best shape at the likeliest place, where that is another one than the explanation's;
+        None of what sits at several."""
+        top = next(iter(self.places()), "")
+        word = self._part.word
+        once = sum(p.word == word for p in self.chosen.parts) == 1
+        if not once or top in ("", _named(self._part.variant)):
+            return None
+        there = [e for e in self.every if _named(e[0].parts[self.index].variant) == top]
+        return max(there, key=lambda e: e[1])[0]
 
     @property
     def _part(self) -> Part:

@@ -28,10 +28,11 @@ def measured(engine: Engine, ranked: Iterable[Explanation]) -> list[Explanation]
     if not engine.bench.data.arm:
         return out
     least = out[0].log_weight - _NATS
-    return [_of(engine, e) if len(e.words) > 1 and e.log_weight > least else e for e in out]
+    return [sized(engine, e) if len(e.words) > 1 and e.log_weight > least else e for e in out]
 
 
-def _of(engine: Engine, e: Explanation) -> Explanation:
+def sized(engine: Engine, e: Explanation) -> Explanation:
+    """The explanation with these sizes."""
     fitted = fit(engine, e)
     return e.sized(size_of(engine, fitted, i) for i in range(len(e.parts)))
 

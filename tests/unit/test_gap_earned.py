@@ -9,9 +9,9 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
+from identification.gap.choice import WORTH_OF_THIRD, chosen_of
 from identification.gap.data import Array, Instruments
-from identification.gap.diagnose import WORTH_OF_THIRD, diagnose_gap
-from identification.gap.diagnose import _chosen as chosen_of
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.earned import earned
 from identification.gap.effects.drift import FreePath, free_path, free_variant
 from identification.gap.evidence import Engine

@@ -22,7 +22,14 @@ from identification.gap.fit import fit
 from identification.gap.interval import NOMINAL, Parameter, Softer
 from identification.gap.parameters import parameters, run_seconds
 from identification.gap.parts import Part
-from identification.gap.posterior import SHARING, _mixture, _stretched, _wider, parameters_of
+from identification.gap.posterior import (
+    SHARING,
+    _mixture,
+    _stretched,
+    _wider,
+    parameters_of,
+    settled,
+)
 from identification.gap.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
@@ -333,6 +340,12 @@ def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> No
     assert found == {"joint 1": pytest.approx(0.5 / 0.52), "joint 5": pytest.approx(0.02 / 0.52)}
     far = replace(one, columns=(1,), prior=1e-6)
     assert parameters_of(engine, [*many, far], chosen)[0].places == {"joint 1": pytest.approx(1)}
+    # what is said of it is said of where it sits most likely
+    for variants, joint in (([*many, seldom], 0), ([*many, replace(one, prior=2.0)], 4)):
+        said, known = settled(engine, variants, chosen)
+        assert said.parts[0].variant.info["joint"] == joint
+        assert next(iter(known[0].places)) == f"joint {joint + 1}"
+        assert (said is chosen) == (joint == 0)
 
 
 def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> None:

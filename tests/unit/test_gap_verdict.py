@@ -10,8 +10,8 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
+from identification.gap.choice import chosen_of, foresees
 from identification.gap.compare import Scored, log_mean
-from identification.gap.diagnose import _chosen, _held
 from identification.gap.effects import library
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, _counted, up_to_likeliest
@@ -160,7 +160,7 @@ def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> N
             weights = weighed(replace(both, engine=on_arm), {}).probabilities
             assert (weights[second.word] > 0.99) == (worth < most)
             assert weighed(both, {}).probabilities["force_scale"] > 0.9  # of a bench
-            shown = _chosen(replace(both, engine=on_arm), second.word)
+            shown = chosen_of(replace(both, engine=on_arm), second.word)
             assert shown is (one if worth < most or most == TAKES_TWO else pair)
 
 
@@ -182,7 +182,7 @@ def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
         for parts in ((yields, drifts), (yields, drifts, links), (yields, links))
     )
     found = replace(found, kept={two.words: 0.1, frozenset({"joint_creep"}): 0.9})
-    assert [_held(found, e) for e in (two, three, other)] == [False, False, True]
+    assert [foresees(found, e) for e in (two, three, other)] == [False, False, True]
 
 
 def test_springs_beside_a_mechanism_are_looked_for_in_other_joints_too() -> None:
@@ -270,7 +270,7 @@ def test_a_verdict_that_is_nowhere_the_largest_effect_is_shown_where_it_is_likel
     for weight, shown in ((-40.0, beside[0]), (-5.0, None)):
         alone = said((creep,), (1e-5,), weight)
         whole = replace(found, explanations=(*beside, alone), kept={})
-        assert _chosen(whole, "joint_creep") is (shown or alone)
+        assert chosen_of(whole, "joint_creep") is (shown or alone)
 
 
 @pytest.mark.parametrize(("arm", "most"), [(True, DOUBT), (False, BENCH_DOUBT)])
