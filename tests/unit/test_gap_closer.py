@@ -85,6 +85,25 @@ def test_friction_that_grows_is_looked_at_where_a_joint_rubs() -> None:
     assert any("grows_to" in v.info and v.info["joint"] == 1 for v in finer)
 
 
+def test_creep_may_be_forgotten_where_the_rig_is_set_up_anew() -> None:
+    """A setup then creeps as if it had been the first; else it still comes back from the last."""
+    bench = make_bench(arm_data())
+    found = {v.label: v for v in library(bench, ["joint_creep"])}
+    kept, fresh = found["joint 2 spectrum"], found["joint 2 set up anew spectrum"]
+    starts = np.flatnonzero(bench.rebuilt)[1:]
+    assert starts.size
+
+    def slow(v: Variant) -> Array:
+        return bench.columns[v.columns[len(v.columns) - 2]][: bench.rows.n]
+
+    left = np.abs(slow(kept)[starts]).min()
+    assert left > 0
+    assert left > 100 * np.abs(slow(fresh)[starts]).max()
+    first = slice(0, starts[0])
+    np.testing.assert_array_equal(slow(fresh)[first], slow(kept)[first])
+    assert_lawful(bench, [kept, fresh])
+
+
 def test_flow_times_close_in_between_those_of_the_grid() -> None:
     bench = make_bench(arm_data())
     sharp = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")

@@ -234,6 +234,10 @@ def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: b
     spoken = after.foretold.get(both.words)
     assert spoken is (None if needed or second == "thermal_drift" else bump)
     assert chosen_of(after, "joint_nonlinear_stiffness" if spoken else second) is (spoken or both)
+    spoken_for = weighed(replace(after, foretold={both.words: bump}), {})
+    for result, word in ((weighed(replace(after, foretold={}), {}), second),
+                         (spoken_for, "joint_nonlinear_stiffness")):  # fmt: skip
+        assert result.probabilities[word] > 0.7
 
 
 @pytest.mark.parametrize(("share", "named"), [(0.05, 2), (0.3, 3)])

@@ -15,6 +15,7 @@ from identification.gap.effects import library
 from identification.gap.effects.drift import FreePath
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, _beyond_scatter, part_sizes
+from identification.gap.strain import JUMP, _jumps
 from tests.unit.test_gap_operators import bench_data
 
 RUNS, LENGTH, GAP = 7, 500, 400.0  # samples at 10 Hz; s between starts
@@ -78,6 +79,23 @@ def test_a_path_of_steady_rate_is_smoother_than_one_that_wanders() -> None:
     rough = {k: np.abs(np.diff(d, 2, axis=0)).mean() / np.ptp(d, axis=0).mean()
              for k, d in draws.items()}  # fmt: skip
     assert rough[1] < 0.3 * rough[0]
+    steps = np.abs(np.diff(draws[1], axis=0)).mean(axis=1)
+    assert steps[0] > 0.1 * steps.mean()  # it may come with any rate
+
+
+@pytest.mark.parametrize(("steady", "stands_out"), [(True, False), (False, True)])
+def test_the_place_and_the_rate_of_a_steady_path_are_no_jumps(
+    steady: bool, stands_out: bool
+) -> None:
+    bench = make_bench(measured(wave()))
+    label = "steady path" if steady else "free path"
+    path = next(v for v in library(bench, ["thermal_drift"]) if v.label == label)
+    target = bench.observed - prediction(bench)
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, NOISE]))
+    engine.extend()
+    pulls = np.ones(len(path.columns))
+    pulls[1] = 40.0  # the rate of one, a step of the other
+    assert (_jumps(engine, Part(path, NOISE), pulls).max() > JUMP) == stands_out
 
 
 def test_offsets_far_beyond_the_scatter_of_runs_count_as_they_move() -> None:
