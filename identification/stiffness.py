@@ -239,7 +239,7 @@ def _undefined(table: Table, through_origin: bool) -> str:
     force = np.append(table.force, 0.0) if through_origin else table.force
     displacement = np.append(table.displacement, 0.0) if through_origin else table.displacement
     if np.ptp(force) == 0.0:
-        return start + f"the force is {force[0]:.4g} N throughout."
+        return start + f"the force is {force[0]:.4g} N from its zero throughout."
     if np.ptp(displacement) == 0.0:
         return start + "the displacement is the same at every force."
     if np.ptp(force) <= 3.0 * float(np.median(table.u_force)) and not _related(force, displacement):

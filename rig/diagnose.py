@@ -98,10 +98,13 @@ def diagnose(
     if simulation is not None:
         data = with_curves(data, simulation)
     out, forced = tuple(withhold), tuple(add)
-    try:
-        check_words({*out, *forced})
-    except ValueError as error:
-        raise InputError(f"{dataset.path or 'data set'}: {error}.") from error
+    for option, words in (("--withhold", out), ("--add", forced)):
+        try:
+            check_words(set(words))
+        except ValueError as error:
+            raise InputError(f"{option}: {error}.") from error
+    for word in (w for w in forced if w in out):
+        raise InputError(f"--add {word}, --withhold {word}: exclude each other. Leave one out.")
     result = diagnose_gap(
         data,
         withhold=out,

@@ -125,9 +125,8 @@ def _where(r: GapResult) -> str:
         return ""
     forces = ", ".join(f"{d}: {a:.4g} to {b:.4g} N" for d, (a, b) in w.force.items())
     lines = [f"Where ({w.share:.0%} of the gap that springs leave)", f"  directions  {forces}"]
-    poses = ", ".join(p for p in w.poses if p)
-    if poses:
-        lines.append(f"  poses       {poses}")
+    if w.poses:
+        lines.append(f"  poses       {', '.join(w.poses)}")
     lines.append(f"  branches    {', '.join(w.branches)}")
     lines.append(f"  repetitions {', '.join(map(str, w.repetitions))}")
     if w.joints:

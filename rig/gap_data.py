@@ -77,7 +77,21 @@ def gap_data(dataset: Dataset) -> GapData:
         tare=meta.tare,
         imposed=meta.imposed,
         timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
-        notes=notes,
+        notes=(*notes, *_unsettled(dataset)),
+    )
+
+
+def _unsettled(dataset: Dataset) -> tuple[str, ...]:
+    """What was recorded before it had come to rest."""
+    kinds = [e["kind"] for e in dataset.events]
+    late, steps = kinds.count("not_settled"), kinds.count("step_start")
+    if not late:
+        return ()
+    faster = dataset.origin == "emulated"
+    return (
+        f"At {late} places (of {steps} steps, and zero plateaus) nothing had settled when it was "
+        "recorded: what still moved may look like a drift, a swing or creep. "
+        + ("Emulate at a lower --speed." if faster else "Allow more time to settle."),
     )
 
 

@@ -375,6 +375,8 @@ def displacement_imposed(data: GapData) -> bool:
     not. So it is with a rig that rests at levels of force."""
     if data.imposed == "force" or (data.arm and data.imposed is None):
         return False
+    if not np.ptp(data.force) > 0:
+        return False  # what moves without any force nobody presses
     hold = hold_ids(data)
     if data.imposed is not None:
         return not data.arm or is_continuous(data, hold)

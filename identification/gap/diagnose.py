@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.interval import Parameter
 from identification.gap.leftover import looked_up
-from identification.gap.locate import Where, locate
+from identification.gap.locate import NOWHERE, Where, locate
 from identification.gap.noise import NOISY, SWINGS
 from identification.gap.posterior import Known, settled
 from identification.gap.refine import refine
@@ -182,7 +183,7 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         verdict=verdict,
         probabilities=found.probabilities,
         effects=_effects(found, chosen, known),
-        where=locate(engine, fitted, structural),
+        where=NOWHERE if verdict == "none" else locate(engine, fitted, structural),
         noise=noise_of(bench),
         before=sample_rms(bench, stated_prediction(engine)),
         after=sample_rms(bench, predicted),
@@ -200,7 +201,8 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
 
 
 def _effects(found: Found, chosen: Explanation, known: list[Known]) -> tuple[Effect, ...]:
-    weights = np.array([e.log_weight for e in found.explanations])
+    weights = np.array([e.log_good + log(found.kept.get(e.words, 1.0) + 1e-300)
+                        for e in found.explanations])  # fmt: skip
     share = np.exp(weights - weights.max())
     total = float(share.sum())
     squares = np.array(chosen.sizes) ** 2 if chosen.sizes else np.zeros(0)

@@ -29,6 +29,9 @@ class Where:
     share: float
 
 
+NOWHERE = Where((), (), {}, (), (), (), None, 0.0)
+
+
 def locate(engine: Engine, fit: Fit, gap: Array) -> Where:
     """From the main effect's contribution; without one, from the gap (n,) that springs leave."""
     bench, n = engine.bench, engine.bench.rows.n
@@ -36,7 +39,7 @@ def locate(engine: Engine, fit: Fit, gap: Array) -> Where:
     per_setup = _size_per(bench.rows.setup, _visible(engine, fit, main), len(bench.data.setups))
     top = per_setup.max()
     if not top > 0:
-        return Where((), (), {}, (), (), (), None, 0.0)
+        return NOWHERE
     shows = per_setup >= _SHOWS * top
     setups = [s for s, yes in zip(bench.data.setups, shows, strict=True) if yes]
     rows = shows[bench.rows.setup] & (np.abs(main) >= _SHOWS * np.abs(main).max())
@@ -45,7 +48,7 @@ def locate(engine: Engine, fit: Fit, gap: Array) -> Where:
     word = fit.parts[0].word if fit.parts else ""
     return Where(
         directions=tuple(dict.fromkeys(s.direction for s in setups)),
-        poses=tuple(dict.fromkeys(s.pose for s in setups)),
+        poses=tuple(dict.fromkeys(s.pose for s in setups if s.pose)),
         force=_ranges(engine, rows),
         branches=tuple(BRANCH_NAMES[b] for b in np.unique(bench.rows.branch[rows])),
         repetitions=tuple(int(r) for r in np.unique(bench.rows.repetition[rows])),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from rig.cli import files, gap, measuring, models, stiffness
+from rig.cli.guard import Guarded
 
 app = typer.Typer(
     name="rig",
@@ -14,16 +15,16 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command()(measuring.measure)
-app.command()(measuring.check)
-app.command()(measuring.emulate)
-app.command()(stiffness.analyze)
-app.command()(stiffness.identify)
-app.command()(models.couple)
-app.command()(models.simulate)
-app.command()(gap.diagnose)
-app.command()(gap.blind)
-app.command()(files.report)
-app.command("list")(files.list_)
-app.command("import")(files.import_)
-app.command()(files.export)
+app.command(cls=Guarded)(measuring.measure)
+app.command(cls=Guarded)(measuring.check)
+app.command(cls=Guarded)(measuring.emulate)
+app.command(cls=Guarded)(stiffness.analyze)
+app.command(cls=Guarded)(stiffness.identify)
+app.command(cls=Guarded)(models.couple)
+app.command(cls=Guarded)(models.simulate)
+app.command(cls=Guarded)(gap.diagnose)
+app.command(cls=Guarded)(gap.blind)
+app.command(cls=Guarded)(files.report)
+app.command("list", cls=Guarded)(files.list_)
+app.command("import", cls=Guarded)(files.import_)
+app.command(cls=Guarded)(files.export)

@@ -51,6 +51,12 @@ def measure(
 
     if (protocol is None) == (resume is None):
         raise InputError("rig measure: give a PROTOCOL.yaml, or --resume DATASET.h5.")
+    for option, value in (("--station", station), ("-o", output)):
+        if resume is not None and value is not None:
+            raise InputError(
+                f"{option} {value}: a measurement that is resumed keeps its station and its file. "
+                f"Leave {option} out."
+            )
     page = None
     if panel or panel_host is not None or panel_port is not None:
         page = PanelOptions(panel_host or DEFAULT_HOST, panel_port)

@@ -110,7 +110,9 @@ def test_undefined_stiffness_is_null_and_a_sentence() -> None:
     assert entry["status"] == "undefined"
     assert entry["stiffness_N_per_mm"]["value"] is None
     assert "k in x is undefined" in result.to_text()
-    assert "The stiffness is undefined: the force is 0 N throughout." in result.to_text()
+    assert (
+        "The stiffness is undefined: the force is 0 N from its zero throughout." in result.to_text()
+    )
 
 
 def test_zero_load_alone_and_nothing_at_all() -> None:

@@ -123,6 +123,59 @@ def test_json_that_could_not_be_written_is_said_before_the_work(
     assert err.startswith(says)
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("analyze d.h5 --json d.h5", "--json d.h5: is read by this command"),
+        ("diagnose d.h5 --write-model ./d.h5", "--write-model d.h5: is read by this command"),
+        ("analyze d.h5 --json other.h5", "--json other.h5: is a data set;"),
+        ("list . --json d.h5", "--json d.h5: is a data set;"),
+        ("export d.h5 -o d.h5", "--output d.h5: is read by this command"),
+        ("import t.csv m.yaml -o m.yaml", "--output m.yaml: is read by this command"),
+        ("check p.yaml --json p.yaml", "--json p.yaml: is read by this command"),
+        ("simulate model.yaml p.yaml --csv p.yaml", "--csv p.yaml: is read by this command"),
+    ],
+)
+def test_no_result_takes_the_place_of_an_input_or_a_measurement(
+    rig: Rig, files: Path, words: str, says: str
+) -> None:
+    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+    assert rig("import", "t.csv", "m.yaml", "-o", "other.h5")[0] == 0
+    before = {p.name: p.read_bytes() for p in files.iterdir()}
+    status, out, err = rig(*words.split())
+    assert (status, out) == (2, "")
+    assert err.startswith(says)
+    assert "Give another name." in err
+    assert {p.name: p.read_bytes() for p in files.iterdir()} == before
+
+
+def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
+    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+    (files / "r.json").write_text("{}")
+    assert rig("analyze", "d.h5", "--json", "r.json")[0] == 0
+    assert json.loads((files / "r.json").read_text())["schema"] == "rig.analysis/1"
+    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("measure --resume d.h5 --station nope", "--station nope: a measurement that is resumed"),
+        ("measure --resume d.h5 -o e.h5", "-o e.h5: a measurement that is resumed"),
+        ("diagnose d.h5 --add joint_yield --withhold joint_yield",
+         "--add joint_yield, --withhold joint_yield: exclude each other."),
+        ("diagnose d.h5 --add joint_yeld", '--add: "joint_yeld" is no effect; known: joint_yield'),
+    ],
+)  # fmt: skip
+def test_options_that_contradict_each_other_are_refused(
+    rig: Rig, files: Path, words: str, says: str
+) -> None:
+    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+    status, _, err = rig(*words.split())
+    assert status == 2
+    assert err.startswith(says)
+
+
 def test_json_that_cannot_be_written_costs_no_result(
     rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -156,7 +156,7 @@ def test_every_place_of_a_document_is_escaped() -> None:
 def test_what_the_data_do_not_allow_is_said(tmp_path: Path) -> None:
     zero = bench(tmp_path / "zero.h5", lambda f, r: 0.001 * r, forces=(0.0, 0.0), meta=META)
     text = Page(make([zero], Wishes(made="now")).to_html()).text
-    assert "The stiffness is undefined: the force is 0 N throughout." in text
+    assert "The stiffness is undefined: the force is 0 N from its zero throughout." in text
     assert "Robot: none; joint stiffnesses need an arm." in text
     assert "META names no simulation, so there is no gap to diagnose." in text
     assert "No simulation is stated for this measurement." in text

@@ -228,7 +228,7 @@ def nan_at(c: Curve, step: int) -> Curve:
 
 UNDEFINED = [
     (curve(levels=()), "there are no loaded levels"),
-    (curve(levels=(0.0, 0.0)), "the force is 0 N throughout"),
+    (curve(levels=(0.0, 0.0)), "the force is 0 N from its zero throughout"),
     (replace(curve(levels=(50.0,)), origin=False), "one level only"),
     (curve(lambda _: 0.0), "the displacement is the same at every force"),
     (
