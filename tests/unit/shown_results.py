@@ -139,7 +139,7 @@ def without_gap() -> Diagnosis:
 
 def unexplained() -> Diagnosis:
     """A gap that no word explains."""
-    where = Where(("x", "y"), ("",), {"x": (-20.0, 40.0), "y": (0.0, 1234.5)}, ("loading",), (2,),
+    where = Where(("x", "y"), (), {"x": (-20.0, 40.0), "y": (0.0, 1234.5)}, ("loading",), (2,),
                   (), False, 0.4)  # fmt: skip
     swings = Likeness("swings", 121.4, -80.0)
     return Diagnosis("id", _gap("unknown", 0.731, where=where, remainder=3.417e-5, before=8e-5,

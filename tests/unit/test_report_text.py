@@ -81,7 +81,7 @@ def test_the_command(
     assert "run_report.html: written" in err
     assert (tmp_path / "run_report.html").read_text("utf-8").startswith("<!DOCTYPE html>")
     assert (tmp_path / "f" / "run_curve.png").exists()
-    assert run(monkeypatch, "run.h5", "-o", "run.h5") == 2
+    assert run(monkeypatch, "run.h5", "-o", "page.h5") == 2
     assert "a name that ends in .html is wanted" in capsys.readouterr().err
     assert run(monkeypatch, "none.h5", "-o", "a.html") == 2
     assert "none.h5: cannot be read: no such file." in capsys.readouterr().err
