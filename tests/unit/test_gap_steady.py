@@ -80,7 +80,7 @@ def test_a_path_of_steady_rate_is_smoother_than_one_that_wanders() -> None:
              for k, d in draws.items()}  # fmt: skip
     assert rough[1] < 0.3 * rough[0]
     steps = np.abs(np.diff(draws[1], axis=0)).mean(axis=1)
-    assert steps[0] > 0.1 * steps.mean()  # it may come with any rate
+    assert steps[0] > 0.2 * steps.mean()  # it may come with any rate
 
 
 @pytest.mark.parametrize(("steady", "stands_out"), [(True, False), (False, True)])
