@@ -1,0 +1,51 @@
+"""What a diagnosis says of data that show little: not at rest, no force, nothing wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import displacement_imposed
+from rig.dataset import Origin, load
+from rig.diagnose import diagnose
+from rig.gap_data import gap_data
+from rig.tables import import_table
+from tests.unit.test_cli import META, TABLE
+from tests.unit.test_gap_operators import bench_data
+
+
+@pytest.mark.parametrize(("origin", "advice"), [("emulated", "--speed"), ("measured", "more time")])
+def test_what_had_not_settled_is_said(tmp_path: Path, origin: Origin, advice: str) -> None:
+    (tmp_path / "t.csv").write_text(TABLE)
+    (tmp_path / "m.yaml").write_text(META)
+    import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
+    dataset = load(tmp_path / "d.h5")
+    assert not any("settled" in n for n in gap_data(dataset).notes)
+    events = [{"kind": "step_start"}, {"kind": "not_settled"}, {"kind": "step_start"}]
+    (note,) = gap_data(replace(dataset, events=events, origin=origin)).notes
+    assert note.startswith("At 1 places (of 2 steps, and zero plateaus) nothing had settled")
+    assert advice in note
+
+
+def test_a_force_that_never_changes_was_not_answered_to_a_stroke() -> None:
+    """Levels in name only: the displacement comes and goes without a force."""
+    step = np.tile(np.repeat([0, 1, 2, 1], 6), 3)
+    moved, n = 1e-3 * step, len(step)
+    data = bench_data(np.zeros(n), moved, step=step, branch=np.where(step > 0, 1, 0))
+    assert not displacement_imposed(data)
+    assert displacement_imposed(replace(data, imposed="displacement", force=1e5 * moved))
+
+
+def test_where_nothing_is_wrong_no_place_is_named(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(TABLE)
+    (tmp_path / "m.yaml").write_text(META)
+    import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
+    found = diagnose(load(tmp_path / "d.h5"))
+    assert found.result.verdict == "none"
+    assert "Where" not in found.to_text()
+    where = found.to_json()["where"]
+    assert where["directions"] == where["poses"] == []
+    assert where["share_of_gap"] == 0.0
