@@ -39,25 +39,17 @@ class Known(NamedTuple):
 _MOST, _LEAST_SHARE = 10, 0.01  # shapes that count, and their least share of the posterior
 
 
-def parameters_of(
-    engine: Engine,
-    variants: list[Variant],
-    chosen: Explanation,
-    rivals: Iterable[Explanation] = (),
-) -> list[Known]:
-    """Parameters and places of every effect of the explanation: 95 % intervals of the mixture of
-    its likeliest shapes, wherever they sit, under every size of imperfection; value: of those that
-    sit where the explanation says. What names its joint or axis is mixed over the shapes that have
-    it. By how much a value moves with the shapes of the effects beside it, and with which effects
-    these are (rivals: other explanations, by their weights), adds to its variance."""
-    return _known(engine, chosen, _all_shapes(engine, variants, chosen), rivals)
-
-
 def settled(
     engine: Engine, variants: list[Variant], chosen: Explanation, rivals: Iterable[Explanation] = ()
 ) -> tuple[Explanation, list[Known]]:
-    """The explanation with its effects at their likeliest joints or axes, and what is known of
-    them: a grid's best shape may sit where few others do."""
+    """The explanation with its effects at their likeliest joints or axes (a grid's best shape may
+    sit where few others do), and parameters and places of each.
+
+    Of parameters: 95 % intervals of the mixture of the effect's likeliest shapes, wherever they
+    sit, under every size of imperfection; value: of those that sit where the explanation says. What
+    names its joint or axis is mixed over the shapes that have it. By how much a value moves with
+    the shapes of the effects beside it, and with which effects these are (rivals: other
+    explanations, by their weights), adds to its variance."""
     each = _all_shapes(engine, variants, chosen)
     for shapes in each:
         better = shapes.elsewhere()

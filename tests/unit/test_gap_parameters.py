@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -24,10 +25,10 @@ from identification.gap.parameters import parameters, run_seconds
 from identification.gap.parts import Part
 from identification.gap.posterior import (
     SHARING,
+    Known,
     _mixture,
     _stretched,
     _wider,
-    parameters_of,
     settled,
 )
 from identification.gap.variants import Variant
@@ -36,6 +37,16 @@ from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
 Array = np.ndarray
+
+
+def known_of(
+    engine: Engine,
+    variants: list[Variant],
+    chosen: Explanation,
+    rivals: Iterable[Explanation] = (),
+) -> list[Known]:
+    """What is known of each effect."""
+    return settled(engine, variants, chosen, rivals)[1]
 
 
 def up_and_down() -> Bench:
@@ -300,7 +311,7 @@ def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
         for c, j in ((30.0, 0), (60.0, 1))
     )  # fmt: skip
     chosen = Explanation((Part(low, 1.0),), 0.0, 0.0, (0.0,), 0.0)
-    found = parameters_of(engine, [low, high], chosen)[0].parameters["threshold"]
+    found = known_of(engine, [low, high], chosen)[0].parameters["threshold"]
     assert found.value == pytest.approx(30.0, rel=0.01)  # where the explanation says
     assert found.low < 30.0
     assert found.high > 60.0
@@ -314,7 +325,7 @@ def test_no_interval_of_a_threshold_reaches_below_zero(monkeypatch: pytest.Monke
     v = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**info, "joint": 0})
     monkeypatch.setattr("identification.gap.posterior._moves", lambda *_: 100.0**2)
     chosen = Explanation((Part(v, 1.0),), 0.0, 0.0, (0.0,), 0.0)
-    found = parameters_of(engine, [v], chosen)[0].parameters
+    found = known_of(engine, [v], chosen)[0].parameters
     assert found["threshold"].low == found["threshold"].ci90[0] == 0.0
     assert found["threshold"].high > 200.0
     assert found["slope_beyond_over_elastic"].low < 0.0
@@ -333,13 +344,13 @@ def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> No
     one = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**common, "joint": 4},
                   prior=0.5)  # fmt: skip
     chosen = Explanation((Part(many[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
-    found = parameters_of(engine, [*many, one], chosen)[0].places
+    found = known_of(engine, [*many, one], chosen)[0].places
     assert found == {"joint 1": pytest.approx(0.5), "joint 5": pytest.approx(0.5)}
     seldom = replace(one, prior=0.02)
-    found = parameters_of(engine, [*many, seldom], chosen)[0].places
+    found = known_of(engine, [*many, seldom], chosen)[0].places
     assert found == {"joint 1": pytest.approx(0.5 / 0.52), "joint 5": pytest.approx(0.02 / 0.52)}
     far = replace(one, columns=(1,), prior=1e-6)
-    assert parameters_of(engine, [*many, far], chosen)[0].places == {"joint 1": pytest.approx(1)}
+    assert known_of(engine, [*many, far], chosen)[0].places == {"joint 1": pytest.approx(1)}
     # what is said of it is said of where it sits most likely
     for variants, joint in (([*many, seldom], 0), ([*many, replace(one, prior=2.0)], 4)):
         said, known = settled(engine, variants, chosen)
@@ -360,8 +371,8 @@ def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> Non
         for k, c, prior in ((0, 30.0, 1.0), (1, 36.0, 1e-12))
     ]  # fmt: skip
     chosen = Explanation((Part(family[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
-    alone = parameters_of(engine, family[:1], chosen)[0].parameters["threshold"]
-    found = parameters_of(engine, family, chosen)[0].parameters["threshold"]
+    alone = known_of(engine, family[:1], chosen)[0].parameters["threshold"]
+    found = known_of(engine, family, chosen)[0].parameters["threshold"]
     assert found.value == pytest.approx(30.0, rel=0.01)
     assert sd(found) == pytest.approx(np.hypot(sd(alone), 6.0 / 12**0.5), rel=0.01)
     assert found.high - 30.0 == pytest.approx(30.0 - found.low)
@@ -397,15 +408,15 @@ def test_beside_another_effect_intervals_are_wider(monkeypatch: pytest.MonkeyPat
     ]
     parts = tuple(Part(v, 1.0) for v in family)
     both = Explanation(parts, 0.0, 0.0, (1.0, 0.5), 0.0)
-    wide = parameters_of(engine, family, both)[1].parameters["factor"]
-    alone = parameters_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,)))
+    wide = known_of(engine, family, both)[1].parameters["factor"]
+    alone = known_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,)))
     monkeypatch.setattr(posterior, "SHARING", 1.0)
-    narrow = parameters_of(engine, family, both)[1].parameters["factor"]
+    narrow = known_of(engine, family, both)[1].parameters["factor"]
     assert SHARING > 1.2
     assert np.log(wide.high / wide.value) == pytest.approx(
         SHARING * np.log(narrow.high / narrow.value)
     )
-    assert parameters_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,))) == alone
+    assert known_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,))) == alone
 
 
 def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
@@ -421,8 +432,8 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
     engine.target = engine.target + 4.0 * bench.columns[0] + 2.0 * bench.columns[1]
     engine = Engine(bench, engine.base, engine.target, engine.etas)
     chosen = Explanation((Part(mine, 10.0), Part(rival, 1.0)), 0.0, 0.0, (1.0, 0.5), 0.0)
-    alone = parameters_of(engine, [mine, rival], chosen)[0].parameters["factor_joint1"]
-    both = parameters_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_joint1"]
+    alone = known_of(engine, [mine, rival], chosen)[0].parameters["factor_joint1"]
+    both = known_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_joint1"]
     assert both.value == pytest.approx(alone.value)
     assert both.high - both.low > 1.02 * (alone.high - alone.low)
 
@@ -450,7 +461,7 @@ def test_explanations_by_other_words_move_parameters_as_far_as_they_are_likely()
 
     def width(rival_weight: float) -> float:
         rival = Explanation((Part(mine, 0.3), Part(other, 1.0)), rival_weight, 0.0, (1.0, 0.5), 0.0)
-        found = parameters_of(engine, [mine, other], chosen, [chosen, rival])[0].parameters
+        found = known_of(engine, [mine, other], chosen, [chosen, rival])[0].parameters
         return found["factor_joint1"].high - found["factor_joint1"].low
 
     assert width(0.0) > width(-2.0) > width(-9.0)
