@@ -169,6 +169,7 @@ def _opened(
         scripted = station.operator.driver == "scripted"
         if scripted:
             loader = LoaderWithBar(loader, protocol, len(progress.steps))
+            say(_NO_HAND if panel is None else _PAGE_ALONE)
         loader = onlooker.operator(loader, clock, scripted=scripted)
         stack.callback(loader.close)
         if progress.rows:
@@ -176,6 +177,15 @@ def _opened(
         say(SAFETY_NOTE)
         loader.open()  # from here on the screen moves, and what is said would be painted over
         yield _Rig(station, devices, loader, clock, onlooker)
+
+
+_NO_HAND = (
+    "A script turns the screw and answers every question; no keys are heard. Ctrl-C ends the "
+    "measurement; for buttons: --panel."
+)
+_PAGE_ALONE = (
+    "A script turns the screw; the page's buttons are heard, keys in this terminal are not."
+)
 
 
 @contextmanager

@@ -218,7 +218,10 @@ class CsvFile:
                 hint = "wanted: commas between the cells, not semicolons."
             return f"{what}; {hint}"
         hint = "Remove what is too much, or name it in the header."
-        if len(cells) >= 2 * wanted - 1 or all(c.lstrip("-+").isdigit() for c in cells if c):
+        if (
+            _decimal_commas(cells) >= len(cells) - wanted >= _SEVERAL
+            or len(cells) >= 2 * wanted - 1
+        ):
             hint = "If the numbers have decimal commas, write points instead."
         return f"{what}. {hint}"
 
@@ -252,6 +255,19 @@ class CsvFile:
             return read()
         except OSError as error:
             raise InputError(f"{self.path}: cannot be read: {error.strerror or error}.") from error
+
+
+_SEVERAL = 2  # one cell too many has other causes, too
+
+
+def _decimal_commas(cells: Sequence[str]) -> int:
+    """How many numbers may have been cut in two at a decimal comma: digits follow digits."""
+    found, row = 0, 0
+    while row < len(cells) - 1:
+        cut = cells[row].lstrip("-+").isdigit() and cells[row + 1].isdigit()
+        found += cut
+        row += 1 + cut
+    return found
 
 
 def split_line(text: str) -> list[str]:

@@ -33,6 +33,7 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
         monkeypatch.setattr(measure, name, stand_in)
     protocol, station = load_protocol(PROTOCOL), load_station("emulated")
     with measure._opened(protocol, station, Progress(rows=225), said.append, None):
+        assert "no keys are heard" in said[-4]
         assert said[-3:] == ["resuming after 225 rows", measure.SAFETY_NOTE, "(screen)"]
 
 
