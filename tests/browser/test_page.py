@@ -279,6 +279,10 @@ def test_device_fault_with_its_remedy(page: Viewer, feed: Feed) -> None:
     assert scenes.LASER_FAULT.remedy in page.text("devices")
     assert page.text("cue-word") == "Stop turning"
     assert page.looks_old("displacement")
+    for size in ((1024, 768), (1920, 1080)):
+        resize(page.here(), *size)
+        hidden = "const e = arguments[0]; return e.scrollHeight - e.clientHeight"
+        assert page.script(hidden, page.element("state-card")) <= 0, size
     feed.state = scenes.turning()
     page.wait(lambda: page.text("alarms") == "", "the band has gone")
 
