@@ -26,7 +26,8 @@ def torque_unit(bench: Bench) -> str:
 
 
 def of_knee(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
-    """Threshold, slope beyond and flow time of `joint_yield` and `base_slip`."""
+    """Threshold, of an arm the push where it is met, slope beyond and flow time of `joint_yield`
+    and `base_slip`."""
     info = part.variant.info
     if info.get("other_springs"):
         found = found.without_line(int(info["joint"]))
@@ -40,7 +41,10 @@ def of_knee(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
     if bench.imposed and not bench.data.arm:
         threshold = _carried(threshold, *found.of_spring(int(info["joint"])))
-    out = _with_weight(bench, part, threshold)
+    out = _with_weight(bench, part, _about_an_axis(bench, part, threshold))
+    if bench.data.arm:
+        met = out.get("threshold_of_load", threshold)
+        out |= _onsets(bench, np.asarray(info["load"]), met)
     out["slope_beyond_over_elastic"] = Parameter(value, low, high, "1")
     if info["flow_s"]:
         flow = float(info["flow_s"])
@@ -63,9 +67,16 @@ def _threshold(bench: Bench, part: Part, knee: Found) -> Parameter:
         value = float(np.clip(top - mean, radius.min(), min(float(radius.max()), top)))
         variance = float(slope @ knee.cov @ slope)
     shared = bench.data.instruments.force_gain if not bench.imposed else 0.0
-    if part.word == "base_slip" and info["axis"] != "z":
-        shared = float(np.hypot(shared, _depth_sd(bench, np.asarray(info["load"]))))
     return normal(value, max(variance, 0.0) + (shared * value) ** 2, torque_unit(bench))
+
+
+def _about_an_axis(bench: Bench, part: Part, threshold: Parameter) -> Parameter:
+    """Of a slip about a lying axis, with what is not known of its depth."""
+    info = part.variant.info
+    if part.word != "base_slip" or info["axis"] == "z":
+        return threshold
+    half = TWO_SIDED * abs(threshold.value) * _depth_sd(bench, np.asarray(info["load"]))
+    return _moved(threshold, 0.0, half)
 
 
 def _carried(way: Parameter, stiffer: float, variance: float) -> Parameter:
@@ -109,6 +120,29 @@ def _moved(p: Parameter, shift: float, half: float) -> Parameter:
     low, high = np.hypot(p.value - p.low, half), np.hypot(p.high - p.value, half)
     value = p.value + shift
     return Parameter(value, value - float(low), value + float(high), p.unit)
+
+
+def _onsets(bench: Bench, load: Array, threshold: Parameter) -> dict[str, Parameter]:
+    """onset_D: the push along direction D that brings a threshold of the load (n,) there, in the
+    pose where that is the smallest; no direction whose pushes stay below it."""
+    out = dict[str, Parameter]()
+    for number, setup in enumerate(bench.data.setups):
+        mine, name = bench.rows.setup == number, f"onset_{setup.direction}"
+        push = bench.load[mine]
+        power = float(push @ push)
+        lever = abs(float(push @ load[mine])) / power if power > 0 else 0.0
+        if not lever * float(np.abs(push).max(initial=0.0)) > threshold.value > 0:
+            continue
+        onset = _over(threshold, lever)
+        if name not in out or onset.value < out[name].value:
+            out[name] = onset
+    return out
+
+
+def _over(threshold: Parameter, lever: float) -> Parameter:
+    """The force that makes the threshold at a lever, m."""
+    value, low, high = (v / lever for v in (threshold.value, threshold.low, threshold.high))
+    return Parameter(value, low, high, "N")
 
 
 def _depth_sd(bench: Bench, moment: Array) -> float:

@@ -244,6 +244,13 @@ def test_threshold_of_the_yield(results: dict[str, GapResult]) -> None:
     assert threshold.value == pytest.approx(45.0, rel=0.05)
 
 
+def test_onset_where_a_direction_reaches_the_threshold(results: dict[str, GapResult]) -> None:
+    tip = load_robot("ur10e").jacobian(np.array(Q["P1"]), tool_offset(np.array([0, 0, 0.1])))
+    found = results["yield"].effects[0].parameters
+    assert found["onset_y"].value == pytest.approx(45.0 / abs(tip[1, 0]), rel=0.05)
+    assert "onset_x" not in found  # never so much on joint 1
+
+
 def test_creep_fraction_and_time(results: dict[str, GapResult]) -> None:
     parameters = results["creep"].effects[0].parameters
     assert parameters["creep_fraction"].value == pytest.approx(0.2, rel=0.25)

@@ -216,6 +216,15 @@ def test_on_the_paper_arm_yield_and_slip_are_not_told_apart(
     assert sum(result.probabilities.values()) == pytest.approx(1.0)
 
 
+def test_on_the_paper_arm_the_knee_is_found_whatever_gives_way(
+    paper: tuple[Dataset, Diagnosis],
+) -> None:
+    onset = paper[1].result.effects[0].parameters["onset_y"]
+    assert onset.unit == "N"
+    assert onset.value == pytest.approx(75.0, abs=2.0)
+    assert onset.low < 75.0 < onset.high
+
+
 def test_and_joint_readings_are_what_to_measure(paper: tuple[Dataset, Diagnosis]) -> None:
     """Nothing else separates a yielding joint 1 from a stand that slips about the same axis."""
     proposal = paper[1].result.next_measurement
