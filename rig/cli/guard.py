@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,8 @@ class Guarded(TyperCommand):
     """A command that looks at its output paths before it begins."""
 
     def invoke(self, ctx: Any) -> Any:
-        """InputError where a result would overwrite an input, or a data set."""
+        """InputError where a result would overwrite an input, or a data set, or could not be
+        written once the work is done."""
         from rig.errors import InputError
 
         inputs = [path for _, path in _paths(ctx, written=False)]
@@ -33,7 +35,47 @@ class Guarded(TyperCommand):
                     f"{option} {path}: is a data set; no result takes the place of a measurement. "
                     "Give another name."
                 )
+            _check_file(option, path)
+        for option, path in _folders(ctx):
+            _check_may_be_made(option, path)
         return super().invoke(ctx)
+
+
+def _check_file(option: str, path: Path) -> None:
+    from rig.errors import InputError
+    from rig.storage.files import check_folder
+
+    if path.is_dir():
+        or_out = ", or - for stdout" if option == "--json" else ""
+        raise InputError(f"{option} {path}: is a folder. Give the name of a file{or_out}.")
+    if str(path) == "-":
+        raise InputError(f"{option} -: this one goes to a file only. Give its name.")
+    check_folder(path, f"{option} ")
+    if not path.exists() and not os.access(str(path.parent), os.W_OK):
+        raise InputError(
+            f"{option} {path}: nothing may be written into the folder {path.parent}. "
+            "Choose another."
+        )
+
+
+def _check_may_be_made(option: str, path: Path) -> None:
+    """It is made where it is missing."""
+    from rig.errors import InputError
+
+    there = next(p for p in (path, *path.parents) if p.exists())
+    if not there.is_dir():
+        raise InputError(f"{option} {path}: {there} is a file, no folder. Choose another.")
+    if not os.access(str(there), os.W_OK):
+        raise InputError(
+            f"{option} {path}: nothing may be written into the folder {there}. Choose another."
+        )
+
+
+def _folders(ctx: Any) -> Iterator[tuple[str, Path]]:
+    for parameter in ctx.command.params:
+        path = ctx.params.get(str(parameter.name))
+        if parameter.name in _FOLDERS and isinstance(path, Path):
+            yield parameter.opts[-1], path
 
 
 def _paths(ctx: Any, *, written: bool) -> Iterator[tuple[str, Path]]:

@@ -3,37 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-
-def _json_file(name: str | None) -> str | None:
-    """Refuses a place that cannot be written to before the work that would be lost there."""
-    from rig.errors import InputError
-    from rig.storage.files import check_folder
-
-    if name is None or name == "-":
-        return name
-    path = Path(name)
-    if path.is_dir():
-        raise InputError(f"--json {name}: is a folder. Give the name of a file, or - for stdout.")
-    check_folder(path, "--json ")
-    if not path.exists() and not os.access(str(path.parent), os.W_OK):
-        raise InputError(
-            f"--json {name}: nothing may be written into the folder {path.parent}. Choose another."
-        )
-    return name
-
-
 JsonOption = Annotated[
     str | None,
-    typer.Option(
-        "--json", metavar="FILE", callback=_json_file, help="Write the result as JSON; - : stdout."
-    ),
+    typer.Option("--json", metavar="FILE", help="Write the result as JSON; - : stdout."),
 ]
 StationOption = Annotated[
     str | None,

@@ -126,6 +126,28 @@ def test_json_that_could_not_be_written_is_said_before_the_work(
 @pytest.mark.parametrize(
     ("words", "says"),
     [
+        ("diagnose no.h5 --figures m.yaml", "--figures m.yaml: m.yaml is a file, no folder."),
+        ("diagnose no.h5 --figures m.yaml/f", "--figures m.yaml/f: m.yaml is a file, no folder."),
+        ("diagnose no.h5 --figures shut/f", "--figures shut/f: nothing may be written into the"),
+        ("diagnose no.h5 --write-model no/m.yaml", "--write-model no/m.yaml: the folder no does"),
+        ("report no.h5 --pdf no/r.pdf", "--pdf no/r.pdf: the folder no does not exist."),
+        ("export no.h5 -o .", "--output .: is a folder. Give the name of a file."),
+        ("export no.h5 -o -", "--output -: this one goes to a file only. Give its name."),
+    ],
+)
+def test_places_that_could_not_be_written_to_are_said_before_the_work(
+    rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch, words: str, says: str
+) -> None:
+    (files / "shut").mkdir()
+    monkeypatch.setattr(os, "access", lambda folder, _mode: folder != "shut")
+    status, out, err = rig(*words.split())
+    assert (status, out) == (2, "")
+    assert err.startswith(says)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
         ("analyze d.h5 --json d.h5", "--json d.h5: is read by this command"),
         ("diagnose d.h5 --write-model ./d.h5", "--write-model d.h5: is read by this command"),
         ("analyze d.h5 --json other.h5", "--json other.h5: is a data set;"),
