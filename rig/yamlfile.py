@@ -124,6 +124,7 @@ def read_document_text(
     if not isinstance(data, dict):
         found = words.value_words(data, "")
         refuse(name, [*reader.problems, Problem(1, 1, f"{found}; `key: value` lines are wanted.")])
+    _check_kind(data, reader, type_, name)
     value = _validate(data, reader, type_)
     if value is not None and check is not None:
         for path, what in check(value):
@@ -132,6 +133,33 @@ def read_document_text(
     if reader.problems or value is None:
         refuse(name, reader.problems)
     return Document(name, text, value, reader.places)
+
+
+_KINDS = {
+    "rig.protocol": "a protocol",
+    "rig.station": "a station",
+    "rig.robot": "a robot's nominal model",
+}
+
+
+def _check_kind(data: dict[str, object], reader: Reader, type_: type[T], name: str) -> None:
+    """InputError for a file that says it is another kind: every key of it would be wrong."""
+    kind = _kind(data.get("schema"))
+    if kind is None:
+        return
+    properties = TypeAdapter(type_).json_schema(mode="validation").get("properties", {})
+    wanted = _kind(properties.get("schema", {}).get("const"))
+    if kind == wanted:
+        return
+    other = "another kind of file" if wanted is None else _KINDS[wanted]
+    what = f"this is {_KINDS[kind]}; wanted: {other}. Give that file's path."
+    refuse(name, [_problem(reader.places, ("schema",), what)])
+
+
+def _kind(schema: object) -> str | None:
+    """The kind without its version, of what is one."""
+    kind = schema.partition("/")[0] if isinstance(schema, str) else None
+    return kind if kind in _KINDS else None
 
 
 def _validate(data: dict[str, object], reader: Reader, type_: type[T]) -> T | None:

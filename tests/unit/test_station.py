@@ -2,12 +2,17 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from rig.errors import InputError
+from rig.meta import Meta
+from rig.protocol import load_protocol
 from rig.station import STATIONS, load_station, parse_station, station_names
+from rig.yamlfile import load_yaml
 
 EMULATED = (STATIONS / "emulated.yaml").read_text("utf-8")
 LAB = (STATIONS / "ur10e_lab.yaml").read_text("utf-8")
@@ -124,3 +129,17 @@ def test_what_a_driver_refuses_has_its_place() -> None:
 def test_a_station_without_devices_is_none() -> None:
     text = "schema: rig.station/1\nname: empty\noperator: {driver: console}"
     assert said(text) == ["robot, dynamometer and laser are missing; a station has one at least."]
+
+
+@pytest.mark.parametrize(
+    ("read", "wanted"),
+    [(load_protocol, "a protocol"), (partial(load_yaml, type_=Meta), "another kind of file")],
+)
+def test_a_file_of_another_kind_is_one_line(read: Callable[[Path], object], wanted: str) -> None:
+    """Not one for each of its keys."""
+    path = STATIONS / "emulated.yaml"
+    with pytest.raises(InputError) as caught:
+        read(path)
+    place, what = str(caught.value).split(": schema: ")
+    assert place.startswith(f"{path}:")
+    assert what == f"this is a station; wanted: {wanted}. Give that file's path."
