@@ -99,9 +99,12 @@ def resume(
     """Goes on with an interrupted measurement at the step where it stopped."""
     journal_file = journal_path(path)
     if not journal_file.exists():
+        hint = "A complete measurement needs no resuming; measure again for another data set."
+        if not path.exists():
+            hint = "Nor is that file there; give the name that the measurement writes to."
         raise InputError(
             f"{path}: there is no {journal_file.name} beside it, so there is nothing to resume. "
-            "A complete measurement needs no resuming; measure again for another data set."
+            f"{hint}"
         )
     records = replay(journal_file)
     start = records[0].data
