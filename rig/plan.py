@@ -145,7 +145,7 @@ def plan(protocol: MeasurementProtocol, station: Station | None = None) -> Plan:
             elif share > 1 - MARGIN:
                 warnings.append(f"{_name(run)}: {what}: {100 * (1 - share):.0f} % to spare.")
     _refuse(protocol, errors)
-    warnings += _time_warnings(protocol, runs)
+    warnings += [*_unit_warnings(protocol), *_time_warnings(protocol, runs)]
     pairs = [(run.pose, run.direction) for _, run, _ in protocol.sequence()]
     mounts = 1 + sum(a != b for a, b in pairwise(pairs))
     emulated = station is not None and station.emulation is not None
@@ -271,6 +271,16 @@ def _beyond_joints(protocol: MeasurementProtocol, arm: Arm) -> Iterator[tuple[Ke
         for i in np.flatnonzero((q < low - 1e-6) | (q > high + 1e-6)):
             allowed = f"allowed: {low[i]:g} to {high[i]:g} deg"
             yield ("poses", name), f"joint {i + 1} at {q[i]:.2f} deg; {allowed}."
+
+
+def _unit_warnings(protocol: MeasurementProtocol) -> Iterator[str]:
+    """Radians under q_deg put the arm near its zero, stretched out, where nobody measures."""
+    for name, pose in protocol.poses.items():
+        if 0 < max(map(abs, pose.q_rad)) <= np.deg2rad(2 * np.pi):
+            yield (
+                f"pose {name}: all joints within {np.rad2deg(max(map(abs, pose.q_rad))):.2f} deg "
+                "of zero, the arm stretched out. If these are radians, write q_rad."
+            )
 
 
 def _time_warnings(protocol: MeasurementProtocol, runs: Sequence[PlannedRun]) -> Iterator[str]:

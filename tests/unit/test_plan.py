@@ -11,7 +11,7 @@ from drivers.kistler.settings import PerAxis
 from rig.errors import InputError
 from rig.model import load_robot
 from rig.plan import MOUNT_S, Plan, plan
-from rig.protocol import MeasurementProtocol, Pose, Run, load_protocol
+from rig.protocol import MeasurementProtocol, Pose, Run, load_protocol, parse_protocol
 from rig.station import Station, load_station
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -100,6 +100,18 @@ def test_narrow_margins_are_warned_of(paper: MeasurementProtocol, lab: Station) 
         f"{x}about 1.6 mm expected at 220 N, the laser's range is 1.7 mm: 8 % to spare.",
         f"{x}the dynamometer's x carries 220 N, full scale 250 N: 12 % to spare.",
     )
+
+
+@pytest.mark.parametrize(
+    ("q_deg", "warned"),
+    [("[0.2344, -1.7425, -1.8867, -1.0832, 1.5708, -1.3364]", True),
+     ("[0.2344, -17.425, -1.8867, -1.0832, 1.5708, -1.3364]", False)],
+)  # fmt: skip
+def test_radians_in_the_place_of_degrees_are_asked_about(q_deg: str, warned: bool) -> None:
+    path = PROTOCOLS / "paper_xy.yaml"
+    text = path.read_text("utf-8").replace("[13.43, -99.84, -108.10, -62.06, 90.0, -76.57]", q_deg)
+    asked = "pose P1: all joints within 1.89 deg of zero, the arm stretched out. If these are"
+    assert any(w.startswith(asked) for w in plan(parse_protocol(text, path)).warnings) is warned
 
 
 def test_eight_channels_share_the_force(paper: MeasurementProtocol, lab: Station) -> None:
