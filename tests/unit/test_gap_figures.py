@@ -272,4 +272,4 @@ def test_command_writes_the_figures_and_refuses_a_file_for_a_folder(tmp_path: Pa
     assert done.exit_code == 0, done.output
     assert (tmp_path / "new/gap_curve.png").exists()
     refused = CliRunner().invoke(cli.app, [*args, str(tmp_path / "d.h5")])
-    assert "the figures can't be written there" in str(refused.exception)
+    assert "d.h5 is a file, no folder" in str(refused.exception)
