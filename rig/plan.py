@@ -276,10 +276,11 @@ def _beyond_joints(protocol: MeasurementProtocol, arm: Arm) -> Iterator[tuple[Ke
 def _unit_warnings(protocol: MeasurementProtocol) -> Iterator[str]:
     """Radians under q_deg put the arm near its zero, stretched out, where nobody measures."""
     for name, pose in protocol.poses.items():
-        if 0 < max(map(abs, pose.q_rad)) <= np.deg2rad(2 * np.pi):
+        most = float(np.rad2deg(max(map(abs, pose.q_rad))))
+        if 0 < most <= 2 * np.pi:
             yield (
-                f"pose {name}: all joints within {np.rad2deg(max(map(abs, pose.q_rad))):.2f} deg "
-                "of zero, the arm stretched out. If these are radians, write q_rad."
+                f"pose {name}: all joints within {most:.2f} deg of zero, the arm stretched out. "
+                "If these are radians, write q_rad."
             )
 
 

@@ -124,8 +124,7 @@ def read_document_text(
     if not isinstance(data, dict):
         found = words.value_words(data, "")
         refuse(name, [*reader.problems, Problem(1, 1, f"{found}; `key: value` lines are wanted.")])
-    _check_kind(data, reader, type_, name)
-    value = _validate(data, reader, type_)
+    value = _validate(data, reader, type_, name)
     if value is not None and check is not None:
         for path, what in check(value):
             if not reader.is_bad(path):
@@ -142,14 +141,12 @@ _KINDS = {
 }
 
 
-def _check_kind(data: dict[str, object], reader: Reader, type_: type[T], name: str) -> None:
+def _check_kind(data: dict[str, object], reader: Reader, schema: words.Schema, name: str) -> None:
     """InputError for a file that says it is another kind: every key of it would be wrong."""
     kind = _kind(data.get("schema"))
-    if kind is None:
-        return
-    properties = TypeAdapter(type_).json_schema(mode="validation").get("properties", {})
-    wanted = _kind(properties.get("schema", {}).get("const"))
-    if kind == wanted:
+    consts = [node.get("const") for node in words.schemas_at(schema, ("schema",))]
+    wanted = next((k for k in map(_kind, consts) if k is not None), None)
+    if kind is None or kind == wanted:
         return
     other = "another kind of file" if wanted is None else _KINDS[wanted]
     what = f"this is {_KINDS[kind]}; wanted: {other}. Give that file's path."
@@ -162,13 +159,16 @@ def _kind(schema: object) -> str | None:
     return kind if kind in _KINDS else None
 
 
-def _validate(data: dict[str, object], reader: Reader, type_: type[T]) -> T | None:
-    """The value, also when only mistyped words stood in its way; problems go to the reader."""
+def _validate(data: dict[str, object], reader: Reader, type_: type[T], name: str) -> T | None:
+    """The value, also when only mistyped words stood in its way; problems go to the reader, but for
+    another kind of file."""
     adapter: TypeAdapter[T] = TypeAdapter(type_)
     first = _attempt(adapter, data)  # (named: or mypy infers T | None for the adapter)
     value, errors = first
     if errors or _any_bool(data):
-        judge = _Judge(data, reader, adapter.json_schema(mode="validation"))
+        schema = adapter.json_schema(mode="validation")
+        _check_kind(data, reader, schema, name)
+        judge = _Judge(data, reader, schema)
         judge.add(errors)
         if errors and judge.correct():
             second = _attempt(adapter, data)

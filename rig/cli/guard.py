@@ -1,4 +1,5 @@
-"""No result takes the place of what it was computed from, nor of any measurement."""
+"""Before the work: no result takes the place of what it is computed from, nor of any measurement,
+and every place can be written to."""
 
 from __future__ import annotations
 
@@ -8,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from typer.core import TyperCommand
+
+from rig.errors import InputError
 
 _READ = {"model", "simulation", "couple", "resume", "station", "prior", "path"}
 _FOLDERS = {"figures", "keep"}
@@ -21,8 +24,6 @@ class Guarded(TyperCommand):
     def invoke(self, ctx: Any) -> Any:
         """InputError where a result would overwrite an input, or a data set, or could not be
         written once the work is done."""
-        from rig.errors import InputError
-
         inputs = [path for _, path in _paths(ctx, written=False)]
         for option, path in _paths(ctx, written=True):
             if any(_same(path, other) for other in inputs):
@@ -42,7 +43,6 @@ class Guarded(TyperCommand):
 
 
 def _check_file(option: str, path: Path) -> None:
-    from rig.errors import InputError
     from rig.storage.files import check_folder
 
     if path.is_dir():
@@ -51,23 +51,22 @@ def _check_file(option: str, path: Path) -> None:
     if str(path) == "-":
         raise InputError(f"{option} -: this one goes to a file only. Give its name.")
     check_folder(path, f"{option} ")
-    if not path.exists() and not os.access(str(path.parent), os.W_OK):
-        raise InputError(
-            f"{option} {path}: nothing may be written into the folder {path.parent}. "
-            "Choose another."
-        )
+    if not path.exists():
+        _check_open(option, path, path.parent)
 
 
 def _check_may_be_made(option: str, path: Path) -> None:
     """It is made where it is missing."""
-    from rig.errors import InputError
-
     there = next(p for p in (path, *path.parents) if p.exists())
     if not there.is_dir():
         raise InputError(f"{option} {path}: {there} is a file, no folder. Choose another.")
-    if not os.access(str(there), os.W_OK):
+    _check_open(option, path, there)
+
+
+def _check_open(option: str, path: Path, folder: Path) -> None:
+    if not os.access(str(folder), os.W_OK):
         raise InputError(
-            f"{option} {path}: nothing may be written into the folder {there}. Choose another."
+            f"{option} {path}: nothing may be written into the folder {folder}. Choose another."
         )
 
 

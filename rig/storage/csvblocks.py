@@ -219,8 +219,9 @@ class CsvFile:
             return f"{what}; {hint}"
         hint = "Remove what is too much, or name it in the header."
         if (
-            _decimal_commas(cells) >= len(cells) - wanted >= _SEVERAL
-            or len(cells) >= 2 * wanted - 1
+            len(cells) >= 2 * wanted - 1
+            or all(c.lstrip("-+").isdigit() for c in cells if c)
+            or _decimal_commas(cells) >= len(cells) - wanted >= _SEVERAL
         ):
             hint = "If the numbers have decimal commas, write points instead."
         return f"{what}. {hint}"

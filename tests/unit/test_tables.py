@@ -206,6 +206,8 @@ REFUSED: list[tuple[str | bytes, str]] = [
      "numbers have decimal commas, write points instead."),
     (HEAD + GOOD + "1,x,1,loading,1,10,5,1,25\n", ":3: 9 cells, but the header names 7 columns. If "
      "the numbers have decimal commas, write points instead."),
+    ("force_N,displacement_mm,time_s,step\n1,5,2,0,3\n", ":2: 5 cells, but the header names 4 "
+     "columns. If the numbers have decimal commas, write points instead."),
     (HEAD + GOOD + "1,x,1,loading,1,10,1,a,b\n", ":3: 9 cells, but the header names 7 columns. "
      "Remove what is too much, or name it in the header."),
     ("force_N,displacement_mm\n1;5\n", ":2: 1 cell, but the header names 2 columns; wanted: "
