@@ -18,6 +18,7 @@ from identification.gap.parts import (
     Sizes,
     energies,
     log_joints,
+    mended,
     part_sizes,
     signs_kept,
 )
@@ -122,9 +123,12 @@ class Found:
     foretold: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
 
 
-def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Explanation:
+def explain(
+    engine: Engine, parts: tuple[Part, ...], log_evidence: float, taken: float | None = None
+) -> Explanation:
     """The explanation with its prior; too small a part is charged as what it is: freedom of the
-    larger one's law."""
+    larger one's law. taken: mean square (m^2) that the evidence of the last part took all others to
+    have; left out: there are none."""
     levels = engine.levels
     bases = log_joints(engine, parts)
     sizes = part_sizes(engine, parts, int(bases.argmax()))
@@ -141,6 +145,8 @@ def explain(engine: Engine, parts: tuple[Part, ...], log_evidence: float) -> Exp
     share = np.exp(logs - logs.max())
     fraction = float(share @ good / share.sum())
     order = _order(parts, each)
+    if taken is not None:
+        log_evidence += mended(engine, parts, taken)
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
     weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
     weight -= within_stated(engine, parts, sizes)

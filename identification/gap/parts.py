@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.compare import imperfect, mean_squares
+from identification.gap.compare import imperfect, logsumexp, mean_squares
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.factor import factor_of
+from identification.gap.imperfection import level_prior
 from identification.gap.signs import Limits, all_kept, log_odds
 from identification.gap.variants import Variant, block
 from identification.gap.words import DRIFTS, LINEAR
@@ -164,12 +165,31 @@ def log_joint_between(engine: Engine, parts: tuple[Part, ...], eta: float) -> fl
 
 def energies(engine: Engine, parts: tuple[Part, ...]) -> Array:
     """(l,) the `Sizes.energy` of the parts at every level."""
+    return np.minimum(_energies_each(engine, parts).sum(axis=1), engine.most)
+
+
+def _energies_each(engine: Engine, parts: tuple[Part, ...]) -> Array:
+    """(l, p) mean square (m^2) of what of each part counts by its imperfection, all together."""
     root = block([p.root for p in parts])
     gram, moment = _asked(engine, parts)
     inner = np.eye(len(root)) + root.T @ gram @ root
     w = np.linalg.solve(inner, (moment @ root)[..., None])[..., 0] @ root.T
-    each = [_mean_square(engine, p.variant) for p in parts]
-    return np.asarray(np.minimum(np.sum(w @ block(each) * w, axis=1), engine.most))
+    squares = w @ block([_mean_square(engine, p.variant) for p in parts]) * w
+    starts = np.cumsum([0, *(len(p.variant.columns) for p in parts[:-1])])
+    return np.asarray(np.add.reduceat(squares, starts, axis=1))
+
+
+def mended(engine: Engine, parts: tuple[Part, ...], taken: float) -> float:
+    """Nats by which the last part's evidence beside the others is off, if these were taken to have
+    a mean square of `taken` (m^2), as without it: what a law tries to do alone is not what it does
+    beside another one, and by that its imperfection is judged."""
+    joint, each = log_joints(engine, parts), _energies_each(engine, parts)
+    together, alone = each.sum(axis=1), each[:, -1] + taken
+    now, before = (
+        [level_prior(engine.etas, i, min(float(e), engine.most)) for i, e in enumerate(energy)]
+        for energy in (together, alone)
+    )
+    return float(logsumexp(joint + np.array(now)) - logsumexp(joint + np.array(before)))
 
 
 def _mean_square(engine: Engine, v: Variant) -> Array:

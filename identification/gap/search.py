@@ -195,7 +195,7 @@ def _with_one_more(
                 continue
             top = closest(scored)
             parts = (*start.parts, Part(top.variant, top.scale))
-            found = explain(engine, parts, marginal(scored))
+            found = explain(engine, parts, marginal(scored), energy)
             better = out.get(words, known.get(words))
             if better is None or better.log_weight < found.log_weight:
                 out[words] = found

@@ -56,7 +56,7 @@ def _in_one_more(
     scored = score(engine, levels, others, energy)
     top = closest(scored)
     parts = (*start.parts, Part(top.variant, top.scale))
-    found = explain(engine, parts, marginal(scored) - WORTH)
+    found = explain(engine, parts, marginal(scored) - WORTH, energy)
     if found.log_weight < start.log_weight - _HOPELESS:
         return None
     return polished(engine, variants, found)
@@ -72,7 +72,8 @@ def polished(engine: Engine, variants: list[Variant], start: Explanation) -> Exp
         scored = score(engine, levels, family_of(variants, word, rest), energy)
         top = closest(scored)
         again = WORTH * sum(p.word == word for p in rest)
-        found = explain(engine, (*rest, Part(top.variant, top.scale)), marginal(scored) - again)
+        parts = (*rest, Part(top.variant, top.scale))
+        found = explain(engine, parts, marginal(scored) - again, energy if rest else None)
         if found.log_weight > best.log_weight:
             best = found
     return best
