@@ -28,6 +28,7 @@ _STRETCHES, _LAST = 20, 3  # of a pull; so many of them are its end,
 _FLOWS = 0.03  # whose stiffness is less than that of the steepest
 _FALLS = 0.025  # of its range
 _WANDERS = 0.05  # of the way: a displacement that goes back by more wanders
+_AT_ZERO = 0.01  # of the largest displacement: so near to none
 _PULLED = 0.3  # of the largest force: by less of the other sign metal does not flow back
 _ENCLOSES, _AGAIN = 0.05, 0.1  # of its box, by a loop; of that, by the next ones
 _MET_AGAIN = 0.2  # of the smaller one's range of load
@@ -102,6 +103,19 @@ class Course:
     def force_keeps_its_sign(self) -> bool:
         """It was only pressed, or only pulled."""
         return _keeps_its_sign(self.rows.measured_force)
+
+    @cached_property
+    def crosses_its_zero(self) -> bool:
+        """One way from one sign of the load to the other, and where the force passes zero so does
+        the displacement: what slips or flows would have left it elsewhere."""
+        path, force = self.data.displacement, self.data.force
+        if self.data.arm or len(self.data.setups) > 1 or self.one_sided:
+            return False
+        if way_back(path * np.sign(path[-1] - path[0])) > _WANDERS * np.ptp(path):
+            return False
+        order = np.argsort(force, kind="stable")
+        left = float(np.interp(0.0, force[order], path[order]))
+        return abs(left) < _AT_ZERO * float(np.abs(path).max())
 
     @property
     def repeats(self) -> bool:

@@ -103,13 +103,18 @@ class Found:
 
     def without_line(self, joint: int) -> Found:
         """All coefficients but the last, which is what the joint's spring has more."""
-        k, s = len(self.w) - 1, self.softer
+        k = len(self.w) - 1
+        return self.on_spring(np.eye(k + 1)[k], joint).first(k)
+
+    def on_spring(self, functional: Array, joint: int) -> Found:
+        """A linear function of the coefficients counted as compliance of the joint's spring."""
+        s = self.softer
         value, variance, cross = dict(s.value), dict(s.variance), dict(s.cross)
         if joint in value:
-            value[joint] += float(self.w[k])
-            variance[joint] += float(self.cov[k, k] + 2 * s.cross[joint][k])
-            cross[joint] = s.cross[joint] + self.cov[k]
-        return replace(self, softer=Softer(value, variance, cross)).first(k)
+            value[joint] += float(functional @ self.w)
+            variance[joint] += float(functional @ (self.cov @ functional + 2 * s.cross[joint]))
+            cross[joint] = s.cross[joint] + self.cov @ functional
+        return replace(self, softer=Softer(value, variance, cross))
 
     def of_spring(self, joint: int) -> tuple[float, float]:
         """The spring that was found over that simulated, compliances or, of what is imposed as a

@@ -49,18 +49,24 @@ NOT_NEGATIVE = frozenset({"friction", "lag", "threshold", "threshold_of_load", "
 
 
 def _hysteresis(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
-    """Of the strengths that slip within the range; of friction in proportion to the load, at the
-    largest one."""
+    """Of the strengths that slip, which takes a load beyond them; of friction in proportion to the
+    load, at the largest one."""
     radius, joint = np.asarray(part.variant.info["radius"]), int(part.variant.info["joint"])
     if part.variant.info.get("other_springs"):
         found = found.without_line(joint)
-    slips = (radius < float(np.ptp(np.append(bench.torque[:, joint], 0.0)))).astype(float)
+    largest = float(np.abs(bench.torque[:, joint]).max())
+    slips = (radius < _SLIPS * largest).astype(float)
     if part.variant.info["law"] in BY_LOAD:
-        radius = np.full(len(radius), float(np.abs(bench.torque[:, joint]).max()))
+        radius = np.full(len(radius), largest)
+    if part.variant.info["law"] == "Iwan":  # what never slips is a spring like the joint's own
+        found = found.on_spring(slips - 1, joint)
     return {
         "friction": from_zero(found.linear(slips * radius, torque_unit(bench))),
         "share_through_friction": found.per_spring(slips, joint),
     }
+
+
+_SLIPS = 0.98  # of the largest load: what slips beyond that only hardly shows
 
 
 def from_zero(p: Parameter) -> Parameter:

@@ -165,7 +165,7 @@ def log_joint_between(engine: Engine, parts: tuple[Part, ...], eta: float) -> fl
 
 def energies(engine: Engine, parts: tuple[Part, ...]) -> Array:
     """(l,) the `Sizes.energy` of the parts at every level."""
-    return np.minimum(_energies_each(engine, parts).sum(axis=1), engine.most)
+    return np.asarray(np.minimum(_energies_each(engine, parts).sum(axis=1), engine.most))
 
 
 def _energies_each(engine: Engine, parts: tuple[Part, ...]) -> Array:

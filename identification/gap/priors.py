@@ -52,9 +52,11 @@ RARER = (
     Rarer(-20.0, CURVES, _YIELD, lambda c: c.gives_in),
     # A way at no force before all of it: what is not there yet has no curve.
     Rarer(-20.0, _ANY, _TOUCHES, lambda c: c.approaches),
-    # Loaded from one side and let go again and again: friction that is seen the first time only,
+    # Loaded from one side and let go again and again: friction that is seen the first time only.
     Rarer(-30.0, _HYSTERESIS, _NO_WORD, lambda c: c.comes_back_as_it_went),
-    # and metal that flows back under a pull.
+    # What slips or flows on its way through no load, and yet is at its zero there.
+    Rarer(-30.0, _HYSTERESIS | _YIELD, _NO_WORD, lambda c: c.crosses_its_zero),
+    # Metal that flows back under a pull.
     Rarer(-20.0, _YIELD, _HYSTERESIS, lambda c: c.rubs),
 )
 

@@ -13,6 +13,7 @@ from identification.gap.data import Array
 
 UNDER_WEIGHT = " under weight"  # a memory that begins with the weight coming on
 BACK_UNDER_WEIGHT = " under weight, taken back"  # one that is lost between runs, but for the weight
+LASTING = " lasting"  # one that outlasts the arm's way to another pose
 TAKEN_BACK = " taken back"  # one that is lost between runs
 SET_UP_ANEW = " set up anew"  # one that is lost when the rig is turned to another direction
 

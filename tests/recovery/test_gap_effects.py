@@ -367,7 +367,13 @@ def test_a_million_samples_of_friction_on_a_bench() -> None:
                       branch=np.full(n, 3))  # fmt: skip
     found = diagnose_gap(data)
     assert found.verdict == "joint_hysteresis"
-    assert found.effects[0].parameters["friction"].value == pytest.approx(60.0, rel=0.05)
+    friction, share = (
+        found.effects[0].parameters[p] for p in ("friction", "share_through_friction")
+    )
+    assert friction.value == pytest.approx(60.0, rel=0.05)
+    # strengths that never slip here and the spring itself are one to these data
+    assert share.value == pytest.approx(1.0, abs=0.05)
+    assert share.high - share.low < 0.1
 
 
 def test_renamed_poses_and_permuted_directions_change_nothing(

@@ -58,6 +58,33 @@ def test_spectra_have_no_reach_and_a_specimen_keeps_its_other_springs() -> None:
     assert sum(v.label.endswith("other springs") for v in finer) == len(finer) / 2
 
 
+def test_a_specimens_spectrum_has_strengths_between_the_strengths() -> None:
+    bench = bench_without_arm()
+    grid = library(bench, ["joint_hysteresis"])
+    spectrum = next(v for v in grid if v.label == "joint 1 spectrum")
+    finer = joint_hysteresis.closer(bench, spectrum)
+    assert [v.label for v in finer] == [
+        "joint 1 spectrum fine", "joint 1 spectrum fine, other springs"
+    ]  # fmt: skip
+    before, after = (v.info["radius"] for v in (spectrum, finer[0]))
+    assert set(before) < set(after)
+    assert len(after) == 2 * len(before) - 2  # between what never slips and the rest there is none
+    assert_lawful(bench, finer)
+
+
+def test_friction_may_outlast_the_way_to_another_pose() -> None:
+    """A knee may: what does not is no reason to call all friction that does a yield."""
+    bench = make_bench(arm_data())
+    found = {v.info["memory"]: v for v in library(bench, ["joint_hysteresis"])
+             if v.label.endswith("spectrum that slips")}  # fmt: skip
+    kept, lost = (bench.columns[found[m].columns[4]][: bench.rows.n] for m in ("lasting", ""))
+    moved = np.flatnonzero(bench.moved)
+    first = slice(0, moved[1])
+    np.testing.assert_array_equal(kept[first], lost[first])
+    assert np.abs(kept - lost)[moved[1] :].max() > 0.1 * np.abs(lost).max()
+    assert_lawful(bench, [found["lasting"]])
+
+
 @pytest.mark.parametrize("memory", ["", "worked in", "under weight", "rested"])
 def test_friction_may_grow_with_what_the_gear_carries(memory: str) -> None:
     """Half as strong where half the net torque is carried, push and weights together."""

@@ -20,9 +20,10 @@ from identification.gap.evidence import (
     level_covariance,
     run_columns,
 )
+from identification.gap.explanation import conditioned
 from identification.gap.finer import LOG_STEP
 from identification.gap.fit import _holds
-from identification.gap.parts import log_joint_between
+from identification.gap.parts import Part, log_joint_between, mended
 from identification.gap.priors import prior_of
 from identification.gap.search import _as_stated, search
 from identification.gap.table import Table
@@ -236,3 +237,26 @@ def test_none_is_looked_at_between_the_levels_as_well() -> None:
     wanted = log_mean([engine.levels[0].log_base, *between], [1 - less, *[less / 4] * 4])
     assert _as_stated(engine) == pytest.approx(wanted, abs=1e-6)
     assert max(between[:3]) > between[3] + 1.0  # which the levels alone would not see
+
+
+def test_effects_are_as_likely_together_in_whichever_order_they_are_added() -> None:
+    """A curve alone does what a second effect beside it then need not: its imperfection is judged
+    by what is left to it."""
+    bench = small_bench()
+    engine = small_engine(bench, (0.0, 5e-7, 1.25e-6, 3e-6))
+    x = bench.load / np.ptp(bench.load)
+    target = engine.target + bench.stacked(3e-5 * x**2 - 2.9e-5 * x**3)
+    bench.add(bench.stacked(1e-5 * x**3))
+    engine = Engine(bench, engine.base, target, engine.etas)
+    parts = tuple(
+        Part(variant(word, word, [k], (3.0,), positive=False), 3.0)
+        for word, k in (("joint_nonlinear_stiffness", 0), ("contact_seating", 2))
+    )
+    found, off = [], []
+    for one, other in (parts, parts[::-1]):
+        levels, energy = conditioned(engine, (one,))
+        (scored,) = score(engine, levels, [other.variant], energy)
+        off.append(mended(engine, (one, other), energy))
+        found.append(scored.log_evidence + off[-1])
+    assert found[0] == pytest.approx(found[1], abs=1e-6)
+    assert abs(off[0] - off[1]) > 0.1

@@ -322,6 +322,16 @@ def test_pull_and_press_may_each_have_a_curve_of_its_own() -> None:
     assert not bench.course.comes_again
 
 
+@pytest.mark.parametrize("off", [0.0, 0.04])
+def test_what_is_at_its_zero_without_load_has_not_slipped_on_its_way_there(off: float) -> None:
+    """Rubber from pressed to pulled, one way: stiff under pressure, soft under tension; the same
+    with its zero elsewhere may as well be half a loop."""
+    stretch = np.linspace(0.55, 1.9, 34)
+    found = pulled(12.0 * (stretch - stretch**-2), (stretch - 1 + off) * STROKE)
+    assert found.bench.course.crosses_its_zero == (off == 0)
+    assert (found.verdict == "joint_nonlinear_stiffness") == (off == 0)
+
+
 @pytest.mark.parametrize("imposed", ["force", "displacement"])
 def test_what_stiffens_from_the_first_weight_on_is_a_curve(imposed: str) -> None:
     """A sensor that saturates: of each further weight it shows less, in proportion to the load."""

@@ -217,7 +217,8 @@ def test_of_springs_beside_a_mechanism_the_better_ones_are_taken(
     springs = [Scored(part(SPRINGS, [0], joints=j).variant, 9.0 - len(j), 1.0, 0)
                for j in ([0], [1, 2])]  # fmt: skip
 
-    def explained(_: Engine, parts: tuple[Part, ...], evidence: float) -> Explanation:
+    def explained(_: Engine, parts: tuple[Part, ...], evidence: float, taken: float) -> Explanation:
+        assert taken == 0.0
         shared = parts[0].variant.info["joints"][0] in parts[1].variant.info["joints"]
         return said(parts, (1e-5, 1e-5), evidence - wall * shared)
 

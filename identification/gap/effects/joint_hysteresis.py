@@ -23,6 +23,7 @@ Source: hysteresis loss in catalogues of strain wave gears.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,7 +31,14 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effects.specimens import with_other_springs
 from identification.gap.history import Path, bristles, play, worked_in
-from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant, smooth_root, variant
+from identification.gap.variants import (
+    LASTING,
+    SET_UP_ANEW,
+    UNDER_WEIGHT,
+    Variant,
+    smooth_root,
+    variant,
+)
 
 WORD = "joint_hysteresis"
 # Strengths, of the joint's range of torque: near each other at small ones, which slip first. Of an
@@ -38,6 +46,7 @@ WORD = "joint_hysteresis"
 # friction brings a spring of its own, and more strengths won nothing there.
 _WEAK = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2)
 RADII = (*_WEAK, 0.27, 0.36, 0.5, 0.7, 1.0)
+BETWEEN = tuple(sorted((*RADII, *((a * b) ** 0.5 for a, b in pairwise(RADII)))))
 ARM_RADII = (*_WEAK, 0.26, 0.33, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
@@ -56,8 +65,9 @@ OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off 
 
 def variants(bench: Bench) -> list[Variant]:
     """Per joint and memory: kept while the arm stands, from no load or from the weight that came
-    on first; lost when the rig is turned to another direction, or in the rest between runs; there
-    from the beginning, of loads like those measured (rigs are cycled before they are measured)."""
+    on first; kept on the way to another pose as well, on which what rubs may not turn; lost when
+    the rig is turned to another direction, or in the rest between runs; there from the beginning,
+    of loads like those measured (rigs are cycled before they are measured)."""
     if not bench.data.arm and not bench.course.returns:  # pulls show a curve, and no loop
         return []
     out = []
@@ -78,6 +88,8 @@ def _memories(bench: Bench, joint: int) -> dict[str, _How]:
     out: dict[str, _How] = {"": (bench.moved, None, None)}
     if not bench.course.once:
         out[WORKED_IN] = (bench.moved, worked_in(bench.true_torque[:, joint], bench.moved), None)
+    if np.sum(bench.moved) > 1:
+        out[LASTING] = (np.zeros(bench.rows.n, dtype=bool), None, None)
     if np.sum(bench.rebuilt) > np.sum(bench.moved):
         out[SET_UP_ANEW] = (bench.rebuilt, None, None)
     if np.sum(bench.rest) > np.sum(bench.moved):
@@ -123,18 +135,20 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
 
 
 def closer(bench: Bench, found: Variant) -> list[Variant]:
-    """Exponential laws of the same joint and memory whose reaches lie nearer to each other."""
-    if found.info["law"] not in LAWS:
-        return []
+    """The same law with the same memory: exponential ones whose reaches lie closer together; of
+    a specimen's spectrum, the strengths between the strengths as well."""
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
     span = bench.reach_of(bench.true_torque[:, joint])
-    low, high = found.info["radius"]
-    reach = np.geomspace(0.9 * float(low), 1.1 * float(high), _CLOSER)
     name, how = _as_found(bench, found)
-    out = [
-        replace(v, label=f"{v.label} fine", info={**v.info, "memory": memory})
-        for v in _exponential(bench, joint, name, reach / span, *how)
-    ]
+    if found.info["law"] in LAWS:
+        low, high = found.info["radius"]
+        reach = np.geomspace(0.9 * float(low), 1.1 * float(high), _CLOSER)
+        finer = _exponential(bench, joint, name, reach / span, *how)
+    elif not bench.data.arm and bench.course.unloads:
+        finer = _spectra(bench, joint, name, span, *how, BETWEEN)
+    else:
+        return []
+    out = [replace(v, label=f"{v.label} fine", info={**v.info, "memory": memory}) for v in finer]
     return out + _with_other_springs(bench, out)
 
 
@@ -192,13 +206,13 @@ def _laws(
 
 def _spectra(
     bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None,
-    weight: Array | None,
+    weight: Array | None, strengths: tuple[float, ...] = RADII,
 ) -> list[Variant]:  # fmt: skip
     """The whole spectrum of strengths, which holds back what the spring would deflect; on an arm
     also where the stated spring is that of small loads, which make nothing slip: then every element
     adds its play (Prandtl 1928)."""
     torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
-    seen = RADII if bench.course.unloads else RADII[:_SMALL]
+    seen = strengths if bench.course.unloads else strengths[:_SMALL]
     radius = span * np.array(ARM_RADII if bench.data.arm else seen)
     radius = bench.radii(torque, radius) if bench.course.unloads else radius
     radius = np.append(radius, NEVER * span)

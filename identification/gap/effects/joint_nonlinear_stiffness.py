@@ -184,13 +184,14 @@ def _came_back(bench: Bench) -> bool:
 
 
 def _both_ways(bench: Bench) -> bool:
-    """Pulled and pressed, from zero either way, or to and fro: half a loop could be anything."""
+    """Pulled and pressed, from zero either way, or to and fro, or through a zero that both channels
+    share: any other half of a loop could be anything."""
     course = bench.course
     if course.one_sided:
         return False
     if not bench.rows.continuous:
         return len(np.unique(bench.rows.run)) > 1
-    return course.unloads and course.passes > 2
+    return course.crosses_its_zero or (course.unloads and course.passes > 2)
 
 
 def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:

@@ -40,6 +40,7 @@ from identification.gap.history import flowing_play
 from identification.gap.rows import way_back
 from identification.gap.variants import (
     BACK_UNDER_WEIGHT,
+    LASTING,
     SET_UP_ANEW,
     TAKEN_BACK,
     UNDER_WEIGHT,
@@ -52,7 +53,7 @@ from identification.gap.variants import (
 WORD = "joint_yield"
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 # A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
-_LIKELY = {"": 1.0, " lasting": 0.5, SET_UP_ANEW: 0.5, TAKEN_BACK: 0.3, UNDER_WEIGHT: 1.0,
+_LIKELY = {"": 1.0, LASTING: 0.5, SET_UP_ANEW: 0.5, TAKEN_BACK: 0.3, UNDER_WEIGHT: 1.0,
            BACK_UNDER_WEIGHT: 0.3}  # fmt: skip
 _HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 _FIRST = 2  # lower ones only round off the knees above them
@@ -343,7 +344,7 @@ def _memories(bench: Bench) -> dict[str, Flags]:
     moved, first = bench.moved, np.zeros(bench.rows.n, dtype=bool)
     out = {"": moved}
     if np.sum(moved) > 1:
-        out[" lasting"] = first
+        out[LASTING] = first
     if np.sum(bench.rebuilt) > np.sum(moved):
         out[SET_UP_ANEW] = bench.rebuilt
     if np.sum(bench.rest) > np.sum(moved):

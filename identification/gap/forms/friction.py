@@ -8,12 +8,22 @@ from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effects import joint_backlash, joint_hysteresis
 from identification.gap.flanks import Flanks, shapes
-from identification.gap.forms.law import ANEW, HUNG, KEPT, LOST, WORKED, Law, Term, fresh_after
+from identification.gap.forms.law import (
+    ACROSS,
+    ANEW,
+    HUNG,
+    KEPT,
+    LOST,
+    WORKED,
+    Law,
+    Term,
+    fresh_after,
+)
 from identification.gap.history import bristles, play, worked_in
-from identification.gap.variants import SET_UP_ANEW, UNDER_WEIGHT, Variant
+from identification.gap.variants import LASTING, SET_UP_ANEW, UNDER_WEIGHT, Variant
 
 _MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
-           SET_UP_ANEW.strip(): ANEW}  # fmt: skip
+           SET_UP_ANEW.strip(): ANEW, LASTING.strip(): ACROSS}  # fmt: skip
 SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *joint_hysteresis.LAWS)
 

@@ -20,13 +20,14 @@ from identification.gap.forms.law import (
 )
 from identification.gap.variants import (
     BACK_UNDER_WEIGHT,
+    LASTING,
     SET_UP_ANEW,
     TAKEN_BACK,
     UNDER_WEIGHT,
     Variant,
 )
 
-_MEMORY = {"": KEPT, " lasting": ACROSS, TAKEN_BACK: LOST, joint_yield.HARDENED: KEPT,
+_MEMORY = {"": KEPT, LASTING: ACROSS, TAKEN_BACK: LOST, joint_yield.HARDENED: KEPT,
            UNDER_WEIGHT: HUNG, BACK_UNDER_WEIGHT: HUNG_LOST, SET_UP_ANEW: ANEW}  # fmt: skip
 _SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
