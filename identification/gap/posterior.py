@@ -17,8 +17,8 @@ from identification.gap.fit import Fit, fit
 from identification.gap.imperfection import IMPERFECTION, level_prior
 from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Softer
 from identification.gap.parameters import NOT_NEGATIVE, from_zero, parameters
-from identification.gap.parts import Part, energies, log_joints, signs_kept
-from identification.gap.penalties import SAME_JOINT
+from identification.gap.parts import Part, energies, log_joints, part_sizes, signs_kept
+from identification.gap.penalties import SAME_JOINT, pettiness
 from identification.gap.readings import as_moved
 from identification.gap.several import family_of
 from identification.gap.shares import sized
@@ -269,10 +269,17 @@ def _open(engine: Engine, variants: list[Variant], chosen: Explanation, index: i
     out = []
     for shape, more in shapes:
         parts = (*chosen.parts[:index], shape, *chosen.parts[index + 1 :])
-        prior = np.log(shape.variant.prior) + more - SAME_JOINT * _crowds(shape, rest)
-        each = _levels(engine, replace(chosen, parts=parts), prior)
-        out += sorted(each, key=lambda e: -e[1])
+        each = _levels(engine, replace(chosen, parts=parts), np.log(shape.variant.prior) + more)
+        level = max(range(len(each)), key=lambda i: each[i][1])
+        charge = max(SAME_JOINT * _crowds(shape, rest), _petty(engine, parts, level))
+        out += sorted(((e, weight - charge) for e, weight in each), key=lambda e: -e[1])
     return out
+
+
+def _petty(engine: Engine, parts: tuple[Part, ...], level: int) -> float:
+    """Nats that a set of effects is charged where one of them does next to nothing: what has moved
+    to another joint must still be an effect there."""
+    return pettiness(engine, parts, part_sizes(engine, parts, level)) if len(parts) > 1 else 0.0
 
 
 def _representatives(scored: list[Scored]) -> list[tuple[Scored, float]]:

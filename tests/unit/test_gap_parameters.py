@@ -359,6 +359,29 @@ def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> No
         assert (said is chosen) == (joint == 0)
 
 
+def test_an_effect_does_not_move_to_a_joint_where_it_would_do_nothing() -> None:
+    """Two that share a joint are charged for that; but what leaves it must still be an effect."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    idle = bench.add(1e-9 * engine.bench.columns[1])
+    target = engine.target + 4.0 * bench.columns[0]
+    engine = Engine(bench, engine.base, target, engine.etas)
+    info = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
+    here, there = (
+        Variant("joint_yield", "at 30", (k,), (1.0,), np.eye(1), info={**info, "joint": j})
+        for k, j in ((0, 0), (idle, 4))
+    )
+    curve = Variant("joint_nonlinear_stiffness", "bend", (0,), (1.0,), np.eye(1), info={
+        "joint": 0, "kinds": ("cubic",), "torque": 1.0, "hinges": (),
+    })  # fmt: skip
+    parts = (Part(here, 1.0), Part(curve, 1.0))
+    said, known = settled(
+        engine, [here, there, curve], Explanation(parts, 0.0, 0.0, (0.0,) * 2, 0.0)
+    )
+    assert said.parts[0].variant is here
+    assert known[0].places == {"joint 1": pytest.approx(1)}
+
+
 def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> None:
     """Data that exclude all thresholds of a grid but one say no more than where it stands on it."""
     bench = small_bench()
