@@ -153,7 +153,7 @@ def _title(e: Effect, names: list[str]) -> str:
 
 
 def _one_effect(e: Effect, title: str) -> list[str]:
-    lines = [f"  {title}: present with {e.probability:.0%}, {e.share_of_gap:.0%} of the gap"]
+    lines = [f"  {title}: present with {e.probability:.0%}, {_share(e.share_of_gap)} of the gap"]
     if len(e.places) > 1:
         each = ", ".join(f"{place} ({p:.0%})" for place, p in e.places.items())
         lines.append(f"    these data leave open where it sits: {each}")
@@ -165,6 +165,11 @@ def _one_effect(e: Effect, title: str) -> list[str]:
 
 _OF_RUN = re.compile(r"(.+)_run\d+$")
 _EACH = 2  # runs that are listed one by one
+
+
+def _share(value: float) -> str:
+    """What is there is more than nothing of the gap."""
+    return f"{value:.0%}" if value >= 0.005 else "less than 1%"
 
 
 def _parameters(found: Mapping[str, Parameter]) -> list[str]:

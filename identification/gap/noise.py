@@ -34,7 +34,8 @@ NOISY, SWINGS = 3.0, 1.0
 class Noise:
     """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
     already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
-    one sample. raised: how many times what is stated a running recording scatters, at least 1.
+    one sample. raised: how many times what is stated readings scatter, of a running recording or
+    within holds, at least 1.
     sure: of an arm's instruments, or measured; what else is stated is known to a factor UNSURE.
     swings: how many times what is stated an arm goes to and fro while nothing changes. seen: of one
     sample, m, as far as a rig without an arm showed it: 0 where it read every level but once."""
@@ -78,10 +79,11 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     if rows.continuous or imposed:
         stated = float(np.median(per_sample if rows.continuous else fallback))
     white = stated if rows.continuous else scatter_within(data.displacement, hold) or 0.0
+    raised = max(1.0, white / meter.displacement) if data.arm and not imposed else 1.0
     return Noise(
         response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
-        raised=_raised(data) if rows.continuous else 1.0,
+        raised=_raised(data) if rows.continuous else raised,
         swings=_swings(data, rows, hold),
         sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),

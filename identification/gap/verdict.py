@@ -152,23 +152,44 @@ FLANKS = frozenset({"joint_backlash", "joint_nonlinear_stiffness"})
 
 def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
     """Which effect of an explanation is its main one, an arm's by how far one is larger than the
-    other (`SURER`). Without an arm all words speak of one spring, and a second one is mostly more
+    other. Without an arm all words speak of one spring, and a second one is mostly more
     of the first one's law."""
     if not explanation.parts:
         return {"none": 1.0}
     if not arm:
         return {explanation.parts[0].word: 1.0}
-    sizes = dict(explanation.troubles)
-    largest = max(sizes.values()) or 1.0
-    odds = {w: (size / largest) ** SURER for w, size in sizes.items()}
-    odds[explanation.parts[0].word] += 1e-300
-    return {w: odd / sum(odds.values()) for w, odd in odds.items()}
+    return _largest(explanation.troubles)
 
 
-# Of 99 mixtures of the blind check whose effects were both found, the ratio of their sizes was
-# known to a factor of 1.8 (rms), and the larger one was the right one in 84: odds that are the
-# ratio to this power say that best.
-SURER = 3.0
+def _largest(sizes: Mapping[str, float]) -> dict[str, float]:
+    """Word -> probability that its effect is the largest of an explanation; sizes: rms m of each,
+    the logarithm of each known as well as `KNOWN` says."""
+    from scipy.special import ndtr
+
+    names = list(sizes)
+    if len(names) == 1:
+        return {names[0]: 1.0}
+    most = max(sizes.values()) or 1.0
+    logs = np.log(np.maximum([sizes[w] for w in names], _NEXT_TO_NONE * most))[:, None]
+    sd = np.array([KNOWN[w in LINEAR] for w in names])[:, None]
+    # how often each is above all others, wherever it may lie itself
+    own = logs + sd * _DEVIATES  # (w, g)
+    above = ndtr((own[:, None, :] - logs[None]) / sd[None])
+    above[np.arange(len(names)), np.arange(len(names))] = 1.0
+    first = np.prod(above, axis=1) @ _SHARES
+    first = (1 - _GROSSLY) * first / first.sum() + _GROSSLY / len(names)
+    return dict(zip(names, first.tolist(), strict=True))
+
+
+# Standard deviation of the logarithm of a size, of a mechanism and of what is linear: of 97
+# mixtures of the blind check whose effects were both found, two mechanisms stood in the right ratio
+# to 3 % (median; 40 of 43 the right way round), one beside what is linear to a factor of 2.6: of
+# that, springs that are known to a tenth hide most.
+KNOWN = {False: 0.08, True: 0.9}
+_GROSSLY = 0.05  # of them were far off
+_NEXT_TO_NONE = 1e-9
+_DEVIATES = np.linspace(-4.0, 4.0, 81)
+_SHARES = np.exp(-0.5 * _DEVIATES**2) / np.exp(-0.5 * _DEVIATES**2).sum()
 
 
 def _heir(

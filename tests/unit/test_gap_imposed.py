@@ -12,6 +12,7 @@ from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.imposed import _Channel, _slides, displacement_simpler
+from tests.conformance.gap_designs import linear
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
@@ -282,6 +283,20 @@ def test_what_is_held_at_no_displacement_may_still_be_pulled() -> None:
     moved = np.where(late, data.displacement - 5.0 * 1.1e-5, data.displacement)
     found = diagnose_gap(replace(gripped, force=pulled, displacement=moved))
     assert "force_drift" not in [e.name for e in found.effects]
+
+
+@pytest.mark.parametrize(("times", "verdict"), [(1.0, "none"), (6.0, "unknown")])
+def test_an_arm_whose_readings_scatter_more_than_stated_is_not_explained(
+    times: float, verdict: str
+) -> None:
+    """A neighbour's machine, sampled too seldom to be seen as a vibration."""
+    data = linear("rich")
+    shaken = np.random.default_rng(8).normal(0, (times**2 - 1) ** 0.5, len(data.force))
+    sd = data.instruments.displacement
+    found = diagnose_gap(replace(data, displacement=data.displacement + sd * shaken))
+    assert found.verdict == verdict
+    noted = [n for n in found.notes if "6 times as much as stated" in n]
+    assert bool(noted) == found.bench.noise.misjudged == (verdict == "unknown")
 
 
 def test_a_ramp_is_no_vibration() -> None:

@@ -86,12 +86,19 @@ def test_without_an_arm_a_wrong_spring_counts_by_what_friction_leaves_of_the_gap
     assert _counted(arm, (rubs, spring), sizes) is gap
 
 
-def test_the_main_cause_of_two_is_shared_by_what_they_do() -> None:
-    two = (part("joint_yield", [0]), part("thermal_drift", [1]))
-    alike = said(two, (2e-5, 1e-5))
-    assert _main(alike, True) == pytest.approx({"joint_yield": 8 / 9, "thermal_drift": 1 / 9})
-    assert _main(alike, False) == {"joint_yield": 1.0}
-    assert _main(said(two, (0.0, 0.0)), True)["joint_yield"] == 1.0
+def test_the_main_cause_of_two_is_the_larger_one_as_far_as_their_sizes_are_known() -> None:
+    mechanisms = (part("joint_yield", [0]), part("thermal_drift", [1]))
+    linear = (part("joint_yield", [0]), part("force_scale", [1]))
+    for parts, ratio, share in ((mechanisms, 1.0, 0.5), (mechanisms, 1.2, 0.946 * 0.95 + 0.025),
+                                (linear, 1.2, 0.580 * 0.95 + 0.025),
+                                (linear, 9.0, 0.992 * 0.95 + 0.025),
+                                (mechanisms, 1e12, 0.975)):  # fmt: skip
+        found = _main(said(parts, (ratio * 1e-5, 1e-5)), True)
+        assert found[parts[0].word] == pytest.approx(share, abs=2e-3)
+        assert sum(found.values()) == pytest.approx(1.0)
+    assert _main(said(mechanisms, (2e-5, 1e-5)), False) == {"joint_yield": 1.0}
+    assert _main(said(mechanisms, (0.0, 0.0)), True)["joint_yield"] == pytest.approx(0.5)
+    assert _main(said(mechanisms[:1], (0.0,)), True) == {"joint_yield": 1.0}
     assert _main(said((), ()), True) == {"none": 1.0}
 
 
