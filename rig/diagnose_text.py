@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from rig.digits import brief
+
 if TYPE_CHECKING:
     from identification.gap.diagnose import Effect, GapResult
     from identification.gap.explanation import Likeness
@@ -82,9 +84,9 @@ _SURE = 3  # periods
 def looks_like(like: Likeness) -> str:
     """In words, with the period in its unit."""
     period = like.period or 0.0
-    told = [f"{t:.3g} s" for t in (period, _SURE * period)]
+    told = [f"{brief(t, 3)} s" for t in (period, _SURE * period)]
     if like.kind == "waves":
-        told = [f"{period * MM:.3g} mm"]
+        told = [f"{brief(period * MM, 3)} mm"]
     return LOOKS_LIKE["wanders" if like.wanders else like.kind].format(*told)
 
 
@@ -107,15 +109,15 @@ def _answer(r: GapResult) -> str:
         like = "" if r.looks_like is None else f" It looks like this: {looks_like(r.looks_like)}."
         return (
             f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
-            f"the uncertainty; about {r.remainder * MM:.3g} mm rms of structure remain.{like}"
+            f"the uncertainty; about {brief(r.remainder * MM, 3)} mm rms of structure remain.{like}"
         )
     more = [name for name in r.names if name != r.verdict]
     also = f" Beside it: {', '.join(more)}." if more else ""
     meaning = meanings(arm=r.bench.data.arm)[r.verdict]
     return (
         f"{r.verdict} ({p:.0%}): {meaning}.{also} With it the gap shrinks from "
-        f"{r.before * MM:.3g} to {r.after * MM:.3g} mm rms; the instruments alone leave "
-        f"{r.noise * MM:.3g} mm."
+        f"{brief(r.before * MM, 3)} to {brief(r.after * MM, 3)} mm rms; the instruments "
+        f"alone leave {brief(r.noise * MM, 3)} mm."
     )
 
 
@@ -123,7 +125,7 @@ def _where(r: GapResult) -> str:
     w = r.where
     if not w.directions:
         return ""
-    forces = ", ".join(f"{d}: {a:.4g} to {b:.4g} N" for d, (a, b) in w.force.items())
+    forces = ", ".join(f"{d}: {brief(a)} to {brief(b)} N" for d, (a, b) in w.force.items())
     lines = [f"Where ({w.share:.0%} of the gap that springs leave)", f"  directions  {forces}"]
     if w.poses:
         lines.append(f"  poses       {', '.join(w.poses)}")
@@ -188,7 +190,7 @@ def _parameters(found: Mapping[str, Parameter]) -> list[str]:
         wide = max(max(p.high - p.value, p.value - p.low) for p in each)
         unit = "" if each[0].unit == "1" else f" {each[0].unit}"
         lines.append(
-            f"    {family} = {low:.4g} to {high:.4g}{unit} in {len(each)} runs"
+            f"    {family} = {brief(low)} to {brief(high)}{unit} in {len(each)} runs"
             f" (95 %: each +- {wide:.2g}{unit} at most; one by one in the JSON)"
         )
     return lines
@@ -196,7 +198,7 @@ def _parameters(found: Mapping[str, Parameter]) -> list[str]:
 
 def _value(p: Parameter) -> str:
     unit = "" if p.unit == "1" else f" {p.unit}"
-    return f"{p.value:.4g}{unit} (95 %: {p.low:.4g} to {p.high:.4g}{unit})"
+    return f"{brief(p.value)}{unit} (95 %: {brief(p.low)} to {brief(p.high)}{unit})"
 
 
 def _gap(r: GapResult) -> str:
@@ -208,18 +210,20 @@ def _gap(r: GapResult) -> str:
     for h in r.held_out:
         low, high = h.ci95
         lines.append(
-            _row(f"withheld {h.fold}", h.before, h.after, r.noise) + f" ({low:.3g} to {high:.3g})"
+            _row(f"withheld {h.fold}", h.before, h.after, r.noise)
+            + f" ({brief(low, 3)} to {brief(high, 3)})"
         )
-    lines.append(f"  noise of the instruments {r.noise * MM:.4g}")
+    lines.append(f"  noise of the instruments {brief(r.noise * MM)}")
     for word, after in r.runners_up.items():
-        lines.append(f"  withheld, with {word} instead: {after * MM:.4g}")
+        lines.append(f"  withheld, with {word} instead: {brief(after * MM)}")
     return "\n".join(lines)
 
 
 def _row(name: str, before: float, after: float, noise: float) -> str:
     shrink = before / after if after > 0 else 1.0
     ratio = after / noise if noise > 0 else 1.0
-    return f"  {name:22s}{before * MM:10.4g} {after * MM:10.4g} {ratio:10.2f}  {shrink:10.3g}"
+    shown = f"{brief(before * MM):>10s} {brief(after * MM):>10s} {ratio:10.2f}"
+    return f"  {name:22s}{shown}  {brief(shrink, 3):>10s}"
 
 
 def _next(r: GapResult) -> str:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 _BINS = 40  # of force, for running recordings
 _COLOURS = "PuOr_r"  # orange against purple: told apart by colour-blind readers
 _BRANCHES = {RISING: "loading", FALLING: "unloading"}
+_LET_GO = "back at zero"  # nothing was read on the way there
 
 
 def gap_map(r: Shown, p: Points) -> Figure:
@@ -47,7 +48,7 @@ def gap_map(r: Shown, p: Points) -> Figure:
 
 def _lines(r: Shown, p: Points) -> list[tuple[str, Flags]]:
     """(name, points) per setup and branch; zero load before the highest load of a run belongs to
-    loading, that after it to unloading."""
+    loading, that after it to unloading, of which there may be nothing else."""
     sense = p.sense.copy()
     for run in np.unique(p.run):
         path = np.flatnonzero(p.run == run)
@@ -59,7 +60,8 @@ def _lines(r: Shown, p: Points) -> list[tuple[str, Flags]]:
         for branch, word in _BRANCHES.items():
             mine = (p.setup == s) & (sense == branch)
             if mine.any():
-                out.append((f"{r.setup_name(s)}: {word}", mine))
+                named = word if np.any(p.sense[mine] == branch) else _LET_GO
+                out.append((f"{r.setup_name(s)}: {named}", mine))
     return out
 
 

@@ -20,7 +20,7 @@ from identification.gap.effects import library
 from identification.gap.ends import without_ends
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Explanation, Found, Likeness
-from identification.gap.faults import faults
+from identification.gap.faults import faults, goes_against
 from identification.gap.fit import Fit, fit
 from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
@@ -191,13 +191,20 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,
         remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
-        looks_like=found.looks_like if verdict == "unknown" else None,
+        looks_like=_likeness(found, verdict),
         notes=(*_notes(bench), *_disbelieved(found, verdict)),
         bench=bench,
         engine=engine,
         fit=fitted,
         found=found,
     )
+
+
+def _likeness(found: Found, verdict: str) -> Likeness | None:
+    """Of an unknown gap; none of one whose channels count in opposite senses."""
+    if verdict != "unknown" or goes_against(found.engine.bench.data):
+        return None
+    return found.looks_like
 
 
 def _effects(found: Found, chosen: Explanation, known: list[Known]) -> tuple[Effect, ...]:

@@ -18,6 +18,13 @@ from identification.gap.rows import hold_ids, is_continuous
 def faults(data: GapData) -> tuple[str, ...]:
     """A note for every fault that is found, with what to see to."""
     out = []
+    against = goes_against(data)
+    if against:
+        out.append(
+            f"The displacement falls while the force grows, in {', '.join(against)}: one of the "
+            "two has the wrong sign. See which way force and laser count, turn one of them in the "
+            "table, and diagnose again."
+        )
     if bursts(data):
         out.append(
             "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "
@@ -31,7 +38,7 @@ def faults(data: GapData) -> tuple[str, ...]:
             "goes on growing: the sensor has lost its target, or stands still. See to it."
         )
     back = goes_back(data)
-    if back is not None:
+    if back is not None and not against:
         out.append(
             f"At {data.force[back]:.4g} N the displacement goes back, from "
             f"{1e3 * data.displacement[back - 1]:.4g} to {1e3 * data.displacement[back]:.4g} mm, "
@@ -59,6 +66,27 @@ def faults(data: GapData) -> tuple[str, ...]:
             f"and {broken.mean():.0%} of the readings come after that: a break. End the recording "
             "there to learn of what was before."
         )
+    return tuple(out)
+
+
+_AGAINST = -0.8  # correlation of force and displacement
+_BEGINS = 0.5  # of the largest force: a record that starts above that may be one of giving way
+
+
+def goes_against(data: GapData) -> tuple[str, ...]:
+    """Poses and directions in which the displacement falls while the force grows from little, all
+    the way and by far more than the instrument's uncertainty, as nothing goes that is pressed."""
+    out = []
+    for i, setup in enumerate(data.setups):
+        mine = data.setup == i
+        raw, moved = data.force[mine], data.displacement[mine]
+        _, first, run = np.unique(data.run[mine], return_index=True, return_inverse=True)
+        force, u = (v - (np.bincount(run, v) / np.bincount(run))[run] for v in (raw, moved))
+        size = float(np.sqrt((force @ force) * (u @ u)))
+        far = np.ptp(moved) > _CLEARLY * data.instruments.displacement
+        grows = float(np.abs(raw[first]).max()) < _BEGINS * float(np.abs(raw).max())
+        if far and grows and float(force @ u) < _AGAINST * size:
+            out.append(f"{setup.pose}/{setup.direction}" if data.arm else setup.direction)
     return tuple(out)
 
 

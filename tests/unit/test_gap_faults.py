@@ -13,6 +13,7 @@ from identification.gap.faults import (
     bursts,
     faults,
     frozen_since,
+    goes_against,
     goes_back,
     jumps_to,
     saturates,
@@ -221,3 +222,26 @@ def test_a_force_that_stays_from_step_to_step_while_all_goes_on_is_an_amplifier_
     top = replace(data, force=np.where(data.step == 4, 121.0, data.force))
     assert saturates(top) is None  # a last step of 1 N was asked for
     assert saturates(replace(full, arm=False)) is None  # a specimen may flow
+
+
+def test_channels_that_count_in_opposite_senses_are_told_where_they_do() -> None:
+    data = arm_data()
+    assert goes_against(data) == ()
+    everywhere = replace(data, displacement=-data.displacement)
+    assert goes_against(everywhere) == ("P1/x", "P1/y", "P2/x", "P2/y")
+    one = replace(data, displacement=np.where(data.setup == 1, -1, 1) * data.displacement)
+    assert goes_against(one) == ("P1/y",)
+    told = [n for n in faults(everywhere) if "wrong sign" in n or "goes back" in n]
+    assert len(told) == 1
+    assert "P2/y" in told[0]
+    found = diagnose_gap(everywhere)
+    assert (found.verdict, found.looks_like) == ("unknown", None)
+
+
+def test_what_gives_way_ever_more_has_its_signs_as_they_are() -> None:
+    """The end of a record, after the largest force; the whole of it is no case either."""
+    u = np.linspace(0.0, 1e-3, 200)
+    force = 100 * np.minimum(u / 2e-4, np.exp(-(u - 2e-4) / 4e-4))
+    assert goes_against(running(force[40:], u[40:])) == ()
+    assert goes_against(running(force, u)) == ()
+    assert goes_against(running(-force[40:], u[40:])) == ()
