@@ -157,14 +157,14 @@ def test_an_unknown_weighting_is_named_with_a_suggestion() -> None:
     [(95.9277, "95.93"), (1234567.0, "1234567"), (0.000123456, "0.0001235"), (1.2e-7, "1.200e-07"),
      (0.0, "0"), (math.nan, "-"), (-3.14159, "-3.142"), (3.2e9, "3.200e+09")],
 )  # fmt: skip
+def test_numbers_read_well_at_any_scale(value: float, text: str) -> None:
+    assert number(value) == text
+
+
 def test_thousands_are_written_out() -> None:
     assert [brief(v, 3) for v in (1044.0, 0.25, -2.0e6, 1.0)] == ["1040", "0.25", "-2000000", "1"]
     assert brief(1.2345e9) == "1.234e+09"
     assert brief(3.2e-7) == "3.2e-07"
-
-
-def test_numbers_read_well_at_any_scale(value: float, text: str) -> None:
-    assert number(value) == text
 
 
 def test_figures_are_written_twice_and_alike(analysis: Analysis, tmp_path: Path) -> None:
