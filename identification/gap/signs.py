@@ -22,7 +22,6 @@ from identification.gap.data import Array, Flags, Ints
 from identification.gap.variants import Variant
 
 _TINY, _LOG_2 = 1e-300, log(2)
-_WRONG, _FAR = 1.0, 4.0  # standard deviations of two limits at least, or of one
 _NEAR = 1 - 1e-9  # as correlated as two may be
 
 
@@ -109,9 +108,8 @@ def log_odds_together(limits: Limits, which: Ints, sums: Array, roots: Array) ->
     size = np.where(asked, np.linalg.norm(roots, axis=2) + _TINY, 1.0)
     z, unit = centre / size, roots / size[:, :, None]
     out = np.full(len(z), np.inf)
-    wrong = np.sum((z < -_WRONG) & asked, axis=1)
-    worst = np.where(asked, z, 0.0).min(axis=1)
-    for i in np.flatnonzero((wrong > 1) | ((worst < -_FAR) & (asked.sum(axis=1) > 1))):
+    wrong = np.any((z < 0) & asked, axis=1)
+    for i in np.flatnonzero(wrong & (asked.sum(axis=1) > 1)):
         out[i] = _largest(z[i, asked[i]], unit[i, asked[i]])
     return out
 

@@ -103,8 +103,26 @@ def test_limits_that_two_by_two_are_near_may_be_far_together() -> None:
     assert log_odds_together(more, np.zeros(1, int), sums, roots)[0] < found - 10.0
 
 
-@pytest.mark.parametrize(("first", "looks"), [(-6.0, True), (-2.0, False)])
-def test_one_limit_that_is_far_off_may_ask_others_to_be_so(first: float, looks: bool) -> None:
+def test_limits_each_hardly_broken_may_be_far_from_all_kept() -> None:
+    """A knee that bends below all of its thresholds: data know the sum of five coefficients, and
+    about which threshold it lies, but none of them; negative ones put it where none is."""
+    radius = np.array([-2.0, -1, 0, 1, 2])
+    known = np.linalg.qr(np.column_stack([np.ones(5), radius]))[0]
+    covariance = 100.0 * (np.eye(5) - (1 - 1e-8) * known @ known.T)
+    v = variant("joint_yield", "v", list(range(5)), (1.0,), each=True)
+    limits = Limits.of([v])
+    roots = limits.rows @ np.linalg.cholesky(covariance)
+    for centre, free in ((-4.0, False), (-1.0, True)):
+        mean = np.linalg.lstsq(np.vstack([np.ones(5), radius]), np.array([3.0, 3 * centre]))[0]
+        sums = limits.rows @ mean
+        assert (sums / np.linalg.norm(roots, axis=2)).min() > -0.5
+        found = log_odds_together(limits, np.zeros(1, int), sums, roots)[0]
+        assert (found > 0) == free
+        assert free or found < -1000.0
+
+
+@pytest.mark.parametrize(("first", "looks"), [(-6.0, True), (-0.1, True), (0.1, False)])
+def test_one_limit_that_is_broken_may_ask_others_to_be_so(first: float, looks: bool) -> None:
     """Data see the difference of two alone: the first is far below zero, the second just above, and
     can follow it no further than to there."""
     apart = np.array([1.0, -1.0]) / 2**0.5
@@ -115,7 +133,7 @@ def test_one_limit_that_is_far_off_may_ask_others_to_be_so(first: float, looks: 
     roots = limits.rows @ np.linalg.cholesky(covariance)
     found = log_odds_together(limits, np.zeros(1, int), limits.rows @ mean, roots)[0]
     assert np.isfinite(found) == looks
-    assert not looks or found < -15.0
+    assert first > -1 or found < -15.0
 
 
 def test_parts_are_asked_what_they_keep_together(monkeypatch: pytest.MonkeyPatch) -> None:
