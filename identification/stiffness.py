@@ -48,6 +48,7 @@ from identification.levels import (
 from identification.uncertainty import Contribution, Quantity, combined
 
 Status = Literal["ok", "doubtful", "undefined"]
+BENT = 0.2  # change of the stiffness along a curve that is worth a word
 STRAIGHT = 0.8  # share of the displacement's variance below which a line is a poor description
 SIGNIFICANT = 3.0  # slope over its standard deviation, where the force is within its noise
 
@@ -205,16 +206,47 @@ def _with_k(described: Stiffness, curve: Curve, loading: Grid, used: Grid) -> St
     except ValueError as error:
         return replace(described, sentence=f"The stiffness is undefined: {error}.")
     status, sentence = _judge(table, fit.residuals, k)
+    rivals = _alternatives(curve, loading, used, choice)
+    highest = float(np.abs(table.force).max())
+    before = [p for p in described.pointwise if abs(p.force) <= highest]
+    bend = _bend(before, [a.value for a in rivals if not a.after_knee])
     return replace(
         described,
         status=status,
         sentence=sentence,
+        notes=(*described.notes, *bend),
         k=combined(k, budget),
         intercept=fit.intercept,
         budget=budget,
         by_repetition=each,
-        alternatives=_alternatives(curve, loading, used, choice),
+        alternatives=rivals,
     )
+
+
+def _bend(pointwise: Sequence[PointwiseStiffness], rivals: Sequence[float]) -> tuple[str, ...]:
+    """A note where the stiffness between levels changes along the curve, plainly beyond its
+    scatter: one number is then a matter of averaging. rivals N/m: k under other choices."""
+    known = [p for p in pointwise if math.isfinite(p.stiffness) and math.isfinite(p.sd)]
+    third = len(known) // 3
+    if third < 1:
+        return ()
+    ends = []
+    for part in (known[:third], known[-third:]):
+        mean = float(np.mean([p.stiffness for p in part]))
+        ends.append((mean, float(np.sqrt(np.sum([p.sd**2 / p.n for p in part]))) / third))
+    (first, u_first), (last, u_last) = ends
+    change = abs(last - first)
+    if change < max(BENT * min(abs(first), abs(last)), SIGNIFICANT * math.hypot(u_first, u_last)):
+        return ()
+    way = "falls" if last < first else "rises"
+    note = (
+        f"The stiffness between neighbouring levels {way} from {first / 1e3:.4g} to "
+        f"{last / 1e3:.4g} N/mm along the curve (means over its first and last third): k is an "
+        "average"
+    )
+    if rivals:
+        note += f"; other choices give {min(rivals) / 1e3:.4g} to {max(rivals) / 1e3:.4g} N/mm"
+    return (f"{note}.",)
 
 
 def _usable(points: Sequence[Point]) -> tuple[list[Point], tuple[Exclusion, ...]]:

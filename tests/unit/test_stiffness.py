@@ -258,6 +258,25 @@ def test_one_level_over_a_measured_zero_has_a_stiffness() -> None:
     assert k_of(analyze_curve(curve(levels=(50.0,)))) == pytest.approx(1e5, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("bend", "text"),
+    [(0.0, ""), (0.1, ""), (1.0, "falls from 87.4 to 57.27 N/mm"), (-0.4, "rises from 106.5 to")],
+)
+def test_a_curve_whose_stiffness_changes_is_told(bend: float, text: str) -> None:
+    """Between levels f and g it is 100 / (1 + bend (f + g) / 200) N/mm; mean of the first and of the
+    last three of nine. A tenth in all is no matter."""
+    levels = tuple(10.0 * (k + 1) for k in range(9))
+    result = analyze_curve(curve(lambda f: (f + bend * f**2 / 200) / 1e5, levels))
+    told = [n for n in result.notes if "between neighbouring levels" in n]
+    assert len(told) == bool(text)
+    if told:
+        assert text in told[0]
+        values = [a.value / 1e3 for a in result.alternatives]
+        assert f"other choices give {min(values):.4g} to {max(values):.4g} N/mm" in told[0]
+    alone = analyze_curve(curve(lambda f: (f + bend * f**2 / 200) / 1e5, levels, (1.0,)))
+    assert not [n for n in alone.notes if "between neighbouring" in n]  # its scatter is unknown
+
+
 def test_a_line_that_explains_little_is_doubtful() -> None:
     bent = curve(lambda f: 1e-3 * math.sin(f / 16.0), factors=(1.0, 1.0))
     assert analyze_curve(bent).status == "doubtful"
