@@ -263,7 +263,7 @@ def test_one_level_over_a_measured_zero_has_a_stiffness() -> None:
     [(0.0, ""), (0.1, ""), (1.0, "falls from 87.4 to 57.27 N/mm"), (-0.4, "rises from 106.5 to")],
 )
 def test_a_curve_whose_stiffness_changes_is_told(bend: float, text: str) -> None:
-    """Between levels f and g it is 100 / (1 + bend (f + g) / 200) N/mm; mean of the first and of the
+    """Between levels f and g it is 100 / (1 + bend (f + g) / 200) N/mm; means of the first and the
     last three of nine. A tenth in all is no matter."""
     levels = tuple(10.0 * (k + 1) for k in range(9))
     result = analyze_curve(curve(lambda f: (f + bend * f**2 / 200) / 1e5, levels))
