@@ -80,6 +80,8 @@ def goes_against(data: GapData) -> tuple[str, ...]:
     for i, setup in enumerate(data.setups):
         mine = data.setup == i
         raw, moved = data.force[mine], data.displacement[mine]
+        if not raw.size:
+            continue
         _, first, run = np.unique(data.run[mine], return_index=True, return_inverse=True)
         force, u = (v - (np.bincount(run, v) / np.bincount(run))[run] for v in (raw, moved))
         size = float(np.sqrt((force @ force) * (u @ u)))
