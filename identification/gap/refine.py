@@ -159,6 +159,7 @@ def _friction(word: _Word) -> list[Variant]:
     for s in _places(word.alone, word.beside):
         out += joint_hysteresis.closer(bench, s.variant)
         out += joint_hysteresis.growing(bench, s.variant)
+        out += joint_hysteresis.outlasting(bench, s.variant)
     for s in _places(word.alone, word.beside, joint_hysteresis.hangs):
         out += joint_hysteresis.refined(bench, s.variant)
     return out

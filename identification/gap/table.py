@@ -20,7 +20,7 @@ from identification.gap.imperfection import log_level
 from identification.gap.signs import Limits, log_odds, log_odds_together, padded
 
 _COUNTS = 40.0  # nats below the best: what lies further down adds nothing; limits add four at most
-_NEAR = 12.0  # nats below the best: what is looked at closely
+_NEAR = 8.0  # nats below the best: what is looked at closely
 # Nats by which no variant has been seen to catch up at another level: of 90 diagnoses none changed
 # by 1e-6, with 40 nats one did.
 _HOPELESS = 60.0

@@ -75,14 +75,20 @@ def test_a_specimens_spectrum_has_strengths_between_the_strengths() -> None:
 def test_friction_may_outlast_the_way_to_another_pose() -> None:
     """A knee may: what does not is no reason to call all friction that does a yield."""
     bench = make_bench(arm_data())
-    found = {v.info["memory"]: v for v in library(bench, ["joint_hysteresis"])
-             if v.label.endswith("spectrum that slips")}  # fmt: skip
-    kept, lost = (bench.columns[found[m].columns[4]][: bench.rows.n] for m in ("lasting", ""))
+    lost = next(v for v in library(bench, ["joint_hysteresis"])
+                if v.label == "joint 1 spectrum that slips")  # fmt: skip
+    lasting = joint_hysteresis.outlasting(bench, lost)
+    kept = lasting[1]
+    assert kept.label == "joint 1 lasting spectrum that slips"
+    assert kept.info["memory"] == "lasting"
+    before, after = (bench.columns[v.columns[4]][: bench.rows.n] for v in (lost, kept))
     moved = np.flatnonzero(bench.moved)
     first = slice(0, moved[1])
-    np.testing.assert_array_equal(kept[first], lost[first])
-    assert np.abs(kept - lost)[moved[1] :].max() > 0.1 * np.abs(lost).max()
-    assert_lawful(bench, [found["lasting"]])
+    np.testing.assert_array_equal(after[first], before[first])
+    assert before[moved[1]] == 0  # without load
+    assert abs(after[moved[1]]) > 0.03 * np.abs(before).max()
+    assert_lawful(bench, lasting)
+    assert joint_hysteresis.outlasting(bench_without_arm(), lost) == []
 
 
 @pytest.mark.parametrize("memory", ["", "worked in", "under weight", "rested"])

@@ -65,9 +65,8 @@ OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off 
 
 def variants(bench: Bench) -> list[Variant]:
     """Per joint and memory: kept while the arm stands, from no load or from the weight that came
-    on first; kept on the way to another pose as well, on which what rubs may not turn; lost when
-    the rig is turned to another direction, or in the rest between runs; there from the beginning,
-    of loads like those measured (rigs are cycled before they are measured)."""
+    on first; lost when the rig is turned to another direction, or in the rest between runs; there
+    from the beginning, of loads like those measured (rigs are cycled before they are measured)."""
     if not bench.data.arm and not bench.course.returns:  # pulls show a curve, and no loop
         return []
     out = []
@@ -88,8 +87,6 @@ def _memories(bench: Bench, joint: int) -> dict[str, _How]:
     out: dict[str, _How] = {"": (bench.moved, None, None)}
     if not bench.course.once:
         out[WORKED_IN] = (bench.moved, worked_in(bench.true_torque[:, joint], bench.moved), None)
-    if np.sum(bench.moved) > 1:
-        out[LASTING] = (np.zeros(bench.rows.n, dtype=bool), None, None)
     if np.sum(bench.rebuilt) > np.sum(bench.moved):
         out[SET_UP_ANEW] = (bench.rebuilt, None, None)
     if np.sum(bench.rest) > np.sum(bench.moved):
@@ -157,6 +154,17 @@ def _as_found(bench: Bench, found: Variant) -> tuple[str, _How]:
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
     how = next(h for m, h in _memories(bench, joint).items() if m.strip() == memory)
     return f"joint {joint + 1}{' ' * bool(memory)}{memory}", how
+
+
+def outlasting(bench: Bench, found: Variant) -> list[Variant]:
+    """Spectra of the joint of a friction that was found, kept on the arm's way to another pose as
+    well: what rubs may not turn on it, and a knee may last as long."""
+    if np.sum(bench.moved) < 2:
+        return []
+    joint = int(found.info["joint"])
+    span, never = bench.reach_of(bench.true_torque[:, joint]), np.zeros(bench.rows.n, dtype=bool)
+    finer = _spectra(bench, joint, f"joint {joint + 1}{LASTING}", span, never, None, None)
+    return [replace(v, info={**v.info, "memory": LASTING.strip()}) for v in finer]
 
 
 def growing(bench: Bench, found: Variant) -> list[Variant]:
