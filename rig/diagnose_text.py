@@ -171,7 +171,8 @@ _EACH = 2  # runs that are listed one by one
 
 def _share(value: float) -> str:
     """What is there is more than nothing of the gap."""
-    return f"{value:.0%}" if value >= 0.005 else "less than 1%"
+    text = f"{value:.0%}"
+    return "less than 1%" if text == "0%" else text
 
 
 def _parameters(found: Mapping[str, Parameter]) -> list[str]:

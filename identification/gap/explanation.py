@@ -12,7 +12,7 @@ import numpy as np
 from identification.gap.compare import condition
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
-from identification.gap.imperfection import level_prior
+from identification.gap.imperfection import level_prior, level_priors
 from identification.gap.parts import (
     Part,
     Sizes,
@@ -146,7 +146,7 @@ def explain(
     fraction = float(share @ good / share.sum())
     order = _order(parts, each)
     if taken is not None:
-        log_evidence += mended(engine, parts, taken)
+        log_evidence += mended(engine, parts, taken, bases)
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
     weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
     weight -= within_stated(engine, parts, sizes)
@@ -205,6 +205,5 @@ def up_to_likeliest(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level
     """The same as `conditioned`, at levels up to the likeliest: with an effect more, no more
     imperfection is needed."""
     energy = energies(engine, parts)
-    prior = [level_prior(engine.etas, i, float(e)) for i, e in enumerate(energy)]
-    likeliest = int(np.argmax(log_joints(engine, parts) + np.array(prior)))
+    likeliest = int(np.argmax(log_joints(engine, parts) + level_priors(engine.etas, energy)))
     return conditioned(engine, parts, engine.levels[: likeliest + 1])

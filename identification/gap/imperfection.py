@@ -27,6 +27,11 @@ def level_prior(etas: Array, i: int, energy: float) -> float:
     return float(log_level(etas, i, np.array(energy)))
 
 
+def level_priors(etas: Array, energy: Array) -> Array:
+    """(l,) the same of every level; energy (l,): mean square (m^2) of the explanation at each."""
+    return np.array([level_prior(etas, i, float(e)) for i, e in enumerate(energy)])
+
+
 def log_level(etas: Array, i: int, energy: Array) -> Array:
     """The same for many. Levels are bins of log eta; the lowest takes all below."""
     from scipy.special import ndtr

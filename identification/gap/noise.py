@@ -79,11 +79,15 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     if rows.continuous or imposed:
         stated = float(np.median(per_sample if rows.continuous else fallback))
     white = stated if rows.continuous else scatter_within(data.displacement, hold) or 0.0
-    raised = max(1.0, white / meter.displacement) if data.arm and not imposed else 1.0
+    raised = 1.0
+    if rows.continuous:
+        raised = _raised(data)
+    elif data.arm and not imposed:
+        raised = max(1.0, white / meter.displacement)
     return Noise(
         response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
         hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
-        raised=_raised(data) if rows.continuous else raised,
+        raised=raised,
         swings=_swings(data, rows, hold),
         sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),

@@ -10,7 +10,7 @@ from identification.gap.compare import imperfect, logsumexp, mean_squares
 from identification.gap.data import Array
 from identification.gap.evidence import Engine, Level
 from identification.gap.factor import factor_of
-from identification.gap.imperfection import level_prior
+from identification.gap.imperfection import level_priors
 from identification.gap.signs import Limits, all_kept, log_odds
 from identification.gap.variants import Variant, block
 from identification.gap.words import DRIFTS, LINEAR
@@ -179,17 +179,17 @@ def _energies_each(engine: Engine, parts: tuple[Part, ...]) -> Array:
     return np.asarray(np.add.reduceat(squares, starts, axis=1))
 
 
-def mended(engine: Engine, parts: tuple[Part, ...], taken: float) -> float:
+def mended(engine: Engine, parts: tuple[Part, ...], taken: float, joint: Array) -> float:
     """Nats by which the last part's evidence beside the others is off, if these were taken to have
     a mean square of `taken` (m^2), as without it: what a law tries to do alone is not what it does
-    beside another one, and by that its imperfection is judged."""
-    joint, each = log_joints(engine, parts), _energies_each(engine, parts)
+    beside another one, and by that its imperfection is judged. joint (l,): `log_joints` of all."""
+    each = _energies_each(engine, parts)
     together, alone = each.sum(axis=1), each[:, -1] + taken
     now, before = (
-        [level_prior(engine.etas, i, min(float(e), engine.most)) for i, e in enumerate(energy)]
+        float(logsumexp(joint + level_priors(engine.etas, np.minimum(energy, engine.most))))
         for energy in (together, alone)
     )
-    return float(logsumexp(joint + np.array(now)) - logsumexp(joint + np.array(before)))
+    return now - before
 
 
 def _mean_square(engine: Engine, v: Variant) -> Array:

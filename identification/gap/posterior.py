@@ -14,7 +14,7 @@ from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
-from identification.gap.imperfection import IMPERFECTION, level_prior
+from identification.gap.imperfection import IMPERFECTION, level_priors
 from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Softer
 from identification.gap.parameters import NOT_NEGATIVE, from_zero, parameters
 from identification.gap.parts import Part, energies, log_joints, part_sizes, signs_kept
@@ -312,10 +312,8 @@ def _levels(engine: Engine, explanation: Explanation, prior: float) -> _Weighed:
     """The explanation at every size of imperfection, with its log weight."""
     out = []
     joint, energy = log_joints(engine, explanation.parts), energies(engine, explanation.parts)
-    weights = [
-        prior + joint[i] + level_prior(engine.etas, i, energy[i]) for i in range(len(engine.levels))
-    ]
-    least = max(weights) - _COUNTS
+    weights = prior + joint + level_priors(engine.etas, energy)
+    least = weights.max() - _COUNTS
     for i, (level, weight) in enumerate(zip(engine.levels, weights, strict=True)):
         signs = signs_kept(level, explanation.parts) if weight > least else 0.0
         out.append((replace(explanation, eta=_size(engine, i, energy[i])), float(weight + signs)))

@@ -128,6 +128,8 @@ def test_sample_that_is_told_twice_counts_once(page: Viewer, feed: Feed) -> None
     feed.items += [{"sample": last}, {"sample": {**last, "row": last["row"] + 1}}]
     label = "repetition 3: 31 samples"
     page.wait(lambda: label in page.attribute("curve", "aria-label"), label)
+    time.sleep(0.3)  # all of them have come
+    assert label in page.attribute("curve", "aria-label")
 
 
 def test_whole_run_over_time(page: Viewer) -> None:

@@ -23,7 +23,7 @@ from identification.gap.evidence import (
 from identification.gap.explanation import conditioned
 from identification.gap.finer import LOG_STEP
 from identification.gap.fit import _holds
-from identification.gap.parts import Part, log_joint_between, mended
+from identification.gap.parts import Part, log_joint_between, log_joints, mended
 from identification.gap.priors import prior_of
 from identification.gap.search import _as_stated, search
 from identification.gap.table import Table
@@ -256,7 +256,8 @@ def test_effects_are_as_likely_together_in_whichever_order_they_are_added() -> N
     for one, other in (parts, parts[::-1]):
         levels, energy = conditioned(engine, (one,))
         (scored,) = score(engine, levels, [other.variant], energy)
-        off.append(mended(engine, (one, other), energy))
+        together = log_joints(engine, (one, other))
+        off.append(mended(engine, (one, other), energy, together))
         found.append(scored.log_evidence + off[-1])
     assert found[0] == pytest.approx(found[1], abs=1e-6)
     assert abs(off[0] - off[1]) > 0.1

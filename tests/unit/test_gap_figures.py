@@ -18,10 +18,13 @@ from identification.gap.base import prediction
 from rig import cli
 from rig.dataset import write
 from rig.diagnose import Diagnosis, diagnose
+from rig.diagnose_text import _share
 from rig.gap_figures import change, curve, draw, legs
 from rig.gap_layout import blank, noise_axis
-from rig.gap_map import _cells
+from rig.gap_map import _cells, _lines
 from rig.gap_points import (
+    FALLING,
+    RISING,
     held_table,
     point_table,
     points,
@@ -233,6 +236,33 @@ def test_lines_follow_the_load_step_by_step(slipped: Diagnosis) -> None:
     p = points(slipped.result)
     runs = [np.flatnonzero((p.setup == 1) & (p.run == i)) for i in np.unique(p.run[p.setup == 1])]
     assert [leg.tolist() for leg in legs(p, p.force, 1)] == [run.tolist() for run in runs]
+
+
+@pytest.mark.parametrize(
+    ("sense", "last"),
+    [([RISING, RISING, 0], "x: back at zero"), ([RISING, FALLING, 0], "x: unloading")],
+)
+def test_what_only_came_back_to_zero_was_not_read_while_unloading(
+    sense: list[int], last: str
+) -> None:
+    force, nil = np.array([50.0, 100 if sense[1] == RISING else 40, 0]), np.zeros(3, int)
+    run: Any = SimpleNamespace(setup=nil, run=nil, sense=np.array(sense), force=force)
+    seen: Any = SimpleNamespace(setups=(("", "x"),), setup_name=lambda _: "x")
+    assert [name for name, _ in _lines(seen, run)] == ["x: loading", last]
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0, "less than 1%"),
+        (0.004, "less than 1%"),
+        (0.005, "less than 1%"),
+        (0.006, "1%"),
+        (0.61, "61%"),
+    ],
+)
+def test_what_is_there_is_more_than_nothing_of_the_gap(share: float, text: str) -> None:
+    assert _share(share) == text
 
 
 def test_change_of_the_gap_in_words() -> None:

@@ -43,9 +43,10 @@ from identification.gap.variants import (
 WORD = "joint_hysteresis"
 # Strengths, of the joint's range of torque: near each other at small ones, which slip first. Of an
 # arm no further apart than a tenth, between which loops are chords of smooth ones; a specimen's
-# friction brings a spring of its own, and more strengths won nothing there.
+# friction brings a spring of its own, and more strengths won nothing there at first sight.
 _WEAK = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2)
 RADII = (*_WEAK, 0.27, 0.36, 0.5, 0.7, 1.0)
+# Those of a specimen's closer look: loops of thousands of readings tell them apart.
 BETWEEN = tuple(sorted((*RADII, *((a * b) ** 0.5 for a, b in pairwise(RADII)))))
 ARM_RADII = (*_WEAK, 0.26, 0.33, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
@@ -164,7 +165,11 @@ def outlasting(bench: Bench, found: Variant) -> list[Variant]:
     joint = int(found.info["joint"])
     span, never = bench.reach_of(bench.true_torque[:, joint]), np.zeros(bench.rows.n, dtype=bool)
     finer = _spectra(bench, joint, f"joint {joint + 1}{LASTING}", span, never, None, None)
-    return [replace(v, info={**v.info, "memory": LASTING.strip()}) for v in finer]
+    return _remembering(finer, LASTING)
+
+
+def _remembering(found: list[Variant], memory: str) -> list[Variant]:
+    return [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
 
 
 def growing(bench: Bench, found: Variant) -> list[Variant]:
@@ -209,7 +214,7 @@ def _laws(
     if not bench.course.once:  # a curve that saturates would be taken for friction
         reaches = np.array(REACHES if bench.course.unloads else REACHES[:2])
         found += _exponential(bench, joint, name, reaches, fresh, path, weight)
-    return [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
+    return _remembering(found, memory)
 
 
 def _spectra(
