@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from identification.gap.effects import base_slip, contact_seating, joint_backlash, time_lag
+from identification.gap.effects import base_slip, contact_seating, lost_motion, time_lag
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
 from identification.gap.forms.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
@@ -52,7 +52,7 @@ CONSTANTS: dict[str, Key] = {
     "placed": Key("placed", "text", options=PLACED),
     "zone": Key("zone_Nm", "positive"),
     "crossing": Key("crossing", "text", options=("weight", "load")),
-    "kind": Key("kind", "text", options=joint_backlash.KINDS),
+    "kind": Key("kind", "text", options=(*lost_motion.KINDS, *lost_motion.UNEVEN)),
     "tool": Key("tool_kg"),
     "preload": Key("preload_Nm"),
     "way": Key("kind", "text", options=(*time_lag.KINDS, "window")),

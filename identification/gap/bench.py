@@ -224,7 +224,7 @@ class Bench:
         out = np.empty(layout.size)
         root = np.sqrt(rows.weight) if not rows.continuous else np.ones(rows.n)
         out[: layout.n] = noise.response
-        total = np.sqrt(np.add.reduceat(rows.weight, np.flatnonzero(rows.hold_starts)))
+        total = np.sqrt(np.add.reduceat(rows.weight, rows.edges))
         if layout.q.stop > layout.q.start:
             out[layout.q] = np.concatenate([s / total for s in noise.q])
         if rows.tangential is not None:
@@ -352,14 +352,12 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
 def hold_means(rows: Rows, values: Array) -> Array:
     """Weighted means (holds, k) of values (n, k): joint readings and force across the direction
     are too coarse to tell more of a hold than where it lies."""
-    edges = np.flatnonzero(rows.hold_starts)
-    total = np.add.reduceat(rows.weight, edges)
-    sums = np.add.reduceat(values * rows.weight[:, None], edges, axis=0)
-    return np.asarray(sums / total[:, None])
+    sums = np.add.reduceat(values * rows.weight[:, None], rows.edges, axis=0)
+    return np.asarray(sums / rows.hold_weight[rows.edges, None])
 
 
 def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:
-    n, m, h = rows.n, data.joints, int(rows.hold_starts.sum())
+    n, m, h = rows.n, data.joints, len(rows.edges)
     q = h * m if data.q is not None and data.output_encoder else 0
     t = 0 if rows.tangential is None else 2 * h
     # what is held at no displacement may still be pressed, or pulled

@@ -77,7 +77,7 @@ class Engine:
         self.structural = structural_rms(bench, base, target)
         self.most = _variance(bench)
         n = bench.rows.n
-        self._edges = np.flatnonzero(bench.rows.hold_starts)
+        self._edges = bench.rows.edges
         self._inverse = 1 / self.sigma[:n]
         self._length_u = np.sqrt(np.add.reduceat(self._inverse**2, self._edges))
         self._length_q = 1 / self.sigma[bench.layout.q]

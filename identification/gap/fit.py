@@ -128,7 +128,7 @@ def _phases(engine: Engine) -> list[Flags]:
     if rows.continuous:
         up = rises(np.abs(bench.load))
         return [up, ~up]
-    first = np.flatnonzero(rows.hold_starts)[np.cumsum(rows.hold_starts) - 1]
+    first = rows.edges[np.cumsum(rows.hold_starts) - 1]
     place = np.minimum(np.arange(rows.n) - first, _LATER)
     up = np.abs(bench.load[first]) >= np.abs(bench.load[np.maximum(first - 1, 0)])
     masks = [(place == k) & way for k in range(_LATER + 1) for way in (up, ~up)]

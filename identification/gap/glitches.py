@@ -1,8 +1,9 @@
-"""Single readings of a running recording that jump off and come back: set aside, and said.
+"""Single readings that jump off and come back at once: set aside, and said.
 
 Converters drop a bit, a clamp knocks at a turning point. A handful of such readings, far off beside
 hundreds that follow a law, is no effect of the rig; but where they are most of what a straight line
-leaves, they are the gap, and stay.
+leaves of a running recording, they are the gap, and stay. At rest only what lies between two
+readings of its hold is looked at: the first of a hold may lag.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
-from identification.gap.rows import hold_ids, is_continuous
+from identification.gap.rows import hold_ids, is_continuous, scatter_within
 
 _WINDOW = 25  # readings, in which a typical change is
 _NOISE, _STEPS, _RANGE = 6.0, 3.0, 0.02  # a glitch is off by more than each: standard deviations,
@@ -26,17 +27,51 @@ _FEWEST = 40
 
 def without_glitches(data: GapData) -> GapData:
     """The data without them, and a note that says how many; as they are where there are none."""
-    if data.arm or len(data.force) < _FEWEST or not is_continuous(data, hold_ids(data)):
+    if len(data.force) < _FEWEST:
         return data
-    off = _off(data.force, data.run) | _off(data.displacement, data.run)
-    if not off.any() or off.mean() > _MOST or not _minor(data, off):
+    hold = hold_ids(data)
+    off = _while_running(data) if is_continuous(data, hold) else _at_rest(data, hold)
+    if not off.any():
         return data
     count = int(off.sum())
+    where = f"{data.time[off][0]:.4g} s" if data.timed else f"reading {int(off.argmax()) + 1}"
     note = (
         f"{count} of {len(off)} readings jump off and come back at once: set aside as glitches "
-        f"(the first at {data.time[off][0]:.4g} s). See to cables, converter and clamps."
+        f"(the first at {where}). See to cables, converter and clamps."
     )
     return picked(data, ~off, note)
+
+
+def _while_running(data: GapData) -> Flags:
+    """(n,) those of a running recording."""
+    off = np.zeros(len(data.force), dtype=bool)
+    if data.arm:
+        return off
+    off = _off(data.force, data.run) | _off(data.displacement, data.run)
+    return off & bool(off.mean() <= _MOST and _minor(data, off))
+
+
+def _at_rest(data: GapData, hold: Ints) -> Flags:
+    """(n,) those within holds."""
+    meter = data.instruments
+    off = _off_in_holds(data.force, hold, meter.force)
+    off |= _off_in_holds(data.displacement, hold, meter.displacement)
+    return off & bool(off.mean() <= _MOST_AT_REST)
+
+
+_FAR = 8.0  # standard deviations of what a reading is off the line between its neighbours
+_MOST_AT_REST = 0.01  # of all readings
+
+
+def _off_in_holds(values: Array, hold: Ints, stated: float) -> Flags:
+    """Readings between two of the same hold that agree with each other, but not with it."""
+    noise = max(stated, scatter_within(values, hold) or 0.0)
+    off = np.zeros(len(values), dtype=bool)
+    before, here, after = values[:-2], values[1:-1], values[2:]
+    away = np.abs(here - (before + after) / 2)
+    same = (hold[:-2] == hold[1:-1]) & (hold[2:] == hold[1:-1])
+    off[1:-1] = same & (away > _FAR * 1.5**0.5 * noise) & (np.abs(after - before) < away / 2)
+    return off
 
 
 def _off(values: Array, run: Ints) -> Flags:

@@ -144,7 +144,7 @@ def _stacked_keep(engine: Engine, out: Flags) -> Flags:
     row = ~out | bench.rows.zero
     keep = np.ones(bench.layout.size, dtype=bool)
     keep[:n] = row
-    held = row[np.flatnonzero(bench.rows.hold_starts)]
+    held = row[bench.rows.edges]
     q = bench.layout.q
     keep[q] = np.tile(held, (q.stop - q.start) // max(len(held), 1))
     return keep

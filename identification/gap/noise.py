@@ -54,7 +54,8 @@ class Noise:
     @property
     def misjudged(self) -> bool:
         """Whether what was stated does not explain what the readings do while nothing changes."""
-        return self.raised > NOISY or self.swings > SWINGS
+        known = 1.0 if self.sure else float(np.hypot(1.0, UNSURE))
+        return self.raised > NOISY * known or self.swings > SWINGS
 
 
 def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Noise:
@@ -82,16 +83,37 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     raised = 1.0
     if rows.continuous:
         raised = _raised(data)
-    elif data.arm and not imposed:
-        raised = max(1.0, white / meter.displacement)
+    elif not imposed:
+        follows = scatter_within(data.displacement - float(np.median(slope)) * data.force, hold)
+        raised = max(1.0, min(white, follows or 0.0) / meter.displacement)
+    rounded = 0.0 if rows.continuous or imposed else _rounded(data, hold)
     return Noise(
         response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
-        hold=np.hypot(HOLD_SHARE * stated, common), run=RUN_SHARE * stated, stated=stated,
+        hold=np.hypot(max(HOLD_SHARE * stated, rounded), common), run=RUN_SHARE * stated,
+        stated=stated,
         raised=raised,
         swings=_swings(data, rows, hold),
         sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),
     )  # fmt: skip
+
+
+_ONE_NUMBER = 0.7  # of successive readings of a hold: they scatter by a quarter of the step
+
+
+def _rounded(data: GapData, hold: Ints) -> float:
+    """What all readings of a hold are off by together (m) because the sensor rounds them, and
+    scatters by less than its step: taking more of them tells no more (GUM F.2.2.1). No more than is
+    stated of one; 0 where they scatter."""
+    u, again = data.displacement, np.diff(hold) == 0
+    if again.sum() < ENOUGH or np.mean(np.diff(u)[again] == 0) < _ONE_NUMBER:
+        return 0.0
+    steps = np.diff(np.unique(u))
+    real = steps[steps > _SAME * float(np.ptp(u))]
+    return min(float(real.min(initial=np.inf)) / 12**0.5, data.instruments.displacement)
+
+
+_SAME = 1e-9  # of the range: digits that a conversion of units leaves
 
 
 def _swings(data: GapData, rows: Rows, hold: Ints) -> float:
@@ -135,9 +157,14 @@ def _between_repetitions(data: GapData, rows: Rows) -> float | None:
 
 def _raised(data: GapData) -> float:
     """The larger ratio of what a channel scatters to what is stated of it, at least 1."""
-    meter = data.instruments
-    force = white_noise(data.force) / meter.force
-    return max(1.0, force, white_noise(data.displacement) / meter.displacement)
+    force, displacement = _whites(data)
+    return max(1.0, force / data.instruments.force, displacement / data.instruments.displacement)
+
+
+def _whites(data: GapData) -> tuple[float, float]:
+    """Noise of one sample of force (N) and displacement (m) in a running recording."""
+    force, displacement = data.force, data.displacement
+    return white_noise(force, displacement), white_noise(displacement, force)
 
 
 def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:
@@ -145,8 +172,8 @@ def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:
     that of what is driven times how steeply the answer follows it there. On a plateau of friction,
     or of a metal that flows, a displacement that is driven adds nothing."""
     meter = data.instruments
-    force = max(meter.force, white_noise(data.force))
-    displacement = max(meter.displacement, white_noise(data.displacement))
+    force, displacement = _whites(data)
+    force, displacement = max(meter.force, force), max(meter.displacement, displacement)
     if imposed:
         stiff = _steepness(rows, rows.displacement, rows.measured_force, displacement, 1 / slope)
         return np.asarray(slope * np.hypot(force, stiff * displacement))
@@ -294,19 +321,42 @@ _WHITE = 1.5  # ratio of second differences' variances over two samples and over
 _LEAST_SAMPLES = 300
 
 
-def white_noise(values: Array) -> float:
+def white_noise(values: Array, beside: Array | None = None) -> float:
     """Standard deviation of the white part of a signal that is sampled densely; 0 where second
     differences show how it moves rather than its noise. Of turning points alone, up and down by
-    turns, every second one tells."""
+    turns, every second one tells. beside (n,): what moves with it, and is read at the same moments:
+    where these come unevenly both are off their course together, which is no noise."""
     if len(values) < _LEAST_SAMPLES:
         return 0.0
 
-    def middle(step: int) -> float:
-        second = values[2 * step :] - 2 * values[step:-step] + values[: -2 * step]
-        return float(np.median(np.abs(second))) / 0.6745 / 6**0.5
+    one, two = _size(_second(values, 1)), _size(_second(values, 2))
+    if two >= _WHITE**0.5 * one:
+        return 0.0
+    if beside is None:
+        return min(one, two)
+    second = _second(values, 1)
+    return min(one, two, _size(second - _in_common(second, _second(beside, 1))))
 
-    one, two = middle(1), middle(2)
-    return min(one, two) if two < _WHITE**0.5 * one else 0.0
+
+def _size(second: Array) -> float:
+    """Standard deviation of the noise behind second differences, from their median size."""
+    return float(np.median(np.abs(second))) / 0.6745 / 6**0.5
+
+
+def _second(values: Array, step: int) -> Array:
+    """Second differences over so many samples to either side."""
+    return values[2 * step :] - 2 * values[step:-step] + values[: -2 * step]
+
+
+def _in_common(values: Array, beside: Array) -> Array:
+    """What of values (n,) goes in proportion to others, as most of them do."""
+    sizes = [np.median(np.abs(v)) for v in (values, beside)]
+    usual = (np.abs(values) <= _USUAL * sizes[0]) & (np.abs(beside) <= _USUAL * sizes[1])
+    square = float(beside[usual] @ beside[usual])
+    return beside * (float(beside[usual] @ values[usual]) / square if square > 0 else 0.0)
+
+
+_USUAL = 5.0  # medians of their sizes
 
 
 def tangent(rows: Rows, force_sd: float) -> Array:
@@ -316,7 +366,7 @@ def tangent(rows: Rows, force_sd: float) -> Array:
     force, multiplied by this slope, is an error of the displacement. Steps of force below three
     standard deviations count as that much.
     """
-    start = np.flatnonzero(rows.hold_starts)
+    start = rows.edges
     f = np.add.reduceat(rows.weight * rows.measured_force, start)
     u = np.add.reduceat(rows.weight * rows.displacement, start)
     total = np.add.reduceat(rows.weight, start)

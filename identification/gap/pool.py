@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from hashlib import blake2b
+
+import numpy as np
 
 from identification.gap.data import Array
 
@@ -14,17 +15,19 @@ class Pool:
 
     def __init__(self) -> None:
         self._columns: list[Array] = []
-        self._places: dict[bytes, int] = {}
+        self._places: dict[int, list[int]] = {}
 
     def add(self, column: Array) -> int:
-        """Index of a column, which is put into the pool if it is not there."""
-        # in single precision: what was worked out in another order differs in the last digit; there
-        # are two zeros
-        mark = blake2b((column.astype("f4") + 0.0).tobytes(), digest_size=16).digest()
-        place = self._places.setdefault(mark, len(self))
-        if place == len(self):
-            self._columns.append(column)
-        return place
+        """Index of a column, which is put into the pool if it is not there, in single precision."""
+        # what was worked out in another order differs in the last digit; there are two zeros
+        single = column.astype("f4") + 0.0
+        alike = self._places.setdefault(hash(single.tobytes()), [])
+        for place in alike:
+            if np.array_equal(single, self._columns[place].astype("f4")):
+                return place
+        alike.append(len(self))
+        self._columns.append(column)
+        return alike[-1]
 
     def __getitem__(self, place: int) -> Array:
         return self._columns[place]

@@ -73,6 +73,11 @@ class Rows:
         return len(self.force)
 
     @cached_property
+    def edges(self) -> Ints:
+        """(holds,) first row of every hold."""
+        return np.flatnonzero(self.hold_starts)
+
+    @cached_property
     def _share_of_setup(self) -> Array:
         """(n, s) what each row weighs in the mean of its setup."""
         weight = (
@@ -84,9 +89,8 @@ class Rows:
         """(n,) by how much values (n,) change per second at every row: between the slopes before
         and after it, and beyond the last of a hold, as an exponential goes on; 0 where there are no
         two slopes of one sense, as after a step."""
-        edges = np.flatnonzero(self.hold_starts)
-        first = edges[self.hold]
-        last = np.append(edges[1:], self.n)[self.hold] - 1
+        first = self.edges[self.hold]
+        last = np.append(self.edges[1:], self.n)[self.hold] - 1
         b = np.clip(np.arange(self.n), first + 1, np.maximum(last - 1, first + 1))
         a, b, c = b - 1, np.minimum(b, last), np.minimum(b + 1, last)
         t, v = self.time, values

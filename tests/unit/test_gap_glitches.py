@@ -66,3 +66,28 @@ def test_the_diagnosis_sets_them_aside_and_says_so() -> None:
     found = diagnose_gap(recording(triangle(), force))
     assert found.bench.rows.n == N - 3
     assert any(note.startswith("3 of 300 readings jump off") for note in found.notes)
+
+
+def resting(spikes: dict[int, float], n: int = 30) -> GapData:
+    """Levels of eight readings, on a spring as simulated."""
+    step = np.repeat(np.arange(n) % 6, 8)
+    draw = np.random.default_rng(5)
+    u = 20.0 * step / 1e5 + 1e-6 * draw.standard_normal(len(step))
+    for at, size in spikes.items():
+        u[at] += size
+    return bench_data(20.0 * step, u, step=step, branch=np.where(step > 0, 1, 0))
+
+
+def test_a_reading_at_rest_that_jumps_off_is_set_aside() -> None:
+    kept = without_glitches(resting({84: 30e-6, 140: -20e-6}))
+    assert len(kept.force) == 8 * N // 10 - 2
+    assert kept.notes[0].startswith("2 of 240 readings jump off")
+    assert diagnose_gap(resting({84: 30e-6})).verdict == "none"  # one that is off is no effect
+
+
+def test_first_readings_of_a_level_and_spells_stay() -> None:
+    first = {80: 30e-6, 96: 30e-6}  # what lags
+    assert not without_glitches(resting(first)).notes
+    assert not without_glitches(resting({84: 30e-6, 85: 30e-6})).notes  # it stayed there
+    assert not without_glitches(resting(dict.fromkeys(range(3, 240, 72), 60e-6))).notes  # 1.7%
+    assert not without_glitches(resting({84: 6e-6})).notes  # noise does that

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from identification.gap.bench import Bench, make_bench
-from identification.gap.effects import library
+from identification.gap.effects import joint_backlash, library, lost_motion
 from identification.gap.forms import Form, Law, Term, describe, realise
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
@@ -71,6 +71,15 @@ def test_every_shape_of_the_library_survives_the_file(bench: Bench, word: str) -
 def test_shapes_of_a_bench_that_is_pulled_survive_the_file() -> None:
     for word in ("contact_seating", "joint_yield", "joint_creep"):
         assert_survives(pulled("displacement"), word)
+
+
+def test_plays_whose_one_end_is_softer_survive_the_file(bench: Bench) -> None:
+    """They are looked for beside a play that was found only."""
+    fresh = replace(bench, columns=Pool())
+    found = next(v for v in library(fresh, ("joint_backlash",)) if v.info["kind"] == "soft")
+    finer = joint_backlash.uneven(fresh, found)
+    assert {v.info["kind"] for v in finer} == set(lost_motion.UNEVEN)
+    survive(fresh, {v.info["kind"]: v for v in finer}.values())
 
 
 def assert_survives(bench: Bench, word: str) -> None:

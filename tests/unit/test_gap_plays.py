@@ -11,8 +11,9 @@ from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import score
 from identification.gap.data import Array
-from identification.gap.effects import joint_backlash, library
+from identification.gap.effects import joint_backlash, library, lost_motion
 from identification.gap.effects.joint_backlash import TOOLS_KG
+from identification.gap.effects.lost_motion import Play
 from identification.gap.evidence import Engine
 from identification.gap.forms.friction import _net, describe_backlash
 from identification.gap.refine import refine
@@ -24,7 +25,7 @@ from tests.unit.test_gap_weights import UP, hanging
 
 def closed_in(bench: Bench, x: Array, zone: float) -> Variant:
     """What the search finds of a play of 0.4 mrad, of that zone (Nm), passed where x (n,) is 0."""
-    play = bench.joint_column(0, 4e-4 * joint_backlash._shapes(bench, x, zone)["free"][0])
+    play = bench.joint_column(0, 4e-4 * Play(bench, x, zone).place("free"))
     variants = library(bench, ["joint_backlash"])
     base, target = base_columns(bench), bench.observed - prediction(bench)
     engine = Engine(bench, base, target + play, np.array([0.0, 1e-7, 2.5e-7]))
@@ -67,14 +68,14 @@ def test_a_joint_lies_in_its_play_where_the_push_before_left_it() -> None:
     there = make_bench(arm_data())
     x = there.true_torque[:, 0]  # of the pushes along y
     zone = 0.02 * float(np.abs(x).max())
-    shapes = joint_backlash._shapes(there, x, zone)
+    play = Play(there, x, zone)
     turned = np.flatnonzero(there.rebuilt & ~there.moved)
     for k in np.flatnonzero(there.rebuilt):
-        assert shapes["friction"][0][k] == pytest.approx(0.0, abs=0.01)
-        left = 0.0 if there.moved[k] else shapes["kept"][0][k - 1]
-        assert shapes["kept"][0][k] == pytest.approx(left, abs=0.01)  # noise of the force
+        assert play.place("friction")[k] == pytest.approx(0.0, abs=0.01)
+        left = 0.0 if there.moved[k] else play.place("kept")[k - 1]
+        assert play.place("kept")[k] == pytest.approx(left, abs=0.01)  # noise of the force
     assert len(turned) == 2
-    assert np.abs(shapes["kept"][0][turned]).max() > 0.4
+    assert np.abs(play.place("kept")[turned]).max() > 0.4
 
 
 def test_the_tool_is_found_to_a_few_grams_where_a_narrow_play_crosses() -> None:
@@ -110,7 +111,7 @@ def test_zones_of_a_play_are_closed_in_on_where_no_tool_can_be_wrong() -> None:
         assert len(zones) == 7
         assert zones[3] == pytest.approx(found.info["zone_Nm"])
         kinds = {v.info["kind"] for v in finer}
-        beside = {"free", "soft", "slow", "arctan", *joint_backlash.KEPT}
+        beside = {"free", "soft", "slow", "arctan", *lost_motion.KEPT}
         assert kinds == (beside if close > 0.1 else {"free"})
         spans.append(zones[-1] / zones[0])
     assert spans[0] == pytest.approx(2.25)
@@ -118,7 +119,7 @@ def test_zones_of_a_play_are_closed_in_on_where_no_tool_can_be_wrong() -> None:
     assert 1.03 < spans[-1] < 1.15  # not so near as masses
     # nobody looked for uneven ends before: from scratch
     first = joint_backlash.uneven(bench, found)
-    assert {v.info["kind"] for v in first} == set(joint_backlash.UNEVEN)
+    assert {v.info["kind"] for v in first} == set(lost_motion.UNEVEN)
     zones = sorted({v.info["zone_Nm"] for v in first})
     assert zones[-1] / zones[0] == pytest.approx(0.07 / 0.004)
     closer = joint_backlash.uneven(bench, first[0], joint_backlash.CLOSE[-1])
@@ -130,7 +131,7 @@ def test_zones_of_a_play_are_closed_in_on_where_no_tool_can_be_wrong() -> None:
 def test_a_play_with_long_flanks_is_taken_up_slowly() -> None:
     bench = hanging(UP)
     x = np.resize([1.0, 10.0, -10.0], bench.rows.n)
-    shape = joint_backlash._shapes(bench, x, 1.0)["arctan"][0]
+    shape = Play(bench, x, 1.0).place("arctan")
     far = np.arctan(10) / np.pi
     assert shape[:3] == pytest.approx([0.25, far, -far])
 

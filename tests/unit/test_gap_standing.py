@@ -31,6 +31,21 @@ def test_noise_of_turning_points_alone_is_told_by_every_second_one() -> None:
     assert white_noise(peaks + rng.normal(0, 1e-3, 400)) == pytest.approx(1e-3, rel=0.2)
 
 
+def test_readings_that_come_unevenly_are_no_noise() -> None:
+    """Force and displacement are read together, so both are off their course together."""
+    rng = np.random.default_rng(6)
+    at = 0.5 * np.arange(1200) + rng.uniform(-0.15, 0.15, 1200)
+    course = 400 * np.abs((at / 40) % 2 - 1)
+    force = course + rng.normal(0, 0.1, 1200)
+    u = course / SPRING + rng.normal(0, 1e-6, 1200)
+    assert white_noise(force) > 0.7
+    assert white_noise(force, u) == pytest.approx(0.1 * 2**0.5, rel=0.3)  # and what u adds to it
+    assert white_noise(u, force) == pytest.approx(1e-6 * 2**0.5, rel=0.3)
+    assert make_bench(running(force, u, imposed="force")).noise.raised < 2.0
+    still = rng.normal(0, 1e-3, 1200)
+    assert white_noise(still, rng.normal(0, 5.0, 1200)) == pytest.approx(1e-3, rel=0.1)
+
+
 def test_the_time_between_samples_is_that_within_a_hold_or_that_of_most_rows() -> None:
     force = 100 * triangle(60, 3)
     hold = np.arange(60) // 3
@@ -46,6 +61,18 @@ def test_an_understated_uncertainty_is_raised_to_what_the_samples_show() -> None
     force = 100 * triangle(3000, 3)
     data = running(force, force / SPRING + rng.normal(0, 5e-6, 3000), imposed="force")
     assert make_bench(data).noise.stated == pytest.approx(5e-6, rel=0.25)  # 1e-6 was stated
+
+
+@pytest.mark.parametrize(("times", "verdict"), [(1.0, "none"), (5.0, "none"), (9.0, "unknown")])
+def test_levels_that_shake_more_than_stated_are_not_explained(times: float, verdict: str) -> None:
+    """What is stated of a bench is known to a factor of two, and three times that is too much."""
+    rng, step = np.random.default_rng(7), np.repeat(np.tile([0, 1, 2, 3, 2, 1, 0], 3), 12)
+    force = 30.0 * step
+    off = rng.normal(0, 1e-6 * times, len(step))
+    data = bench_data(force, force / SPRING + off, step=step, branch=np.where(step > 0, 1, 0))
+    found = diagnose_gap(replace(data, imposed="force"))
+    assert found.verdict == verdict
+    assert any("times as much as stated" in n for n in found.notes) == (times > 3)
 
 
 @pytest.mark.parametrize(("times", "verdict"), [(1.0, "none"), (10.0, "unknown")])

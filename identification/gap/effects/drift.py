@@ -11,6 +11,7 @@ from identification.gap.data import Array
 from identification.gap.variants import Variant, variant
 
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
+_SEEN = 3  # rows within the time constant
 # Pieces of a free smooth path: slower than a run, as slow as an air conditioner's swing. In a
 # recording that runs on and on three passes of the load tell what comes again, and every further
 # one bears three pieces; where nothing is loaded, nothing tells a quick path from other events.
@@ -20,11 +21,22 @@ LONG_PIECES, RESTING_PIECES, LEAST_PIECES = 40, 20, 4
 
 def warm_ups(bench: Bench) -> dict[str, Array]:
     """Named paths (n,), 0 at the start, about 1 at the end: line, exponentials, root of time."""
-    t = (bench.rows.session - bench.rows.session.min()) / bench.course.session_span
+    t = _clock(bench)
     out = {"linear": t, "root": np.sqrt(t)}
     for share in RATES:
         out[f"T {share:g}"] = (1 - np.exp(-t / share)) / (1 - np.exp(-1 / share))
     return out
+
+
+def rates(bench: Bench) -> list[Array]:
+    """The line and the exponentials (n,) of which several rates at once are made."""
+    return [path for label, path in warm_ups(bench).items() if label != "root"]
+
+
+def _clock(bench: Bench) -> Array:
+    """(n,) 0 to 1: share of the session that is over."""
+    session = bench.rows.session
+    return np.asarray((session - session.min()) / bench.course.session_span)
 
 
 def by_direction(bench: Bench) -> dict[str, Array]:
@@ -44,8 +56,11 @@ def own_clock(bench: Bench) -> bool:
 
 def paths(bench: Bench) -> dict[str, Array]:
     """Named paths that a drift may take here: where it can't be told from a curve of the load,
-    only the straight line, and seldom (SMALL); none in one running pull or cycle."""
-    every = warm_ups(bench)
+    only the straight line, and seldom (SMALL); none in one running pull or cycle. What is over
+    before it was read a few times is no path, but a reading that is off."""
+    t = _clock(bench)
+    over = {f"T {share:g}" for share in RATES if np.sum(t < share) < _SEEN}
+    every = {label: path for label, path in warm_ups(bench).items() if label not in over}
     if own_clock(bench):
         return every
     return {} if bench.rows.continuous else {"linear": every["linear"]}
@@ -108,9 +123,8 @@ def free_paths(bench: Bench) -> dict[str, FreePath]:
 
 def free_path(bench: Bench, pieces: int) -> Array:
     """Hat functions (n, pieces) over the session; with correlated coefficients a smooth path."""
-    t = (bench.rows.session - bench.rows.session.min()) / bench.course.session_span
     at = np.linspace(0, 1, pieces)
-    return np.asarray(np.maximum(0.0, 1 - np.abs(t[:, None] - at) * (pieces - 1)))
+    return np.asarray(np.maximum(0.0, 1 - np.abs(_clock(bench)[:, None] - at) * (pieces - 1)))
 
 
 def free_variant(

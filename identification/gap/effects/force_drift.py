@@ -20,6 +20,7 @@ from identification.gap.effects.drift import (
     free_paths,
     free_variant,
     paths,
+    rates,
     shares,
 )
 from identification.gap.variants import Variant, variant
@@ -41,10 +42,9 @@ def variants(bench: Bench) -> list[Variant]:
     def column(path: Array) -> int:
         return bench.add(drifting(bench, _tared(bench, path)))
 
-    out, common = [], {}
+    out = []
     for label, path in paths(bench).items():
-        common[label] = column(path)
-        out.append(variant(WORD, label, [common[label]], scales, positive=False, path=label,
+        out.append(variant(WORD, label, [column(path)], scales, positive=False, path=label,
                            names=("",)))  # fmt: skip
         if len(axes) > 1:
             each = [bench.add(component(bench, axis, path)) for axis in axes.values()]
@@ -54,8 +54,8 @@ def variants(bench: Bench) -> list[Variant]:
     free = free_paths(bench)
     if not free:
         return out
-    rates = [c for label, c in common.items() if label != "root"]
-    out.append(variant(WORD, "rates", rates, scales, positive=False, prior=2.0, path="rates",
+    every = [column(path) for path in rates(bench)]
+    out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
     for label, way in free.items():
         columns = [column(hat) for hat in free_path(bench, way.pieces).T]

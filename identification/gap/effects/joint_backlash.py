@@ -29,15 +29,11 @@ import numpy as np
 
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effects.lost_motion import KEPT, KINDS, SOFTER, UNEVEN, Play
 from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
-KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
-_SOFTER = 2.5  # of soft ends one than the other
-UNEVEN = {"softer up": (_SOFTER, 1.0), "softer down": (1.0, _SOFTER)}
-_LOOSE = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "arctan")
-KINDS = (*_LOOSE, "rubbing", *KEPT)
 PLACED = ("gap", "held", "dragged")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
 _REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow")
@@ -152,7 +148,7 @@ def unreached(bench: Bench, variant: Variant) -> float:
         return 0.0
     x = net(bench, int(info["joint"]), str(info["crossing"]), float(info["tool_kg"]),
             float(info["preload_Nm"]))  # fmt: skip
-    place = _shapes(bench, x, float(info["zone_Nm"]))[info["kind"]][0]
+    place = Play(bench, x, float(info["zone_Nm"])).place(info["kind"])
     left = [0.5 - float(place.max()), 0.5 + float(place.min())]
     return sum(v for v in left if v < _VISITED or info["kind"] in HELD)
 
@@ -177,7 +173,7 @@ def uneven(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     if kind in UNEVEN:
         return _finer(bench, found, tuple(UNEVEN) if close >= CLOSE[0] else (kind,), close)
     span = bench.reach_of(bench.true_torque[:, int(found.info["joint"])])
-    return _finer(bench, found, tuple(UNEVEN), close, np.array(ZONES) / _SOFTER * span)
+    return _finer(bench, found, tuple(UNEVEN), close, np.array(ZONES) / SOFTER * span)
 
 
 def _finer(
@@ -194,7 +190,7 @@ def _finer(
         ratios = np.array([1 / 1.5, 1.0, 1.5]) if weighty else np.geomspace(1 / 1.5, 1.5, 7)
         zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
         # what changes over more of the range is a curved spring
-        widest = ZONES[-1] / (_SOFTER if kinds[0] in UNEVEN else 1.0) * bench.reach_of(torque)
+        widest = ZONES[-1] / (SOFTER if kinds[0] in UNEVEN else 1.0) * bench.reach_of(torque)
         zones = np.unique(np.minimum(zones, widest))
     out: list[Variant] = []
     share = _FINE_PRIOR / (1 + len(CLOSE)) / (len(kg) * len(Nm) * len(zones) * len(kinds))
@@ -237,9 +233,14 @@ def _zone(
     j, width, out = int(info["joint"]), float(info["zone_Nm"]), []
     floating = _floating(bench, j, np.abs(x) < width, places)
     resting = _resting(bench, j, places)
-    shapes = _shapes(bench, x, width)
+    play = Play(bench, x, width)
+    rubs: dict[bool, int] = {}
     for kind in kinds:
-        columns = [bench.add_joint(j, bench.sense * part) for part in shapes[kind]]
+        columns = [bench.add_joint(j, bench.sense * play.place(kind))]
+        kept = kind in KEPT
+        if kept not in rubs:
+            rubs[kept] = bench.add_joint(j, bench.sense * play.rub(kind))
+        columns.append(rubs[kept])
         rests = kind in HELD or bool(info.get("closely"))
         columns += floating if kind not in HELD else []
         columns += resting if rests else []
@@ -272,43 +273,6 @@ def _crosses(net: Array, torque: Array) -> bool:
     """Whether the net torque comes to zero, or near it (weights are known to a few percent)."""
     margin = 0.05 * float(np.abs(net - torque).max()) + 0.02 * float(np.abs(torque).max())
     return bool(net.min() < margin and net.max() > -margin)
-
-
-def _shapes(bench: Bench, x: Array, zone: float) -> dict[str, list[Array]]:
-    """Per kind: the play itself, and the friction beside it; anew in every setup, as the free
-    places are, or kept while the arm stands, whichever way it is pushed next."""
-    state = bench.plays(x, zone * np.array([1.0, 3.0, 0.7, 0.5]), bench.rebuilt)
-    kept = bench.plays(x, zone * np.array([1.0, 0.5]), bench.moved)
-    rub = -(x - state[:, 0]) / (2 * zone)
-    return {
-        "free": [np.tanh(x / zone) / 2, rub],
-        "friction": [np.clip(state[:, 0] / zone, -1, 1) / 2, rub],
-        "friction 1/2": [np.clip(state[:, 3] / zone, -1, 1) / 2, rub],
-        "friction 3": [np.tanh(state[:, 1] / zone) / 2, rub],
-        "soft": [_ends(x, zone, zone), rub],
-        "slow": [x / (np.abs(x) + zone) / 2, rub],
-        "arctan": [np.arctan(x / zone) / np.pi, rub],
-        "rubbing": [np.tanh(state[:, 2] / zone) / 2, rub],
-        "kept": [np.clip(kept[:, 0] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
-        "kept 1/2": [np.clip(kept[:, 1] / zone, -1, 1) / 2, -(x - kept[:, 0]) / (2 * zone)],
-        "jumps": [_side(x, zone, bench.moved) / 2, -(x - kept[:, 0]) / (2 * zone)],
-        **{kind: [_ends(x, up * zone, down * zone), rub] for kind, (up, down) in UNEVEN.items()},
-    }
-
-
-def _ends(x: Array, up: float, down: float) -> Array:
-    """(n,) -1/2 to 1/2: place in the play under the net torque x (n,), its ends soft over these."""
-    return np.where(x > 0, -np.expm1(-np.maximum(x, 0) / up), np.expm1(np.minimum(x, 0) / down)) / 2
-
-
-def _side(x: Array, zone: float, fresh: Flags) -> Array:
-    """(n,) -1 or 1: the side of its play to which the net torque x (n,) last pushed a joint that
-    friction of the zone's strength holds there; 0, its middle, until it is pushed after fresh."""
-    pushed = np.abs(x) > zone
-    knows = pushed | fresh
-    knows[0] = True
-    last = np.maximum.accumulate(np.where(knows, np.arange(len(x)), 0))
-    return np.where(pushed[last], np.sign(x[last]), 0.0)
 
 
 def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[int]]) -> list[int]:

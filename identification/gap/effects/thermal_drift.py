@@ -20,6 +20,7 @@ from identification.gap.effects.drift import (
     free_paths,
     free_variant,
     paths,
+    rates,
     shares,
 )
 from identification.gap.variants import Variant, variant
@@ -32,16 +33,14 @@ def variants(bench: Bench) -> list[Variant]:
     """Paths times directions."""
     scales = tuple(s * bench.reach for s in shares(bench, SHARES))
     named, masks = zip(*by_direction(bench).items(), strict=True)
-    out, rates = [], []
+    out = []
     for label, path in {**paths(bench), **_temperatures(bench)}.items():
         columns = [bench.add(bench.outside_column(m * path)) for m in masks]
         out.append(variant(WORD, label, columns, scales, positive=False, path=label, names=named))
-        if label.startswith("T ") or label == "linear":
-            rates.append(columns)
     free = free_paths(bench)
     if not free:
         return out
-    every = [c for columns in zip(*rates, strict=True) for c in columns]
+    every = [bench.add(bench.outside_column(m * path)) for m in masks for path in rates(bench)]
     out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
                        names=named))  # fmt: skip
     for label, way in free.items():

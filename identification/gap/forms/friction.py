@@ -7,6 +7,7 @@ import numpy as np
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effects import joint_backlash, joint_hysteresis
+from identification.gap.effects.lost_motion import Play
 from identification.gap.flanks import Flanks, shapes
 from identification.gap.forms.law import (
     ACROSS,
@@ -121,7 +122,8 @@ def backlash(bench: Bench, law: Law) -> list[Array]:
         places = Flanks(c["kind"], c["centre"], c["zone"], c["corner"], c["friction"])
         shape = list(shapes(bench, x, places))
     else:
-        shape = joint_backlash._shapes(bench, x, c["zone"])[c["kind"]]
+        play = Play(bench, x, c["zone"])
+        shape = [play.place(c["kind"]), play.rub(c["kind"])]
     parts = {"width": bench.sense * shape[0], "rub": bench.sense * shape[1], "compliance": x}
     rests = joint_backlash.resting_columns(bench, joint)
     names = [(s.pose, s.direction) for s in bench.data.setups]
