@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.gap.compare import Scored, logsumexp, score
 from identification.gap.data import Array
+from identification.gap.effects.base_slip import ACROSS, slides
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
@@ -161,10 +162,12 @@ class _Shapes:
 
 
 def _named(variant: Variant) -> str:
-    """The joint or axis that a variant sits at."""
+    """The joint, or the axis of the base's motion, that a variant sits at."""
     info = variant.info
     if "joint" in info:
         return f"joint {info['joint'] + 1}"
+    if slides(info):
+        return f"sliding along {ACROSS[info['axis']]}"
     return f"axis {info['axis']}" if "axis" in info else ""
 
 

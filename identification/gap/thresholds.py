@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.gap.bench import TOOL_SD_KG, Bench
 from identification.gap.data import Array
-from identification.gap.effects.base_slip import BETWEEN_M
+from identification.gap.effects.base_slip import BETWEEN_M, SLIDES_M, slides
 from identification.gap.interval import TWO_SIDED, Found, Parameter, normal
 from identification.gap.parts import Part
 
@@ -27,7 +27,7 @@ def torque_unit(bench: Bench) -> str:
 
 def of_knee(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Threshold, of an arm the push where it is met, slope beyond and flow time of `joint_yield`
-    and `base_slip`."""
+    and `base_slip`; of a stand that slides the force across at which it does."""
     info = part.variant.info
     if info.get("other_springs"):
         found = found.without_line(int(info["joint"]))
@@ -41,7 +41,10 @@ def of_knee(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
     if bench.imposed and not bench.data.arm:
         threshold = _carried(threshold, *found.of_spring(int(info["joint"])))
-    out = _with_weight(bench, part, _about_an_axis(bench, part, threshold))
+    if slides(info):
+        out = {"threshold_of_force": _over(threshold, SLIDES_M)}
+    else:
+        out = _with_weight(bench, part, _about_an_axis(bench, part, threshold))
     if bench.data.arm:
         met = out.get("threshold_of_load", threshold)
         out |= _onsets(bench, np.asarray(info["load"]), met)

@@ -13,6 +13,7 @@ from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import base_slip, joint_yield, library
 from identification.gap.refine import refine
 from identification.gap.variants import Variant, place_of
+from tests.conformance.gap_designs import linear
 from tests.unit.test_gap_closer import assert_lawful, engine_with
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_running import SPRING, running
@@ -62,6 +63,26 @@ def test_the_axis_of_a_slip_is_looked_for_between_the_depths_of_the_grid() -> No
     best = max(score(engine, engine.levels, [*variants, *finer]), key=lambda s: s.log_evidence)
     assert (best.variant.info["axis"], best.variant.info["depth_m"]) == ("x", 0.35)
     assert_lawful(bench, [best.variant])
+
+
+def test_a_stand_that_slides_is_told_by_the_force_across() -> None:
+    """Beyond 0.6 of the largest push along x, in both poses; until the arm goes to another one."""
+    data = linear("rich")
+    across = np.array([s.unit_vector[0] for s in data.setups])[data.setup]
+    poses = [s.pose for s in data.setups]
+    at, slid, state, pose = 0.6 * float(np.abs(across * data.force).max()), [], 0.0, ""
+    for force, setup in zip(across * data.force, data.setup, strict=True):
+        if poses[setup] != pose:
+            state, pose = 0.0, poses[setup]
+        state = min(max(state, force - at), force + at)
+        slid.append(state)
+    moved = 5e-7 * across * np.array(slid)
+    found = diagnose_gap(replace(data, displacement=data.displacement + moved))
+    (effect,) = found.effects
+    assert effect.name == "base_slip"
+    assert effect.places["sliding along x"] > 0.9
+    assert effect.parameters["threshold_of_force"].value == pytest.approx(at, rel=0.05)
+    assert "threshold" not in effect.parameters
 
 
 def test_what_is_far_worse_beside_the_best_is_not_looked_at_again() -> None:

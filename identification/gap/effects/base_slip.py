@@ -1,6 +1,7 @@
 """The mounting slips above a threshold moment: knee and remaining displacement that the encoders
 do not see. The same knees as `joint_yield`, on the moment about yaw or tilt axes: a stand tips over
-an edge, along an axis of the base or between two of them.
+an edge, along an axis of the base or between two of them; or it slides, which is to turn about an
+axis far below.
 
 The slope beyond the threshold is a compliance of 1e-6 to 1e-3 rad/Nm.
 
@@ -11,7 +12,7 @@ Source: Coulomb friction in the bolted joint of the mounting, effective radius a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,9 @@ AXES: dict[str, tuple[float, float, float]] = {
 # is found.
 DEPTHS_M = (0.0, 0.7)
 BETWEEN_M = (0.175, 0.35, 0.525)
+# An axis so far below that the stand slides rather than tips: to a hundredth the moment about it is
+# the force across, times this.
+SLIDES_M, ACROSS = 20.0, {"y": "x", "x": "y"}  # axis: the way it slides
 # m/N at the target beyond the threshold, which the scales of the knees (0.07 to 56) multiply: on a
 # lever of 0.75 m 0.5e-6 to 4e-4 rad/Nm. Said of the target, not of the moment: axes at several
 # depths whose moments run in proportion have the same knees then, and need not be told apart.
@@ -47,6 +51,13 @@ def places() -> Iterator[tuple[str, float]]:
     for axis in AXES:
         for depth in (0.0,) if axis == "z" else DEPTHS_M:
             yield axis, depth
+    for axis in ACROSS:
+        yield axis, SLIDES_M
+
+
+def slides(info: Mapping[str, Any]) -> bool:
+    """Whether a shape of this word is of a stand that slides."""
+    return float(info.get("depth_m", 0.0)) >= SLIDES_M
 
 
 def lever_of(bench: Bench, axis: str, depth: float) -> Array:
