@@ -69,6 +69,7 @@ CONSTANTS: dict[str, Key] = {
     "about_angles": Key("about_angles_rad", "six"),
     "about_turn": Key("about_turn_rad", "vector"),
     "reads": Key("displacement_read_over_true", "positive"),
+    "only_in": Key("only_in_pose", "text"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
 }
 SHAPES: dict[str, Key] = {
@@ -97,6 +98,7 @@ SHAPES: dict[str, Key] = {
     "power": Key("power_of_load", "positive"),
     "drags_over": Key("drags_over_N", "positive"),
     "at_response": Key("at_mm", "positive", factor=1e3),
+    "above": Key("above_mm", "positive", factor=1e3),
     "time_constant": Key("time_constant_s", "positive"),
     "at": Key("at_s"),
     "sensor": Key("sensor", "text", options=("mean", "1", "2", "3", "4", "5", "6")),
@@ -134,7 +136,8 @@ for _name, _unit in _DRIFTS.items():
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
 
 
-MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent", "placed", "forgets")
+MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent", "placed", "forgets",
+                  "only_in")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -215,11 +218,13 @@ GRAMMAR: dict[str, Grammar] = {
         + tuple(("gives", ("along", *more)) for more in _GOES),
     ),
     "pose_error": Grammar(
-        ("about", "about_offset", "about_angles", "about_turn", "reads"),
+        ("about", "about_offset", "about_angles", "about_turn", "reads", "only_in"),
         (("offset", ("axis",)), ("angle", ("joint",)), ("turn", ("axis",))),
     ),
-    "force_scale": Grammar(("about",), (("gain", ()), ("gain", ("at_load",)))),
-    "displacement_scale": Grammar((), (("gain", ()), ("gain", ("at_response",)))),
+    "force_scale": Grammar(("about",), (("gain", ()), ("gain", ("at_load",)), ("gain", ("axis",)))),
+    "displacement_scale": Grammar(
+        (), (("gain", ()), ("gain", ("at_response",)), ("gain", ("above",)))
+    ),
     "time_lag": Grammar(("channel", "way", "lag"), (("share", ()),)),
     "force_drift": Grammar(
         ("path", "quantity", "about"),

@@ -147,12 +147,16 @@ def _stiffness(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 _BENT = 0.75  # slope of the straight line of least squares through zero of x |x|, 0 to 1
 
 
-def _gain(bench: Bench, _: Part, found: Found) -> dict[str, Parameter]:
+def _gain(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Read over true. The columns are shares of what was read, but for an imposed displacement.
-    Of a gain that bends, the straight line of least squares."""
-    g = found.linear(np.array([1.0, _BENT])[: len(found.w)], "1")
+    Of a gain that bends or changes, the straight line of least squares; of one component's gain,
+    with its name."""
+    share = part.variant.info.get("share")
+    more = _BENT if share is None else 1 - 1.5 * share + 0.5 * share**3
+    g = found.linear(np.array([1.0, more])[: len(found.w)], "1")
     ends = [1 + v if bench.imposed else 1 / max(1 - v, 0.02) for v in (g.value, g.low, g.high)]
-    return {"factor": Parameter(ends[0], ends[1], ends[2], "1")}
+    of = part.variant.info.get("component")
+    return {f"factor_{of}" if of else "factor": Parameter(ends[0], ends[1], ends[2], "1")}
 
 
 def _links(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:

@@ -189,7 +189,7 @@ def _curves(word: _Word) -> list[Variant]:
 def _poses(word: _Word) -> list[Variant]:
     """Where arm and tool are, by what is found alone and beside the words that explain most of
     what that leaves: a second effect must not decide it."""
-    engine, kinds = word.engine, {str(s.variant.info["kind"]): s for s in reversed(word.alone)}
+    engine, kinds = word.engine, {_kind(s.variant): s for s in reversed(word.alone)}
     finer = [
         f
         for s in kinds.values()
@@ -204,11 +204,16 @@ def _poses(word: _Word) -> list[Variant]:
     for name in sorted(found, key=lambda w: -marginal(found[w]))[:_BESIDE]:
         other = closest(found[name])
         estimate = partial(_estimate, engine, beside=(Part(other.variant, other.scale),))
-        again = pose_error.refined(engine.bench, kinds[best.variant.info["kind"]].variant, estimate)
+        again = pose_error.refined(engine.bench, kinds[_kind(best.variant)].variant, estimate)
         finer += [replace(v, label=f"{v.label} beside {name}") for v in again]
-    same = [v for v in finer if v.info["kind"] == best.variant.info["kind"]]
+    same = [v for v in finer if _kind(v) == _kind(best.variant)]
     share = best.variant.prior / len(same)  # they are one place, looked at more than once
     return [replace(v, prior=share) if v in same else v for v in finer]
+
+
+def _kind(variant: Variant) -> tuple[str, str]:
+    """What stands elsewhere, and in which pose only."""
+    return str(variant.info["kind"]), str(variant.info["pose"])
 
 
 _BESIDE = 2  # words

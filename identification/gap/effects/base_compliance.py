@@ -34,7 +34,8 @@ DEPTHS_M = (
 )  # of tilt axes below the base: flange, table, floor
 COUPLED = 0.6  # sd of what couples two axes, against that of their own compliances
 SCALES = (3e-7, 1e-6, 3e-6, 1e-5)  # rad/Nm
-BENDS_AT = (0.12, 0.3, 0.55)  # of the largest moment: where feet stiffen, or bolts let go
+# Of the largest moment: where feet stiffen, or bolts let go.
+BENDS_AT = (0.1, 0.2, 0.3, 0.42, 0.55, 0.7)
 BENDS = 0.6  # of the compliance without a moment: what it changes by there
 
 

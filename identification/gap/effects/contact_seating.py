@@ -3,7 +3,7 @@
 The same function of the force in every direction and pose, ever flatter: `d (1 - exp(-F/F0))`,
 `d F / (F + F0)`, `d log(1 + F/F0)` of rough faces whose asperities take up the load one after the
 other, `d F^(2/3)` of a ball on a plate (Hertz 1881), or a gap that closes on a weak spring at F0;
-unseen by encoders, 2 to 100 um.
+or several faces one after the other; unseen by encoders, 2 to 100 um.
 
 Size: 2 to 100 um; 0.3 to 10 % of the deflection.
 Prior: depth positive, sd out of SHARES, equally likely; force scales and laws equally likely.
@@ -25,6 +25,7 @@ FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
 # A bench has no second direction that would tell a seat from a curved spring: only low forces.
 BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
 BENCH_SHARES = (0.01, 0.03, 0.1)
+STEPS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45)  # of it, between which several faces seat
 HERTZ_AT = 0.1  # of the largest force: where its scale is put
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8)  # of an imposed stroke
 SEATS = (0.08, 0.16, 0.25, 0.35, 0.5, 0.7)  # of the stroke beyond a slack
@@ -77,7 +78,21 @@ def variants(bench: Bench) -> list[Variant]:
             laws=tuple(("exponential", s * top) for s in forces),
         )
     )
+    if bench.data.arm:
+        out.append(_one_after_the_other(bench, [s * top for s in STEPS], scales))
     return [*out, *_slacks(bench)]
+
+
+def _one_after_the_other(bench: Bench, forces: list[float], scales: tuple[float, ...]) -> Variant:
+    """Faces that seat between one force (N) and the next, each by a depth of its own: any depth
+    that only grows. In terms of slacks, of which a step is one less a share of the one before."""
+    columns = [_seated(bench, "slack", f, scales).columns[0] for f in forces]
+    edges = np.array([0.0, *forces])
+    wide = np.diff(edges)
+    root = np.diag(edges[1:] / wide) - np.diag(edges[1:-1] / wide[1:], 1)
+    grows = np.asarray(np.linalg.inv(root))
+    return variant(WORD, "one after the other", columns, scales, root, within=grows,
+                   force_N=forces[0], laws=tuple(("slack", f) for f in forces))  # fmt: skip
 
 
 def _seated(

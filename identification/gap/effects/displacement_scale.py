@@ -1,9 +1,10 @@
 """Gain of the laser is off (tilt, wrong range): every direction by one factor, encoders disagree.
 
-A target tilted by 20 degrees reads 6 % off; a wrong range 20 %. Triangulation bends over its range.
+A target tilted by 20 degrees reads 6 % off; a wrong range 20 %. Triangulation bends over its range,
+and a sensor that changes its range has two gains.
 
 Size: 1 % (10 degrees of tilt: 1.5 %) to 20 %.
-Prior: either sign, sd out of SCALES, equally likely; a third of it on a gain that bends.
+Prior: either sign, sd out of SCALES, equally likely; half of it on a gain that bends or changes.
 Source: cosine of the target's tilt; neighbouring ranges of laser sensors; their linearity.
 """
 
@@ -12,10 +13,12 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.data import Array
 from identification.gap.effects.force_scale import BENDS, SCALES
 from identification.gap.variants import Variant, variant
 
 WORD = "displacement_scale"
+CHANGES_AT = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85)  # of the largest reading
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -28,4 +31,18 @@ def variants(bench: Bench) -> list[Variant]:
         bend = bench.add(bench.outside_column(line * np.abs(line) / top))
         out.append(variant(WORD, "gain that bends", [straight, bend], SCALES, BENDS,
                            positive=False, prior=0.5, full=top))  # fmt: skip
+        out += [_of_two_ranges(bench, straight, share, top) for share in CHANGES_AT]
     return out
+
+
+def _of_two_ranges(bench: Bench, straight: int, share: float, top: float) -> Variant:
+    """Beyond a share of the largest reading (m) the gain is another one."""
+    beyond = bench.add(bench.outside_column(above(bench.line, share * top)))
+    prior = 0.5 / len(CHANGES_AT)
+    return variant(WORD, f"gain that changes at {share:g}", [straight, beyond], SCALES,
+                   positive=False, prior=prior, above=share * top, share=share)  # fmt: skip
+
+
+def above(read: Array, least: float) -> Array:
+    """(n,) what of readings (n,), of either sign, lies above the least one."""
+    return np.asarray(np.sign(read) * np.maximum(np.abs(read) - least, 0.0))

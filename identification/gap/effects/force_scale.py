@@ -1,10 +1,12 @@
-"""Gain of the force chain is off: every direction and pose by the same factor; encoders too.
+"""Gain of the force chain is off: every direction and pose by the same factor; encoders too. Or
+that of one component, whose amplifier is set wrongly: directions that it does not read are right.
 
 Wrong sensitivity or range of a charge amplifier: 2 to 20 %. The gain may bend a little over the
 range, as amplifiers and load cells do.
 
 Size: 2 to 20 %.
-Prior: either sign, sd out of SCALES, equally likely; a third of it on a gain that bends.
+Prior: either sign, sd out of SCALES, equally likely; a third of it on a gain that bends, a fifth as
+much as on one gain on that of each component.
 Source: tolerances and neighbouring ranges of charge amplifiers; their linearity in data sheets.
 """
 
@@ -30,7 +32,31 @@ def variants(bench: Bench) -> list[Variant]:
         bend = bench.add(shown(bench, bench.load * np.abs(bench.load) / top))
         out.append(variant(WORD, "gain that bends", [straight, bend], SCALES, BENDS,
                            positive=False, prior=0.5, full=top))  # fmt: skip
-    return out
+    return out + [_of_one(bench, axis) for axis in _loaded(bench)]
+
+
+def _loaded(bench: Bench) -> list[int]:
+    """Components of the force of which one may be off while others are right: each that some
+    setup loads, and not every one."""
+    units = np.stack([s.unit_vector for s in bench.data.setups])
+    return [a for a in range(3) if np.any(units[:, a]) and not np.all(units[:, a])]
+
+
+def _of_one(bench: Bench, axis: int) -> Variant:
+    """Every component has an amplifier of its own."""
+    column = bench.add(component(bench, axis))
+    return variant(WORD, f"gain of {'xyz'[axis]}", [column], SCALES, positive=False, prior=0.2,
+                   component="xyz"[axis])  # fmt: skip
+
+
+def component(bench: Bench, axis: int) -> Array:
+    """(size,): what a share of one component of the readings does that is too much: of a push
+    askew to it what it has along the push, and across."""
+    setups = bench.data.setups
+    along = np.array([s.unit_vector[axis] for s in setups])[bench.rows.setup]
+    across = np.stack([s.tangents[:, axis] for s in setups])[bench.rows.setup]
+    read = along * bench.load
+    return shown(bench, along * read) + bench.stacked(tangential=across * read[:, None])
 
 
 def shown(bench: Bench, excess: Array) -> Array:

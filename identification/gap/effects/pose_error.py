@@ -8,7 +8,7 @@ degrees, of the base 1 to 15.
 
 Size: tools 5 to 300 mm off, joints 0.2 to 5 degrees, the base 1 to 15 degrees.
 Prior: either sign, sd out of OFFSETS_M, ANGLES_RAD or TURNS_RAD, equally likely; half of it on a
-base that is turned.
+base that is turned, and on joints that stand elsewhere in one pose only.
 Source: wrong tool frames, zero positions of joints, bases and rigs lined up by eye.
 """
 
@@ -47,6 +47,20 @@ def variants(bench: Bench) -> list[Variant]:
     columns = [bench.add(c) for c in turned(bench, np.zeros(3), bench.compliance)]
     for size in TURNS_RAD:
         out.append(_variant(f"base {size:g} rad", columns, [size] * 3, 0.5, "base"))
+    return out + _in_one_pose(bench)
+
+
+def _in_one_pose(bench: Bench) -> list[Variant]:
+    """Joints that stand elsewhere in one of several poses only: one that was taken wrongly."""
+    poses = list(dict.fromkeys(s.pose for s in bench.data.setups))
+    at, joints, out = (np.zeros(3), np.zeros(bench.data.joints)), bench.data.joints, []
+    for pose in poses if len(poses) > 1 else []:
+        there = secants(bench, *at, bench.compliance, pose=pose)[3:]
+        columns = [bench.add(c) for c in there]
+        for size in ANGLES_RAD:
+            label, prior = f"joints {size:g} rad in {pose}", 0.5 / len(poses)
+            found = _variant(label, columns, [size] * joints, prior, "joints")
+            out.append(replace(found, info={**found.info, "pose": pose}))
     return out
 
 
@@ -69,7 +83,7 @@ def refined(bench: Bench, found: Variant, estimate: Callable[[Variant], Estimate
         if kind == "base":
             used = turned(bench, turn, compliance, reads)
         else:
-            columns = secants(bench, offset, angles, compliance, reads)
+            columns = secants(bench, offset, angles, compliance, reads, str(found.info["pose"]))
             used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
         out = replace(
             found, label=f"{found.label}, as they are", prior=3.0,
@@ -90,8 +104,9 @@ class Estimate(NamedTuple):
 
 
 def secants(
-    bench: Bench, offset: Array, angles: Array, compliance: Array, reads: float = 1.0
-) -> list[Array]:
+    bench: Bench, offset: Array, angles: Array, compliance: Array, reads: float = 1.0,
+    pose: str = "",
+) -> list[Array]:  # fmt: skip
     """Stacked columns per metre of tool offset (3) and radian of each joint that stands elsewhere.
 
     With levers l + dl the target moves by `c ((l + dl)^2 - l^2) F = 2 c (l + dl/2) dl F`: linear in
@@ -106,12 +121,15 @@ def secants(
         bent = np.broadcast_to(s.bent_lever, (m, m, m))
         shifts.append(s.offset_lever + 0.5 * np.einsum("ijk,j->ik", across, angles))
         turns.append(s.turned_lever + 0.5 * (bent @ angles + across @ offset))
-    moved, swung = np.stack(shifts)[bench.rows.setup], np.stack(turns)[bench.rows.setup]
+    there = np.array([pose in ("", s.pose) for s in setups], dtype=float)[bench.rows.setup]
+    moved, swung = (
+        np.stack(each)[bench.rows.setup] * there[:, None, None] for each in (shifts, turns)
+    )
     middle = reads * (bench.lever + 0.5 * (moved @ offset + swung @ angles))
     out = _through(bench, np.concatenate([moved, swung], axis=2), middle, compliance)
     for j in range(m):
         q = np.zeros((bench.rows.n, m))
-        q[:, j] = 1.0
+        q[:, j] = there
         out[3 + j] = out[3 + j] + bench.stacked(q=q)
     return out
 
@@ -149,4 +167,5 @@ def _variant(
     return variant(
         WORD, label, columns, (1.0,), np.diag(sizes), positive=False, prior=prior, kind=kind,
         offset_m=np.zeros(3), angles_rad=np.zeros(6), turn_rad=np.zeros(3), reads=1.0,
+        pose="",
     )  # fmt: skip

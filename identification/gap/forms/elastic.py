@@ -240,12 +240,14 @@ def describe_pose(bench: Bench, v: Variant) -> tuple[Law, Array]:
         terms += [Term("angle", {"joint": j}) for j in range(bench.data.joints)]
     if v.info["kind"] == "base":
         terms = [Term("turn", {"axis": a}) for a in "xyz"]
-    about = {
+    about: dict[str, Any] = {
         "about_offset": _triple(v.info["offset_m"]),
         "about_angles": tuple(float(a) for a in v.info["angles_rad"]),
         "about_turn": _triple(v.info["turn_rad"]),
         "reads": float(v.info["reads"]),
     }
+    if v.info["pose"]:
+        about["only_in"] = str(v.info["pose"])
     return Law(about, tuple(terms)), np.ones(len(terms))
 
 
@@ -253,7 +255,8 @@ def pose(bench: Bench, law: Law) -> list[Array]:
     """Change of the levers, by the secants of the library."""
     at = np.array(law.constants["about_offset"]), np.array(law.constants["about_angles"])
     reads = float(law.constants["reads"])
-    moved = pose_error.secants(bench, *at, bench.compliance, reads)
+    pose = str(law.constants.get("only_in", ""))
+    moved = pose_error.secants(bench, *at, bench.compliance, reads, pose)
     about = np.array(law.constants.get("about_turn", (0.0, 0.0, 0.0)))
     turned = pose_error.turned(bench, about, bench.compliance, reads)
     columns = {"offset": moved[:3], "angle": moved[3:], "turn": turned}

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects import force_drift, force_scale, time_lag
+from identification.gap.effects import displacement_scale, force_drift, force_scale, time_lag
 from identification.gap.effects.drift import RATES
 from identification.gap.forms.law import Law, Term, along
 from identification.gap.variants import Variant
@@ -14,16 +14,25 @@ from identification.gap.variants import Variant
 
 def describe_gain(_: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: the share of what is shown that is too much, `1 - 1 / gain`; where it bends, that
-    which comes on top in proportion to the reading."""
+    which comes on top in proportion to the reading, or to what of it lies above a range."""
+    if "component" in v.info:
+        return Law({}, (Term("gain", {"axis": str(v.info["component"])}),)), np.ones(1)
     if len(v.columns) == 1:
         return Law({}, (Term("gain"),)), np.ones(1)
+    if "above" in v.info:
+        return Law({}, (Term("gain"), Term("gain", {"above": float(v.info["above"])}))), np.ones(2)
     of = "at_load" if v.word == "force_scale" else "at_response"
     return Law({}, (Term("gain"), Term("gain", {of: float(v.info["full"])}))), np.ones(2)
 
 
 def force_gain(bench: Bench, law: Law) -> list[Array]:
     """Less force than read deflects less."""
-    return [force_scale.shown(bench, _bent(bench.load, t, "at_load")) for t in law.terms]
+    return [
+        force_scale.component(bench, "xyz".index(t.shape["axis"]))
+        if "axis" in t.shape
+        else force_scale.shown(bench, _bent(bench.load, t, "at_load"))
+        for t in law.terms
+    ]
 
 
 def displacement_gain(bench: Bench, law: Law) -> list[Array]:
@@ -32,6 +41,8 @@ def displacement_gain(bench: Bench, law: Law) -> list[Array]:
 
 
 def _bent(read: Array, term: Term, of: str) -> Array:
+    if "above" in term.shape:
+        return displacement_scale.above(read, term.shape["above"])
     return read * np.abs(read) / term.shape[of] if of in term.shape else read
 
 

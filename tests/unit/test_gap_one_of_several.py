@@ -1,0 +1,85 @@
+"""What is wrong in one component, in one pose, or seats face by face, and mountings that open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.arm import tool_offset
+from identification.gap.bench import make_bench
+from identification.gap.data import GapData
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.effects import library
+from identification.gap.effects.base_compliance import bent_column, moments
+from rig.model import load_robot
+from tests.conformance.gap_designs import TCP_MM, TRUE, Array, Q, linear
+
+
+def of_each(data: GapData, values: list[Array] | list[float]) -> Array:
+    """What belongs to its setup, for every sample."""
+    return np.asarray(values)[data.setup]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_gain_of_one_component_is_no_gain_of_all(axis: int) -> None:
+    data = linear("rich")
+    reads = of_each(data, [1.12 if s.unit_vector[axis] else 1.0 for s in data.setups])
+    found = diagnose_gap(replace(data, force=reads * data.force))
+    assert found.names == ("force_scale",)
+    factor = found.effects[0].parameters[f"factor_{'xyz'[axis]}"]
+    assert factor.low < 1.12 < factor.high
+
+
+def test_an_arm_that_stands_elsewhere_in_one_pose_only() -> None:
+    """By 2 degrees in the shoulder, as the reading shows as well."""
+    data, off, arm = linear("rich"), np.zeros(6), load_robot("ur10e")
+    off[1] = 0.035
+    there = np.array([s.pose == "P2" for s in data.setups])
+    jacobian = arm.jacobian(np.array(Q["P2"]) + off, tool_offset(np.array(TCP_MM) * 1e-3))[:3]
+    lever = of_each(data, [s.lever for s in data.setups])
+    true = of_each(data, [jacobian.T @ s.unit_vector if p else s.lever
+                          for s, p in zip(data.setups, there, strict=True)])  # fmt: skip
+    torque = true * data.force[:, None]
+    moved = (true * torque - lever**2 * data.force[:, None]) @ (1 / TRUE)
+    assert data.q is not None
+    q = data.q + (torque - lever * data.force[:, None]) / TRUE + np.outer(there[data.setup], off)
+    found = diagnose_gap(replace(data, displacement=data.displacement + moved, q=q))
+    assert found.verdict == "pose_error"
+    angle = found.effects[0].parameters["angle_joint2"]
+    assert angle.value == pytest.approx(0.035, rel=0.05)
+    assert "in P2, as they are" in found.effects[0].label
+
+
+def test_faces_that_seat_one_after_the_other() -> None:
+    data = linear("rich")
+    push = np.abs(data.force)
+    depth = 2e-5 * (1 - np.exp(-push / 6)) + 5e-5 / (1 + np.exp(-(push - 34) / 3))
+    found = diagnose_gap(
+        replace(data, displacement=data.displacement + depth * np.sign(data.force))
+    )
+    assert found.names == ("contact_seating",)
+    assert found.effects[0].parameters["depth"].value == pytest.approx(70e-3, rel=0.1)  # mm
+
+
+def test_a_plate_may_open_anywhere() -> None:
+    """Bends of the library's come near to one between them."""
+    bench = make_bench(linear("rich"))
+    m = moments(bench, 0.0)
+    feet = next(v for v in library(bench, ["base_compliance"]) if v.label.endswith("on feet"))
+    columns = np.array([bench.columns[c] for c in feet.columns])
+    axis = int(feet.info["axes"][0])
+    top = float(np.abs(m[:, axis] * bench.load).max())
+    for share in (0.15, 0.36, 0.48, 0.62):
+        opened = bent_column(bench, m[:, axis], share * top)
+        left = opened - columns.T @ np.linalg.lstsq(columns.T, opened, rcond=None)[0]
+        assert np.linalg.norm(left) < 0.06 * np.linalg.norm(opened)
+
+
+def test_a_laser_that_changes_its_range_has_two_gains() -> None:
+    data = linear("rich")
+    beyond = np.sign(data.displacement) * np.maximum(np.abs(data.displacement) - 0.8e-3, 0.0)
+    found = diagnose_gap(replace(data, displacement=data.displacement + 0.15 * beyond))
+    assert found.verdict == "displacement_scale"
+    assert found.effects[0].label.startswith("gain that changes at")
