@@ -137,13 +137,15 @@ def _stiffness(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
             change += found.softer.value[j]
             variance += found.softer.variance[j] + 2 * float(found.softer.cross[j][i])
             stated = float(bench.data.compliance_relative_sd[j])
-        whole = max(1 + change, 0.02)
-        spread = np.exp(TWO_SIDED * float(np.hypot(max(variance, 0.0) ** 0.5 / whole, stated)))
+        whole = max(1 + change, _LEAST)
+        nats = TWO_SIDED * float(np.hypot(max(variance, 0.0) ** 0.5 / whole, stated))
+        spread = np.exp(min(nats, -np.log(_LEAST)))
         value = whole if bench.imposed else 1 / whole
         out[f"factor_joint{j + 1}"] = Parameter(value, value / spread, value * spread, "1")
     return out
 
 
+_LEAST = 1e-6  # of what is simulated: less is not told from nothing
 _BENT = 0.75  # slope of the straight line of least squares through zero of x |x|, 0 to 1
 
 
@@ -154,7 +156,7 @@ def _gain(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     share = part.variant.info.get("share")
     more = _BENT if share is None else 1 - 1.5 * share + 0.5 * share**3
     g = found.linear(np.array([1.0, more])[: len(found.w)], "1")
-    ends = [1 + v if bench.imposed else 1 / max(1 - v, 0.02) for v in (g.value, g.low, g.high)]
+    ends = [1 + v if bench.imposed else 1 / max(1 - v, _LEAST) for v in (g.value, g.low, g.high)]
     of = part.variant.info.get("component")
     return {f"factor_{of}" if of else "factor": Parameter(ends[0], ends[1], ends[2], "1")}
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import score
 from identification.gap.data import GapData
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence import Engine
 from identification.gap.forms import about_springs, law_of, rows_of
@@ -17,6 +19,8 @@ from identification.gap.pool import Pool
 from identification.gap.refine import refine
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_operators import bench_data
+from tests.unit.test_gap_running import SPRING
 
 SOFTER = np.array([1.25, 0.8, 1.2, 0.85, 1.1, 1.0])
 
@@ -87,3 +91,20 @@ def test_every_component_of_the_force_that_is_recorded_drifts() -> None:
 
     assert names(data) == {("",), ("x", "y", "z")}
     assert names(replace(data, tangential=None)) == {("",)}
+
+
+@pytest.mark.parametrize("times", [200.0, 1 / 200])
+def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
+    """Stiffness 200 times what is simulated, or a 200th of it: no factor ends at a bound."""
+    step = np.tile(np.repeat(np.arange(9), 4), 3)
+    u, run = 20.0 * step / SPRING / times, np.arange(len(step)) // 36
+    noise = 1e-3 * float(u.max())
+    read = u + np.random.default_rng(0).normal(0, noise, len(u))
+    data = bench_data(20.0 * step, read, step=step, branch=np.where(step > 0, 1, 0),
+                      repetition=1 + run, run=run, imposed="force")  # fmt: skip
+    data = replace(data, instruments=replace(data.instruments, displacement=noise))
+    (effect,) = diagnose_gap(data).effects
+    key, told = ("factor_joint1", times) if times > 1 else ("factor", 1 / times)
+    factor = effect.parameters[key]
+    assert factor.value == pytest.approx(told, rel=0.1)
+    assert factor.low < told < factor.high
