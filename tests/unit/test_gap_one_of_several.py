@@ -83,3 +83,24 @@ def test_a_laser_that_changes_its_range_has_two_gains() -> None:
     found = diagnose_gap(replace(data, displacement=data.displacement + 0.15 * beyond))
     assert found.verdict == "displacement_scale"
     assert found.effects[0].label.startswith("gain that changes at")
+
+
+def test_a_joint_that_hardens_alike_in_both_senses_gives_way_to_new_loads_only() -> None:
+    """Whichever way they push: what had been borne before is borne again (isotropic hardening)."""
+    data = linear("rich")
+    lever = of_each(data, [s.lever for s in data.setups])[:, 0]
+    torque, most, at = lever * data.force, 0.0, 15.0
+    flowed, so_far, pose = [], 0.0, ""
+    for t, setup in zip(torque, data.setup, strict=True):
+        if data.setups[setup].pose != pose:
+            most, so_far, pose = 0.0, 0.0, data.setups[setup].pose
+        if abs(t) > max(most, at):
+            so_far += np.sign(t) * (abs(t) - max(most, at))
+            most = abs(t)
+        flowed.append(so_far)
+    give = np.array(flowed) / TRUE[0]
+    assert data.q is not None
+    q = data.q + np.outer(give, np.eye(6)[0])
+    found = diagnose_gap(replace(data, displacement=data.displacement + lever * give, q=q))
+    assert found.verdict == "joint_yield"
+    assert found.where.joints == (1,)

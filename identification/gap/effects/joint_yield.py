@@ -206,15 +206,16 @@ def _hardened(
     name: str,
     info: dict[str, Any],
 ) -> list[Variant]:
-    """Metal that hardens alike in both senses (Voce 1948) and is pulled, or pressed, again and
-    again: it yields on only beyond the largest load it has seen, under a tip from the first load
-    on (said of loads that come back before they grow, and of what is not taken back by a long way:
-    a single loop may be friction). Benches alone."""
+    """What hardens alike in both senses (Voce 1948) and is loaded again and again: it yields on
+    only beyond the largest load it has borne. Specimens from one side, under a tip from the first
+    load on (said of loads that come back before they grow, and of what is not taken back by a long
+    way: a single loop may be friction); joints of an arm, whichever way they are pushed next."""
     top = float(np.abs(load).max())
-    if bench.data.arm or not bench.course.lets_go or not bench.course.one_sided:
+    one_sided = bench.course.lets_go and bench.course.one_sided
+    if not (one_sided or (bench.data.arm and bench.course.unloads)):
         return []
     size = np.abs(load)
-    if (
+    if not bench.data.arm and (
         way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top
         or bench.course.left_behind > _LEFT
     ):
@@ -236,13 +237,14 @@ def _hardened(
 
 def grown(load: Array, radius: Array, fresh: Flags) -> Array:
     """(n, k): by how much the size of the load (n,) has ever been beyond the radii (k,) since the
-    memory was fresh, with the load's sign."""
+    memory was fresh; each time with the sign that the load then had."""
     out = np.empty((len(load), len(radius)))
     edges = np.append(np.flatnonzero(fresh | (np.arange(len(load)) == 0)), len(load))
-    sign = 1.0 if load.max() >= -load.min() else -1.0
     for a, b in pairwise(edges):
-        largest = np.maximum.accumulate(np.maximum(sign * load[a:b], 0.0))
-        out[a:b] = sign * np.maximum(largest[:, None] - radius, 0.0)
+        largest = np.maximum.accumulate(np.abs(load[a:b]))
+        beyond = np.maximum(largest[:, None] - radius, 0.0)
+        grows = np.diff(beyond, axis=0, prepend=0.0)
+        out[a:b] = np.cumsum(np.sign(load[a:b])[:, None] * grows, axis=0)
     return out
 
 
