@@ -18,7 +18,7 @@ from identification.joints import identify as estimate
 from identification.levels import grid_of
 from identification.next_poses import Criterion, Plan, Proposal, propose
 from identification.stiffness import Stiffness, analyze_curve
-from rig.dataset import Dataset, load
+from rig.dataset import Dataset, load_each
 from rig.errors import InputError
 from rig.model import load_model, load_robot
 from rig.reduce import curves
@@ -114,7 +114,7 @@ def identify(
     """
     if not paths:
         raise InputError("rig identify: give at least one data set.")
-    datasets = [load(Path(p)) for p in paths]
+    datasets = load_each([Path(p) for p in paths])
     names = [str(p) for p in paths]
     arm = _arm(datasets, names)
     prior = prior or Prior(
