@@ -205,7 +205,9 @@ def _direction(d: Direction) -> dict[str, Any]:
             }
             for p in r.pointwise
         ],
-        "excluded": [{"step": e.step, "reason": e.reason} for e in r.excluded],
+        "excluded": [
+            {"step": e.step, "reason": e.reason, "repetition": e.repetition} for e in r.excluded
+        ],
         "knee": _knee(r.knee),
         "hysteresis": _hysteresis(r),
         "budget": [_contribution(c) for c in r.budget],

@@ -190,6 +190,30 @@ def test_contradictory_sets_are_named(files: Path) -> None:
         assert words in message
 
 
+@pytest.mark.parametrize("encoder", ["motor", "output"])
+def test_a_repetition_that_was_cut_short_is_as_if_not_measured(
+    tmp_path: Path, encoder: str
+) -> None:
+    made = measure(one_pose(encoder), PAPER_C, 8)
+    c = made.columns
+    third = (c["direction"] == "x") & (c["repetition"] == 3)
+    for name, kept in {"cut": ~third | (c["step"] <= 3), "without": ~third}.items():
+        columns = {n: values[kept] for n, values in c.items()}
+        write(replace(made, columns=columns), tmp_path / f"{name}.h5")
+    cut, without = (
+        identify([tmp_path / f"{n}.h5"], proposals=0, joint_readings=False)
+        for n in ("cut", "without")
+    )
+    np.testing.assert_allclose(cut.fit.stiffness, without.fit.stiffness)
+    np.testing.assert_allclose(cut.fit.relative_sd, without.fit.relative_sd)
+    seen, alike = (identify([tmp_path / f"{n}.h5"], proposals=0) for n in ("cut", "without"))
+    np.testing.assert_allclose(seen.fit.stiffness, alike.fit.stiffness, rtol=5e-5)
+    assert any(
+        "direction x: repetition 3 ended at " in n and n.endswith(" N: left out of the mean.")
+        for n in seen.notes
+    )
+
+
 def test_a_data_set_counts_once(files: Path, tmp_path: Path) -> None:
     single, copy = files / "single.h5", tmp_path / "copy.h5"
     copy.write_bytes(single.read_bytes())
