@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.dataset import Dataset, Origin, write
-from rig.errors import InputError, did_you_mean
+from rig.errors import InputError, close_to, did_you_mean
 from rig.journal import journal_path
 from rig.meta import Meta
 from rig.software import software_version
@@ -171,6 +171,11 @@ class _Table:
             bad = np.flatnonzero(~np.isfinite(values))
             if len(bad):
                 raise self._cell(file, block, column.name, bad[0], "every row needs a finite value")
+        bad = np.flatnonzero(np.abs(values) > column.largest)
+        if len(bad):
+            limit = f"{column.largest:.0f} {column.unit}"
+            what = f"allowed: -{limit} to {limit}"
+            raise self._cell(file, block, column.name, bad[0], what, " Is the unit right?")
         if column.kind == "flag":
             bad = np.flatnonzero(~np.isin(values, (0.0, 1.0)))
             if len(bad):
@@ -197,13 +202,13 @@ class _Table:
         if not len(bad):
             return words
         word = str(words[bad[0]])
+        hint = did_you_mean(word, known) if word and known != [""] else ""
         if column.name == "branch":
-            what = f"allowed: {', '.join(BRANCHES)}"
+            what, hint = f"allowed: {', '.join(BRANCHES)}", close_to(word, known)
         elif self._meta.robot == "none" and column.name == "pose":
             what = f"robot: none in {self._meta_name} has no poses; remove the column"
         else:
             what = f"{self._meta_name} does not define it"
-        hint = did_you_mean(word, known) if word and known != [""] else ""
         raise self._cell(file, block, column.name, bad[0], what, hint)
 
     def _known_words(self, name: str) -> list[str]:
