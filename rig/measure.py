@@ -32,7 +32,7 @@ from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
 from rig.runner import Runner
 from rig.software import software_version
 from rig.station import Station, load_station, parse_station
-from rig.storage.files import check_folder
+from rig.storage.files import check_ending, check_folder
 
 if TYPE_CHECKING:
     from rig.panel.link import PanelOptions
@@ -76,7 +76,7 @@ def measure(
         station = _at_speed(station, speed)
     plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
     path = output or default_output(protocol_file)
-    _refuse_existing(path)
+    _check_output(path)
     start = {
         "uuid": str(uuid.uuid4()),
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -131,7 +131,8 @@ def default_output(protocol_file: Path) -> Path:
     return Path(f"{protocol_file.stem}_{datetime.now():%Y%m%d-%H%M%S}.h5")
 
 
-def _refuse_existing(path: Path) -> None:
+def _check_output(path: Path) -> None:
+    check_ending(path)
     if path.exists() or journal_path(path).exists():
         raise InputError(
             f"{path}: exists already, and measurements are never overwritten. "

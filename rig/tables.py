@@ -28,7 +28,7 @@ from rig.storage.columns import (
     unit_of,
 )
 from rig.storage.csvblocks import Block, CsvFile, close_match
-from rig.storage.files import in_place_of
+from rig.storage.files import check_ending, in_place_of
 from rig.terminal import Progress, silent
 from rig.yamlfile import read_document
 
@@ -67,6 +67,7 @@ def _check_target(out: Path) -> None:
     """Imported data sets may be made anew; measurements are never written over."""
     from rig.storage.hdf5read import holds_import
 
+    check_ending(out)
     if journal_path(out).exists():
         raise InputError(f"{out}: a measurement is under way there (journal). Choose another name.")
     if out.exists() and not holds_import(out):

@@ -322,6 +322,18 @@ def test_missing_files(tmp_path: Path) -> None:
         import_table(tmp_path, tmp_path / "META.yaml")
 
 
+@pytest.mark.parametrize("name", ["z.csv", "z", "z.h5.bak"])
+def test_a_data_set_is_named_as_one(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError) as caught:
+        bring(tmp_path, TABLE, out=tmp_path / name)
+    assert str(caught.value) == (
+        f"{tmp_path / name}: a data set is an HDF5 file; allowed endings: .h5, .hdf5. "
+        f"Choose another name with -o, such as {'z.h5.h5' if 'bak' in name else 'z.h5'}."
+    )
+    assert not (tmp_path / name).exists()
+    bring(tmp_path, TABLE, out=tmp_path / "Z.HDF5")
+
+
 def test_measurements_are_never_written_over(tmp_path: Path) -> None:
     out = tmp_path / "run.h5"
     write(example.dataset(), out)
