@@ -399,6 +399,15 @@ def test_diagnose_gives_the_contracts_json(rig: Rig, files: Path) -> None:
     assert "joint_yield" in err
 
 
+def test_what_cannot_become_a_model_is_said_before_the_work(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    status, out, err = rig("diagnose", "d.h5", "--write-model", "found.yaml")
+    assert (status, out) == (2, "")  # no result: nothing was diagnosed
+    assert err == (
+        "d.h5: robot: none. A model file holds an arm; write the diagnosis with --json.\n"
+    )
+
+
 def test_diagnose_takes_the_stiffnesses_of_a_model_of_the_same_robot(rig: Rig, files: Path) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     model = str(HOME / "data" / "models" / "F1.yaml")
