@@ -187,7 +187,7 @@ def test_what_has_no_model_file_is_refused(
     bench = replace(dataset, meta=dataset.meta.model_copy(update={"robot": "none"}))
     with pytest.raises(InputError, match=r"robot: none\. A model file holds an arm"):
         model_text(diagnosis, bench)
-    with pytest.raises(InputError, match="another simulator's curves.*Leave --simulation out"):
+    with pytest.raises(InputError, match=r"another simulator's curves.*Leave --simulation out"):
         check_writable(dataset, others=True)
     with pytest.raises(InputError, match="cannot be written"):
         write_model(diagnosis, dataset, tmp_path / "nowhere" / "m.yaml")
