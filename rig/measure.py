@@ -255,7 +255,8 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     except DeviceError as error:
         reason = str(error)
         recorder.event("device_failed", reason, device=error.device)
-        rig.loader.notify(f"{reason} {UNLOAD}", "error")
+        # Fault and remedy follow as the command's last word, once the data are safe.
+        rig.loader.notify(f"The {error.device} has failed. {UNLOAD}", "error")
         raise
     except KeyboardInterrupt:
         reason = "interrupted"
