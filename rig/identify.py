@@ -19,6 +19,7 @@ from identification.levels import grid_of
 from identification.next_poses import Criterion, Plan, Proposal, propose
 from identification.stiffness import Stiffness, analyze_curve
 from rig.dataset import Dataset, load_each
+from rig.digits import counted
 from rig.errors import InputError
 from rig.model import load_model, load_robot
 from rig.reduce import curves
@@ -242,11 +243,10 @@ def _left_out(result: Stiffness) -> list[str]:
     """What does not count towards k, in words."""
     words = []
     if result.steps_out:
-        words.append(f"{len(result.steps_out)} steps do not count towards k")
-    for repetition, reason in {e.repetition: e.reason for e in result.excluded}.items():
-        if repetition is not None:
-            words.append(reason)
-    return words
+        verb = "does" if len(result.steps_out) == 1 else "do"
+        words.append(f"{counted(len(result.steps_out), 'step')} {verb} not count towards k")
+    single = [e.reason for e in result.excluded if e.repetition is not None]
+    return words + list(dict.fromkeys(single))
 
 
 _NONE: tuple[Array | None, Array | None] = (None, None)

@@ -16,6 +16,7 @@ from drivers.clock import Clock
 from drivers.errors import DeviceError
 from drivers.interfaces import Loader
 from rig import dataset as datasets
+from rig.digits import counted
 from rig.emulation import EmulatedRig
 from rig.errors import InputError, MeasurementStopped
 from rig.journal import Journal, JournalError, journal_path, replay
@@ -177,7 +178,7 @@ def _opened(
         loader = onlooker.operator(loader, clock, scripted=scripted)
         stack.callback(loader.close)
         if progress.rows:
-            say(f"resuming after {progress.rows} rows")
+            say(f"resuming after {counted(progress.rows, 'row')}")
         say(SAFETY_NOTE)
         loader.open()  # from here on the screen moves, and what is said would be painted over
         yield _Rig(station, devices, loader, clock, onlooker)
@@ -289,7 +290,7 @@ def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bo
     job.journal.close()
     stored = datasets.finish(job.output)
     if not stored.complete:
-        say(f"{stored.rows} rows are kept. To go on: rig measure --resume {job.output}")
+        say(f"{counted(stored.rows, 'row')} kept. To go on: rig measure --resume {job.output}")
 
 
 def _build(job: Job) -> None:

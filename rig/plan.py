@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import Arm, along, tool_offset
+from rig.digits import counted
 from rig.model import load_robot
 from rig.plan_margins import (
     MARGIN,
@@ -91,8 +92,8 @@ class Plan:
         steps = sum(run.steps for run in self.runs)
         lines = [f"Plan: {self.title} (robot {self.robot}{station})", "", *_table(self.runs), ""]
         lines += [
-            f"Together: {_count(len(self.runs), 'run')} of {_count(steps, 'step')}, "
-            f"{_count(self.repetitions, 'time')}; "
+            f"Together: {counted(len(self.runs), 'run')} of {counted(steps, 'step')}, "
+            f"{counted(self.repetitions, 'time')}; "
             f"at least {self.samples} samples",
             f"Duration: about {_time(self.duration_s)}"
             + (f"; at {self.speed:g} times real time {_time(self.duration_s / self.speed)}"
@@ -239,10 +240,6 @@ def _refuse(protocol: MeasurementProtocol, errors: Sequence[tuple[Key, str]]) ->
 # --- text ----------------------------------------------------------------------------------------
 
 
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
-
-
 def _time(seconds: float) -> str:
     minutes = seconds / 60
     if minutes < 2:
@@ -254,7 +251,7 @@ def _assumptions(
     protocol: MeasurementProtocol, arm: Arm, mounts: int, emulated: bool
 ) -> Iterator[str]:
     if not emulated:
-        yield f"{MOUNT_S / 60:g} min to set up a pose or direction ({_count(mounts, 'time')})"
+        yield f"{MOUNT_S / 60:g} min to set up a pose or direction ({counted(mounts, 'time')})"
     settle = protocol.settle
     yield (
         f"{SCREW_S:g} s of turning and {settle.window_s:g} s of settling (no longer than its "
