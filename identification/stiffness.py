@@ -17,13 +17,12 @@ a single repetition the stated uncertainties of its levels stand in for the scat
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 
-from identification.curve import Array, Curve, Point
+from identification.curve import Curve, Point
+from identification.cut_short import cut_short
 from identification.estimate import (
     MANY,
     WEIGHTINGS,
@@ -45,12 +44,8 @@ from identification.levels import (
     hysteresis,
     pointwise,
 )
+from identification.straight import Status, bend, judge, undefined
 from identification.uncertainty import Contribution, Quantity, combined
-
-Status = Literal["ok", "doubtful", "undefined"]
-BENT = 0.2  # change of the stiffness along a curve that is worth a word
-STRAIGHT = 0.8  # share of the displacement's variance below which a line is a poor description
-SIGNIFICANT = 3.0  # slope over its standard deviation, where the force is within its noise
 
 
 @dataclass(frozen=True)
@@ -67,10 +62,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Exclusion:
-    """A loading step that does not count towards k, and why."""
+    """A loading step that does not count towards k, and why; repetition None: in all of them."""
 
     step: int
     reason: str
+    repetition: int | None = None
 
 
 @dataclass(frozen=True)
@@ -118,12 +114,23 @@ class Stiffness:
     hysteresis: Hysteresis | None = None
     notes: tuple[str, ...] = field(default=())
 
+    @property
+    def steps_out(self) -> frozenset[int]:
+        """Steps that count in no repetition."""
+        return frozenset(e.step for e in self.excluded if e.repetition is None)
+
+    def counts(self, repetition: int, step: int) -> bool:
+        """Whether a loading step of a repetition counts towards k."""
+        both = (None, repetition)
+        return not any(e.step == step and e.repetition in both for e in self.excluded)
+
 
 def analyze_curve(curve: Curve, options: Options | None = None) -> Stiffness:
     """Stiffness of a curve. Whatever the data are, the answer is a status, not an exception."""
     options = options or Options()
     choice, reason = default_choice(curve, options)
-    points, excluded = _usable(curve.points)
+    points, excluded = _usable(curve)
+    curve = replace(curve, points=points)
     loading, unloading = grid_of(points, "loading"), grid_of(points, "unloading")
     bare = Stiffness(
         "undefined",
@@ -134,7 +141,7 @@ def analyze_curve(curve: Curve, options: Options | None = None) -> Stiffness:
         excluded=excluded,
         notes=curve.notes,
     )
-    problem = _undefined(loading.mean(), curve.origin and not choice.intercept)
+    problem = undefined(loading.mean(), curve.origin and not choice.intercept)
     if problem:
         return replace(bare, sentence=problem)
     knee, behind = _knee(curve, loading)
@@ -205,16 +212,16 @@ def _with_k(described: Stiffness, curve: Curve, loading: Grid, used: Grid) -> St
             budget += (Contribution(name, "B", stated, counted=False),)
     except ValueError as error:
         return replace(described, sentence=f"The stiffness is undefined: {error}.")
-    status, sentence = _judge(table, fit.residuals, k)
+    status, sentence = judge(table, fit.residuals, k)
     rivals = _alternatives(curve, loading, used, choice)
     highest = float(np.abs(table.force).max())
     before = [p for p in described.pointwise if abs(p.force) <= highest]
-    bend = _bend(before, [a.value for a in rivals if not a.after_knee])
+    bends = bend(before, [a.value for a in rivals if not a.after_knee])
     return replace(
         described,
         status=status,
         sentence=sentence,
-        notes=(*described.notes, *bend),
+        notes=(*described.notes, *bends),
         k=combined(k, budget),
         intercept=fit.intercept,
         budget=budget,
@@ -223,85 +230,20 @@ def _with_k(described: Stiffness, curve: Curve, loading: Grid, used: Grid) -> St
     )
 
 
-def _bend(pointwise: Sequence[PointwiseStiffness], rivals: Sequence[float]) -> tuple[str, ...]:
-    """A note where the stiffness between levels changes along the curve, plainly beyond its
-    scatter: one number is then a matter of averaging. rivals N/m: k under other choices."""
-    known = [p for p in pointwise if math.isfinite(p.stiffness) and math.isfinite(p.sd)]
-    third = len(known) // 3
-    if third < 1:
-        return ()
-    ends = []
-    for part in (known[:third], known[-third:]):
-        mean = float(np.mean([p.stiffness for p in part]))
-        ends.append((mean, float(np.sqrt(np.sum([p.sd**2 / p.n for p in part]))) / third))
-    (first, u_first), (last, u_last) = ends
-    change = abs(last - first)
-    if change < max(BENT * min(abs(first), abs(last)), SIGNIFICANT * math.hypot(u_first, u_last)):
-        return ()
-    way = "falls" if last < first else "rises"
-    note = (
-        f"The stiffness between neighbouring levels {way} from {first / 1e3:.4g} to "
-        f"{last / 1e3:.4g} N/mm along the curve (means over its first and last third): k is an "
-        "average"
-    )
-    if rivals:
-        note += f"; other choices give {min(rivals) / 1e3:.4g} to {max(rivals) / 1e3:.4g} N/mm"
-    return (f"{note}.",)
-
-
-def _usable(points: Sequence[Point]) -> tuple[list[Point], tuple[Exclusion, ...]]:
-    """Points with a force and a displacement; the steps that lost one are named."""
+def _usable(curve: Curve) -> tuple[tuple[Point, ...], tuple[Exclusion, ...]]:
+    """Points with a force and a displacement, of repetitions that were not cut short; the steps
+    that lost one are named."""
+    reasons = cut_short(curve)
     good, lost = [], []
-    for p in points:
-        if math.isfinite(p.force) and math.isfinite(p.displacement):
+    for p in curve.points:
+        reason = reasons.get(p.repetition, "")
+        if not (math.isfinite(p.force) and math.isfinite(p.displacement)):
+            reason = f"repetition {p.repetition}: no valid value of force or displacement"
+        if not reason:
             good.append(p)
         elif p.branch == "loading":
-            reason = f"repetition {p.repetition}: no valid value of force or displacement"
-            lost.append(Exclusion(p.step, reason))
-    return good, tuple(lost)
-
-
-def _undefined(table: Table, through_origin: bool) -> str:
-    """Why these levels have no stiffness, as a sentence; empty if they have one."""
-    start = "The stiffness is undefined: "
-    if table.size == 0:
-        return start + "there are no loaded levels."
-    if table.size == 1 and not through_origin:
-        return start + "there is one level only, and no measured origin to draw a line from."
-    force = np.append(table.force, 0.0) if through_origin else table.force
-    displacement = np.append(table.displacement, 0.0) if through_origin else table.displacement
-    if np.ptp(force) == 0.0:
-        return start + f"the force is {force[0]:.4g} N from its zero throughout."
-    if np.ptp(displacement) == 0.0:
-        return start + "the displacement is the same at every force."
-    if np.ptp(force) <= 3.0 * float(np.median(table.u_force)) and not _related(force, displacement):
-        return (
-            start + f"the force varies by {np.ptp(force):.3g} N, within its uncertainty of "
-            f"{float(np.median(table.u_force)):.3g} N, and the displacement does not follow it."
-        )
-    return ""
-
-
-def _related(force: Array, displacement: Array) -> bool:
-    """Whether the slope of displacement over force is told from zero by the points' own scatter."""
-    if force.size < 4:
-        return False
-    r = float(np.corrcoef(force, displacement)[0, 1])
-    return abs(r) * math.sqrt((force.size - 2) / max(1e-300, 1.0 - r * r)) > SIGNIFICANT
-
-
-def _judge(table: Table, residuals: Array, k: float) -> tuple[Status, str]:
-    if k < 0:
-        return "doubtful", "The displacement falls while the force rises: k is negative."
-    if table.size > 2 and np.ptp(table.displacement) > 0:
-        spread = float(np.sum((table.displacement - table.displacement.mean()) ** 2))
-        explained = 1.0 - float(np.sum(residuals**2)) / spread
-        if explained < STRAIGHT:
-            return "doubtful", (
-                f"A line explains only {max(0.0, explained):.0%} of how the displacement varies: "
-                "k is an average over a curve that is not straight; look at the pointwise k."
-            )
-    return "ok", ""
+            lost.append(Exclusion(p.step, reason, p.repetition))
+    return tuple(good), tuple(lost)
 
 
 def _by_repetition(used: Grid, choice: Choice) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 from identification import stiffness as st
 from identification.estimate import WEIGHTINGS, Weighting
 from identification.uncertainty import Contribution, Quantity
-from rig.errors import InputError, did_you_mean
+from rig.errors import InputError, close_to
 from rig.reduce import Measurements, curves
 
 SCHEMA = "rig.analysis/1"
@@ -53,7 +53,7 @@ def weighting(word: str) -> Weighting | Literal["auto"]:
             return known
     allowed = ", ".join((AUTO, *WEIGHTINGS))
     raise InputError(
-        f'--weighting: "{word}" is not known.{did_you_mean(word, (AUTO, *WEIGHTINGS))} '
+        f'--weighting: "{word}" is not known.{close_to(word, (AUTO, *WEIGHTINGS))} '
         f"Allowed: {allowed}."
     )
 
@@ -205,7 +205,9 @@ def _direction(d: Direction) -> dict[str, Any]:
             }
             for p in r.pointwise
         ],
-        "excluded": [{"step": e.step, "reason": e.reason} for e in r.excluded],
+        "excluded": [
+            {"step": e.step, "reason": e.reason, "repetition": e.repetition} for e in r.excluded
+        ],
         "knee": _knee(r.knee),
         "hysteresis": _hysteresis(r),
         "budget": [_contribution(c) for c in r.budget],

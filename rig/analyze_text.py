@@ -38,12 +38,14 @@ def answer(analysis: Analysis) -> str:
             parts.append(f"k in {key} is {_with_interval(k, N_PER_MM)} N/mm")
     for (a, b), ratio in analysis.anisotropy.items():
         parts.append(f"{a} is {_with_interval(ratio)} times as stiff as {b}")
-    return "; ".join(parts) + " (in brackets: 95 % intervals)."
+    known = any(d.result.k is not None for d in analysis.directions.values())
+    return "; ".join(parts) + (" (in brackets: 95 % intervals)." if known else ".")
 
 
 def _with_interval(q: Quantity, scale: float = 1.0) -> str:
-    low, high = (number(edge * scale) for edge in q.interval)
-    return f"{number(q.value * scale)} [{low}, {high}]"
+    value = q.value * scale
+    low, high = (number(edge * scale, beside=value) for edge in q.interval)
+    return f"{number(value)} [{low}, {high}]"
 
 
 def _direction(key: str, direction: Direction) -> Iterator[str]:
@@ -78,10 +80,11 @@ def _direction(key: str, direction: Direction) -> Iterator[str]:
 
 
 def _stiffness(r: Stiffness, k: Quantity) -> Iterator[str]:
+    value = k.value * N_PER_MM
+    low, high = (number(edge * N_PER_MM, beside=value) for edge in k.interval)
     yield (
-        f"k = {number(k.value * N_PER_MM)} N/mm, standard uncertainty "
-        f"{number(k.u * N_PER_MM, 2)} N/mm, 95 % from {number(k.interval[0] * N_PER_MM)} to "
-        f"{number(k.interval[1] * N_PER_MM)} N/mm"
+        f"k = {number(value)} N/mm, standard uncertainty {number(k.u * N_PER_MM, 2, value)} N/mm, "
+        f"95 % from {low} to {high} N/mm"
     )
     yield from wrap(f"Line: {r.choice.label}; {r.choice_reason}.", WIDTH)
     if r.choice.intercept:

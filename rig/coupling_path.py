@@ -42,7 +42,11 @@ def read_path(path: Path) -> Path6:
     """
     try:
         text = path.read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror or error}. Check the name of the table."
+        ) from error
+    except UnicodeDecodeError as error:
         raise InputError(f"{path}: cannot be read as a UTF-8 table: {error}.") from error
     lines = [(i, line) for i, line in enumerate(text.splitlines(), 1)]
     lines = [(i, line) for i, line in lines if line.strip() and not line.lstrip().startswith("#")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -143,6 +144,24 @@ def load(path: Path) -> Dataset:
             f"({dataset.uuid} instead of {stored}). Move one of the two elsewhere."
         )
     return dataset
+
+
+def load_each(paths: Sequence[Path]) -> list[Dataset]:
+    """The data sets of several files, in their order; InputError where two are the same: counted
+    twice it would narrow the intervals without a new measurement."""
+    datasets = [load(path) for path in paths]
+    known: dict[str, Path] = {}
+    for path, dataset in zip(paths, datasets, strict=True):
+        name = dataset.uuid or str(path)
+        other = known.get(name)
+        known[name] = path
+        if other is None:
+            continue
+        which = "is given twice"
+        if other != path:
+            which = f"is the same data set as {other} (UUID {dataset.uuid})"
+        raise InputError(f"{path}: {which}; every measurement counts once. Leave one of them out.")
+    return datasets
 
 
 def finish(path: Path) -> Dataset:

@@ -17,7 +17,10 @@ class MeasurementStopped(Exception):
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """` Did you mean "x"?` for a mistyped word, or the list of known ones."""
     names = sorted(known)
-    close = get_close_matches(word, names, n=1)
-    if close:
-        return f' Did you mean "{close[0]}"?'
-    return " Known: " + ", ".join(names) + "."
+    return close_to(word, names) or " Known: " + ", ".join(names) + "."
+
+
+def close_to(word: str, known: Iterable[str]) -> str:
+    """` Did you mean "x"?`, or nothing: for messages that list the known words anyway."""
+    close = get_close_matches(word, sorted(known), n=1)
+    return f' Did you mean "{close[0]}"?' if close else ""

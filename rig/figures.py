@@ -80,7 +80,7 @@ def _styles(analysis: Analysis) -> Iterator[tuple[str, str, str, Direction]]:
 
 def _curve(axes: Any, direction: Direction, key: str, colour: str, marker: str) -> None:
     r = direction.result
-    left_out = {e.step for e in r.excluded}
+    left_out = r.steps_out
     for branch, fill in (("loading", colour), ("unloading", "white")):
         levels = [p for p in r.levels if p.branch == branch]
         if not levels:

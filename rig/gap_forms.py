@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.gap.forms import Form, Law, Term
 from identification.gap.words import WORDS
-from rig.errors import did_you_mean
+from rig.errors import close_to, did_you_mean
 from rig.gap_keys import (
     ABOUT,
     CONSTANTS,
@@ -124,7 +124,7 @@ def _word(entry: Mapping[str, Any]) -> str:
         raise FormError(
             ("name",),
             f'the effect "{name}" is none that rig simulate can compute.'
-            f"{did_you_mean(str(name), WORDS)} Known: {', '.join(WORDS)}. With `effects: []` the "
+            f"{close_to(str(name), WORDS)} Known: {', '.join(WORDS)}. With `effects: []` the "
             "springs alone are simulated.",
         )
     return name

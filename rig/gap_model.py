@@ -42,16 +42,7 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
     against another simulator's curves (its springs are not ours to correct).
     """
     meta, result = dataset.meta, diagnosis.result
-    where = str(dataset.path or "data set")
-    if meta.robot == "none":
-        raise InputError(
-            f"{where}: robot: none. A model file holds an arm; write the diagnosis with --json."
-        )
-    if result.bench.rows.simulated is not None:
-        raise InputError(
-            f"{where}: diagnosed against another simulator's curves; --write-model corrects the "
-            "springs of META or --model. Leave --simulation out."
-        )
+    check_writable(dataset, others=result.bench.rows.simulated is not None)
     stiffness, sd = springs(result)
     setup = result.bench.data.setups[0]
     pose = meta.poses[setup.pose]
@@ -75,6 +66,21 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
         "kind: rigid}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def check_writable(dataset: Dataset, *, others: bool) -> None:
+    """Before the diagnosis; InputError where it can't become a model. others: it is made against
+    another simulator's curves."""
+    where = str(dataset.path or "data set")
+    if dataset.meta.robot == "none":
+        raise InputError(
+            f"{where}: robot: none. A model file holds an arm; write the diagnosis with --json."
+        )
+    if others:
+        raise InputError(
+            f"{where}: diagnosed against another simulator's curves; --write-model corrects the "
+            "springs of META or --model. Leave --simulation out."
+        )
 
 
 def springs(result: GapResult) -> tuple[Array, Array]:

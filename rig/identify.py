@@ -18,7 +18,8 @@ from identification.joints import identify as estimate
 from identification.levels import grid_of
 from identification.next_poses import Criterion, Plan, Proposal, propose
 from identification.stiffness import Stiffness, analyze_curve
-from rig.dataset import Dataset, load
+from rig.dataset import Dataset, load_each
+from rig.digits import counted
 from rig.errors import InputError
 from rig.model import load_model, load_robot
 from rig.reduce import curves
@@ -114,7 +115,7 @@ def identify(
     """
     if not paths:
         raise InputError("rig identify: give at least one data set.")
-    datasets = [load(Path(p)) for p in paths]
+    datasets = load_each([Path(p) for p in paths])
     names = [str(p) for p in paths]
     arm = _arm(datasets, names)
     prior = prior or Prior(
@@ -211,8 +212,7 @@ def _observations(
         if result.k is None or not result.k.value > 0:
             notes.append(f"{label} is left out: {result.sentence or 'no stiffness above 0'}")
             continue
-        if result.excluded:
-            notes.append(f"{label}: {len(result.excluded)} steps do not count towards k.")
+        notes += [f"{label}: {words}." for words in _left_out(result)]
         found.append((curve, result, _stated(curve, result)))
     scale = _scale(found)
     out = []
@@ -239,14 +239,23 @@ def _observations(
     return out, notes
 
 
+def _left_out(result: Stiffness) -> list[str]:
+    """What does not count towards k, in words."""
+    words = []
+    if result.steps_out:
+        verb = "does" if len(result.steps_out) == 1 else "do"
+        words.append(f"{counted(len(result.steps_out), 'step')} {verb} not count towards k")
+    single = [e.reason for e in result.excluded if e.repetition is not None]
+    return words + list(dict.fromkeys(single))
+
+
 _NONE: tuple[Array | None, Array | None] = (None, None)
 
 
 def _stated(curve: Curve, result: Stiffness) -> float:
     """Standard uncertainty of k (N/m) from the levels' stated ones, repetitions averaged."""
-    dropped = {e.step for e in result.excluded}
-    loading = grid_of(curve.points, "loading")
-    used = loading.keep(s for s in loading.steps if s not in dropped)
+    points = [p for p in curve.points if result.counts(p.repetition, p.step)]
+    used = grid_of(points, "loading")
     table = used.mean()
     u = stated_uncertainty(table, result.choice)
     return float(u / np.sqrt(max(1, len(used.repetitions))))
@@ -279,10 +288,11 @@ def _joint_readings(
     names = [f"q{j}_rad" for j in range(1, JOINTS + 1)]
     if dataset.meta.joint_encoder != "output" or not all(n in columns for n in names):
         return _NONE
-    dropped = [e.step for e in result.excluded]
     rows = (columns["pose"] == curve.pose) & (columns["direction"] == curve.direction)
     rows &= ~columns["discarded"] & np.isin(columns["branch"], ["zero", "loading"])
-    rows &= ~np.isin(columns["step"], dropped) | (columns["branch"] == "zero")
+    for e in result.excluded:
+        out = (columns["branch"] == "loading") & (columns["step"] == e.step)
+        rows &= ~out if e.repetition is None else ~out | (columns["repetition"] != e.repetition)
     force, repetition = columns["force_N"][rows], columns["repetition"][rows]
     q = np.stack([columns[n][rows] for n in names], axis=-1).astype(float)
     slopes, u = _slopes(np.asarray(force, dtype=float), np.asarray(repetition), q)

@@ -12,11 +12,11 @@ from rig.catalogue import recall, remember, stiffness_of
 from rig.digits import number
 from rig.errors import InputError
 from rig.journal import journal_path
+from rig.storage.files import ENDINGS
 from rig.storage.seal import seal_of
 from rig.storage.summary import Summary, journal_summary, read_summary
 
 SCHEMA = "rig.list/1"
-ENDINGS = (".h5", ".hdf5")
 _JOURNAL = ".journal"
 Progress = Callable[[str, float], None]
 

@@ -16,6 +16,7 @@ from drivers.clock import Clock
 from drivers.errors import DeviceError
 from drivers.interfaces import Loader
 from rig import dataset as datasets
+from rig.digits import counted
 from rig.emulation import EmulatedRig
 from rig.errors import InputError, MeasurementStopped
 from rig.journal import Journal, JournalError, journal_path, replay
@@ -32,7 +33,7 @@ from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
 from rig.runner import Runner
 from rig.software import software_version
 from rig.station import Station, load_station, parse_station
-from rig.storage.files import check_folder
+from rig.storage.files import check_ending, check_folder
 
 if TYPE_CHECKING:
     from rig.panel.link import PanelOptions
@@ -76,7 +77,7 @@ def measure(
         station = _at_speed(station, speed)
     plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
     path = output or default_output(protocol_file)
-    _refuse_existing(path)
+    _check_output(path)
     start = {
         "uuid": str(uuid.uuid4()),
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -131,7 +132,8 @@ def default_output(protocol_file: Path) -> Path:
     return Path(f"{protocol_file.stem}_{datetime.now():%Y%m%d-%H%M%S}.h5")
 
 
-def _refuse_existing(path: Path) -> None:
+def _check_output(path: Path) -> None:
+    check_ending(path)
     if path.exists() or journal_path(path).exists():
         raise InputError(
             f"{path}: exists already, and measurements are never overwritten. "
@@ -176,7 +178,7 @@ def _opened(
         loader = onlooker.operator(loader, clock, scripted=scripted)
         stack.callback(loader.close)
         if progress.rows:
-            say(f"resuming after {progress.rows} rows")
+            say(f"resuming after {counted(progress.rows, 'row')}")
         say(SAFETY_NOTE)
         loader.open()  # from here on the screen moves, and what is said would be painted over
         yield _Rig(station, devices, loader, clock, onlooker)
@@ -254,7 +256,8 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     except DeviceError as error:
         reason = str(error)
         recorder.event("device_failed", reason, device=error.device)
-        rig.loader.notify(f"{reason} {UNLOAD}", "error")
+        # Fault and remedy follow as the command's last word, once the data are safe.
+        rig.loader.notify(f"The {error.device} has failed. {UNLOAD}", "error")
         raise
     except KeyboardInterrupt:
         reason = "interrupted"
@@ -287,7 +290,7 @@ def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bo
     job.journal.close()
     stored = datasets.finish(job.output)
     if not stored.complete:
-        say(f"{stored.rows} rows are kept. To go on: rig measure --resume {job.output}")
+        say(f"{counted(stored.rows, 'row')} kept. To go on: rig measure --resume {job.output}")
 
 
 def _build(job: Job) -> None:

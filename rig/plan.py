@@ -15,7 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import Arm, along, tool_offset
+from rig.digits import counted
 from rig.model import load_robot
+from rig.plan_margins import (
+    MARGIN,
+    beyond_joints,
+    limit_warnings,
+    name_of,
+    shares,
+    soft_warnings,
+    time_warnings,
+    unit_warnings,
+)
 from rig.protocol import MeasurementProtocol, Run
 from rig.protocolfile import ProtocolFile
 from rig.station import Station
@@ -24,10 +35,6 @@ from rig.yamlnodes import Key, Problem, refuse
 
 Array = NDArray[np.float64]
 
-# A margin smaller than this share of what is allowed is worth a warning.
-MARGIN = 0.2
-# A charge amplifier's drift is taken as a straight line; longer than this it is none.
-QUASI_STATIC_S = 1000.0
 # What hands and devices take, in s; the text of the plan names every one.
 MOUNT_S = 300.0
 SCREW_S = 10.0
@@ -85,8 +92,8 @@ class Plan:
         steps = sum(run.steps for run in self.runs)
         lines = [f"Plan: {self.title} (robot {self.robot}{station})", "", *_table(self.runs), ""]
         lines += [
-            f"Together: {_count(len(self.runs), 'run')} of {_count(steps, 'step')}, "
-            f"{_count(self.repetitions, 'time')}; "
+            f"Together: {counted(len(self.runs), 'run')} of {counted(steps, 'step')}, "
+            f"{counted(self.repetitions, 'time')}; "
             f"at least {self.samples} samples",
             f"Duration: about {_time(self.duration_s)}"
             + (f"; at {self.speed:g} times real time {_time(self.duration_s / self.speed)}"
@@ -137,15 +144,17 @@ def plan(protocol: MeasurementProtocol, station: Station | None = None) -> Plan:
     arm = load_robot(protocol.robot)
     runs = tuple(_planned(protocol, run, arm, station) for run in protocol.runs)
     warnings: list[str] = []
-    errors: list[tuple[Key, str]] = list(_beyond_joints(protocol, arm))
+    errors: list[tuple[Key, str]] = list(beyond_joints(protocol, arm))
     for n, run in enumerate(runs):
-        for share, what, remedy in _shares(protocol, run, arm, station):
+        for share, what, remedy in shares(protocol, run, arm, station):
             if share > 1:
                 errors.append((("runs", n), f"{what}. {remedy}"))
             elif share > 1 - MARGIN:
-                warnings.append(f"{_name(run)}: {what}: {100 * (1 - share):.0f} % to spare.")
+                warnings.append(f"{name_of(run)}: {what}: {100 * (1 - share):.0f} % to spare.")
+        warnings += limit_warnings(protocol, run, station)
+        warnings += soft_warnings(protocol, n, run, arm, station)
     _refuse(protocol, errors)
-    warnings += [*_unit_warnings(protocol), *_time_warnings(protocol, runs)]
+    warnings += [*unit_warnings(protocol), *time_warnings(protocol, runs)]
     pairs = [(run.pose, run.direction) for _, run, _ in protocol.sequence()]
     mounts = 1 + sum(a != b for a, b in pairwise(pairs))
     emulated = station is not None and station.emulation is not None
@@ -221,85 +230,6 @@ def _repetition_s(protocol: MeasurementProtocol, run: Run, station: Station | No
     return amplifier_s + TARE_S + sampled_s + steps + UNLOAD_S + protocol.rest_s
 
 
-# --- margins -------------------------------------------------------------------------------------
-
-
-def _shares(
-    protocol: MeasurementProtocol, run: PlannedRun, arm: Arm, station: Station | None
-) -> Iterator[tuple[float, str, str]]:
-    """(share of what is allowed, in words, what to do when it is above 1)."""
-    for i in range(6):
-        hold, limit = abs(run.hold_torque_Nm[i]), run.torque_limit_Nm[i]
-        what = f"joint {i + 1} holds {hold:.0f} Nm at {run.forces_N[-1]:g} N, allowed {limit:g} Nm"
-        yield hold / limit, what, "Lower the top force, or choose a pose with a shorter lever."
-    yield from _displacement_shares(protocol, run, arm, station)
-    if station is not None and station.dynamometer is not None:
-        sensor = station.dynamometer
-        many = sensor.channels == 8
-        rows = zip("xyz", sensor.axes_in_base, strict=True)
-        for axis, row in rows:
-            # Eight channels: two carry a shear force, four the normal one.
-            channels = (4 if axis == "z" else 2) if many else 1
-            allowed = getattr(sensor.full_scale_N, axis) * channels
-            force = abs(float(np.dot(row, run.unit_vector))) * run.forces_N[-1]
-            what = f"the dynamometer's {axis} carries {force:.4g} N, full scale {allowed:g} N"
-            yield force / allowed, what, "Set a larger range at the amplifier and in the station."
-
-
-def _displacement_shares(
-    protocol: MeasurementProtocol, run: PlannedRun, arm: Arm, station: Station | None
-) -> Iterator[tuple[float, str, str]]:
-    u = run.displacement_mm
-    limits = []
-    if station is not None and station.laser is not None:
-        limits.append(("the laser's range", station.laser.range_mm))
-    if protocol.limits.displacement_mm is not None:
-        limits.append(("limits.displacement_mm.max", protocol.limits.displacement_mm.max))
-    stiffer = 1 + 2 * float(np.max(arm.joint_stiffness_relative_sd))
-    for name, allowed in limits:
-        what = f"about {u:.2g} mm expected at {run.forces_N[-1]:g} N, {name} is {allowed:g} mm"
-        share = u / allowed
-        # Nominal springs are uncertain: only what even a much stiffer arm exceeds is an error.
-        if 1 < share <= stiffer:
-            share = 1.0
-        yield share, what, "Lower the top force, or give stop_at_displacement_mm."
-
-
-def _beyond_joints(protocol: MeasurementProtocol, arm: Arm) -> Iterator[tuple[Key, str]]:
-    for name, pose in protocol.poses.items():
-        q, low, high = (np.rad2deg(v) for v in (pose.q_rad, arm.q_min, arm.q_max))
-        for i in np.flatnonzero((q < low - 1e-6) | (q > high + 1e-6)):
-            allowed = f"allowed: {low[i]:g} to {high[i]:g} deg"
-            yield ("poses", name), f"joint {i + 1} at {q[i]:.2f} deg; {allowed}."
-
-
-def _unit_warnings(protocol: MeasurementProtocol) -> Iterator[str]:
-    """Radians under q_deg put the arm near its zero, stretched out, where nobody measures."""
-    for name, pose in protocol.poses.items():
-        most = float(np.rad2deg(max(map(abs, pose.q_rad))))
-        if 0 < most <= 2 * np.pi:
-            yield (
-                f"pose {name}: all joints within {most:.2f} deg of zero, the arm stretched out. "
-                "If these are radians, write q_rad."
-            )
-
-
-def _time_warnings(protocol: MeasurementProtocol, runs: Sequence[PlannedRun]) -> Iterator[str]:
-    for run in runs:
-        if run.duration_s > QUASI_STATIC_S:
-            yield (
-                f"{_name(run)}: {run.duration_s:.0f} s between two resets of the charge "
-                f"amplifier; its drift stays a straight line for about {QUASI_STATIC_S:g} s. "
-                "Fewer steps or shorter holds."
-            )
-    unwatched = [
-        key for key in ("force_N", "displacement_mm")
-        if (limit := getattr(protocol.limits, key)) is None or limit.at != "stop"
-    ]  # fmt: skip
-    for key in unwatched:
-        yield f"limits.{key} does not stop the measurement."
-
-
 def _refuse(protocol: MeasurementProtocol, errors: Sequence[tuple[Key, str]]) -> None:
     if errors:
         document = read_document_text(protocol.text, str(protocol.path), ProtocolFile)
@@ -308,14 +238,6 @@ def _refuse(protocol: MeasurementProtocol, errors: Sequence[tuple[Key, str]]) ->
 
 
 # --- text ----------------------------------------------------------------------------------------
-
-
-def _name(run: PlannedRun) -> str:
-    return f"pose {run.pose}, direction {run.direction}"
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
 
 
 def _time(seconds: float) -> str:
@@ -329,7 +251,7 @@ def _assumptions(
     protocol: MeasurementProtocol, arm: Arm, mounts: int, emulated: bool
 ) -> Iterator[str]:
     if not emulated:
-        yield f"{MOUNT_S / 60:g} min to set up a pose or direction ({_count(mounts, 'time')})"
+        yield f"{MOUNT_S / 60:g} min to set up a pose or direction ({counted(mounts, 'time')})"
     settle = protocol.settle
     yield (
         f"{SCREW_S:g} s of turning and {settle.window_s:g} s of settling (no longer than its "

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.dataset import Dataset, Origin, write
-from rig.errors import InputError, did_you_mean
+from rig.errors import InputError, close_to, did_you_mean
 from rig.journal import journal_path
 from rig.meta import Meta
 from rig.software import software_version
@@ -28,7 +28,7 @@ from rig.storage.columns import (
     unit_of,
 )
 from rig.storage.csvblocks import Block, CsvFile, close_match
-from rig.storage.files import in_place_of
+from rig.storage.files import check_ending, in_place_of
 from rig.terminal import Progress, silent
 from rig.yamlfile import read_document
 
@@ -67,6 +67,7 @@ def _check_target(out: Path) -> None:
     """Imported data sets may be made anew; measurements are never written over."""
     from rig.storage.hdf5read import holds_import
 
+    check_ending(out)
     if journal_path(out).exists():
         raise InputError(f"{out}: a measurement is under way there (journal). Choose another name.")
     if out.exists() and not holds_import(out):
@@ -171,6 +172,11 @@ class _Table:
             bad = np.flatnonzero(~np.isfinite(values))
             if len(bad):
                 raise self._cell(file, block, column.name, bad[0], "every row needs a finite value")
+        bad = np.flatnonzero(np.abs(values) > column.largest)
+        if len(bad):
+            limit = f"{column.largest:.0f} {column.unit}"
+            what = f"allowed: -{limit} to {limit}"
+            raise self._cell(file, block, column.name, bad[0], what, " Is the unit right?")
         if column.kind == "flag":
             bad = np.flatnonzero(~np.isin(values, (0.0, 1.0)))
             if len(bad):
@@ -197,13 +203,13 @@ class _Table:
         if not len(bad):
             return words
         word = str(words[bad[0]])
+        hint = did_you_mean(word, known) if word and known != [""] else ""
         if column.name == "branch":
-            what = f"allowed: {', '.join(BRANCHES)}"
+            what, hint = f"allowed: {', '.join(BRANCHES)}", close_to(word, known)
         elif self._meta.robot == "none" and column.name == "pose":
             what = f"robot: none in {self._meta_name} has no poses; remove the column"
         else:
             what = f"{self._meta_name} does not define it"
-        hint = did_you_mean(word, known) if word and known != [""] else ""
         raise self._cell(file, block, column.name, bad[0], what, hint)
 
     def _known_words(self, name: str) -> list[str]:

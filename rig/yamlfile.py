@@ -19,7 +19,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from rig import yamlwords as words
-from rig.errors import InputError, did_you_mean
+from rig.errors import InputError, close_to, did_you_mean
 from rig.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, refuse
 
 T = TypeVar("T")
@@ -322,8 +322,7 @@ def _hint(value: object, nodes: Sequence[words.Schema]) -> str:
         return " Put it in quotes if it is a name."
     if isinstance(value, str):
         options = _texts(nodes)
-        close = did_you_mean(value, options)
-        return close if len(options) > 1 and close.startswith(" Did") else ""
+        return close_to(value, options) if len(options) > 1 else ""
     return ""
 
 

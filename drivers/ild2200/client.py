@@ -71,6 +71,7 @@ class Ild2200:
         self._source = "emulated+ild2200" if emulated else "ild2200"
         self._stream = Stream(1, clock, self._source)
         self._health = _Health()
+        self._connecting = True
         self._identity: dict[str, str] = {}
         self._port: serial.Serial | None = None
         self._stop = threading.Event()
@@ -82,12 +83,14 @@ class Ild2200:
         Raises CannotConnect, BadReply or OutOfRange within `connect_deadline_s`.
         """
         self.close()
+        self._connecting = True
         deadline = time.monotonic() + self._settings.connect_deadline_s
         self._port = self._open_port()
         try:
             self._identify(self._port, deadline)
             self._start_reader(self._port)
             self._await_values(deadline)
+            self._connecting = False
         except DeviceError:
             self.close()
             raise
@@ -125,7 +128,7 @@ class Ild2200:
         if reading is None or (now - health.last_value) > self._settings.stale_after_s:
             silent_s = now - health.last_byte
             if silent_s > self._settings.stale_after_s or not health.causes:
-                raise complaints.silent(self._settings.port, silent_s)
+                raise complaints.silent(self._settings.port, silent_s, connecting=self._connecting)
             raise complaints.invalid(health.causes, self._settings)
         return replace(reading, age_s=now - health.last_value)
 
@@ -200,7 +203,7 @@ class Ild2200:
             raise self._stream.failure
         silent_s = time.monotonic() - self._health.last_byte
         if silent_s > self._settings.stale_after_s:
-            raise complaints.silent(self._settings.port, silent_s)
+            raise complaints.silent(self._settings.port, silent_s, connecting=True)
 
 
 class _Reader:
@@ -316,7 +319,7 @@ class _Reader:
         try:
             reply = self._inquiry.feed(data)
             if reply is not None:
-                complaints.check(commands.parse_settings(reply), self._settings)
+                complaints.check(commands.parse_settings(reply), self._settings, under_way=True)
         except (commands.Refused, ValueError) as error:
             self._gathered.problems[f"asked for its settings, the sensor {error}"] = None
             self._inquiry = None

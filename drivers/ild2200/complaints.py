@@ -11,14 +11,16 @@ from drivers.ild2200.commands import NoReply, SensorSettings
 from drivers.ild2200.settings import Ild2200Settings
 
 DEVICE = "laser"
-CABLE = "Check the sensor's power, its cable and the adapter, then start again."
+_CABLE = "Check the sensor's power, its cable and the adapter, then "
+CABLE = f"{_CABLE}start again."
+_ON = "Switch the laser on (key or external input of the controller)"
 _OUTSIDE = {65522, 65524, 65526}
 _REMEDIES = {
     65522: "Put the target into the beam, remove what hides it, and check the laser's alignment.",
     65524: "Move the laser away from the target until the distance lies in the measuring range.",
     65526: "Move the laser towards the target until the distance lies in the measuring range.",
     65528: "Clean the target or give it a matt, light surface, and check the angle of the beam.",
-    65530: "Switch the laser on (key or external input of the controller) and start again.",
+    65530: f"{_ON}, then go on with --resume.",
 }
 
 
@@ -43,9 +45,11 @@ def unplugged(port: str, error: Exception) -> ReadTimeout:
     )
 
 
-def silent(port: str, silent_s: float) -> ReadTimeout:
-    """Values came, and come no more."""
-    return ReadTimeout(DEVICE, f"the sensor on {port} has sent nothing for {silent_s:.1f} s", CABLE)
+def silent(port: str, silent_s: float, *, connecting: bool) -> ReadTimeout:
+    """Values came, and come no more; or none has come since the port was opened."""
+    remedy = CABLE if connecting else f"{_CABLE}go on with --resume."
+    fault = f"the sensor on {port} has sent nothing for {silent_s:.1f} s"
+    return ReadTimeout(DEVICE, fault, remedy)
 
 
 def no_reply(error: NoReply, settings: Ild2200Settings) -> CannotConnect:
@@ -70,12 +74,17 @@ def no_reply(error: NoReply, settings: Ild2200Settings) -> CannotConnect:
 
 
 def check(
-    sensor: SensorSettings, settings: Ild2200Settings, stated_range_mm: float | None = None
+    sensor: SensorSettings,
+    settings: Ild2200Settings,
+    stated_range_mm: float | None = None,
+    *,
+    under_way: bool = False,
 ) -> None:
     """Compares the sensor with the station file; raises BadReply for the first difference.
 
-    `stated_range_mm`: the range that INFO gives, if it does.
+    `stated_range_mm`: the range that INFO gives, if it does. `under_way`: values have come already.
     """
+    again = "then go on with --resume" if under_way else "then start again"
     ranges = {float(sensor.range_mm), stated_range_mm or float(sensor.range_mm)}
     if ranges != {settings.range_mm}:
         shown = " and ".join(f"{value:g} mm" for value in sorted(ranges))
@@ -100,10 +109,10 @@ def check(
     if sensor.relative_zero:
         _refuse(
             "the sensor counts from a relative zero, so its place in the range is unknown",
-            "Clear it with the zero key of the sensor's controller and start again.",
+            f"Clear it with the zero key of the sensor's controller, {again}.",
         )
     if not sensor.laser_on:
-        _refuse("the laser is switched off", _REMEDIES[65530])
+        _refuse("the laser is switched off", f"{_ON}, {again}.")
 
 
 def _refuse(fault: str, remedy: str) -> None:

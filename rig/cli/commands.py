@@ -6,6 +6,7 @@ import typer
 
 from rig.cli import files, gap, measuring, models, stiffness
 from rig.cli.guard import Guarded
+from rig.cli.options import version
 
 app = typer.Typer(
     name="rig",
@@ -15,6 +16,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.callback()(version)
 app.command(cls=Guarded)(measuring.measure)
 app.command(cls=Guarded)(measuring.check)
 app.command(cls=Guarded)(measuring.emulate)

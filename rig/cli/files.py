@@ -90,6 +90,7 @@ def import_(
     output: _Imported,
 ) -> None:
     """Bring in measurements that were taken with other software."""
+    from rig.digits import counted
     from rig.tables import import_table
     from rig.terminal import terminal_progress
 
@@ -98,7 +99,7 @@ def import_(
     for event in result.events:
         if event["kind"] == "note":
             say(f"note: {event['text']}")
-    say(f"{output}: {result.rows} rows. Next: rig analyze {output}")
+    say(f"{output}: {counted(result.rows, 'row')}. Next: rig analyze {output}")
 
 
 def export(dataset: DatasetArgument, output: _Exported) -> None:

@@ -83,10 +83,13 @@ def diagnose(
     """The sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
     from rig.dataset import load
     from rig.diagnose import diagnose as run_diagnose
+    from rig.gap_model import check_writable
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
         measured = load(dataset)
+        if write_model is not None:
+            check_writable(measured, others=simulation is not None)
         result = run_diagnose(
             measured, model=model, simulation=simulation,
             add=add or (), withhold=withhold or (), progress=progress,

@@ -32,6 +32,23 @@ DatasetsArgument = Annotated[list[Path], typer.Argument(metavar="DATASET.h5 ..."
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL.yaml")]
 
 
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        from rig.software import software_version
+
+        typer.echo(software_version())
+        raise typer.Exit
+
+
+def version(
+    asked: Annotated[
+        bool,
+        typer.Option("--version", callback=_tell_version, is_eager=True, help="Name and version."),
+    ] = False,
+) -> None:
+    """What can be asked of the program itself."""
+
+
 def say(text: str) -> None:
     """Progress and notes go to standard error: standard output belongs to results."""
     typer.echo(text, err=True)

@@ -22,7 +22,7 @@ from rig.cli.options import (
 _Weighting = Annotated[
     str,
     typer.Option(
-        help="proportional, 1/s^2 or none: how the points are weighted; "
+        help="proportional, 1/s^2, none or errors-in-variables: how the points are weighted; "
         "auto: proportional where levels were held and a zero was measured."
     ),
 ]

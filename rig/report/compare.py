@@ -196,6 +196,6 @@ def _remarks(a: Stiffness, b: Stiffness) -> tuple[str, ...]:
 
 def _range(side: Stiffness) -> tuple[float, float]:
     """Of the forces that count towards k."""
-    out = {e.step for e in side.excluded}
-    forces = [p.force for p in side.levels if p.branch == "loading" and p.step not in out]
+    levels = [p for p in side.levels if p.branch == "loading"]
+    forces = [p.force for p in levels if p.step not in side.steps_out]
     return (min(forces), max(forces)) if forces else (0.0, 0.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.analyze import Analysis, analyze
-from rig.dataset import Dataset, load
+from rig.dataset import Dataset, load_each
 from rig.errors import InputError
 from rig.identify import IdentifyResult, identify
 from rig.journal import journal_path
@@ -114,7 +114,8 @@ class Gathered:
 def gather(names: Sequence[Named], wishes: Wishes, progress: Progress = silent) -> Gathered:
     """Reads and computes everything but the gap. A part that the data do not allow is missing, with
     its reason; InputError only for files that cannot be read."""
-    loaded = [load(name.path) for name in names]  # what is wrong with a file shows before long work
+    # what is wrong with a file shows before long work
+    loaded = load_each([name.path for name in names])
     coupling = _coupling(wishes.couple)
     sessions: list[Session] = []
     for name, dataset in zip(names, loaded, strict=True):

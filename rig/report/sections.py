@@ -45,9 +45,11 @@ def in_short(session: Session, data: Node) -> Section:
 def _k_unit(d: Node) -> Rich:
     if d["stiffness_N_per_mm"]["value"].value is None:
         return (": ", d["status_text"].text())
-    left_out = len({e["step"].value for e in d["excluded"]})
-    words = f" N/mm ({left_out} step{'s' if left_out != 1 else ''} not counted)"
-    return (words,) if left_out else (" N/mm",)
+    everywhere = len({e["step"].value for e in d["excluded"] if e["repetition"].value is None})
+    single = {e["repetition"].value for e in d["excluded"]} - {None}
+    words = [f"{everywhere} step{'s' if everywhere != 1 else ''} not counted"] * bool(everywhere)
+    words += [f"repetition {r} not counted in full" for r in sorted(single)]
+    return (f" N/mm ({', '.join(words)})" if words else " N/mm",)
 
 
 def _joints(data: Node) -> Cell:

@@ -6,6 +6,7 @@ signals of the devices, or whatever a table brought along) are described where t
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -18,6 +19,9 @@ Kind = Literal["number", "count", "word", "flag"]
 
 BRANCHES = ("zero", "loading", "unloading", "cycle")
 SAMPLE_NUMBER = "number of the sample; no time was recorded"  # in place of what time_s means
+# Far beyond any rig (the largest machines reach some 1e7 N): what lies there is in another unit.
+LARGEST_N = 1e7
+LARGEST_MM = 1e5
 NO_STEP = -1  # in the column `step`: a continuous measurement, not held at any level
 AXES = ("x", "y", "z")
 JOINTS = range(1, 7)
@@ -27,7 +31,8 @@ JOINTS = range(1, 7)
 class Column:
     """Kind: "number" float64, "count" int64, "word" text, "flag" bool.
 
-    `required`: a table must have it; `finite`: a cell that is empty or not finite is refused.
+    `required`: a table must have it; `finite`: a cell that is empty or not finite is refused;
+    `largest`: numbers beyond it, either way, are refused.
     """
 
     name: str
@@ -36,6 +41,7 @@ class Column:
     kind: Kind = "number"
     required: bool = False
     finite: bool = False
+    largest: float = math.inf
 
 
 def _all_columns() -> list[Column]:
@@ -51,10 +57,12 @@ def _all_columns() -> list[Column]:
         Column("step", "", "force step, 0 for zero load, -1 for continuous", "count"),
     ]
     measured = [
-        Column("force_N", "N", "force along the direction", required=True, finite=True),
-        *(Column(f"force_{a}_N", "N", f"force along {a} of the base frame") for a in AXES),
+        Column("force_N", "N", "force along the direction",
+               required=True, finite=True, largest=LARGEST_N),
+        *(Column(f"force_{a}_N", "N", f"force along {a} of the base frame", largest=LARGEST_N)
+          for a in AXES),
         Column("displacement_mm", "mm", "displacement along the direction",
-               required=True, finite=True),
+               required=True, finite=True, largest=LARGEST_MM),
     ]  # fmt: skip
     arm = [
         *(Column(f"q{j}_rad", "rad", f"position of joint {j}") for j in JOINTS),

@@ -11,6 +11,17 @@ from pathlib import Path
 
 from rig.errors import InputError
 
+ENDINGS = (".h5", ".hdf5")  # of data sets, in any case of letters
+
+
+def check_ending(path: Path) -> None:
+    """InputError for a new data set whose name says it is something else."""
+    if path.suffix.lower() not in ENDINGS:
+        raise InputError(
+            f"{path}: a data set is an HDF5 file; allowed endings: {', '.join(ENDINGS)}. "
+            f"Choose another name with -o, such as {path.with_suffix('.h5').name}."
+        )
+
 
 @contextmanager
 def in_place_of(path: Path) -> Iterator[Path]:

@@ -192,7 +192,7 @@ def test_fault_shows_its_remedy_on_the_page(driver: Chrome, tmp_path: Path) -> N
         carry_on(page, until="Stop")
         page.wait_for("alarms", "The measurement has ended")
         assert running.status() == 3
-        remedy = "Check the sensor's power, its cable and the adapter, then start again."
+        remedy = "Check the sensor's power, its cable and the adapter, then go on with --resume."
         assert remedy in running.said
         assert remedy in page.text("alarms")
         assert remedy in page.text("devices")

@@ -22,7 +22,7 @@ from identification.gap.words import WORDS
 from rig.dataset import Dataset, write
 from rig.diagnose import Diagnosis, diagnose
 from rig.errors import InputError
-from rig.gap_model import model_text, springs, write_model
+from rig.gap_model import check_writable, model_text, springs, write_model
 from rig.gap_path import planned_data
 from rig.measured_meta import measured_meta
 from rig.model import MODELS, load_model
@@ -187,6 +187,8 @@ def test_what_has_no_model_file_is_refused(
     bench = replace(dataset, meta=dataset.meta.model_copy(update={"robot": "none"}))
     with pytest.raises(InputError, match=r"robot: none\. A model file holds an arm"):
         model_text(diagnosis, bench)
+    with pytest.raises(InputError, match=r"another simulator's curves.*Leave --simulation out"):
+        check_writable(dataset, others=True)
     with pytest.raises(InputError, match="cannot be written"):
         write_model(diagnosis, dataset, tmp_path / "nowhere" / "m.yaml")
 

@@ -116,7 +116,7 @@ def test_emulated_data_are_said_to_be(single: IdentifyResult, files: Path) -> No
     real = identify([files / "real.h5"], proposals=1)
     assert "EMULATED" not in real.to_text() + model_text(real) + protocol_text(real)
     assert "station: ur10e_lab" in protocol_text(real)
-    measure(one_pose(), PAPER_C, 2, files / "cut.h5", complete=False)
+    measure(one_pose(), PAPER_C, 7, files / "cut.h5", complete=False)
     cut = identify([files / "single.h5", files / "cut.h5"], proposals=0)
     assert [b.split(":")[0] for b in cut.banners] == ["EMULATED", "INCOMPLETE"]
 
@@ -188,6 +188,46 @@ def test_contradictory_sets_are_named(files: Path) -> None:
     assert message.count("\n") == 0
     for words in ("single.h5", "other.h5", "contradict each other", "N/mm", "pose P0"):
         assert words in message
+
+
+@pytest.mark.parametrize("encoder", ["motor", "output"])
+def test_a_repetition_that_was_cut_short_is_as_if_not_measured(
+    tmp_path: Path, encoder: str
+) -> None:
+    made = measure(one_pose(encoder), PAPER_C, 8)
+    c = made.columns
+    third = (c["direction"] == "x") & (c["repetition"] == 3)
+    for name, kept in {"cut": ~third | (c["step"] <= 3), "without": ~third}.items():
+        columns = {n: values[kept] for n, values in c.items()}
+        write(replace(made, columns=columns), tmp_path / f"{name}.h5")
+    cut, without = (
+        identify([tmp_path / f"{n}.h5"], proposals=0, joint_readings=False)
+        for n in ("cut", "without")
+    )
+    np.testing.assert_allclose(cut.fit.stiffness, without.fit.stiffness)
+    np.testing.assert_allclose(cut.fit.relative_sd, without.fit.relative_sd)
+    seen, alike = (identify([tmp_path / f"{n}.h5"], proposals=0) for n in ("cut", "without"))
+    np.testing.assert_allclose(seen.fit.stiffness, alike.fit.stiffness, rtol=5e-5)
+    assert any(
+        "direction x: repetition 3 ended at " in n and n.endswith(" N: left out of the mean.")
+        for n in seen.notes
+    )
+
+
+def test_a_data_set_counts_once(files: Path, tmp_path: Path) -> None:
+    single, copy = files / "single.h5", tmp_path / "copy.h5"
+    copy.write_bytes(single.read_bytes())
+    with pytest.raises(InputError) as caught:
+        identify([single, files / "seen.h5", single], proposals=0)
+    assert str(caught.value) == (
+        f"{single}: is given twice; every measurement counts once. Leave one of them out."
+    )
+    with pytest.raises(InputError) as caught:
+        identify([single, copy], proposals=0)
+    assert str(caught.value) == (
+        f"{copy}: is the same data set as {single} (UUID 00000000-0000-0000-0000-000000000002); "
+        "every measurement counts once. Leave one of them out."
+    )
 
 
 def test_bad_input(files: Path) -> None:

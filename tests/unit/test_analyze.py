@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +110,7 @@ def test_undefined_stiffness_is_null_and_a_sentence() -> None:
     entry = result.to_json()["directions"]["x"]
     assert entry["status"] == "undefined"
     assert entry["stiffness_N_per_mm"]["value"] is None
-    assert "k in x is undefined" in result.to_text()
+    assert "run.h5: k in x is undefined.\n" in result.to_text()  # and no brackets to explain
     assert (
         "The stiffness is undefined: the force is 0 N from its zero throughout." in result.to_text()
     )
@@ -159,6 +160,22 @@ def test_an_unknown_weighting_is_named_with_a_suggestion() -> None:
 )  # fmt: skip
 def test_numbers_read_well_at_any_scale(value: float, text: str) -> None:
     assert number(value) == text
+
+
+def test_numbers_of_one_quantity_are_written_alike() -> None:
+    assert number(5847289.0, 2, 1e9) == "5.8e+06"
+    assert number(5847289.0, 2, 1e6) == "5847289"
+    assert number(0.0, 2, 1e9) == "0"
+    rows = []
+    for r in (1, 2, 3):
+        rows += run(lambda f, r=r: f / 1e9 * (1 + 0.01 * r), X, repetition=r)
+    text = analyze(table(rows)).to_text()
+    line = next(part for part in text.splitlines() if part.startswith("k = "))
+    assert re.fullmatch(
+        r"k = \d\.\d{3}e\+08 N/mm, standard uncertainty \d\.\de\+06 N/mm, "
+        r"95 % from \d\.\d{3}e\+08 to \d\.\d{3}e\+0[89] N/mm",
+        line,
+    )
 
 
 def test_thousands_are_written_out() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,7 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from identification.estimate import WEIGHTINGS
 from rig import cli
+from rig.software import software_version
 from tests.unit.test_runner import PROTOCOL
 
 HOME = Path(__file__).parents[2]
@@ -397,6 +400,44 @@ def test_diagnose_gives_the_contracts_json(rig: Rig, files: Path) -> None:
     status, _, err = rig("diagnose", "d.h5", "--add", "joint_yeild")
     assert status == 2
     assert "joint_yield" in err
+
+
+def test_version(rig: Rig) -> None:
+    status, out, err = rig("--version")
+    assert (status, err) == (0, "")
+    assert out == f"{software_version()}\n"
+    assert re.fullmatch(r"stiffness-rig \d+\.\d+\.\d+\n", out)
+    assert "How stiff is this arm, and why" in rig("--help")[1]
+
+
+def test_the_help_names_every_weighting(rig: Rig) -> None:
+    said = " ".join(rig("analyze", "--help")[1].split()).replace("- ", "-")  # wrapped lines
+    for word in WEIGHTINGS:
+        assert word in said.split("how the points are weighted")[0]
+
+
+def test_one_row_is_no_rows(rig: Rig, files: Path) -> None:
+    (files / "one.csv").write_text("force_N,displacement_mm\n1,2\n")
+    _, _, err = rig("import", "one.csv", "m.yaml", "-o", "d.h5")
+    assert "d.h5: 1 row. Next: rig analyze d.h5" in err
+
+
+def test_a_path_that_is_not_there(rig: Rig, files: Path) -> None:
+    model = str(HOME / "data" / "models" / "F1.yaml")
+    status, _, err = rig("couple", model, "--path", "gone.csv")
+    assert status == 2
+    assert err == (
+        "gone.csv: cannot be read: No such file or directory. Check the name of the table.\n"
+    )
+
+
+def test_what_cannot_become_a_model_is_said_before_the_work(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    status, out, err = rig("diagnose", "d.h5", "--write-model", "found.yaml")
+    assert (status, out) == (2, "")  # no result: nothing was diagnosed
+    assert err == (
+        "d.h5: robot: none. A model file holds an arm; write the diagnosis with --json.\n"
+    )
 
 
 def test_diagnose_takes_the_stiffnesses_of_a_model_of_the_same_robot(rig: Rig, files: Path) -> None:

@@ -75,6 +75,16 @@ def test_every_command_stands_in_the_readme_and_the_changelog() -> None:
         assert missing <= ({"emulate"} if page == "README.md" else set()), page
 
 
+def test_the_readmes_blind_figures_are_those_of_the_page() -> None:
+    readme, page = ((HOME / n).read_text("utf-8") for n in ("README.md", "docs/blind.md"))
+    rows = readme.partition("## Blind check")[2].partition("| measure |")[2].partition("\n\n")[0]
+    first = page.partition("\n## 300 cases")[2].partition("\n## ")[0]
+    figures = re.findall(r"(\d\.\d+) \((\d+ of \d+)\) \| (\d\.\d+ to \d\.\d+)", rows)
+    assert ("0.87", "120 of 138", "0.80 to 0.92") in figures
+    for figure, cases, interval in figures:
+        assert f"| {figure} | {interval} | {cases} |" in first
+
+
 def test_the_architecture_names_modules_that_exist() -> None:
     text = (HOME / "docs" / "architecture.md").read_text("utf-8")
     dotted = re.findall(r"`((?:rig|identification|drivers)(?:\.\w+)+)`", text)

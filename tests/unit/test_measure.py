@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from rig import measure
+from rig.errors import InputError
 from rig.procedure.progress import Progress
 from rig.protocol import load_protocol
 from rig.station import load_station
@@ -35,6 +36,12 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
     with measure._opened(protocol, station, Progress(rows=225), said.append, None):
         assert "no keys are heard" in said[-4]
         assert said[-3:] == ["resuming after 225 rows", measure.SAFETY_NOTE, "(screen)"]
+
+
+def test_a_data_set_is_named_as_one(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"x\.csv: a data set is an HDF5 file; allowed endings"):
+        measure.measure(PROTOCOL, "emulated", tmp_path / "x.csv", print)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(("speed", "synced"), [(50.0, False), (1.0, True), (0.5, True)])

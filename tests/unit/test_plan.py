@@ -102,6 +102,36 @@ def test_narrow_margins_are_warned_of(paper: MeasurementProtocol, lab: Station) 
     )
 
 
+def limited(paper: MeasurementProtocol, **limits: float) -> MeasurementProtocol:
+    """With other values of limits."""
+    changed = {n: dataclasses.replace(getattr(paper.limits, n), max=v) for n, v in limits.items()}
+    return dataclasses.replace(paper, limits=dataclasses.replace(paper.limits, **changed))
+
+
+def test_a_force_limit_that_no_reading_reaches(paper: MeasurementProtocol, lab: Station) -> None:
+    assert plan(limited(paper, force_N=5000), lab).warnings == tuple(
+        f"pose P1, direction {d}: limits.force_N.max is 5000 N, but the dynamometer's full scale "
+        "ends at 1000 N: no reading reaches the limit. Set it below."
+        for d in "xy"
+    )
+    assert plan(limited(paper, force_N=1000), lab).warnings == ()
+    assert plan(limited(paper, force_N=5000)).warnings == ()  # no station, no full scale
+
+
+def test_a_limit_that_a_softer_arm_meets(paper: MeasurementProtocol, lab: Station) -> None:
+    near = limited(paper, displacement_mm=2.0)
+    assert plan(near, lab).warnings == (
+        "pose P1, direction x: 1.57 mm +- 35 % expected at 220 N, so it may be 2.11 mm; "
+        "limits.displacement_mm.max is 2 mm. Lower the top force, or give "
+        "stop_at_displacement_mm.",
+    )
+    assert plan(limited(paper, displacement_mm=2.2), lab).warnings == ()
+    stopped = tuple(dataclasses.replace(r, stop_at_displacement_mm=1.9) for r in paper.runs)
+    assert plan(dataclasses.replace(near, runs=stopped), lab).warnings == ()
+    narrower = plan(limited(paper, displacement_mm=1.8), lab).warnings
+    assert [w.endswith(": 13 % to spare.") for w in narrower] == [True]
+
+
 @pytest.mark.parametrize(
     ("q_deg", "warned"),
     [("[0.2344, -1.7425, -1.8867, -1.0832, 1.5708, -1.3364]", True),
@@ -132,6 +162,8 @@ def test_the_sensors_own_axes_carry_the_force(paper: MeasurementProtocol, lab: S
     assert plan(paper, dataclasses.replace(lab, dynamometer=turned)).warnings == (
         "pose P1, direction x: the dynamometer's y carries 220 N, full scale 250 N: 12 % to spare.",
         "pose P1, direction y: the dynamometer's x carries 82 N, full scale 100 N: 18 % to spare.",
+        "pose P1, direction y: limits.force_N.max is 240 N, but the dynamometer's full scale ends "
+        "at 100 N: no reading reaches the limit. Set it below.",
     )
 
 

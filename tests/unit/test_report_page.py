@@ -6,12 +6,13 @@ import hashlib
 import io
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure as Plot
 
-from rig.dataset import load
+from rig.dataset import load, write
 from rig.errors import InputError
 from rig.journal import journal_path
 from rig.report import pictures
@@ -69,7 +70,10 @@ def evil(tmp_path_factory: pytest.TempPathFactory) -> Report:
                 {"kind": "discard", "text": EVIL, "reason": EVIL, "first": 0, "last": 0,
                  "sample": 3}],
     )  # fmt: skip
-    return make([path, path], QUIET)
+    again = folder / "b" / path.name
+    again.parent.mkdir()
+    write(replace(load(path), uuid="another"), again)
+    return make([path, again], QUIET)
 
 
 def test_text_stays_text(evil: Report) -> None:
@@ -240,6 +244,12 @@ def test_two_files_of_one_name(tmp_path: Path) -> None:
     assert [s.label for s in report.gathered.sessions] == [str(p) for p in paths]
     files = [p.name for p in write_figures(report, tmp_path / "figures")]
     assert len({name.lower() for name in files}) == len(files)
+
+
+def test_a_data_set_is_not_compared_with_itself(tmp_path: Path) -> None:
+    path = bench(tmp_path / "a.h5")
+    with pytest.raises(InputError, match=r"a\.h5: is given twice"):
+        make([path, path], QUIET)
 
 
 def test_wrong_names_of_files(tmp_path: Path) -> None:

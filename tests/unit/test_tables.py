@@ -244,12 +244,20 @@ REFUSED: list[tuple[str | bytes, str]] = [
      "allowed; every row needs a finite value."),
     (HEAD + GOOD + "1,x,1,loading,1,-inf,0\n", ':3: column force_N: "-inf" (N) is not allowed; '
      "every row needs a finite value."),
+    (HEAD + GOOD + "1,x,1,loading,1,-2e7,0\n", ':3: column force_N: "-2e7" (N) is not allowed; '
+     "allowed: -10000000 N to 10000000 N. Is the unit right?"),
+    (HEAD + GOOD + "1,x,1,loading,1,1,100001\n", ':3: column displacement_mm: "100001" (mm) is '
+     "not allowed; allowed: -100000 mm to 100000 mm. Is the unit right?"),
+    ("force_N,displacement_mm,force_z_N\n1,5,\n1,5,2e7\n", ':3: column force_z_N: "2e7" (N) is '
+     "not allowed; allowed: -10000000 N to 10000000 N. Is the unit right?"),
     (HEAD + GOOD + "1,x,1,loading,1,1e999,0\n", ':3: column force_N: "1e999" (N) is not allowed; '
      "every row needs a finite value."),
     (HEAD + GOOD + ",x,1,loading,1,5,0\n", ":3: column time_s: an empty cell is not allowed; "
      "every row needs a finite value."),
     (HEAD + GOOD + "1,x,1,laoding,1,5,0\n", ':3: column branch: "laoding" is not allowed; allowed: '
      'zero, loading, unloading, cycle. Did you mean "loading"?'),
+    (HEAD + GOOD + "1,x,1,up,1,5,0\n", ':3: column branch: "up" is not allowed; allowed: '
+     "zero, loading, unloading, cycle."),
     (HEAD + GOOD + "1,x,1,,1,5,0\n", ":3: column branch: an empty cell is not allowed; allowed: "
      "zero, loading, unloading, cycle."),
     (HEAD + GOOD + "1,z,1,loading,1,5,0\n", ':3: column direction: "z" is not allowed; META.yaml '
@@ -312,6 +320,18 @@ def test_missing_files(tmp_path: Path) -> None:
         import_table(tmp_path / "none.csv", tmp_path / "none.yaml")
     with pytest.raises(InputError, match="cannot be read: Is a directory"):
         import_table(tmp_path, tmp_path / "META.yaml")
+
+
+@pytest.mark.parametrize("name", ["z.csv", "z", "z.h5.bak"])
+def test_a_data_set_is_named_as_one(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError) as caught:
+        bring(tmp_path, TABLE, out=tmp_path / name)
+    assert str(caught.value) == (
+        f"{tmp_path / name}: a data set is an HDF5 file; allowed endings: .h5, .hdf5. "
+        f"Choose another name with -o, such as {'z.h5.h5' if 'bak' in name else 'z.h5'}."
+    )
+    assert not (tmp_path / name).exists()
+    bring(tmp_path, TABLE, out=tmp_path / "Z.HDF5")
 
 
 def test_measurements_are_never_written_over(tmp_path: Path) -> None:
@@ -393,13 +413,13 @@ def test_marks_survive_the_table(tmp_path: Path) -> None:
     assert load(tmp_path / "e.h5").origin == "emulated"
 
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+newtons, millimetres = st.floats(-1e7, 1e7), st.floats(-1e5, 1e5)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     rows=st.lists(
-        st.tuples(finite, finite, st.floats(allow_infinity=False), st.integers(-1, 2**40),
+        st.tuples(newtons, millimetres, st.floats(allow_infinity=False), st.integers(-1, 2**40),
                   st.sampled_from(["x", "y"]), st.sampled_from(["zero", "loading", "cycle"]),
                   st.booleans(), st.text("aä,;\"'# é|", max_size=5).map(str.strip)),
         min_size=1, max_size=20,

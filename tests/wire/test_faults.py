@@ -80,6 +80,7 @@ def test_fault(
     assert outcome.status in (3, 4), outcome.stderr
     assert NAMED.get((fault, when), f"{device}: ") in message
     assert len(message.split(". ")) >= 2, f"fault and remedy: {message}"
+    assert outcome.stderr.count(message.removeprefix("Stopped for safety. ")) == 1
     if when == "mid-run":
         dataset = load(tmp_path / "run.h5")
         assert not dataset.complete

@@ -167,19 +167,20 @@ AT_START: dict[str, Outcome] = {
     "before_range": (OutOfRange, r"before the range \(65524\)"),
     "beyond_range": (OutOfRange, r"beyond the range \(65526\)"),
     "poor_target": (BadReply, r"poor target \(65528\)"),
-    "laser_off": (BadReply, "the laser is switched off"),
+    "laser_off": (BadReply, r"the laser is switched off\. .*, then start again\."),
     "unknown_error_value": (BadReply, r"unknown error value \(65532\)"),
-    "relative_zero": (BadReply, "relative zero"),
+    "relative_zero": (BadReply, r"relative zero.*, then start again\."),
     "wrong_range": (BadReply, "range of 50 mm"),
     "wrong_rate": (BadReply, "sends 5000 values/s"),
     "mute_to_commands": (CannotConnect, "no answer to INFO .*, although values come"),
 }
 IN_MID_RUN: dict[str, Outcome] = {
     **AT_START,
-    "silence": (ReadTimeout, "has sent nothing for"),
+    "silence": (ReadTimeout, r"has sent nothing for .*, then go on with --resume\."),
     "close": (ReadTimeout, "has gone"),
     "garbage": (BadReply, "bytes that are no values"),
-    "laser_off": (BadReply, r"laser off \(65530\)"),
+    "laser_off": (BadReply, r"laser off \(65530\)\. .*, then go on with --resume\."),
+    "relative_zero": (BadReply, r"relative zero.*, then go on with --resume\."),
     "mute_to_commands": MEASURES,
 }
 

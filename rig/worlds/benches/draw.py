@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from rig.errors import InputError, did_you_mean
+from rig.errors import InputError, close_to
 from rig.worlds.benches import channels, curves, loops, metals, strange, viscous
 from rig.worlds.benches.imperfect import imperfect
 from rig.worlds.benches.label import answers, structural
@@ -79,7 +79,7 @@ def draw_case(
 def _check(word: str | None, form: str | None) -> None:
     if word is not None and word not in WORDS:
         raise InputError(
-            f'word: "{word}" is not known; allowed: {", ".join(WORDS)}.{did_you_mean(word, WORDS)}'
+            f'word: "{word}" is not known; allowed: {", ".join(WORDS)}.{close_to(word, WORDS)}'
         )
     if form is not None and word is None:
         raise InputError(f'form: "{form}" stands without its word; name the word as well.')

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from rig.errors import InputError, did_you_mean
+from rig.errors import InputError, close_to
 from rig.worlds.arm import Array
 from rig.worlds.hidden import channel_laws, joint_laws, label, outer_laws, strange_laws
 from rig.worlds.hidden.design import DESIGNS, draw_plan
@@ -87,7 +87,7 @@ def _check(word: str | None, second: str | None, design: str | None, laws: str |
         if value is not None and value not in allowed:
             known = ", ".join(allowed)
             raise InputError(
-                f'{name}: "{value}" is not known; allowed: {known}.{did_you_mean(value, allowed)}'
+                f'{name}: "{value}" is not known; allowed: {known}.{close_to(value, allowed)}'
             )
     if second is not None and word in ("none", "unknown"):
         raise InputError(

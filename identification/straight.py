@@ -1,0 +1,87 @@
+"""Whether levels have a stiffness at all, and how well one number describes them; in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from identification.curve import Array
+from identification.levels import PointwiseStiffness, Table
+
+Status = Literal["ok", "doubtful", "undefined"]
+BENT = 0.2  # change of the stiffness along a curve that is worth a word
+STRAIGHT = 0.8  # share of the displacement's variance below which a line is a poor description
+SIGNIFICANT = 3.0  # slope over its standard deviation, where the force is within its noise
+
+
+def undefined(table: Table, through_origin: bool) -> str:
+    """Why these levels have no stiffness, as a sentence; empty if they have one."""
+    start = "The stiffness is undefined: "
+    if table.size == 0:
+        return start + "there are no loaded levels."
+    if table.size == 1 and not through_origin:
+        return start + "there is one level only, and no measured origin to draw a line from."
+    force = np.append(table.force, 0.0) if through_origin else table.force
+    displacement = np.append(table.displacement, 0.0) if through_origin else table.displacement
+    if np.ptp(force) == 0.0:
+        return start + f"the force is {force[0]:.4g} N from its zero throughout."
+    if np.ptp(displacement) == 0.0:
+        return start + "the displacement is the same at every force."
+    if np.ptp(force) <= 3.0 * float(np.median(table.u_force)) and not _related(force, displacement):
+        return (
+            start + f"the force varies by {np.ptp(force):.3g} N, within its uncertainty of "
+            f"{float(np.median(table.u_force)):.3g} N, and the displacement does not follow it."
+        )
+    return ""
+
+
+def _related(force: Array, displacement: Array) -> bool:
+    """Whether the slope of displacement over force is told from zero by the points' own scatter."""
+    if force.size < 4:
+        return False
+    r = float(np.corrcoef(force, displacement)[0, 1])
+    return abs(r) * math.sqrt((force.size - 2) / max(1e-300, 1.0 - r * r)) > SIGNIFICANT
+
+
+def judge(table: Table, residuals: Array, k: float) -> tuple[Status, str]:
+    """Whether one line describes the levels; k N/m. A doubt comes with its sentence."""
+    if k < 0:
+        return "doubtful", "The displacement falls while the force rises: k is negative."
+    if table.size > 2 and np.ptp(table.displacement) > 0:
+        spread = float(np.sum((table.displacement - table.displacement.mean()) ** 2))
+        explained = 1.0 - float(np.sum(residuals**2)) / spread
+        if explained < STRAIGHT:
+            return "doubtful", (
+                f"A line explains only {max(0.0, explained):.0%} of how the displacement varies: "
+                "k is an average over a curve that is not straight; look at the pointwise k."
+            )
+    return "ok", ""
+
+
+def bend(pointwise: Sequence[PointwiseStiffness], rivals: Sequence[float]) -> tuple[str, ...]:
+    """A note where the stiffness between levels changes along the curve, plainly beyond its
+    scatter: one number is then a matter of averaging. rivals N/m: k under other choices."""
+    known = [p for p in pointwise if math.isfinite(p.stiffness) and math.isfinite(p.sd)]
+    third = len(known) // 3
+    if third < 1:
+        return ()
+    ends = []
+    for part in (known[:third], known[-third:]):
+        mean = float(np.mean([p.stiffness for p in part]))
+        ends.append((mean, float(np.sqrt(np.sum([p.sd**2 / p.n for p in part]))) / third))
+    (first, u_first), (last, u_last) = ends
+    change = abs(last - first)
+    if change < max(BENT * min(abs(first), abs(last)), SIGNIFICANT * math.hypot(u_first, u_last)):
+        return ()
+    way = "falls" if last < first else "rises"
+    note = (
+        f"The stiffness between neighbouring levels {way} from {first / 1e3:.4g} to "
+        f"{last / 1e3:.4g} N/mm along the curve (means over its first and last third): k is an "
+        "average"
+    )
+    if rivals:
+        note += f"; other choices give {min(rivals) / 1e3:.4g} to {max(rivals) / 1e3:.4g} N/mm"
+    return (f"{note}.",)
