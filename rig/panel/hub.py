@@ -69,12 +69,11 @@ class Seat:
         elif viewer.client == self._holder:
             self._left_at = self.now()
 
-    def take(self, client: str) -> bool:
-        """Makes the client the operator; False if no stream of his is open."""
-        if client not in self._streams:
-            return False
+    def take(self, client: str) -> None:
+        """Makes the client the operator. His stream may be closed: a page whose browser has no
+        other connection free lets go of it to send this, and comes back like one that reloads."""
         self._holder = client
-        return True
+        self._left_at = self.now()
 
 
 class Hub:

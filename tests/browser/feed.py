@@ -143,7 +143,10 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
-        told, seq = int(self.headers.get("Last-Event-ID") or 0), 0
+        last = self.headers.get("Last-Event-ID") or query.get("last", ["0"])[0]
+        told, seq = int(last), 0
+        if not told:
+            self._event({"reset": "run"})
         feed.viewers += 1
         try:
             while not self.server.stopping.is_set():

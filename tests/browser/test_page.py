@@ -261,7 +261,7 @@ def test_refused_command_says_why(page: Viewer, feed: Feed) -> None:
 
 
 def test_two_viewers_and_one_operator(page: Viewer, feed: Feed) -> None:
-    other = Viewer(page.here(), feed.url, new_tab=True)
+    other = Viewer(page.here(), feed.url, new="tab")
     other.wait_for("force-number", "126.4")
     other.wait_for("viewer-text", "somebody else is the operator")
     assert not other.seen("controls")

@@ -81,7 +81,11 @@ def test_a_slip_at_another_depth_is_the_same_shape_where_moments_run_in_proporti
         depths.setdefault(key, {}).setdefault(v.shape, set()).add(v.info["depth_m"])
     assert depths
     assert max(map(len, depths.values())) == 1  # one shape
-    assert {len(d) for shapes in depths.values() for d in shapes.values()} == {1, 2, 3}  # yaw, tilt, slides
+    assert {len(d) for shapes in depths.values() for d in shapes.values()} == {
+        1,
+        2,
+        3,
+    }  # yaw, tilt, slides
     natural = {v.info["depth_m"]: v.info["natural"] for v in slips if v.info["axis"] == "x"}
     assert natural[0.7] < natural[0.0]  # a longer lever does more
 

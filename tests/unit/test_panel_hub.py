@@ -170,14 +170,22 @@ def test_the_first_with_the_operators_link_operates(hub: Hub, now: Time) -> None
     assert operator(hub, now, second) == {"you": False, "taken": True, "may_take": True}
 
 
-def test_taking_over_is_explicit_and_needs_an_open_page(hub: Hub) -> None:
-    first, second = viewer("first"), viewer("second")
-    hub.seat.join(first)
-    assert not hub.seat.take("second")
-    hub.seat.join(second)
+def test_taking_over_is_explicit(hub: Hub) -> None:
+    hub.seat.join(viewer("first"))
+    hub.seat.join(viewer("second"))
     assert hub.seat.holder == "first"
-    assert hub.seat.take("second")
+    hub.seat.take("second")
     assert hub.seat.holder == "second"
+
+
+def test_who_takes_over_without_a_stream_has_to_come_back_soon(hub: Hub, now: Time) -> None:
+    hub.seat.join(viewer("first"))
+    now.t += 100
+    hub.seat.take("second")
+    now.t += hubs.SEAT_GRACE_S - 0.1
+    assert hub.seat.holder == "second"
+    now.t += 0.2
+    assert hub.seat.holder is None
 
 
 def test_a_reload_keeps_the_seat_and_a_long_absence_loses_it(hub: Hub, now: Time) -> None:
