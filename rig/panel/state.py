@@ -9,6 +9,8 @@ set. Each message is one JSON object of these kinds, told apart by its keys:
                            comes late or reloads gets all of them; who reconnects, those after
                            his last id.
     {"reset": run id}      forget all items: another run, or the gap can't be filled. Items follow.
+    {"recent": [[t_s, force_N, displacement_mm], ...]}  the last two minutes, once in each stream
+                           before its first state: in place of what the viewer kept of them.
     {"end": {"phase", "text"}}  the last message: the measurement is over; don't reconnect.
 
 Items, each an object with one key:

@@ -39,6 +39,7 @@ class Feed:
     def __init__(self, state: State, items: list[dict[str, object]] | None = None) -> None:
         self.state = state
         self.items = items or []
+        self.recent: list[tuple[float, float | None, float | None]] = []
         self.commands: list[dict[str, Any]] = []
         self.refusal = ""
         self.on_command: Callable[[dict[str, Any]], None] = lambda _: None
@@ -147,6 +148,8 @@ class _Handler(BaseHTTPRequestHandler):
         told, seq = int(last), 0
         if not told:
             self._event({"reset": "run"})
+        if feed.recent:
+            self._event({"recent": feed.recent})
         feed.viewers += 1
         try:
             while not self.server.stopping.is_set():

@@ -123,6 +123,22 @@ def test_reload_shows_the_whole_run_again(page: Viewer, feed: Feed) -> None:
     page.wait(lambda: page.seen("controls"), "still the operator after the reload")
 
 
+def test_who_comes_late_sees_the_last_two_minutes(page: Viewer, feed: Feed) -> None:
+    def values() -> int:
+        return int(page.attribute("time", "aria-label").split(", ")[-1].split()[0])
+
+    now = time.monotonic()
+    feed.recent = [(now - 90 + 0.1 * n, 0.1 * n, None) for n in range(900)]
+    assert values() < 800
+    page.reload()
+    page.wait(lambda: "values" in page.attribute("time", "aria-label"), "the chart over time")
+    assert 900 < values() < 1000
+    feed.start(feed.stop())
+    page.wait_for("alarms", "Connection lost")
+    page.wait(lambda: page.text("alarms") == "", "another stream")
+    assert 900 < values() < 1000, "told anew, and not added"
+
+
 def test_sample_that_is_told_twice_counts_once(page: Viewer, feed: Feed) -> None:
     last = cast("dict[str, Any]", feed.items[-1]["sample"])
     feed.items += [{"sample": last}, {"sample": {**last, "row": last["row"] + 1}}]

@@ -42,6 +42,7 @@ class Page {
   receive(message) {
     if (message.batch) message.batch.forEach((item) => this.item(item));
     else if (message.reset !== undefined) this.store.clear();
+    else if (message.recent) this.store.recall(message.recent);
     else if (message.end) this.end = message.end;
     else if (message.seq !== undefined) this.newest(message);
     this.want();
