@@ -6,6 +6,7 @@ import re
 import time
 from dataclasses import replace
 from functools import partial
+from math import nan
 from typing import TYPE_CHECKING, Any, cast
 
 import pytest
@@ -330,8 +331,31 @@ def test_dangerous_names_show_as_text(page: Viewer, feed: Feed) -> None:
     assert page.script("return document.querySelectorAll('img').length") == 0
 
 
+def test_nothing_is_said_of_samples_before_there_are_any(driver: Chrome) -> None:
+    feed = Feed(scenes.setting_up(), [scenes.plan(), scenes.prediction()])
+    page = Viewer(driver, feed.url)
+    try:
+        page.wait_for("prompt-text", "Set up screw, dynamometer and laser along x")
+        assert page.attribute("arm", "aria-label").endswith(
+            "the screw pushes it along x +x of the base frame"
+        )
+        assert page.script("return document.querySelector('#arm .push-head') !== null")
+        assert page.text("slots") == ""
+        assert page.text("curve-legend") == "simulation"
+    finally:
+        feed.close()
+
+
+def test_one_order_at_a_time(page: Viewer, feed: Feed) -> None:
+    feed.state = replace(scenes.setting_up(scenes.UNLOAD), turn=Turn("out", nan, nan, nan))
+    page.wait_for("prompt-text", "Turn the screw back")
+    page.wait(lambda: not page.seen("cue"), "the question alone")
+    feed.show(force=Force(12.0, 0.1, 0.0, 0.0, stale=False))
+    page.wait_for("cue-word", "Loosen")
+    assert page.text("cue-far") == "until the force no longer answers"
+
+
 def test_unknown_values_are_dashes(page: Viewer, feed: Feed) -> None:
-    nan = float("nan")
     feed.show(
         force=Force(nan, nan, nan, 0.0, stale=True),
         displacement=Displacement(nan, nan, stale=True),
