@@ -48,6 +48,7 @@ class Feed:
         self.late_s = 0.0
         self.end: dict[str, str] | None = None
         self.viewers = 0
+        self.resumed: list[int] = []  # items that a viewer had when it opened each stream
         self._server: _Server | None = None
         self.start()
 
@@ -146,6 +147,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         last = self.headers.get("Last-Event-ID") or query.get("last", ["0"])[0]
         told, seq = int(last), 0
+        feed.resumed.append(told)
         if not told:
             self._event({"reset": "run"})
         if feed.recent:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import replace
-from functools import partial
 from math import nan
 from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
 from rig.panel.picture import BANNER
-from rig.panel.state import Displacement, Force, PromptState, Slots, State, Turn
+from rig.panel.state import Displacement, Force, PromptState, Slots, Turn
 from tests.browser import scenes
 from tests.browser.browser import resize, theme
 from tests.browser.feed import Feed
@@ -381,65 +380,7 @@ def test_theme_follows_the_system_until_the_button_says_otherwise(page: Viewer) 
     assert background() == light, "the choice outlives a reload"
 
 
-def scene_shown(page: Viewer, state: State) -> bool:
-    return page.seen("prompt") == bool(state.prompt)
-
-
-@pytest.mark.parametrize("size", [(1920, 1080), (1024, 768), (390, 844)])
-def test_nothing_is_cut_off(page: Viewer, feed: Feed, size: tuple[int, int]) -> None:
-    resize(page.here(), *size)
-    try:
-        for state in (scenes.turning(), scenes.prompting(scenes.MOUNT), scenes.laser_failed()):
-            feed.state = state
-            page.wait(partial(scene_shown, page, state), "the scene")
-            time.sleep(0.3)
-            assert page.script(CUT_OFF) == []
-    finally:
-        resize(page.here(), 1920, 1080)
-
-
-# Ids of what is wider than its place or sticks out of the window at the side.
-CUT_OFF = """
-const ids = ["force", "target", "gauge-scale", "cue-word", "cue-far", "displacement", "prompt-text",
-  "prompt-choices", "facts", "controls", "safety", "curve-legend", "emulated", "alarms"];
-return ids.filter((id) => {
-  const e = document.getElementById(id);
-  if (!e.checkVisibility()) return false;
-  const box = e.getBoundingClientRect();
-  const card = (e.closest(".card") ?? document.body).getBoundingClientRect();
-  const cut = id === "prompt-text" && e.scrollHeight > e.clientHeight + 1;
-  return cut || e.scrollWidth > e.clientWidth + 1
-    || box.right > Math.min(innerWidth, card.right) + 1 || box.bottom > card.bottom + 1
-    || box.left < 0;
-});
-"""
-
-
 def test_foreign_resources_are_not_asked_for(page: Viewer, feed: Feed) -> None:
     code = "return performance.getEntriesByType('resource').map((e) => new URL(e.name).origin)"
     origin = feed.url.split("/?")[0]
     assert set(page.script(code)) == {origin}
-
-
-def test_phone_keeps_controls_in_sight(driver: Chrome, page: Viewer) -> None:
-    resize(driver, 390, 844)
-    try:
-        page.script("scrollTo(0, document.body.scrollHeight)")
-        box = page.script(
-            "return document.getElementById('abort').getBoundingClientRect().toJSON()"
-        )
-        assert 0 < box["top"] < box["bottom"] <= 844
-        assert box["height"] >= 44
-    finally:
-        resize(driver, 1920, 1080)
-
-
-def test_names_of_devices_are_not_torn_on_a_tablet(page: Viewer, feed: Feed) -> None:
-    resize(page.here(), 1024, 768)
-    feed.state = scenes.laser_failed()
-    page.wait(lambda: "FAULT" in page.text("devices"), "the fault")
-    lines = page.script(
-        "return [...document.querySelectorAll('#devices .name')].map(n => n.getClientRects()[0]"
-        ".height / parseFloat(getComputedStyle(n).lineHeight))"
-    )
-    assert lines == pytest.approx([1.0] * len(lines), abs=0.2)

@@ -57,6 +57,7 @@ def test_a_hidden_tab_is_not_live_and_then_has_the_whole_run(page: Viewer, feed:
     page.wait_for("force-number", "131.0")
     page.wait(lambda: not page.looks_old("force"), "live again")
     assert "repetition 3: 31 samples" in page.attribute("curve", "aria-label")
+    assert feed.resumed == [0, 0, len(feed.items) - 1], "each item is told once"
     Viewer(page.here(), "about:blank", new="tab")  # hides a page that knows of another
     look, band, locked = page.script("return window.left")
     assert "old" in look.split()
