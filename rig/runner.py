@@ -143,7 +143,9 @@ class Runner:
         run = where.run
         if self._mounted == (run.pose, run.direction):
             return
-        self._supervision.show(phase="mounting")
+        # Nobody looks at the devices meanwhile: where the rig goes is told, and no value beside it.
+        self._supervision.show(phase="mounting", force_N=nan, displacement_mm=nan)
+        self._loader.guide(self._supervision.view)
         # In Reset nothing that happens while the rig is set up can overload the amplifier.
         self._reset()
         pose = self._protocol.poses[run.pose]

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
+from rig.panel.recent import Recent
 from rig.panel.state import STALE_S, to_json
 
 KEPT_ITEMS = 50_000  # fourteen hours at 1 Hz; older ones are in the data set alone
@@ -23,7 +24,8 @@ Clock = Callable[[], float]
 
 @dataclass
 class Viewer:
-    """One open stream. `seen`: number of the last item sent, None before the first message."""
+    """One open stream. `seen`: number of the last item sent, None before the first message;
+    `recalled`: whether it has been told the last minutes."""
 
     client: str
     may_take: bool
@@ -31,6 +33,7 @@ class Viewer:
     pinned: int = 0
     state: int = 0
     at: float = 0.0
+    recalled: bool = False
     ended: bool = False
 
 
@@ -69,12 +72,11 @@ class Seat:
         elif viewer.client == self._holder:
             self._left_at = self.now()
 
-    def take(self, client: str) -> bool:
-        """Makes the client the operator; False if no stream of his is open."""
-        if client not in self._streams:
-            return False
+    def take(self, client: str) -> None:
+        """Makes the client the operator. His stream may be closed: a page whose browser has no
+        other connection free lets go of it to send this, and comes back like one that reloads."""
         self._holder = client
-        return True
+        self._left_at = self.now()
 
 
 class Hub:
@@ -91,6 +93,7 @@ class Hub:
         self.end: Mapping[str, Any] | None = None
         self._now = now
         self._at = 0.0
+        self._recent = Recent()
         self._version = 0  # of state and seat
         self._sequence = 0
         self._items: deque[bytes] = deque(maxlen=KEPT_ITEMS)
@@ -102,6 +105,7 @@ class Hub:
     def set_state(self, state: dict[str, Any], at: float) -> None:
         """`at`: monotonic s of the moment in which the measuring process made it."""
         self.state, self._at = state, at
+        self._recent.add(state, at)
         self.touch()
 
     def add(self, item: Mapping[str, Any]) -> None:
@@ -166,6 +170,9 @@ class Hub:
         if items := list(islice(self._items, skipped, skipped + BATCH)):
             viewer.seen += len(items)
             yield self._batch(items, viewer.seen)
+        if not viewer.recalled and (rows := self._recent.rows()):
+            yield _event(to_json({"recent": rows}))
+        viewer.recalled = True  # what comes from now on is told by the states
         now = self._now()
         if self.state is not None and (
             viewer.state != self._version or now - viewer.at >= HEARTBEAT_S

@@ -137,7 +137,7 @@ class _Site:
         if self._viewers >= MOST_VIEWERS:
             return PlainTextResponse(f"{MOST_VIEWERS} viewers are the most.", 503)
         may_take = self._guard.may_command(request.query_params.get("token"))
-        last = request.headers.get("last-event-id")
+        last = request.headers.get("last-event-id") or request.query_params.get("last")
         viewer = Viewer(client, may_take, seen=self._hub.first_seen(last))
         return _Stream(self, viewer)
 
@@ -165,7 +165,8 @@ class _Site:
             client = self._operator(request)
             wish = _json(await _body(request))
             if isinstance(wish, dict) and wish.get("command") == "take_over":
-                self._take_over(client)
+                self._hub.seat.take(client)
+                self._hub.touch()
             else:
                 self._obey(client, wish)
         except Refused as refused:
@@ -182,11 +183,6 @@ class _Site:
         if not CLIENT_WORD.fullmatch(client):
             raise Refused(400, "The request does not say which page it comes from.")
         return client
-
-    def _take_over(self, client: str) -> None:
-        if not self._hub.seat.take(client):
-            raise Refused(409, "The page must be connected before it can take over.")
-        self._hub.touch()
 
     def _obey(self, client: str, wish: object) -> None:
         if self._hub.seat.holder != client:

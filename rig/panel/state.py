@@ -1,13 +1,16 @@
 """What travels to the page: one state ten times a second, and items that are kept for the run.
 
-The page opens `GET /events?token=T&client=C` (server-sent events, no `event:` field: all arrive
-as "message"). Each message is one JSON object of these kinds, told apart by its keys:
+The page opens `GET /events?token=T&client=C&last=I` (server-sent events, no `event:` field: all
+arrive as "message"). I is the last id that it holds, or empty: a Last-Event-ID that a page can
+set. Each message is one JSON object of these kinds, told apart by its keys:
 
     {"seq": ...}           a `State`, see below: the newest only, never queued; carries no id.
     {"batch": [item, ...]} one or more `Item`s; the SSE id names the last of them. A viewer who
                            comes late or reloads gets all of them; who reconnects, those after
-                           his Last-Event-ID.
+                           his last id.
     {"reset": run id}      forget all items: another run, or the gap can't be filled. Items follow.
+    {"recent": [[t_s, force_N, displacement_mm], ...]}  the last two minutes, once in each stream
+                           before its first state: in place of what the viewer kept of them.
     {"end": {"phase", "text"}}  the last message: the measurement is over; don't reconnect.
 
 Items, each an object with one key:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.browser import scenes
-from tests.browser.browser import chromium, missing, theme
+from tests.browser.browser import chromium, missing, resize, theme
 from tests.browser.feed import Feed
 from tests.browser.viewer import Viewer
 
@@ -34,6 +34,7 @@ def driver(chrome: Chrome) -> Chrome:
     chrome.switch_to.window(chrome.window_handles[0])
     chrome.get("about:blank")
     theme(chrome, "light")
+    resize(chrome, 1920, 1080)
     chrome.get_log("browser")  # type: ignore[no-untyped-call]
     return chrome
 

@@ -39,6 +39,7 @@ class Feed:
     def __init__(self, state: State, items: list[dict[str, object]] | None = None) -> None:
         self.state = state
         self.items = items or []
+        self.recent: list[tuple[float, float | None, float | None]] = []
         self.commands: list[dict[str, Any]] = []
         self.refusal = ""
         self.on_command: Callable[[dict[str, Any]], None] = lambda _: None
@@ -47,6 +48,7 @@ class Feed:
         self.late_s = 0.0
         self.end: dict[str, str] | None = None
         self.viewers = 0
+        self.resumed: list[int] = []  # items that a viewer had when it opened each stream
         self._server: _Server | None = None
         self.start()
 
@@ -143,7 +145,13 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
-        told, seq = int(self.headers.get("Last-Event-ID") or 0), 0
+        last = self.headers.get("Last-Event-ID") or query.get("last", ["0"])[0]
+        told, seq = int(last), 0
+        feed.resumed.append(told)
+        if not told:
+            self._event({"reset": "run"})
+        if feed.recent:
+            self._event({"recent": feed.recent})
         feed.viewers += 1
         try:
             while not self.server.stopping.is_set():

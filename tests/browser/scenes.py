@@ -45,6 +45,12 @@ MOUNT = PromptState(
     "dynamometer and laser point along the direction of this run.",
     (Choice("ok", LABELS["ok"]),),
 )
+UNLOAD = PromptState(
+    "2",
+    "unload",
+    "Turn the screw back until it no longer touches the arm, then confirm.",
+    (Choice("ok", LABELS["ok"]),),
+)
 LASER_FAULT = DeviceState(
     "laser",
     "fault",
@@ -98,6 +104,18 @@ def prompting(prompt: PromptState) -> State:
     """A question is open."""
     phase: Phase = "paused" if prompt.kind == "paused" else "prompt"
     return replace(turning(), phase=phase, prompt=prompt, turn=None)
+
+
+def setting_up(prompt: PromptState = MOUNT) -> State:
+    """A question before anything was measured."""
+    return replace(
+        prompting(prompt),
+        run=RunState("P1", "x", (1.0, 0.0, 0.0), 1, 3, 0, 11, "zero"),
+        force=Force(nan, nan, nan, 0.0, stale=True),
+        displacement=Displacement(nan, nan, stale=True),
+        samples=SampleCount(0, 0),
+        slots=Slots(0, nan),
+    )
 
 
 def settling() -> State:

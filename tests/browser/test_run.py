@@ -145,11 +145,11 @@ def test_viewers_a_foreign_page_and_abort(
 
 
 def late_viewers_see_the_whole_run(driver: Chrome, measurement: Measurement) -> None:
-    late = Viewer(driver, measurement.link(), new_tab=True)
+    late = Viewer(driver, measurement.link(), new="tab")
     late.wait_for("viewer-text", "somebody else is the operator")
     late.wait(lambda: "repetition 1: " in late.attribute("curve", "aria-label"), "earlier samples")
     assert not late.seen("controls")
-    watching = Viewer(driver, measurement.link().split("?")[0], new_tab=True)
+    watching = Viewer(driver, measurement.link().split("?")[0], new="tab")
     watching.wait_for("viewer-text", "somebody else is the operator")
     assert not watching.seen("take"), "without the operator's link nobody takes over"
 
@@ -173,7 +173,7 @@ def foreign_page_cannot_abort(driver: Chrome, feed: Feed, measurement: Measureme
     """The page of another port, with the token even, and without the page's own policy, which
     would stop it before anything is sent."""
     address, token = measurement.link().split("?token=")
-    foreign = Viewer(driver, feed.url, new_tab=True)
+    foreign = Viewer(driver, feed.url, new="tab")
     driver.execute_cdp_cmd("Page.setBypassCSP", {"enabled": True})
     foreign.reload()
     driver.set_script_timeout(20)
@@ -181,6 +181,18 @@ def foreign_page_cannot_abort(driver: Chrome, feed: Feed, measurement: Measureme
     assert len(answers) == 3
     assert 200 not in answers
     assert measurement.running
+
+
+def test_seven_tabs_of_a_measurement_and_abort(driver: Chrome, measurement: Measurement) -> None:
+    """A browser has six connections to a server, and every stream holds one."""
+    page = Viewer(driver, measurement.link())
+    page.wait_for("prompt-text", "Bring the arm to pose P1")
+    for _ in range(6):
+        Viewer(driver, measurement.link(), new="tab").wait_for("viewer-text", "You are watching")
+    page.wait(lambda: page.seen("controls"), "still the operator")
+    page.press("a\ue007")
+    page.wait_for("cue-word", "Stopped")
+    assert measurement.status() == 4, measurement.said
 
 
 def test_fault_shows_its_remedy_on_the_page(driver: Chrome, tmp_path: Path) -> None:

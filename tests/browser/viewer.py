@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
@@ -14,17 +14,17 @@ DEADLINE_S = 20.0
 
 
 class Viewer:
-    """A tab of the browser with the page in it."""
+    """A tab of the browser with the page in it; a new one hides those of its window."""
 
-    def __init__(self, driver: Chrome, url: str, *, new_tab: bool = False) -> None:
+    def __init__(self, driver: Chrome, url: str, *, new: Literal["tab", "window", ""] = "") -> None:
         self._driver = driver
-        if new_tab:
-            driver.switch_to.new_window("tab")
+        if new:
+            driver.switch_to.new_window(new)
         driver.get(url)
         self._tab = driver.current_window_handle
 
     def here(self) -> Chrome:
-        """The driver, looking at this tab."""
+        """The driver, looking at this tab, which comes to the front."""
         if self._driver.current_window_handle != self._tab:
             self._driver.switch_to.window(self._tab)
         return self._driver

@@ -57,7 +57,7 @@ def everything(hub: Hub, to: Viewer) -> list[int]:
 
 
 def state(force_age_s: float | None = 0.1, *, stale: bool = False) -> dict[str, Any]:
-    value = {"N": 1.0, "age_s": force_age_s, "stale": stale}
+    value = {"N": 1.0, "mm": 1.0, "age_s": force_age_s, "stale": stale}
     return {"phase": "turning", "force": value, "displacement": dict(value)}
 
 
@@ -136,11 +136,43 @@ def test_a_value_grows_old_though_nobody_says_so(hub: Hub, now: Time) -> None:
     assert old["seq"] > fresh["seq"]
 
 
+def recent(hub: Hub, to: Viewer) -> list[list[float | None]]:
+    rows = [message["recent"] for message in sent(hub, to) if "recent" in message]
+    return rows[0] if rows else []
+
+
+def test_who_comes_late_is_told_the_last_two_minutes_once(hub: Hub, now: Time) -> None:
+    early = viewer()
+    assert recent(hub, early) == []
+    for n in range(1500):
+        now.t += 0.1
+        hub.set_state(state(stale=n == 1490), now.t)
+        hub.set_state(state(), now.t + 0.01)  # faster than anybody sees
+    assert recent(hub, early) == [], "he has had the states"
+    late = viewer()
+    rows = recent(hub, late)
+    assert len(rows) == pytest.approx(1200, abs=1)
+    assert rows[0][0] == pytest.approx(now.t - 120, abs=0.11)
+    assert rows[-1] == pytest.approx([now.t, 1.0, 1.0])
+    assert [n for n, row in enumerate(rows) if row[1] is None] == [len(rows) - 10]
+    hub.set_state(state(), now.t)
+    assert recent(hub, late) == []
+
+
+def test_no_line_leads_across_a_time_in_which_nothing_came(hub: Hub, now: Time) -> None:
+    hub.set_state(state(), now.t)
+    hub.set_state(state(), now.t + 5)
+    forces = [row[1] for row in recent(hub, viewer())]
+    assert forces == [1.0, None, 1.0]
+
+
 def test_what_the_measurement_calls_stale_stays_so(hub: Hub, now: Time) -> None:
     hub.set_state(state(0.0, stale=True), now.t)
     assert sent(hub, viewer())[-1]["force"]["stale"]
     hub.set_state(state(None), now.t)
-    assert sent(hub, viewer())[-1]["force"] == {"N": 1.0, "age_s": None, "stale": True}
+    assert sent(hub, viewer())[-1]["force"] == {
+        "N": 1.0, "mm": 1.0, "age_s": None, "stale": True,
+    }  # fmt: skip
 
 
 def test_the_end_comes_after_everything_else(hub: Hub) -> None:
@@ -170,14 +202,22 @@ def test_the_first_with_the_operators_link_operates(hub: Hub, now: Time) -> None
     assert operator(hub, now, second) == {"you": False, "taken": True, "may_take": True}
 
 
-def test_taking_over_is_explicit_and_needs_an_open_page(hub: Hub) -> None:
-    first, second = viewer("first"), viewer("second")
-    hub.seat.join(first)
-    assert not hub.seat.take("second")
-    hub.seat.join(second)
+def test_taking_over_is_explicit(hub: Hub) -> None:
+    hub.seat.join(viewer("first"))
+    hub.seat.join(viewer("second"))
     assert hub.seat.holder == "first"
-    assert hub.seat.take("second")
+    hub.seat.take("second")
     assert hub.seat.holder == "second"
+
+
+def test_who_takes_over_without_a_stream_has_to_come_back_soon(hub: Hub, now: Time) -> None:
+    hub.seat.join(viewer("first"))
+    now.t += 100
+    hub.seat.take("second")
+    now.t += hubs.SEAT_GRACE_S - 0.1
+    assert hub.seat.holder == "second"
+    now.t += 0.2
+    assert hub.seat.holder is None
 
 
 def test_a_reload_keeps_the_seat_and_a_long_absence_loses_it(hub: Hub, now: Time) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from math import isnan
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from drivers.errors import NotDischarged, ReadTimeout, SafetyStop
-from drivers.interfaces import Command, LiveView
+from drivers.interfaces import Command, LiveView, Prompt
 from rig.errors import MeasurementStopped
 from rig.journal import Journal, Record, replay
 from rig.procedure.acquisition import Acquisition
@@ -157,6 +158,25 @@ def test_the_operator_is_asked_in_the_order_of_the_procedure(bench: Bench) -> No
     bench.run()
     keys = [p.key for p in bench.loader.asked]
     assert keys == ["mount", "unload", "unload", "unload", "unload"]
+
+
+def test_where_the_rig_is_set_up_is_told_before_the_question(tmp_path: Path) -> None:
+    text = PROTOCOL.replace("{x: [1, 0, 0]}", "{x: [1, 0, 0], y: [0, 1, 0]}")
+    run = "  - {pose: P1, direction: x, steps_N: [20, 40, 60]}\n"
+    bench = Bench(tmp_path, text.replace(run, run + run.replace("x,", "y,")))
+    newest: list[LiveView] = []
+    ask = bench.loader.ask
+
+    def ask_and_note(prompt: Prompt) -> str:
+        if prompt.key == "mount":
+            newest.append(bench.loader.views[-1])
+        return ask(prompt)
+
+    bench.loader.ask = ask_and_note  # type: ignore[method-assign]
+    bench.run()
+    told = [(view.phase, view.pose, view.direction, view.repetition) for view in newest]
+    assert told == [("mounting", "P1", "x", 1), ("mounting", "P1", "y", 1)]
+    assert all(isnan(view.force_N) and isnan(view.displacement_mm) for view in newest)
 
 
 def test_an_amplifier_without_a_line_is_switched_by_the_operator(bench: Bench) -> None:

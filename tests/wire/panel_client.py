@@ -32,13 +32,14 @@ class PanelClient:
         self.closed = threading.Event()
         self._socket: socket.socket | None = None
 
-    def connect(self, last_id: str = "") -> PanelClient:
-        """Opens the stream."""
+    def connect(self, last_id: str = "", *, in_address: bool = False) -> PanelClient:
+        """Opens the stream; the last id in a header as browsers send it, or in the address."""
         self.closed.clear()
         self._socket = socket.create_connection((self.host, self.port), 10)
-        resume = f"Last-Event-ID: {last_id}\r\n" if last_id else ""
+        resume = f"Last-Event-ID: {last_id}\r\n" if last_id and not in_address else ""
+        query = f"token={self.token}&client={self.client}" + f"&last={last_id}" * in_address
         self._socket.sendall(
-            f"GET /events?token={self.token}&client={self.client} HTTP/1.1\r\n"
+            f"GET /events?{query} HTTP/1.1\r\n"
             f"Host: {self.host}:{self.port}\r\n{resume}\r\n".encode()
         )
         threading.Thread(target=self._read, args=(self._socket,), daemon=True).start()

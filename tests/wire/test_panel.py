@@ -218,6 +218,11 @@ def test_viewers_who_come_back_miss_nothing(served: Served) -> None:
     assert len(client.resets) == 1
     late = served.client("client-two", looks=True)
     late.wait(lambda me: len(me.items) == 1600)
+    late.disconnect()
+    served.link.add({"sample": {"row": 1600}})
+    late.connect(late.last_id, in_address=True)  # as a page that let go of its stream
+    late.wait(lambda me: len(me.items) == 1601)
+    assert len(late.resets) == 1
 
 
 def test_who_never_reads_holds_up_nobody(served: Served) -> None:
@@ -253,6 +258,9 @@ def test_take_over(served: Served) -> None:
     first.wait_state(lambda newest: not newest["operator"]["you"])
     assert first.command("pause")[0] == 409
     assert second.command("pause")[0] == 200
+    first.disconnect()
+    assert first.command("take_over") == (200, {"ok": True}), "lets go of its stream to say so"
+    assert first.command("pause")[0] == 200
     status, reply = looker.command("take_over")
     assert (status, reply["error"]) == (
         403,

@@ -42,11 +42,12 @@ function deviceBands(state) {
     .map(({ name, reason, remedy }) => ({ kind: "fault", text: `✖ ${name}: ${reason}`, remedy }));
 }
 
-/** `connection`: {connected, old, last (Date or null), end ({text} or null)}. */
-function connectionBand({ connected, old, last, age_s, end }, state) {
+/** `connection`: {connected, away, old, last (Date or null), end ({text} or null)}. */
+function connectionBand({ connected, away, old, last, age_s, end }, state) {
   if (end) return [{ kind: "warn", text: `■ ${endWords(end, state)}. The values are from ${at(last)}.` }];
   if (!old) return [];
   if (last === null) return [{ kind: "warn", text: connected ? "Waiting for the first values." : "No connection to the measurement yet; trying again." }];
+  if (away) return [{ kind: "warn", text: `Catching up: the values are from ${at(last)}.` }];
   const what = connected ? "No values arrive" : "Connection lost";
   const seconds = age(Math.floor(age_s) || 0).replace(".0", "");
   return [{ kind: "fault", text: `⚠ ${what}: the values are from ${at(last)}, ${seconds} ago`, remedy: "Stop turning. The page goes on by itself when values arrive; the terminal shows the same." }];

@@ -22,8 +22,9 @@ export class Link {
     this.client = clientWord();
   }
 
-  events() {
-    return `events?${new URLSearchParams({ token: this.token, client: this.client })}`;
+  /** Address of the stream that goes on after the id `last`; from the start if that is "". */
+  events(last) {
+    return `events?${new URLSearchParams({ token: this.token, client: this.client, last })}`;
   }
 
   /** Sends a command; returns "" or why it was refused, in words. */
@@ -40,14 +41,14 @@ export class Link {
       const said = await reply.json();
       return said.ok ? "" : said.error || `refused (${reply.status})`;
     } catch {
-      return `"${command}" did not reach the measurement: no connection. Use the terminal.`;
+      return `"${command}" did not reach the measurement: no connection. Ctrl-C in the terminal interrupts it.`;
     }
   }
 }
 
 export class Controls {
-  constructor(link, say) {
-    this.link = link;
+  constructor(send, say) {
+    this.send = send;
     this.say = say;
     this.state = null;
     this.answered = null;
@@ -133,7 +134,7 @@ export class Controls {
   }
 
   async #send(command, extra = {}) {
-    const refused = await this.link.send(command, extra);
+    const refused = await this.send(command, extra);
     if (refused) this.say(refused);
     return !refused;
   }

@@ -33,7 +33,8 @@ export function cueOf(state, old) {
   if (old) return ["stop", "Stop turning", "the values are old"];
   const failed = state.devices.find((device) => device.state === "fault");
   if (failed) return ["stop", "Stop turning", `${failed.name} has failed`];
-  if (state.prompt && !state.turn) return ["ask", "Answer", "the question below"];
+  // A way to turn stands beside a question only where there is a force to watch.
+  if (state.prompt && !(state.turn && isNumber(state.force.N))) return ["ask", "Answer", "the question below"];
   if (["prompt", "turning"].includes(state.phase)) {
     if (!isNumber(state.force.N)) return ["hands", "Wait", "no force yet"];
     return state.force.stale || !state.turn ? ["stop", "Stop turning", "the force is old"] : turnCue(state);

@@ -6,8 +6,8 @@ import { Lane, Surface, extent, roundRange, strokeRows } from "./plot.js";
 
 const LEAST_N = 10, LEAST_MM = 0.05;
 
-const legend = onChange(({ repetition, earlier, model }) => {
-  const items = [make("li", "", `repetition ${repetition}`)];
+const legend = onChange(({ now, earlier, model }) => {
+  const items = now ? [make("li", "", `repetition ${now}`)] : [];
   if (earlier) items.push(make("li", "earlier", "earlier"));
   if (model) items.push(make("li", "model", "simulation"));
   byId("curve-legend").replaceChildren(...items);
@@ -32,7 +32,7 @@ export class CurvePlot {
     this.surface.clear(this.surface.top);
     if (!old && isNumber(state.force.N) && isNumber(state.displacement.mm)) this.surface.dot(this.lane, state.force.N, state.displacement.mm, false);
     const earlier = [...repetitions.keys()].some((r) => r !== repetition);
-    legend({ repetition, earlier, model: model.length > 0 });
+    legend({ now: repetitions.has(repetition) ? repetition : 0, earlier, model: model.length > 0 });
     this.#describe(repetitions, direction, model);
   }
 

@@ -29,17 +29,20 @@ class Page {
     this.time = new TimePlot(() => this.want());
     const theme = new Theme(() => this.restyle());
     const link = new Link();
-    this.controls = new Controls(link, (text) => { this.bands.say(text); this.want(); });
+    const send = (...words) => this.feed.giveWayTo(link.send(...words));
+    this.controls = new Controls(send, (text) => { this.bands.say(text); this.want(); });
     new Keys(this.controls, { theme: () => theme.toggle(), full: toggleFullScreen });
     byId("full").addEventListener("click", toggleFullScreen);
     new ResizeObserver(() => this.want()).observe(document.body);
-    this.feed = new Feed(link.events(), { reset: () => this.store.clear(), message: (m) => this.receive(m) });
+    // Drawn at once when the stream is let go: a hidden tab is given no frame to draw in.
+    this.feed = new Feed((last) => link.events(last), { message: (m) => this.receive(m), released: () => this.draw() });
     setInterval(() => { this.feed.check(); this.want(); }, CHECK_MS);
   }
 
   receive(message) {
     if (message.batch) message.batch.forEach((item) => this.item(item));
     else if (message.reset !== undefined) this.store.clear();
+    else if (message.recent) this.store.recall(message.recent);
     else if (message.end) this.end = message.end;
     else if (message.seq !== undefined) this.newest(message);
     this.want();
@@ -69,10 +72,10 @@ class Page {
   }
 
   draw() {
-    const { connected, ended } = this.feed;
+    const { connected, ended, away } = this.feed;
     const age_s = this.feed.freshness.age();
     const old = ended || !connected || age_s > STALE_S;
-    this.bands.draw(this.state, { connected, old, last: this.last, age_s, end: this.end });
+    this.bands.draw(this.state, { connected, away, old, last: this.last, age_s, end: this.end });
     if (this.state === null) return;
     this.readout.draw(this.state, old, old ? Math.max(0, age_s) : 0);
     drawCue(this.state, old);

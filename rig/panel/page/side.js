@@ -59,10 +59,10 @@ export function shownLimits(list) {
 
 function slots({ missed, late_ms }) {
   const element = byId("slots");
-  const late = isNumber(late_ms) && late_ms > LATE_MS;
-  element.classList.toggle("late", missed > 0 || late);
+  element.classList.toggle("late", missed > 0 || late_ms > LATE_MS);
   const words = missed > 0 ? `▲ ${missed} missed` : "none missed";
-  setText(element, `Samples: ${words}, ${number(late_ms, 0)} ms late`);
+  // Before the first sample there is nothing to say.
+  setText(element, isNumber(late_ms) ? `Samples: ${words}, ${number(late_ms, 0)} ms late` : "");
 }
 
 export function drawSide(state) {

@@ -100,6 +100,12 @@ export class Store {
     }
   }
 
+  /** The last minutes as the server has them: all of them, also those in which nobody listened. */
+  recall(rows) {
+    this.live = new Columns(["t_s", ...COLUMNS]);
+    for (const row of rows) this.live.push(...row.map(number));
+  }
+
   repetitions(pose, direction) {
     return this.curves.get(`${pose}|${direction}`) ?? new Map();
   }
