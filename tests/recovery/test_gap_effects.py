@@ -317,7 +317,7 @@ def test_an_arm_tells_a_gain_that_bends_and_springs_off_beside_one_joint(tmp_pat
 
     arm = make_bench(gap_data(measure(tmp_path, nothing, ("P1", "P2"))))
     for word in ("force_scale", "displacement_scale"):
-        straight, bent = library(arm, [word])
+        straight, bent, *_ = library(arm, [word])
         assert (straight.label, bent.label) == ("gain", "gain that bends")
         full, excess = (arm.columns[i] for i in (straight.columns[0], bent.columns[1]))
         top = int(np.abs(full[: arm.rows.n]).argmax())

@@ -211,11 +211,12 @@ def _hardened(
     load on (said of loads that come back before they grow, and of what is not taken back by a long
     way: a single loop may be friction); joints of an arm, whichever way they are pushed next."""
     top = float(np.abs(load).max())
-    one_sided = bench.course.lets_go and bench.course.one_sided
-    if not (one_sided or (bench.data.arm and bench.course.unloads)):
+    course, arm = bench.course, bench.data.arm
+    told = word == WORD and course.unloads if arm else course.lets_go and course.one_sided
+    if not told:
         return []
     size = np.abs(load)
-    if not bench.data.arm and (
+    if not arm and (
         way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top
         or bench.course.left_behind > _LEFT
     ):
