@@ -80,7 +80,8 @@ def test_the_readmes_blind_figures_are_those_of_the_page() -> None:
     rows = readme.partition("## Blind check")[2].partition("| measure |")[2].partition("\n\n")[0]
     first = page.partition("\n## 300 cases")[2].partition("\n## ")[0]
     figures = re.findall(r"(\d\.\d+) \((\d+ of \d+)\) \| (\d\.\d+ to \d\.\d+)", rows)
-    assert ("0.87", "120 of 138", "0.80 to 0.92") in figures
+    assert "| exactly the true word | " in rows  # the least flattering one, too
+    assert len(figures) >= 4
     for figure, cases, interval in figures:
         assert f"| {figure} | {interval} | {cases} |" in first
 
