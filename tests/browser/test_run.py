@@ -190,6 +190,8 @@ def test_seven_tabs_of_a_measurement_and_abort(driver: Chrome, measurement: Meas
     for _ in range(6):
         Viewer(driver, measurement.link(), new="tab").wait_for("viewer-text", "You are watching")
     page.wait(lambda: page.seen("controls"), "still the operator")
+    # shown again it catches up first
+    page.wait(lambda: not page.attribute("abort", "disabled"), "commands to be taken again")
     page.press("a\ue007")
     page.wait_for("cue-word", "Stopped")
     assert measurement.status() == 4, measurement.said
