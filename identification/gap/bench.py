@@ -184,14 +184,16 @@ class Bench:
         tangential: Array | None = None,
         zero_force: Array | None = None,
     ) -> Array:
-        """A stacked column of response (n,), q (n, m), tangential (n, 2), zero_force (n,)."""
+        """A stacked column of response (n,), q (n, m), tangential (n, 2), zero_force (n,): joint
+        readings and force across the direction are too coarse to tell more of a hold than where it
+        lies."""
         out = np.zeros(self.layout.size)
         if response is not None:
             out[: self.layout.n] = response
         if q is not None and self.has_q:
-            out[self.layout.q] = hold_means(self.rows, q).T.reshape(-1)
+            out[self.layout.q] = self.rows.hold_means(q).T.reshape(-1)
         if tangential is not None and self.rows.tangential is not None:
-            out[self.layout.tangential] = hold_means(self.rows, tangential).T.reshape(-1)
+            out[self.layout.tangential] = self.rows.hold_means(tangential).T.reshape(-1)
         if zero_force is not None and self.has_zero_force:
             out[self.layout.zero_force] = zero_force[self.rows.zero]
         return out
@@ -207,7 +209,7 @@ class Bench:
         out = self.stacked(response)
         if self.has_q:
             readings = out[self.layout.q].reshape(self.data.joints, -1)
-            readings[joint] = hold_means(self.rows, turned[:, None])[:, 0]
+            readings[joint] = self.rows.hold_means(turned)
         return out
 
     def outside_column(self, motion: Array) -> Array:
@@ -224,7 +226,7 @@ class Bench:
         out = np.empty(layout.size)
         root = np.sqrt(rows.weight) if not rows.continuous else np.ones(rows.n)
         out[: layout.n] = noise.response
-        total = np.sqrt(np.add.reduceat(rows.weight, rows.edges))
+        total = np.sqrt(rows.hold_weight[rows.edges])
         if layout.q.stop > layout.q.start:
             out[layout.q] = np.concatenate([s / total for s in noise.q])
         if rows.tangential is not None:
@@ -335,9 +337,9 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     observed = np.zeros(layout.size)
     observed[: rows.n] = response
     if layout.q.stop > layout.q.start and rows.q is not None:
-        observed[layout.q] = hold_means(rows, rows.q).T.reshape(-1)
+        observed[layout.q] = rows.hold_means(rows.q).T.reshape(-1)
     if rows.tangential is not None:
-        observed[layout.tangential] = hold_means(rows, rows.tangential).T.reshape(-1)
+        observed[layout.tangential] = rows.hold_means(rows.tangential).T.reshape(-1)
     if layout.zero_force.stop > layout.zero_force.start:
         observed[layout.zero_force] = rows.measured_force[rows.zero]
     reach = max(float(np.ptp(slope * load)), float(np.ptp(response)), 1e-15)
@@ -347,13 +349,6 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, scatter=scatter,
         trend=trend, observed=observed,
     )  # fmt: skip
-
-
-def hold_means(rows: Rows, values: Array) -> Array:
-    """Weighted means (holds, k) of values (n, k): joint readings and force across the direction
-    are too coarse to tell more of a hold than where it lies."""
-    sums = np.add.reduceat(values * rows.weight[:, None], rows.edges, axis=0)
-    return np.asarray(sums / rows.hold_weight[rows.edges, None])
 
 
 def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:

@@ -44,9 +44,8 @@ def without_glitches(data: GapData) -> GapData:
 
 def _while_running(data: GapData) -> Flags:
     """(n,) those of a running recording."""
-    off = np.zeros(len(data.force), dtype=bool)
     if data.arm:
-        return off
+        return np.zeros(len(data.force), dtype=bool)
     off = _off(data.force, data.run) | _off(data.displacement, data.run)
     return off & bool(off.mean() <= _MOST and _minor(data, off))
 

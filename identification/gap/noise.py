@@ -366,11 +366,8 @@ def tangent(rows: Rows, force_sd: float) -> Array:
     force, multiplied by this slope, is an error of the displacement. Steps of force below three
     standard deviations count as that much.
     """
-    start = rows.edges
-    f = np.add.reduceat(rows.weight * rows.measured_force, start)
-    u = np.add.reduceat(rows.weight * rows.displacement, start)
-    total = np.add.reduceat(rows.weight, start)
-    f, u, run = f / total, u / total, rows.run[start]
+    f, u = rows.hold_means(rows.measured_force), rows.hold_means(rows.displacement)
+    run = rows.run[rows.edges]
     least = 3 * force_sd
     step = np.abs(np.diff(u)) / np.maximum(np.abs(np.diff(f)), least)
     step[(run[1:] != run[:-1]) | (np.abs(np.diff(f)) < least)] = 0.0

@@ -106,6 +106,12 @@ class Rows:
         means = values.T @ self._share_of_setup
         return np.asarray(values - means[:, self.setup].T)
 
+    def hold_means(self, values: Array) -> Array:
+        """(holds, ...) means of values (n, ...) over every hold, each sample counted."""
+        weight = self.weight.reshape(-1, *(1,) * (values.ndim - 1))
+        total = self.hold_weight[self.edges].reshape(-1, *(1,) * (values.ndim - 1))
+        return np.asarray(np.add.reduceat(values * weight, self.edges, axis=0) / total)
+
     def rms(self, values: Array) -> float:
         """Of values (n,), every sample counted."""
         return float(np.sqrt(self.weight @ values**2 / self.weight.sum()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rig.digits import counted
 from rig.report.document import (
     Block,
     Bullets,
@@ -47,7 +48,7 @@ def _k_unit(d: Node) -> Rich:
         return (": ", d["status_text"].text())
     everywhere = len({e["step"].value for e in d["excluded"] if e["repetition"].value is None})
     single = {e["repetition"].value for e in d["excluded"]} - {None}
-    words = [f"{everywhere} step{'s' if everywhere != 1 else ''} not counted"] * bool(everywhere)
+    words = [f"{counted(everywhere, 'step')} not counted"] * bool(everywhere)
     words += [f"repetition {r} not counted in full" for r in sorted(single)]
     return (f" N/mm ({', '.join(words)})" if words else " N/mm",)
 

@@ -13,6 +13,7 @@ from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import bent_column, moments
+from identification.gap.effects.force_scale import component
 from rig.model import load_robot
 from tests.conformance.gap_designs import TCP_MM, TRUE, Array, Q, linear
 
@@ -30,6 +31,27 @@ def test_the_gain_of_one_component_is_no_gain_of_all(axis: int) -> None:
     assert found.names == ("force_scale",)
     factor = found.effects[0].parameters[f"factor_{'xyz'[axis]}"]
     assert factor.low < 1.12 < factor.high
+
+
+def test_a_component_that_reads_too_much_shows_across_a_push_askew_to_it() -> None:
+    data, slant = linear("rich"), np.array([1.0, 1.0, 0.0]) / 2**0.5
+    across = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]) / [[2**0.5], [1.0]]
+    askew = tuple(replace(s, unit_vector=slant, tangents=across) for s in data.setups)
+    bench = make_bench(replace(data, setups=askew))
+    shown = component(bench, 0)[bench.layout.tangential].reshape(2, -1)
+    np.testing.assert_allclose(shown[0], bench.rows.hold_means(bench.load) / 2, atol=1e-9)
+    assert not shown[1].any()
+
+
+def test_means_of_holds_count_every_sample() -> None:
+    rows = make_bench(linear("rich")).rows
+    values = np.column_stack([rows.displacement, rows.time])
+    assert len(np.unique(rows.weight)) > 1
+    for hold, mean in enumerate(rows.hold_means(values)):
+        mine = rows.hold == hold
+        wanted = np.average(values[mine], axis=0, weights=rows.weight[mine])
+        np.testing.assert_allclose(mean, wanted, rtol=1e-12)
+    np.testing.assert_array_equal(rows.hold_means(rows.time), rows.hold_means(values)[:, 1])
 
 
 def test_an_arm_that_stands_elsewhere_in_one_pose_only() -> None:

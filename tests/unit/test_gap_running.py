@@ -214,6 +214,8 @@ def test_hardened_metal_yields_on_only_beyond_what_it_has_seen() -> None:
     fresh = np.arange(8) == 0
     assert grown(load, np.array([4.0]), fresh)[:, 0].tolist() == [0, 0, 1, 1, 1, 2, 2, 2]
     assert grown(-load, np.array([4.0]), fresh)[:, 0].tolist() == [0, 0, -1, -1, -1, -2, -2, -2]
+    both = np.array([5.0, -6.0, -5.0, 8.0])  # from either side only beyond what was borne
+    assert grown(both, np.array([4.0]), fresh[:4])[:, 0].tolist() == [1, 0, 0, 2]
 
 
 def test_what_is_below_the_noise_of_a_sample_is_no_effect_of_a_running_recording() -> None:

@@ -86,7 +86,7 @@ def variants(bench: Bench) -> list[Variant]:
 def _one_after_the_other(bench: Bench, forces: list[float], scales: tuple[float, ...]) -> Variant:
     """Faces that seat between one force (N) and the next, each by a depth of its own: any depth
     that only grows. In terms of slacks, of which a step is one less a share of the one before."""
-    columns = [_seated(bench, "slack", f, scales).columns[0] for f in forces]
+    columns = [_late(bench, "slack", f) for f in forces]
     edges = np.array([0.0, *forces])
     wide = np.diff(edges)
     root = np.diag(edges[1:] / wide) - np.diag(edges[1:-1] / wide[1:], 1)
@@ -100,10 +100,8 @@ def _seated(
 ) -> Variant:
     """One law with a force scale N."""
     share = f0 / float(np.abs(bench.load).max())
-    size, sign = pressed(bench)
-    column = bench.add(bench.outside_column(sign * LAWS[law](size / f0)))
-    return variant(WORD, f"{law} {share:.3g}", [column], scales, force_N=f0, laws=((law, f0),),
-                   goes_on=law in GOES_ON, prior=prior)  # fmt: skip
+    return variant(WORD, f"{law} {share:.3g}", [_late(bench, law, f0)], scales, force_N=f0,
+                   laws=((law, f0),), goes_on=law in GOES_ON, prior=prior)  # fmt: skip
 
 
 def pressed(bench: Bench) -> tuple[Array, Array]:
@@ -157,7 +155,7 @@ def _then_seats(bench: Bench, force: float, prior: float) -> Variant:
 
 
 def _late(bench: Bench, law: str, force: float) -> int:
-    """Column of what is lost to one slack."""
+    """Column of what is lost to one law of a force, or of a slack's stroke, N."""
     size, sign = pressed(bench)
     return bench.add(bench.outside_column(sign * LAWS[law](size / force)))
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array
 from identification.gap.effects.force_scale import BENDS, SCALES
+from identification.gap.effects.joint_nonlinear_stiffness import hinge
 from identification.gap.variants import Variant, variant
 
 WORD = "displacement_scale"
@@ -37,12 +37,7 @@ def variants(bench: Bench) -> list[Variant]:
 
 def _of_two_ranges(bench: Bench, straight: int, share: float, top: float) -> Variant:
     """Beyond a share of the largest reading (m) the gain is another one."""
-    beyond = bench.add(bench.outside_column(above(bench.line, share * top)))
+    beyond = bench.add(bench.outside_column(hinge(bench.line, share * top)))
     prior = 0.5 / len(CHANGES_AT)
     return variant(WORD, f"gain that changes at {share:g}", [straight, beyond], SCALES,
                    positive=False, prior=prior, above=share * top, share=share)  # fmt: skip
-
-
-def above(read: Array, least: float) -> Array:
-    """(n,) what of readings (n,), of either sign, lies above the least one."""
-    return np.asarray(np.sign(read) * np.maximum(np.abs(read) - least, 0.0))

@@ -198,14 +198,9 @@ _LEFT = 0.2  # of the largest response: as much as friction seldom holds
 
 
 def _hardened(
-    bench: Bench,
-    load: Array,
-    radius: Array,
-    column: Callable[[Array], int],
-    word: str,
-    name: str,
+    bench: Bench, load: Array, radius: Array, column: Callable[[Array], int], word: str, name: str,
     info: dict[str, Any],
-) -> list[Variant]:
+) -> list[Variant]:  # fmt: skip
     """What hardens alike in both senses (Voce 1948) and is loaded again and again: it yields on
     only beyond the largest load it has borne. Specimens from one side, under a tip from the first
     load on (said of loads that come back before they grow, and of what is not taken back by a long

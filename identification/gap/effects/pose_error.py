@@ -59,8 +59,7 @@ def _in_one_pose(bench: Bench) -> list[Variant]:
         columns = [bench.add(c) for c in there]
         for size in ANGLES_RAD:
             label, prior = f"joints {size:g} rad in {pose}", 0.5 / len(poses)
-            found = _variant(label, columns, [size] * joints, prior, "joints")
-            out.append(replace(found, info={**found.info, "pose": pose}))
+            out.append(_variant(label, columns, [size] * joints, prior, "joints", pose))
     return out
 
 
@@ -162,10 +161,11 @@ def _through(bench: Bench, change: Array, middle: Array, compliance: Array) -> l
 
 
 def _variant(
-    label: str, columns: list[int], sizes: list[float], prior: float, kind: str
+    label: str, columns: list[int], sizes: list[float], prior: float, kind: str, pose: str = ""
 ) -> Variant:
+    """pose: the only one in which it is so; "" all."""
     return variant(
         WORD, label, columns, (1.0,), np.diag(sizes), positive=False, prior=prior, kind=kind,
         offset_m=np.zeros(3), angles_rad=np.zeros(6), turn_rad=np.zeros(3), reads=1.0,
-        pose="",
+        pose=pose,
     )  # fmt: skip

@@ -6,8 +6,9 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects import displacement_scale, force_drift, force_scale, time_lag
+from identification.gap.effects import force_drift, force_scale, time_lag
 from identification.gap.effects.drift import RATES
+from identification.gap.effects.joint_nonlinear_stiffness import hinge
 from identification.gap.forms.law import Law, Term, along
 from identification.gap.variants import Variant
 
@@ -42,7 +43,7 @@ def displacement_gain(bench: Bench, law: Law) -> list[Array]:
 
 def _bent(read: Array, term: Term, of: str) -> Array:
     if "above" in term.shape:
-        return displacement_scale.above(read, term.shape["above"])
+        return hinge(read, term.shape["above"])
     return read * np.abs(read) / term.shape[of] if of in term.shape else read
 
 
