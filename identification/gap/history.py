@@ -200,16 +200,17 @@ def flowing_play(
     """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
 
     `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
-    falls below it, wherever it has come to. square (k,): it flows with the square of the
-    overstress, `T p' = o |o| / r`, and slows down as it comes near. Ramps between holds in _PARTS
-    parts, then standing; within a hold the load hardly moves, and one part will do. weight (n,): as
-    in `play`.
+    falls below it, wherever it has come to. load (n,), or (n, k): of each. square (k,): it
+    flows with the square of the overstress, `T p' = o |o| / r`, and slows down as it comes near.
+    Ramps between holds in _PARTS parts, then standing; within a hold the load hardly moves, and one
+    part will do. weight (n,): as in `play`.
     """
+    load = load.reshape(len(load), -1)
     out = np.empty((len(load), len(radius)))
     centre = np.zeros((len(load), 1)) if weight is None else weight[:, None]
     below, above = centre - radius, centre + radius
     hung = _clipped(0.0, below, above)
-    low, high = load[:, None] + below, load[:, None] + above
+    low, high = load + below, load + above
     rest = rests(rows)
     phases = _phases(rows, rest)
     parts = np.where(rows.hold_starts | rest | rows.continuous, _PARTS, 1)
@@ -220,12 +221,12 @@ def flowing_play(
         for seconds in (phases.pause, phases.ramp / parts, phases.stands)
     )
     flown = partial(_flown, radius=radius, square=square, some=bool(np.any(square)))
-    state, before = hung[0], 0.0
+    state, before = hung[0], np.zeros(load.shape[1])
     for i, x in enumerate(load):
         if fresh[i]:
-            state, before = hung[i], 0.0
+            state, before = hung[i], 0.0 * x
         elif rest[i]:  # minutes without load
-            state, before = _clipped(state, below[i], above[i]), 0.0
+            state, before = _clipped(state, below[i], above[i]), 0.0 * x
         if phases.pause[i] > 0:
             state = flown(state, paused[i], before + below[i], before + above[i])
         if phases.ramp[i] > 0:

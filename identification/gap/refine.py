@@ -94,7 +94,7 @@ def _elsewhere(word: _Word, finer: list[Variant]) -> list[Variant]:
         return []
     word.engine.extend()
     found = sorted(_scored_beside(word.engine, word.families, word.ranked, able), key=_evidence)
-    out = []
+    moved = []
     for v in (s.variant for s in found[-_ELSEWHERE:]):
         places = [
             (joint_yield.place_in(there.label), there.info)
@@ -102,8 +102,8 @@ def _elsewhere(word: _Word, finer: list[Variant]) -> list[Variant]:
             if memory == v.info["memory"] and place != _axle(v)
         ]
         places += base_slip.between(bench, v) if v.word == base_slip.WORD else []
-        out += [joint_yield.elsewhere(bench, v, *place) for place in places]
-    return [v for v in out if v is not None]
+        moved += [(v, place) for place in places]
+    return joint_yield.elsewhere(bench, moved)
 
 
 def _axle(variant: Variant) -> tuple[object, ...]:

@@ -10,7 +10,8 @@ import pytest
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import Scored, score
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import base_slip, joint_yield, library
+from identification.gap.effects import base_slip, flows, joint_yield, library
+from identification.gap.effects.flows import Flow
 from identification.gap.refine import refine
 from identification.gap.variants import Variant, place_of
 from tests.conformance.gap_designs import linear
@@ -20,8 +21,8 @@ from tests.unit.test_gap_running import SPRING, running
 
 
 def elsewhere(bench: Bench, found: Variant, there: Variant) -> Variant | None:
-    name = joint_yield.place_in(there.label)
-    return joint_yield.elsewhere(bench, found, name, there.info)
+    place = joint_yield.place_in(there.label), there.info
+    return next(iter(joint_yield.elsewhere(bench, [(found, place)])), None)
 
 
 @pytest.mark.parametrize("word", ["joint_yield", "base_slip"])
@@ -103,6 +104,26 @@ def test_a_place_without_load_has_no_knee() -> None:
     sharp = [v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp"]
     idle = replace(sharp[-1], info={**sharp[-1].info, "load": np.zeros(bench.rows.n)})
     assert elsewhere(bench, sharp[0], idle) is None
+
+
+def test_flows_made_in_one_go_are_those_made_one_by_one() -> None:
+    data = arm_data()
+    bench, torque = make_bench(data), make_bench(data).true_torque
+    every = [
+        Flow(torque[:, j], radius * np.abs(torque[:, j]).max(), time, fresh, square=square)
+        for j, radius, time, fresh, square in (
+            (0, np.array([0.3, 0.5]), 5.0, bench.moved, False),
+            (1, np.array([0.4]), 1.2, bench.moved | bench.rest, False),
+            (1, np.array([0.2, 0.3, 0.6]), 15.0, bench.moved, True),
+            (2, np.array([0.4]), 0.0, bench.moved, False),
+        )
+    ]
+    flows.make(bench, every)
+    assert len(bench.flows) == 3  # one is there at once
+    for one in every:
+        alone = make_bench(data)
+        assert np.array_equal(flows.states(bench, one), flows.states(alone, one))
+        assert np.ptp(flows.states(alone, one)) > 0
 
 
 def test_without_readings_a_joint_is_not_named_for_having_been_looked_at_closely() -> None:

@@ -19,7 +19,7 @@ Source: Prandtl 1928, Perzyna 1966 (laws); torque limits of joints in arms' manu
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -28,7 +28,9 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effects import flows
 from identification.gap.effects.flow_back import flowing_back, yielded_from
+from identification.gap.effects.flows import Flow
 from identification.gap.effects.specimens import (
     OWN,
     off,
@@ -36,7 +38,6 @@ from identification.gap.effects.specimens import (
     softening,
     with_other_springs,
 )
-from identification.gap.history import flowing_play
 from identification.gap.rows import way_back
 from identification.gap.variants import (
     BACK_UNDER_WEIGHT,
@@ -285,7 +286,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     radius = alone + (float(info["centre"]) - alone) * (1 + close * np.linspace(-0.16, 0.2, FINE))
     fresh = _fresh(bench, info["memory"])
     name, out = place_in(found.label), []
-    for (flow, square), states in _flowing(bench, ways, info["load"], radius, fresh, weight):
+    at = Flow(info["load"], radius, 0.0, fresh, weight)
+    for (flow, square), states in flows.each_way(bench, ways, at):
         columns = [info["column"](s) for s in states.T]
         share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S) + len(SQUARE_S))
         how = f" flow {flow:.3g} s{' squared' if square else ''}" if flow else ""
@@ -302,25 +304,44 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     return out
 
 
-def elsewhere(bench: Bench, found: Variant, name: str, there: Mapping[str, Any]) -> Variant | None:
-    """A knee that was found, at another place (joint, or axis; `knee_at`) of the same memory, where
-    it begins at the same load of the rig: its thresholds in proportion to what loads the two
-    places. None where nothing loads the other one then, or nothing flows back there."""
-    info, other = found.info, there
-    most = int(np.abs(info["load"]).argmax())
-    factor = float(np.abs(other["load"][most]) / np.abs(info["load"][most]))
-    if not factor > 0:
-        return None
-    radius, flow = factor * np.asarray(info["radius"]), float(info["flow_s"])
-    fresh = _fresh(bench, info["memory"])
-    moved = states(bench, other["load"], radius, flow, fresh, square=bool(info.get("square")))
-    columns = [other["column"](s) for s in moved.T]
-    if len(found.columns) > len(radius):
+Place = tuple[str, Mapping[str, Any]]  # with which a knee's label begins; its `knee_at`
+
+
+def elsewhere(bench: Bench, found: Sequence[tuple[Variant, Place]]) -> list[Variant]:
+    """Knees that were found, at other places (joint, or axis) of the same memory, where they begin
+    at the same load of the rig: thresholds in proportion to what loads the two places. Without
+    those that nothing loads there then, or where nothing flows back."""
+    moved = [(v, place, _factor(v.info, place[1])) for v, place in found]
+    moved = [(v, place, factor) for v, place, factor in moved if factor > 0]
+    flows.make(bench, [_followed(bench, *one) for one in moved])
+    out = [_moved(bench, *one) for one in moved]
+    return [v for v in out if v is not None]
+
+
+def _factor(here: Mapping[str, Any], there: Mapping[str, Any]) -> float:
+    """What loads one place over what loads another, where the load is largest here."""
+    most = int(np.abs(here["load"]).argmax())
+    return float(np.abs(there["load"][most]) / np.abs(here["load"][most]))
+
+
+def _followed(bench: Bench, found: Variant, place: Place, factor: float) -> Flow:
+    """Its states at another place."""
+    info = found.info
+    radius, fresh = factor * np.asarray(info["radius"]), _fresh(bench, info["memory"])
+    square = bool(info.get("square"))
+    return Flow(place[1]["load"], radius, float(info["flow_s"]), fresh, square=square)
+
+
+def _moved(bench: Bench, found: Variant, place: Place, factor: float) -> Variant | None:
+    info, (name, other) = found.info, place
+    flow = _followed(bench, found, place, factor)
+    columns = [other["column"](s) for s in flows.states(bench, flow).T]
+    if len(found.columns) > len(flow.radius):
         columns += other["back"].get(info["back_from"], [])
     if len(columns) != len(found.columns):
         return None
-    exact = {**other, "back_from": info["back_from"], "radius": radius, "flow_s": flow,
-             "centre": factor * float(info["centre"]), "square": bool(info.get("square")),
+    exact = {**other, "back_from": info["back_from"], "radius": flow.radius, "flow_s": flow.time,
+             "centre": factor * float(info["centre"]), "square": flow.square,
              "knee": info["knee"]}  # fmt: skip
     start, end = found.label.rsplit(" at ", 1)
     how = start.removeprefix(place_in(found.label)) + f" at {exact['centre']:.4g}"
@@ -356,44 +377,14 @@ def _fresh(bench: Bench, memory: str) -> Flags:
     return _memories(bench).get(lost, bench.moved)
 
 
-def states(
-    bench: Bench, load: Array, radius: Array, flow: float, fresh: Flags,
-    weight: Array | None = None, square: bool = False,
-) -> Array:  # fmt: skip
-    """Play states (n, k) of radii (k,): reached at once, or by viscoplastic flow in `flow` s."""
-    if flow == 0:
-        return bench.plays(load, radius, fresh, weight)
-    given = (load, radius, flow, fresh, 0.0 if weight is None else weight, square)
-    key = b"".join(np.asarray(v).tobytes() for v in given)
-    if key not in bench.flows:
-        times = np.full(len(radius), flow)
-        bench.flows[key] = flowing_play(load, radius, times, bench.rows, fresh, weight, square)
-    return bench.flows[key]
-
-
-_Way = tuple[float, bool]  # flow time s, 0 for none; whether it flows with the square
 CLOSE = (0.4,)  # of a closer look
 _BETWEEN = (-0.5, -0.25, 0.25, 0.5)  # powers of two of a flow time
 
 
-def _ways(bench: Bench) -> list[_Way]:
+def _ways(bench: Bench) -> list[flows.Way]:
     """What flows at once, and in all times that are looked for."""
     if bench.rows.continuous or bench.course.timeless:
         return [(0.0, False)]
     # what slows down so under a load that stands, a single spring can't tell from creep
     squared = SQUARE_S if bench.data.arm else ()
     return [(0.0, False), *((t, False) for t in FLOWS_S), *((t, True) for t in squared)]
-
-
-def _flowing(
-    bench: Bench, ways: list[_Way], load: Array, radius: Array, fresh: Flags, weight: Array | None
-) -> Iterator[tuple[_Way, Array]]:
-    """Play states (n, k) of every way; all that takes time in one go."""
-    slow = [way for way in ways if way[0] > 0]
-    if len(slow) < len(ways):
-        yield (0.0, False), bench.plays(load, radius, fresh, weight)
-    if slow:
-        times, square = (np.repeat(v, len(radius)) for v in zip(*slow, strict=True))
-        every = flowing_play(load, np.tile(radius, len(slow)), times, bench.rows, fresh, weight,
-                             square)  # fmt: skip
-        yield from zip(slow, np.split(every, len(slow), axis=1), strict=True)

@@ -7,6 +7,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects import base_slip, flow_back, joint_yield
+from identification.gap.effects.flows import Flow, states
 from identification.gap.forms.law import (
     ACROSS,
     ANEW,
@@ -85,7 +86,7 @@ def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
     if hung and "joint" in law.constants:  # its twin may sit elsewhere
         weight = bench.weight(law.constants["joint"])
     flow, square = law.constants["flow_time"], law.constants.get("flow_exponent") == _SQUARE
-    out = list(joint_yield.states(bench, load, radius, flow, fresh, weight, square).T)
+    out = list(states(bench, Flow(load, radius, flow, fresh, weight, square)).T)
     beyond = np.array([t.shape["grows_beyond"] for t in law.terms if "grows_beyond" in t.shape])
     out += list(joint_yield.grown(load, beyond, fresh).T)
     for term in law.terms:
