@@ -93,6 +93,23 @@ def test_every_component_of_the_force_that_is_recorded_drifts() -> None:
     assert names(replace(data, tangential=None)) == {("",)}
 
 
+def test_every_amplifier_may_drift_at_several_rates_of_its_own() -> None:
+    """A push against an axis reads its amplifier the other way round than one along it."""
+    data = replace(arm_data(), tangential=None)
+    t = data.session - data.session[0]
+    quick, slow = (1 - np.exp(-t / (share * t[-1])) for share in (0.02, 0.12))
+    y = np.array([s.direction == "y" for s in data.setups])[data.setup]
+    drift = 30.0 * quick - 40.0 * slow
+    bench = make_bench(replace(data, force=data.force + np.where(y, -drift, drift)))
+    variants = library(bench, ["force_drift"])
+    target = bench.observed - prediction(bench)
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 4e-6, 2e-5]))
+    found = score(engine, engine.levels, variants)
+    best, *others = sorted(found, key=lambda s: -s.log_evidence)
+    assert best.variant.label == "rates, each component"
+    assert best.log_evidence > others[0].log_evidence + 100
+
+
 @pytest.mark.parametrize("times", [200.0, 1 / 200])
 def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
     """Stiffness 200 times what is simulated, or a 200th of it: no factor ends at a bound."""

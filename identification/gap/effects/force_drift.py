@@ -57,6 +57,10 @@ def variants(bench: Bench) -> list[Variant]:
     every = [column(path) for path in rates(bench)]
     out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
+    if len(axes) > 1:
+        one = [component(bench, a, path) for a in axes.values() for path in rates(bench)]
+        out.append(variant(WORD, "rates, each component", [bench.add(c) for c in one], scales,
+                           positive=False, path="rates", names=tuple(axes)))  # fmt: skip
     for label, way in free.items():
         columns = [column(hat) for hat in free_path(bench, way.pieces).T]
         out.append(free_variant(WORD, label, way, columns, scales, ("",)))
