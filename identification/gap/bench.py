@@ -17,10 +17,11 @@ import numpy as np
 from identification.gap.course import Course
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.history import moves, play, rests
+from identification.gap.holds import hold_ids, is_continuous
 from identification.gap.imposed import displacement_simpler, on_plateau
 from identification.gap.noise import Noise, driven, estimate_noise
 from identification.gap.pool import Pool
-from identification.gap.rows import Rows, hold_ids, is_continuous, reduce_rows
+from identification.gap.rows import Rows, reduce_rows
 
 
 @dataclass(frozen=True, eq=False)

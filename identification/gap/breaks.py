@@ -23,7 +23,7 @@ from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.explanation import Found, Likeness
-from identification.gap.rows import rises
+from identification.gap.turns import rises
 from identification.gap.variants import Variant, variant
 from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING
 

@@ -14,8 +14,9 @@ import numpy as np
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.imposed import approaches
 from identification.gap.loops import lost
-from identification.gap.rows import Rows, passes, turns, way_back
+from identification.gap.rows import Rows
 from identification.gap.snaps import Snaps, let_go
+from identification.gap.turns import passes, turns, way_back
 from identification.gap.wandering import wanders
 
 _MANY = 1000

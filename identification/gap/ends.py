@@ -12,7 +12,8 @@ import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
 from identification.gap.glitches import picked
-from identification.gap.rows import hold_ids, is_continuous, way_back
+from identification.gap.holds import hold_ids, is_continuous
+from identification.gap.turns import way_back
 
 _FEWEST = 20  # readings: of fewer nothing is known of what is sudden
 _FALLS, _LOADED = 0.25, 0.5  # of the largest force: so far it falls, from that at least,

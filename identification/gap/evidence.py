@@ -28,7 +28,8 @@ from identification.gap.data import UNLOADING, Array, Flags, Ints
 from identification.gap.factor import factor_of
 from identification.gap.growing import Growing
 from identification.gap.products import Gathered, Some, Weights, White
-from identification.gap.rows import Rows, rises
+from identification.gap.rows import Rows
+from identification.gap.turns import rises
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 _CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat

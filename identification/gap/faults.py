@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.gap.data import LOADING, Array, GapData
 from identification.gap.ends import after_break
-from identification.gap.rows import hold_ids, is_continuous
+from identification.gap.holds import hold_ids, is_continuous
 
 
 def faults(data: GapData) -> tuple[str, ...]:

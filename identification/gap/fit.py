@@ -19,7 +19,7 @@ from identification.gap.evidence import (
 )
 from identification.gap.explanation import Explanation
 from identification.gap.parts import Part
-from identification.gap.rows import rises
+from identification.gap.turns import rises
 from identification.gap.variants import block
 
 _LATER = 3  # rows of a hold from here on count as one

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
-from identification.gap.rows import hold_ids, is_continuous, scatter_within
+from identification.gap.holds import hold_ids, is_continuous, scatter_within
 
 _WINDOW = 25  # readings, in which a typical change is
 _NOISE, _STEPS, _RANGE = 6.0, 3.0, 0.02  # a glitch is off by more than each: standard deviations,

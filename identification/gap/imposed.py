@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.gap.data import ZERO, Array, GapData, Ints
-from identification.gap.rows import way_back
+from identification.gap.turns import way_back
 
 _POINTS = 1000  # bins of a recording: more do not tell the path better
 _CLOSEST = 3e-7  # of the squared range: a piece that leaves less is as good as exact

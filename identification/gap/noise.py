@@ -8,13 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
-from identification.gap.rows import (
-    ENOUGH,
-    Rows,
-    hold_ids,
-    scatter_within,
-    swing_within,
-)
+from identification.gap.holds import ENOUGH, hold_ids, scatter_within, swing_within
+from identification.gap.rows import Rows
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command

@@ -13,8 +13,9 @@ from identification.gap.data import Array, Instruments
 from identification.gap.effects import joint_yield, library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
+from identification.gap.holds import hold_ids, swing_within
 from identification.gap.products import White
-from identification.gap.rows import hold_ids, reduce_rows, swing_within
+from identification.gap.rows import reduce_rows
 from identification.gap.variants import Variant
 from rig.dataset import load
 from rig.gap_data import gap_data

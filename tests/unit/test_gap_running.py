@@ -14,11 +14,13 @@ from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.drift import free_paths, shares
 from identification.gap.effects.joint_yield import grown
+from identification.gap.holds import hold_ids, is_continuous
 from identification.gap.leftover import _FALL
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.priors import prior_of
-from identification.gap.rows import hold_ids, is_continuous, passes, reduce_rows, turns
+from identification.gap.rows import reduce_rows
+from identification.gap.turns import passes, turns
 from identification.gap.words import STANDING
 from tests.unit.test_gap_operators import bench_data
 

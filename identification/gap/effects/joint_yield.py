@@ -38,7 +38,7 @@ from identification.gap.effects.specimens import (
     softening,
     with_other_springs,
 )
-from identification.gap.rows import way_back
+from identification.gap.turns import way_back
 from identification.gap.variants import (
     BACK_UNDER_WEIGHT,
     LASTING,

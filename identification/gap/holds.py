@@ -1,0 +1,102 @@
+"""Samples that belong together: holds at one level, and the noise in them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.data import Array, Flags, GapData, Ints
+
+_RUNNING_SHARE = 0.5  # a "hold" through which the force runs by half its range is none
+
+
+def hold_ids(data: GapData) -> Ints:
+    """(n,) number of the hold of every sample: same run, branch and step, without a pause, and on
+    one side of no load: steps of the same size to and fro may bear the same number."""
+    keys = np.column_stack([data.run, data.branch, data.step])
+    new = np.any(np.diff(keys, axis=0) != 0, axis=1)
+    loaded = (data.step > 0) & (np.abs(data.force) > _LOADED * data.instruments.force)
+    side = np.where(loaded, side_of(data.force), 0.0)
+    new |= side[1:] * side[:-1] < 0
+    return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
+
+
+_NUMBERED, _ONCE = 60, 0.9  # levels a run; readings that are alone on theirs, as a share
+
+
+def _numbered(data: GapData, hold: Ints) -> bool:
+    """Whether steps count readings. Levels are looked up only where there are as many holds."""
+    least = max(_NUMBERED * len(np.unique(data.run)), _ONCE * len(hold))
+    if hold[-1] + 1 < least:
+        return False
+    return len(np.unique(np.column_stack([data.run, data.step]), axis=0)) >= least
+
+
+def is_continuous(data: GapData, hold: Ints) -> bool:
+    """Whether the force runs instead of resting at levels; or rests at one all the time. Without an
+    arm so many levels, each read once and never met again, are no levels, but numbered readings."""
+    if np.any(data.step < 0) or (hold[-1] == 0 and not data.arm):
+        return True
+    if not data.arm and _numbered(data, hold):
+        return True
+    edges = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
+    count = np.diff(np.append(edges, len(hold)))
+    width = np.maximum.reduceat(data.force, edges) - np.minimum.reduceat(data.force, edges)
+    span = float(np.ptp(data.force))
+    return bool(np.any((count > 2) & (width > _RUNNING_SHARE * span) & (span > 0)))
+
+
+_SIDE = 0.05  # of the largest force: less is no load, nor
+_LOADED = 5.0  # standard uncertainties of one sample
+
+
+def side_of(force: Array) -> Array:
+    """Sign of forces (n,), 0 of what is no load."""
+    return np.where(np.abs(force) > _SIDE * np.abs(force).max(initial=0.0), np.sign(force), 0.0)
+
+
+# Noise reaches this square sum in one hold of ten thousand (chi squared of 1 to 8 degrees);
+# what really moves (a lagging channel, a relaxing screw) goes far beyond it.
+_STEADY_PER_ROW, _STEADY_ONCE = 2.6, 12.5
+# What is stated is known to a factor of two (GUM G.4.2): a force that scatters more than that may
+# really tremble.
+_MISJUDGED = 2.0
+ENOUGH = 30  # second differences: then their scatter is known to about an eighth
+
+
+def scatter_within(values: Array, hold: Ints) -> float | None:
+    """Standard deviation of the white part of values (n,), from second differences within holds,
+    the first sample left out (it may lag); trimmed at 5 %, corrected for that (normal noise:
+    0.8713). None where there are too few."""
+    second = values[3:] - 2 * values[2:-1] + values[1:-2] if len(values) > 3 else np.zeros(0)
+    same = (hold[3:] == hold[:-3]) if len(values) > 3 else np.zeros(0, dtype=bool)
+    squares = np.sort((second[same]) ** 2)
+    if squares.size < ENOUGH:
+        return None
+    kept = squares[: int(0.95 * squares.size)]
+    return float(np.sqrt(kept.mean() / 6.0) / 0.8713)
+
+
+def swing_within(values: Array, hold: Ints) -> float:
+    """rms of what values (n,) have in common with the next one about the mean of their hold: a
+    vibration that samples follow, not their own noise. 0 where holds are too short."""
+    count = np.bincount(hold)[hold]
+    left = values - np.bincount(hold, weights=values)[hold] / count
+    pairs = (hold[1:] == hold[:-1]) & (count[1:] >= _SWINGS)
+    common = (left[1:] * left[:-1])[pairs]
+    return float(max(common.mean(), 0.0) ** 0.5) if common.size >= ENOUGH else 0.0
+
+
+_SWINGS = 5  # samples of a hold
+
+
+def noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
+    """What values (n,) scatter in their holds: as stated, or more as far as that may be wrong."""
+    return min(max(stated, scatter_within(values, hold) or 0.0), _MISJUDGED * stated)
+
+
+def steadied(hold: Ints, values: Array, weight: Array, sd: float) -> tuple[Array, Flags]:
+    """Values (n,) with their mean in holds in which they stand still within noise; these (n,)."""
+    mean = np.bincount(hold, weights=weight * values) / np.bincount(hold, weights=weight)
+    square = np.bincount(hold, weights=weight * (values - mean[hold]) ** 2) / sd**2
+    steady = (square <= _STEADY_PER_ROW * np.bincount(hold) + _STEADY_ONCE)[hold]
+    return np.where(steady, mean[hold], values), steady
