@@ -143,6 +143,8 @@ def goes_back(data: GapData) -> int | None:
         size, way = np.abs(force[at]), np.sign(force[at]) * u[at]
         far = max(_CLEARLY * data.instruments.displacement, _BACK * float(np.ptp(u[at])))
         same = force[at][1:] * force[at][:-1] >= 0
+        branch = data.branch[first][at]  # a force that comes late still grows when it is let go
+        same &= branch[1:] == branch[:-1]
         grows = np.diff(size) > _MORE * float(np.ptp(force[at]))
         wrong = np.flatnonzero(same & grows & (np.diff(way) < -far))
         if wrong.size:

@@ -29,7 +29,7 @@ LET_GO = 1e-8  # share that is kept where forces let go at once: no law does tha
 COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whenever it is let go
 _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
-SWINGS = 0.03  # share that is kept by a drift that comes and goes,
+SWINGS = 0.03  # share that is kept by a drift that comes and goes, or hurries,
 _SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
 _STEP = 2.5  # of the grid of imperfections: so much it may be off
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
@@ -71,7 +71,7 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.words))
     fitted = fit(engine, explanation)
     share = _share(_left(engine, fitted), allowed)
-    if _swings(fitted):
+    if _swings(fitted) or _hurries(engine, fitted):
         share *= SWINGS
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
     if explanation.eta > _STEP * allowed:
@@ -101,6 +101,27 @@ def _swings(fitted: Fit) -> bool:
         if np.sum(rest**2) > _MOSTLY * np.sum(path**2):
             return True
     return False
+
+
+def _hurries(engine: Engine, fitted: Fit) -> bool:
+    """Whether a displacement is said to drift faster than anything warms up: somebody leans on the
+    stand, something is moved."""
+    if not engine.bench.rows.clock:
+        return False
+    span = engine.bench.course.session_span
+    for i, part in enumerate(fitted.parts):
+        if part.word != "thermal_drift" or part.variant.info.get("path") != "free":
+            continue
+        pieces = int(part.variant.info["pieces"])
+        path = fitted.of(i)[0].reshape(-1, pieces)
+        if np.abs(np.diff(path, axis=1)).max() > FASTEST * span / (pieces - 1):
+            return True
+    return False
+
+
+# Warm robots move by up to 400 um over hours, lasers by 1 um/K: some hundred times as fast is
+# no heat.
+FASTEST = 400e-6 / 60  # m/s
 
 
 def _left(engine: Engine, fitted: Fit) -> float:

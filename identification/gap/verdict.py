@@ -106,9 +106,10 @@ TAKES_THREE = 50.0
 # Nats that a second effect has to bring before it may be the main one: of 300 cases such an effect
 # stood in twice for what another law left, by 2 and 5 nats, and was never the larger one of two.
 TAKES_TWO = 8.0
-# Of two that are linear, each may be what the other one's law lacks: links that bend otherwise than
-# beams do had asked for a gain of the laser by 36 and 52 nats.
-TAKES_TWO_LINEAR = 60.0
+# Of some that are linear, each may be what the others' laws lack: links that bend otherwise than
+# beams do had asked for a gain of the laser by 36 and 52 nats, and, beside a wrong tool, for a base
+# by 56.
+TAKES_LINEAR = 80.0
 
 
 def _simpler(
@@ -120,7 +121,7 @@ def _simpler(
     e, many = explanation, len(explanation.words)
     if many < (_TWO if arm else _MANY):
         return None
-    most = TAKES_THREE if many >= _MANY else TAKES_TWO_LINEAR if e.words <= LINEAR else TAKES_TWO
+    most = TAKES_LINEAR if e.words <= LINEAR else TAKES_THREE if many >= _MANY else TAKES_TWO
     near = (
         f
         for f in ranked

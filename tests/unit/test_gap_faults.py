@@ -136,7 +136,8 @@ def test_a_displacement_that_goes_back_under_more_force_was_misread() -> None:
 
 
 @pytest.mark.parametrize(
-    "what", ["fine", "coarse", "small", "other sense", "through zero", "unloading", "next run"]
+    "what",
+    ["fine", "coarse", "small", "other sense", "through zero", "unloading", "next run", "late"],
 )
 def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
     data = misread()
@@ -156,11 +157,15 @@ def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
         u = np.concatenate([[-5e-5, -5e-5, -5e-5, 2e-5], np.linspace(2e-5, 3e-5, 16)])
     elif what == "unloading":  # it creeps on while the load comes off
         u[10:] = u[9] + 4e-6 * np.arange(10)
+    elif what == "late":
+        u[10] = 6.5 / SPRING
     elif what == "next run":  # the datum is another one
         run = np.repeat([0, 1], 10)
         force = np.tile(np.arange(1.0, 11.0), 2)
         u = force / SPRING - 5e-4 * run
     step, branch = np.arange(20), np.ones(20, dtype=np.int64)
+    if what == "late":  # it is let go, and the force still shows the last step
+        force[10], branch[10:] = 9.6, 2
     assert goes_back(bench_data(force, u, step=step, branch=branch, run=run)) is None
 
 

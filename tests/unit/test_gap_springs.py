@@ -110,6 +110,25 @@ def test_every_amplifier_may_drift_at_several_rates_of_its_own() -> None:
     assert best.log_evidence > others[0].log_evidence + 100
 
 
+def test_amplifiers_that_drift_alike_show_it_across_the_push_as_well() -> None:
+    data = arm_data()
+    t = (data.session - data.session[0]) / np.ptp(data.session)
+    drift = 4.0 * np.sin(5.0 * t) + 2.0 * np.sin(14.0 * t)
+    across = np.stack([s.tangents.sum(axis=1) for s in data.setups])[data.setup]
+    assert data.tangential is not None
+    seen = data.tangential + across * drift[:, None]
+    bench = make_bench(replace(data, force=data.force + drift, tangential=seen))
+    variants = library(bench, ["force_drift"])
+    target = bench.observed - prediction(bench)
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 4e-6, 2e-5]))
+    best, *others = sorted(score(engine, engine.levels, variants), key=lambda s: -s.log_evidence)
+    assert best.variant.label == "winding path, all components"
+    assert best.log_evidence > others[0].log_evidence + 50
+    law, scale = law_of(bench, best.variant)
+    exact = np.stack([bench.columns[c] for c in best.variant.columns], axis=1)
+    assert rows_of(bench, "force_drift", law) * scale == pytest.approx(exact, abs=1e-12)
+
+
 @pytest.mark.parametrize("times", [200.0, 1 / 200])
 def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
     """Stiffness 200 times what is simulated, or a 200th of it: no factor ends at a bound."""

@@ -10,12 +10,14 @@ Source: 0.05 pC/s and more in data sheets of charge amplifiers.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
-    FreePath,
     free_path,
     free_paths,
     free_variant,
@@ -30,26 +32,27 @@ SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Warm-up paths, alike in all directions or per component, several
-    rates at once, and a free smooth path."""
+    """Warm-up paths, several rates at once, and a free smooth path: alike in all directions, of all
+    amplifiers alike, or of every amplifier's own."""
     top = float(np.abs(bench.rows.measured_force).max())
     scales = tuple(s * top for s in shares(bench, SHARES))
     if not top > 0:
         return []
-
     axes = _axes(bench)
 
     def column(path: Array) -> int:
         return bench.add(drifting(bench, _tared(bench, path)))
+
+    def own(given: Iterable[Array]) -> list[int]:
+        return [bench.add(component(bench, a, path)) for a in axes.values() for path in given]
 
     out = []
     for label, path in paths(bench).items():
         out.append(variant(WORD, label, [column(path)], scales, positive=False, path=label,
                            names=("",)))  # fmt: skip
         if len(axes) > 1:
-            each = [bench.add(component(bench, axis, path)) for axis in axes.values()]
-            out.append(variant(WORD, f"{label}, each component", each, scales, positive=False,
-                               path=label, names=tuple(axes)))  # fmt: skip
+            out.append(variant(WORD, f"{label}, each component", own([path]), scales,
+                               positive=False, path=label, names=tuple(axes)))  # fmt: skip
     out += _each_run(bench, scales)
     free = free_paths(bench)
     if not free:
@@ -58,27 +61,22 @@ def variants(bench: Bench) -> list[Variant]:
     out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
                        names=("",)))  # fmt: skip
     if len(axes) > 1:
-        one = [component(bench, a, path) for a in axes.values() for path in rates(bench)]
-        out.append(variant(WORD, "rates, each component", [bench.add(c) for c in one], scales,
+        out.append(variant(WORD, "rates, each component", own(rates(bench)), scales,
                            positive=False, path="rates", names=tuple(axes)))  # fmt: skip
     for label, way in free.items():
-        columns = [column(hat) for hat in free_path(bench, way.pieces).T]
-        out.append(free_variant(WORD, label, way, columns, scales, ("",)))
+        hats = free_path(bench, way.pieces).T
+        out.append(free_variant(WORD, label, way, [column(hat) for hat in hats], scales, ("",)))
         if len(axes) > 1:
             fewer = way._replace(pieces=min(way.pieces, EACH_PIECES))
-            out.append(_each_component(bench, axes, label, fewer, scales))
+            each = own(free_path(bench, fewer.pieces).T)
+            named = f"{label}, each component"
+            out.append(free_variant(WORD, named, fewer, each, scales, tuple(axes), prior=1.0))
+            along = _alike(bench)
+            same = [bench.add(component(bench, along, hat)) for hat in hats]
+            together = free_variant(WORD, f"{label}, all components", way, same, scales, ("",),
+                                    prior=1.0)  # fmt: skip
+            out.append(replace(together, info={**together.info, "along": along}))
     return out
-
-
-def _each_component(
-    bench: Bench, axes: dict[str, tuple[float, float, float]], label: str, way: FreePath,
-    scales: tuple[float, ...],
-) -> Variant:  # fmt: skip
-    """A free path of every amplifier's own."""
-    hats = free_path(bench, way.pieces)
-    columns = [bench.add(component(bench, axis, hat)) for axis in axes.values() for hat in hats.T]
-    named = f"{label}, each component"
-    return free_variant(WORD, named, way, columns, scales, tuple(axes), prior=1.0)
 
 
 EACH_PIECES = 20  # at most, of one component's path
@@ -114,6 +112,14 @@ def _axes(bench: Bench) -> dict[str, tuple[float, float, float]]:
         return AXES
     units = np.stack([s.unit_vector for s in bench.data.setups])
     return {name: a for name, a in AXES.items() if np.any(np.abs(units @ np.array(a)) > 0.1)}
+
+
+def _alike(bench: Bench) -> tuple[float, float, float]:
+    """Amplifiers that drift alike, so that every direction that has no opposite reads the same: how
+    they are connected is a matter of cables."""
+    units = np.unique([s.unit_vector for s in bench.data.setups], axis=0)
+    x, y, z = np.where(units.sum(axis=0) < -0.1, -1.0, 1.0).tolist()
+    return x, y, z
 
 
 def component(bench: Bench, axis: tuple[float, ...], path: Array) -> Array:

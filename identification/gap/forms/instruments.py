@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.gap.bench import Bench
@@ -76,7 +78,8 @@ def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
     constants, terms, scale = _path(bench, v)
     law = constants | {"quantity": "force"}
     if v.info["names"] == ("",):
-        return Law(law, terms), scale
+        along = {k: v.info[k] for k in ("along",) if k in v.info}
+        return Law(law, tuple(replace(t, shape={**t.shape, **along}) for t in terms)), scale
     each = [{**t.shape, "along": force_drift.AXES[name]} for name in v.info["names"] for t in terms]
     named = tuple(Term(terms[0].coefficient, shape) for shape in each)
     return Law(law, named), np.tile(scale, len(v.info["names"]))
