@@ -143,10 +143,14 @@ def test_a_spring_within_what_is_stated_is_none(bench: Bench) -> None:
 
 
 def test_at_rest_no_mechanism_far_below_the_noise_is_named(bench: Bench) -> None:
-    """Beside whatever else; what springs may hide or the force at zero load shows is none."""
+    """Beside whatever else; what springs may hide or the force at zero load shows is none, but for
+    what bends of a gain."""
     fresh, found = of(bench, "joint_hysteresis")[0], {}
-    for word in ("joint_hysteresis", "link_flexibility", "force_drift"):
+    for word in ("joint_hysteresis", "link_flexibility", "force_drift", "displacement_scale"):
         found[word] = Part(library(fresh, (word,))[0], 1.0)
+    gains = library(fresh, ("displacement_scale",))
+    for label in ("gain that bends", "gain that changes at 0.45"):
+        found[label] = Part(next(v for v in gains if v.label == label), 1.0)
     base, target = base_columns(fresh), fresh.observed - prediction(fresh)
     engine = Engine(fresh, base, target, np.array([0.0, 1e-6]))
     noise = fresh.noise.stated
@@ -155,8 +159,10 @@ def test_at_rest_no_mechanism_far_below_the_noise_is_named(bench: Bench) -> None
         gap = np.array(sizes) * noise
         return trifle(engine, tuple(found[w] for w in words), Sizes(gap, 1e3 * gap, 0.0))
 
-    assert charge(["joint_hysteresis"], [0.1]) == pytest.approx(60 * np.log(2))
-    assert charge(["joint_hysteresis"], [0.25]) == 0.0
+    for what in ("joint_hysteresis", "gain that bends", "gain that changes at 0.45"):
+        assert charge([what], [0.25]) == pytest.approx(60 * np.log(2))
+        assert charge([what], [0.55]) == 0.0
+    assert charge(["displacement_scale"], [0.1]) == 0.0
     assert charge(["link_flexibility", "joint_hysteresis"], [9.0, 0.1]) > 40
     assert charge(["link_flexibility", "force_drift"], [0.01, 0.01]) == 0.0
 
