@@ -168,7 +168,10 @@ def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
     (files / "r.json").write_text("{}")
     assert rig("analyze", "d.h5", "--json", "r.json")[0] == 0
     assert json.loads((files / "r.json").read_text())["schema"] == "rig.analysis/1"
-    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+    status, _, err = rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    assert status == 0
+    assert "d.h5: replaced; an earlier import stood there" in err.splitlines()
+    assert "replaced" not in rig("import", "t.csv", "m.yaml", "-o", "new.h5")[2]
 
 
 @pytest.mark.parametrize(
