@@ -109,7 +109,8 @@ def _answer(r: GapResult) -> str:
         like = "" if r.looks_like is None else f" It looks like this: {looks_like(r.looks_like)}."
         return (
             f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
-            f"the uncertainty; about {brief(r.remainder * MM, 3)} mm rms of structure remain.{like}"
+            f"the uncertainty: {brief(r.after * MM, 3)} of {brief(r.before * MM, 3)} mm rms remain;"
+            f" the instruments alone leave {brief(r.noise * MM, 3)} mm.{like}"
         )
     more = [name for name in r.names if name != r.verdict]
     also = f" Beside it: {', '.join(more)}." if more else ""

@@ -64,8 +64,8 @@ class GapResult:
     """All lengths in m. before, after, noise: rms over samples. held_out: the main fold first.
 
     runners_up: word -> rms after on the main fold, of the best explanations by other words.
-    remainder: rms of repeatable structure that is left unexplained. looks_like: of an unknown gap,
-    where that is plain.
+    remainder: imperfection that the laws are taken to have, of no law for `unknown`; what is left
+    on average stands in `after`. looks_like: of an unknown gap, where that is plain.
     """
 
     verdict: str

@@ -13,6 +13,7 @@ import pytest
 from matplotlib.figure import Figure as Plot
 
 from rig.dataset import load, write
+from rig.digits import number
 from rig.errors import InputError
 from rig.journal import journal_path
 from rig.report import pictures
@@ -175,7 +176,10 @@ def test_an_unknown_gap_is_said_what_it_looks_like(tmp_path: Path) -> None:
     found = report.to_json()["datasets"][0]["diagnose"]
     assert found["verdict"] == "unknown"
     assert found["looks_like"]["kind"] == "rough"
-    assert f"It looks like this: {found['looks_like']['text']}." in Page(report.to_html()).text
+    page = Page(report.to_html()).text
+    assert f"It looks like this: {found['looks_like']['text']}." in page
+    left, gap = (number(found["gap"][f"{k}_rms_mm"], 3) for k in ("after", "before"))
+    assert f"{left} of {gap} mm rms remain" in page  # as in the table below
 
 
 @pytest.mark.parametrize("places", [{"joint 1": 0.62, "joint 5": 0.38}, {"joint 3": 1.0}])
@@ -239,7 +243,7 @@ def test_same_data_same_page(tmp_path: Path) -> None:
 def test_two_files_of_one_name(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
-    paths = [bench(tmp_path / folder / "run.h5") for folder in "ab"]
+    paths = [bench(tmp_path / folder / "run.h5", comment=folder) for folder in "ab"]
     report = make(paths, QUIET)
     assert [s.label for s in report.gathered.sessions] == [str(p) for p in paths]
     files = [p.name for p in write_figures(report, tmp_path / "figures")]
