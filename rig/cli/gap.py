@@ -84,12 +84,15 @@ def diagnose(
     from rig.dataset import load
     from rig.diagnose import diagnose as run_diagnose
     from rig.gap_model import check_writable
+    from rig.next_protocol import check_arm
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
         measured = load(dataset)
         if write_model is not None:
             check_writable(measured, others=simulation is not None)
+        if next_file is not None:
+            check_arm(measured)
         result = run_diagnose(
             measured, model=model, simulation=simulation,
             add=add or (), withhold=withhold or (), progress=progress,

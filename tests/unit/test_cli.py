@@ -443,6 +443,16 @@ def test_what_cannot_become_a_model_is_said_before_the_work(rig: Rig, files: Pat
     )
 
 
+def test_what_cannot_become_a_protocol_is_said_before_the_work(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    status, out, err = rig("diagnose", "d.h5", "--next", "next.yaml")
+    assert (status, out) == (2, "")  # no result: nothing was diagnosed
+    assert err == (
+        "d.h5: robot: none. A protocol file is for an arm; leave --next out, and the diagnosis "
+        "itself says what to measure next.\n"
+    )
+
+
 def test_diagnose_takes_the_stiffnesses_of_a_model_of_the_same_robot(rig: Rig, files: Path) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     model = str(HOME / "data" / "models" / "F1.yaml")
