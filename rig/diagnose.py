@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from identification.gap.data import BRANCH_NAMES, GapData
-from identification.gap.diagnose import Effect, GapResult, check_words, diagnose_gap, explain_gap
+from identification.gap.diagnose import (
+    Effect,
+    GapResult,
+    NotShown,
+    check_words,
+    diagnose_gap,
+    explain_gap,
+)
 from identification.gap.forms.known import less_known
 from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
@@ -105,13 +112,16 @@ def diagnose(
             raise InputError(f"{option}: {error}.") from error
     for word in (w for w in forced if w in out):
         raise InputError(f"--add {word}, --withhold {word}: exclude each other. Leave one out.")
-    result = diagnose_gap(
-        data,
-        withhold=out,
-        add=forced,
-        others=lambda: elsewhere(dataset),
-        progress=progress,
-    )
+    try:
+        result = diagnose_gap(
+            data,
+            withhold=out,
+            add=forced,
+            others=lambda: elsewhere(dataset),
+            progress=progress,
+        )
+    except NotShown as error:
+        raise InputError(f"--add: {error}.") from error
     return Diagnosis(dataset.uuid, result, dataset.banners(), known)
 
 

@@ -101,8 +101,8 @@ def diagnose_gap(
     progress: Progress | None = None,
 ) -> GapResult:
     """The diagnosis of a data set. withhold: words taken out of the library; add: words that the
-    explanation must contain; others: setups that the rig could take up next. Raises ValueError for
-    unknown words."""
+    explanation must contain beside what it has; others: setups that the rig could take up next.
+    Raises ValueError for unknown words, NotShown for words to add that these data can't show."""
     _, whole = explain_gap(data, withhold=withhold, add=add, others=others, progress=progress)
     return whole()
 
@@ -125,6 +125,7 @@ def explain_gap(
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])
+    _check_shown(forced, variants)
     tell("comparing effects", 0.2)
     etas = eta_levels(bench, base, target)
     engine = Engine(bench, base, target, etas)
@@ -143,10 +144,7 @@ def explain_gap(
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
-    if forced:
-        chosen = force(engine, variants, found.explanations, forced)
-    else:
-        chosen = chosen_of(found, verdict)
+    chosen = force(engine, variants, found.explanations, chosen_of(found, verdict), forced)
     chosen, known = settled(engine, variants, chosen, found.explanations)
     result = _with_twins(_result(found, verdict, chosen, known), chosen, out)
 
@@ -157,6 +155,17 @@ def explain_gap(
         return replace(result, next_measurement=following)
 
     return result, whole
+
+
+class NotShown(ValueError):
+    """A word that the data at hand could not show."""
+
+
+def _check_shown(forced: frozenset[str], variants: list[Variant]) -> None:
+    shown = dict.fromkeys(v.word for v in variants)
+    for word in sorted(forced - shown.keys()):
+        raise NotShown(f"{word} is nothing that these data could show; they could: "
+                       f"{', '.join(shown) or 'no effect'}")  # fmt: skip
 
 
 def _silent(_: str, __: float) -> None:

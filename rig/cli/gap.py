@@ -23,7 +23,7 @@ _Simulation = Annotated[
 ]
 _Add = Annotated[
     list[str] | None,
-    typer.Option(metavar="WORD", help="An effect that the explanation must contain."),
+    typer.Option(metavar="WORD", help="An effect to put beside those of the explanation."),
 ]
 _Withhold = Annotated[
     list[str] | None, typer.Option(metavar="WORD", help="An effect to take out of the library.")
@@ -84,7 +84,6 @@ def diagnose(
     from rig.dataset import load
     from rig.diagnose import diagnose as run_diagnose
     from rig.gap_model import check_writable
-    from rig.next_protocol import check_arm
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
@@ -92,6 +91,8 @@ def diagnose(
         if write_model is not None:
             check_writable(measured, others=simulation is not None)
         if next_file is not None:
+            from rig.next_protocol import check_arm
+
             check_arm(measured)
         result = run_diagnose(
             measured, model=model, simulation=simulation,

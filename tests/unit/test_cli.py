@@ -403,6 +403,9 @@ def test_diagnose_gives_the_contracts_json(rig: Rig, files: Path) -> None:
     status, _, err = rig("diagnose", "d.h5", "--add", "joint_yeild")
     assert status == 2
     assert "joint_yield" in err
+    status, _, err = rig("diagnose", "d.h5", "--add", "base_slip")  # there is no arm, and no base
+    assert status == 2
+    assert err.startswith("--add: base_slip is nothing that these data could show; they could: ")
 
 
 def test_version(rig: Rig) -> None:
