@@ -36,12 +36,14 @@ Progress = Callable[[str, float], None]
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The result with what it came from; `to_json` is schema rig.diagnosis/1. known_effects: of
-    the model that was given, part of the simulation."""
+    the model that was given, part of the simulation; left_behind: words of that model which belong
+    to the session that it was made from, and are no part of it."""
 
     dataset: str
     result: GapResult
     banners: tuple[str, ...] = ()
     known_effects: tuple[dict[str, Any], ...] = ()
+    left_behind: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The diagnosis as plain values."""
@@ -82,6 +84,11 @@ class Diagnosis:
 
         names = ", ".join(dict.fromkeys(str(e["name"]) for e in self.known_effects))
         known = [f"The simulation has these effects already: {names}."] if names else []
+        if self.left_behind:
+            known.append(
+                f"Left out of the model: {', '.join(self.left_behind)}, of the session that it was "
+                "made from."
+            )
         return "\n\n".join([*self.banners, *known, render(self.result)])
 
 
@@ -98,10 +105,11 @@ def diagnose(
     simulation: CSV with another simulator's curves; withhold: words taken out of the library; add:
     words the explanation must contain. InputError for anything wrong."""
     known: tuple[dict[str, Any], ...] = ()
+    behind: tuple[str, ...] = ()
     if model is None:
         data = gap_data(dataset)
     else:
-        data, known = _believing(dataset, model)
+        data, known, behind = _believing(dataset, model)
     if simulation is not None:
         data = with_curves(data, simulation)
     out, forced = tuple(withhold), tuple(add)
@@ -122,7 +130,7 @@ def diagnose(
         )
     except NotShown as error:
         raise InputError(f"--add: {error}.") from error
-    return Diagnosis(dataset.uuid, result, dataset.banners(), known)
+    return Diagnosis(dataset.uuid, result, dataset.banners(), known, behind)
 
 
 def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
@@ -135,8 +143,11 @@ def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
     return said(result), lambda: said(whole())
 
 
-def _believing(dataset: Dataset, model: Path) -> tuple[GapData, tuple[dict[str, Any], ...]]:
-    """The data with springs and effects of a model file as their simulation, and those effects."""
+def _believing(
+    dataset: Dataset, model: Path
+) -> tuple[GapData, tuple[dict[str, Any], ...], tuple[str, ...]]:
+    """The data with springs and effects of a model file as their simulation, those effects, and
+    words of the model that are left out."""
     read = load_model(model)
     effects = effects_of(read)
     if read.arm.name != dataset.meta.robot:
@@ -151,10 +162,13 @@ def _believing(dataset: Dataset, model: Path) -> tuple[GapData, tuple[dict[str, 
         gap_data(replace(dataset, meta=believed)),
         compliance_relative_sd=read.arm.joint_stiffness_relative_sd,
     )
-    if not effects.forms:
-        return data, read.effects
+    lasting, behind = effects.lasting, effects.left_behind
+    words = {*effects.contained, *(f.word for f in lasting)}
+    known = tuple(e for e in read.effects if e["name"] in words)
+    if not lasting:
+        return data, known, behind
     try:
-        return less_known(data, effects.forms), read.effects
+        return less_known(data, lasting), known, behind
     except ValueError as error:
         raise InputError(f"{model}: effects: {error}. Give a model without effects.") from error
 
