@@ -316,3 +316,25 @@ def test_the_loop_of_a_cycle_without_zero_has_an_area_and_no_share() -> None:
     assert result.hysteresis is not None
     assert result.hysteresis.area == pytest.approx(80.0 * 1e-4, rel=1e-6)
     assert math.isnan(result.hysteresis.relative)
+
+
+def test_a_curve_is_bent_where_it_leaves_its_line_beyond_the_noise() -> None:
+    """Noise is what is stated, or what differs from run to run where that is more."""
+    noise = np.random.default_rng(3).normal(0, 1e-5, 15)  # five times what is stated
+    points = [
+        replace(p, displacement=p.displacement + e)
+        for p, e in zip(curve().points, noise, strict=True)
+    ]
+    assert not analyze_curve(curve()).bent
+    assert not analyze_curve(replace(curve(), points=tuple(points))).bent
+    assert analyze_curve(curve(lambda f: f / 1e5 + 1e-8 * f**2)).bent
+    assert not analyze_curve(curve(lambda f: f / 1e5 + 1e-10 * f**2)).bent  # 1 um: in the noise
+
+
+def test_a_curve_that_yields_in_its_first_run_only_is_bent() -> None:
+    """What has yielded stays: the runs after it are straight again."""
+    levels = [10.0 * i for i in range(1, 13)]
+    first = curve(lambda f: f / 1e5 + 5e-6 * max(f - 60, 0), levels, factors=(1.0,))
+    later = curve(levels=levels)
+    points = (*first.points, *(p for p in later.points if p.repetition > 1))
+    assert analyze_curve(replace(later, points=points)).bent
