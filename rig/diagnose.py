@@ -3,6 +3,7 @@ gap shrinks once that effect is added."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -30,6 +31,7 @@ from rig.other_setups import elsewhere
 from rig.other_simulator import with_curves
 
 MM = 1e3  # mm per m
+_JOINT = re.compile(r"joint (\d+)")  # as shapes are labelled, whatever their spring is called
 Progress = Callable[[str, float], None]
 
 
@@ -56,7 +58,7 @@ class Diagnosis:
             "verdict": r.verdict,
             "probabilities": {w: float(p) for w, p in r.probabilities.items()},
             "meanings": meanings(arm=r.bench.data.arm),
-            "effects": [_effect(e) for e in r.effects],
+            "effects": [_effect(e, r.bench.data) for e in r.effects],
             "where": _where(r),
             "gap": _gap(r),
             "next_measurement": None
@@ -185,7 +187,10 @@ def _looks_like(r: GapResult) -> dict[str, Any] | None:
     return {"kind": like.kind, **size, "text": looks_like(like)}
 
 
-def _effect(e: Effect) -> dict[str, Any]:
+def _effect(e: Effect, data: GapData) -> dict[str, Any]:
+    def direction(found: re.Match[str]) -> str:
+        return f"direction {data.spring_name(int(found[1]) - 1)}"
+
     return {
         "name": e.name,
         "probability": e.probability,
@@ -194,7 +199,7 @@ def _effect(e: Effect) -> dict[str, Any]:
         "indistinguishable_from": list(e.indistinguishable_from),
         "share_of_gap": e.share_of_gap,
         "rms_mm": e.size * MM,
-        "form": e.label,
+        "form": e.label if data.arm else _JOINT.sub(direction, e.label),
     }
 
 

@@ -120,6 +120,18 @@ def test_withheld_table_begins_with_the_fit_and_ends_with_the_rivals(slipped: Di
     assert t["after_rms_mm"][1] == pytest.approx(r.held_out[0].after * 1e3)
 
 
+def test_without_an_arm_a_spring_is_called_by_its_direction(tmp_path: Path) -> None:
+    wrong = META.replace(
+        "y: 60.0}, stiffness_relative_sd: 0.1", "y: 90.0}, stiffness_relative_sd: 0.05"
+    )
+    found = diagnosed(tmp_path, table(slip_mm=0), wrong)
+    (effect,) = found.to_json()["effects"]
+    assert (effect["name"], effect["form"]) == ("joint_stiffness_error", "direction y")
+    assert list(effect["parameters"]) == ["factor_y"]
+    assert effect["parameters"]["factor_y"]["value"] == pytest.approx(60 / 90, rel=0.01)
+    assert "\n    factor_y = 0.66" in found.to_text()
+
+
 def test_what_a_report_draws_travels_without_the_samples(tmp_path: Path) -> None:
     sizes = []
     for samples in (2, 60):  # of a hold
