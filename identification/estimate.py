@@ -46,8 +46,8 @@ def line(table: Table, choice: Choice) -> LineFit:
     - "proportional": s_i in proportion to u_i. Through the origin the least squares are
       sum((1 - c F_i / u_i)^2), so k = sum(r_i^2) / sum(r_i) with the secants r_i = F_i / u_i. This
       is the convention under which the published curves give the published values. The level's own
-      uncertainty is added to s_i in quadrature, and its noise is kept out of its own weight
-      (`_without_noise`): far below u_i neither changes anything.
+      uncertainty is added to s_i in quadrature, and through the origin its noise is kept out of its
+      own weight (`_without_noise`): far below u_i neither changes anything.
     - "1/s^2": s_i^2 = scatter of the repetitions squared + stated uncertainty squared (of the
       displacement, and of the force through the compliance).
     - "none": equal s_i.
@@ -68,7 +68,8 @@ def _deviations(table: Table, choice: Choice) -> Array:
     if choice.weighting == "errors-in-variables":
         return _with_scatter(table)
     if choice.weighting == "proportional":
-        return np.hypot(_without_noise(table), table.u_displacement)
+        u = table.displacement if choice.intercept else _without_noise(table)
+        return np.hypot(u, table.u_displacement)
     ones = np.ones(table.size)
     if choice.weighting == "none":
         return ones
