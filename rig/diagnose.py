@@ -228,6 +228,7 @@ def _gap(r: GapResult) -> dict[str, Any]:
         "before_rms_mm": r.before * MM,
         "after_rms_mm": r.after * MM,
         "shrink_factor": r.before / r.after if r.after > 0 else 1.0,
+        **({} if r.without_added is None else {"without_added_rms_mm": r.without_added * MM}),
         "held_out": held[0] if held else None,
         "held_out_other": held[1:],
     }

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from identification.gap.interval import Parameter
 
 MM = 1e3
+_MORE = 1.01  # times the rest that is not left by rounding
 
 # One line a word: what happens there.
 MEANING = {
@@ -209,6 +210,10 @@ def _gap(r: GapResult) -> str:
         "                        before      after  after/noise  shrinks by",
         _row("fitted", r.before, r.after, r.noise),
     ]
+    if r.without_added is not None:
+        lines.append(_row("without what was added", r.before, r.without_added, r.noise))
+        if r.after > _MORE * r.without_added:
+            lines.append("  What was added is no explanation: more is left with it than without.")
     for h in r.held_out:
         low, high = h.ci95
         lines.append(

@@ -65,7 +65,8 @@ class GapResult:
 
     runners_up: word -> rms after on the main fold, of the best explanations by other words.
     remainder: imperfection that the laws are taken to have, of no law for `unknown`; what is left
-    on average stands in `after`. looks_like: of an unknown gap, where that is plain.
+    on average stands in `after`. looks_like: of an unknown gap, where that is plain. without_added:
+    `after` without the words that were to be added; None where there were none.
     """
 
     verdict: str
@@ -85,6 +86,7 @@ class GapResult:
     engine: Engine
     fit: Fit
     found: Found
+    without_added: float | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -144,9 +146,12 @@ def explain_gap(
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
-    chosen = force(engine, variants, found.explanations, chosen_of(found, verdict), forced)
+    plain = chosen_of(found, verdict)
+    chosen = force(engine, variants, found.explanations, plain, forced)
     chosen, known = settled(engine, variants, chosen, found.explanations)
     result = _with_twins(_result(found, verdict, chosen, known), chosen, out)
+    if not forced <= plain.words:
+        result = replace(result, without_added=_left(engine, fit(engine, plain)))
 
     def whole() -> GapResult:
         tell("what to measure next", 0.9)
@@ -183,7 +188,6 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
     engine, bench = found.engine, found.engine.bench
     n = bench.rows.n
     fitted = fit(engine, chosen)
-    predicted = bench.response - engine.target[:n] + fitted.response
     ways = folds(engine)
     held = tuple(held_out(engine, chosen, name, number) for name, number in ways.items())
     springs = fit(engine, next(e for e in found.explanations if not e.parts))
@@ -195,7 +199,7 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         where=NOWHERE if verdict == "none" else locate(engine, fitted, structural),
         noise=noise_of(bench),
         before=sample_rms(bench, stated_prediction(engine)),
-        after=sample_rms(bench, predicted),
+        after=_left(engine, fitted),
         held_out=held,
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,
@@ -207,6 +211,12 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         fit=fitted,
         found=found,
     )
+
+
+def _left(engine: Engine, fitted: Fit) -> float:
+    """rms m over samples."""
+    bench = engine.bench
+    return sample_rms(bench, bench.response - engine.target[: bench.rows.n] + fitted.response)
 
 
 def _likeness(found: Found, verdict: str) -> Likeness | None:

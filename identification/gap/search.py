@@ -107,8 +107,7 @@ def force(
     words: frozenset[str],
 ) -> Explanation:
     """`start` with all `words` beside its own effects: the best that the search found, else with
-    one after the other fitted to what the others leave. None of them takes another's place, so
-    that no more is left than before."""
+    one after the other fitted to what the others leave. None of them takes another's place."""
     left = set(words - start.words)
     if not left:
         return start

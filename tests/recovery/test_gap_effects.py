@@ -294,6 +294,8 @@ def test_an_effect_that_is_added_takes_no_other_s_place(
     plain = results["yield"]
     assert set(with_it.names) >= {*plain.names, word}
     assert with_it.after < 1.01 * plain.after
+    assert with_it.without_added == pytest.approx(plain.after, rel=1e-3)
+    assert plain.without_added is None
 
 
 def test_same_data_same_answer(tmp_path: Path, results: dict[str, GapResult]) -> None:
