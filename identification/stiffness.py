@@ -44,7 +44,7 @@ from identification.levels import (
     hysteresis,
     pointwise,
 )
-from identification.straight import Status, bend, judge, undefined
+from identification.straight import Status, bend, judge, leaves_line, undefined
 from identification.uncertainty import Contribution, Quantity, combined
 
 
@@ -95,7 +95,8 @@ class Alternative:
 class Stiffness:
     """Everything that one curve says. status "undefined": `k` is None and `sentence` says why.
 
-    k N/m; by_repetition: k of every repetition, (R,); intercept m: u0 of the line.
+    k N/m; by_repetition: k of every repetition, (R,); intercept m: u0 of the line. bent: the curve
+    is not straight within its noise, steps after a knee included.
     """
 
     status: Status
@@ -112,6 +113,7 @@ class Stiffness:
     alternatives: tuple[Alternative, ...] = ()
     knee: Knee | None = None
     hysteresis: Hysteresis | None = None
+    bent: bool = False
     notes: tuple[str, ...] = field(default=())
 
     @property
@@ -155,6 +157,7 @@ def analyze_curve(curve: Curve, options: Options | None = None) -> Stiffness:
         knee=knee,
         pointwise=pointwise(loading, origin=curve.origin),
         hysteresis=hysteresis(curve, loading, unloading),
+        bent=leaves_line(loading, origin=curve.origin),
     )
     return _with_k(described, curve, loading, used)
 

@@ -9,11 +9,12 @@ from typing import Literal
 import numpy as np
 
 from identification.curve import Array
-from identification.levels import PointwiseStiffness, Table
+from identification.levels import Grid, PointwiseStiffness, Table
 
 Status = Literal["ok", "doubtful", "undefined"]
 BENT = 0.2  # change of the stiffness along a curve that is worth a word
 STRAIGHT = 0.8  # share of the displacement's variance below which a line is a poor description
+BY_CHANCE = 1e-3  # of calling a straight curve bent
 SIGNIFICANT = 3.0  # slope over its standard deviation, where the force is within its noise
 
 
@@ -85,3 +86,48 @@ def bend(pointwise: Sequence[PointwiseStiffness], rivals: Sequence[float]) -> tu
     if rivals:
         note += f"; other choices give {min(rivals) / 1e3:.4g} to {max(rivals) / 1e3:.4g} N/mm"
     return (f"{note}.",)
+
+
+def leaves_line(grid: Grid, *, origin: bool) -> bool:
+    """Whether the runs leave straight lines beyond their noise. origin: they begin at a measured
+    zero.
+
+    Every run has a line of its own (its zero, its mounting). What runs leave of it in common is
+    compared with what each leaves alone; and all that they leave with how rough it is (second
+    differences of noise have six times its variance, those of a bend hardly any), since what has
+    yielded in the first run may stay so. Noise is never less than what is stated of a level.
+    """
+    there = np.isfinite(grid.displacement).all(axis=0)
+    force, moved = grid.force[:, there], grid.displacement[:, there]
+    runs = force.shape[0]
+    if origin:
+        force, moved = (np.hstack([np.zeros((runs, 1)), a]) for a in (force, moved))
+    free = force.shape[1] - 2
+    if runs == 0 or free < 1 or not np.all(np.ptp(force, axis=1) > 0):
+        return False
+    lines = [np.polyfit(f, u, 1) for f, u in zip(force, moved, strict=True)]
+    left = np.array([u - np.polyval(p, f) for f, u, p in zip(force, moved, lines, strict=True)])
+    softness = float(np.mean([p[0] for p in lines]))
+    u_level = np.hypot(grid.u_displacement[:, there], softness * grid.u_force[:, there])
+    stated, alike = float(np.mean(u_level**2)), left.mean(axis=0)
+    rough = float(np.mean(np.diff(left, 2) ** 2)) / 6
+    # neighbouring second differences share values: 18 of 35 are free
+    every = (float(np.sum(left**2)), runs * free, rough, runs * free * 18 / 35)
+    tests = [every]
+    if runs > 1:
+        own = (runs - 1) * free
+        scatter = float(np.sum((left - alike) ** 2)) / own
+        tests.append((runs * float(np.sum(alike**2)), free, scatter, own))
+    return any(_beyond(*one, stated) for one in tests)
+
+
+def _beyond(squares: float, free: int, noise: float, of_noise: float, stated: float) -> bool:
+    """Whether a sum of squares with so many degrees of freedom is more than noise makes: a variance
+    that was seen with `of_noise` of them, or the stated one where that is more."""
+    from scipy.special import chdtrc, fdtrc
+
+    if max(noise, stated) <= 0:
+        return False
+    if stated >= noise:
+        return bool(chdtrc(free, squares / stated) < BY_CHANCE)
+    return bool(fdtrc(free, of_noise, squares / free / noise) < BY_CHANCE)

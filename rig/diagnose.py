@@ -3,13 +3,21 @@ gap shrinks once that effect is added."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from identification.gap.data import BRANCH_NAMES, GapData
-from identification.gap.diagnose import Effect, GapResult, check_words, diagnose_gap, explain_gap
+from identification.gap.diagnose import (
+    Effect,
+    GapResult,
+    NotShown,
+    check_words,
+    diagnose_gap,
+    explain_gap,
+)
 from identification.gap.forms.known import less_known
 from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
@@ -23,18 +31,21 @@ from rig.other_setups import elsewhere
 from rig.other_simulator import with_curves
 
 MM = 1e3  # mm per m
+_JOINT = re.compile(r"joint (\d+)")  # as shapes are labelled, whatever their spring is called
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The result with what it came from; `to_json` is schema rig.diagnosis/1. known_effects: of
-    the model that was given, part of the simulation."""
+    the model that was given, part of the simulation; left_behind: words of that model which belong
+    to the session that it was made from, and are no part of it."""
 
     dataset: str
     result: GapResult
     banners: tuple[str, ...] = ()
     known_effects: tuple[dict[str, Any], ...] = ()
+    left_behind: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The diagnosis as plain values."""
@@ -47,7 +58,7 @@ class Diagnosis:
             "verdict": r.verdict,
             "probabilities": {w: float(p) for w, p in r.probabilities.items()},
             "meanings": meanings(arm=r.bench.data.arm),
-            "effects": [_effect(e) for e in r.effects],
+            "effects": [_effect(e, r.bench.data) for e in r.effects],
             "where": _where(r),
             "gap": _gap(r),
             "next_measurement": None
@@ -75,6 +86,11 @@ class Diagnosis:
 
         names = ", ".join(dict.fromkeys(str(e["name"]) for e in self.known_effects))
         known = [f"The simulation has these effects already: {names}."] if names else []
+        if self.left_behind:
+            known.append(
+                f"Left out of the model: {', '.join(self.left_behind)}, of the session that it was "
+                "made from."
+            )
         return "\n\n".join([*self.banners, *known, render(self.result)])
 
 
@@ -91,10 +107,11 @@ def diagnose(
     simulation: CSV with another simulator's curves; withhold: words taken out of the library; add:
     words the explanation must contain. InputError for anything wrong."""
     known: tuple[dict[str, Any], ...] = ()
+    behind: tuple[str, ...] = ()
     if model is None:
         data = gap_data(dataset)
     else:
-        data, known = _believing(dataset, model)
+        data, known, behind = _believing(dataset, model)
     if simulation is not None:
         data = with_curves(data, simulation)
     out, forced = tuple(withhold), tuple(add)
@@ -105,14 +122,17 @@ def diagnose(
             raise InputError(f"{option}: {error}.") from error
     for word in (w for w in forced if w in out):
         raise InputError(f"--add {word}, --withhold {word}: exclude each other. Leave one out.")
-    result = diagnose_gap(
-        data,
-        withhold=out,
-        add=forced,
-        others=lambda: elsewhere(dataset),
-        progress=progress,
-    )
-    return Diagnosis(dataset.uuid, result, dataset.banners(), known)
+    try:
+        result = diagnose_gap(
+            data,
+            withhold=out,
+            add=forced,
+            others=lambda: elsewhere(dataset),
+            progress=progress,
+        )
+    except NotShown as error:
+        raise InputError(f"--add: {error}.") from error
+    return Diagnosis(dataset.uuid, result, dataset.banners(), known, behind)
 
 
 def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
@@ -125,8 +145,11 @@ def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
     return said(result), lambda: said(whole())
 
 
-def _believing(dataset: Dataset, model: Path) -> tuple[GapData, tuple[dict[str, Any], ...]]:
-    """The data with springs and effects of a model file as their simulation, and those effects."""
+def _believing(
+    dataset: Dataset, model: Path
+) -> tuple[GapData, tuple[dict[str, Any], ...], tuple[str, ...]]:
+    """The data with springs and effects of a model file as their simulation, those effects, and
+    words of the model that are left out."""
     read = load_model(model)
     effects = effects_of(read)
     if read.arm.name != dataset.meta.robot:
@@ -141,10 +164,13 @@ def _believing(dataset: Dataset, model: Path) -> tuple[GapData, tuple[dict[str, 
         gap_data(replace(dataset, meta=believed)),
         compliance_relative_sd=read.arm.joint_stiffness_relative_sd,
     )
-    if not effects.forms:
-        return data, read.effects
+    lasting, behind = effects.lasting, effects.left_behind
+    words = {*effects.contained, *(f.word for f in lasting)}
+    known = tuple(e for e in read.effects if e["name"] in words)
+    if not lasting:
+        return data, known, behind
     try:
-        return less_known(data, effects.forms), read.effects
+        return less_known(data, lasting), known, behind
     except ValueError as error:
         raise InputError(f"{model}: effects: {error}. Give a model without effects.") from error
 
@@ -161,7 +187,10 @@ def _looks_like(r: GapResult) -> dict[str, Any] | None:
     return {"kind": like.kind, **size, "text": looks_like(like)}
 
 
-def _effect(e: Effect) -> dict[str, Any]:
+def _effect(e: Effect, data: GapData) -> dict[str, Any]:
+    def direction(found: re.Match[str]) -> str:
+        return f"direction {data.spring_name(int(found[1]) - 1)}"
+
     return {
         "name": e.name,
         "probability": e.probability,
@@ -170,7 +199,7 @@ def _effect(e: Effect) -> dict[str, Any]:
         "indistinguishable_from": list(e.indistinguishable_from),
         "share_of_gap": e.share_of_gap,
         "rms_mm": e.size * MM,
-        "form": e.label,
+        "form": e.label if data.arm else _JOINT.sub(direction, e.label),
     }
 
 
@@ -199,6 +228,7 @@ def _gap(r: GapResult) -> dict[str, Any]:
         "before_rms_mm": r.before * MM,
         "after_rms_mm": r.after * MM,
         "shrink_factor": r.before / r.after if r.after > 0 else 1.0,
+        **({} if r.without_added is None else {"without_added_rms_mm": r.without_added * MM}),
         "held_out": held[0] if held else None,
         "held_out_other": held[1:],
     }

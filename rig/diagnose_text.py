@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from identification.gap.interval import Parameter
 
 MM = 1e3
+_MORE = 1.01  # times the rest that is not left by rounding
 
 # One line a word: what happens there.
 MEANING = {
@@ -109,7 +110,8 @@ def _answer(r: GapResult) -> str:
         like = "" if r.looks_like is None else f" It looks like this: {looks_like(r.looks_like)}."
         return (
             f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
-            f"the uncertainty; about {brief(r.remainder * MM, 3)} mm rms of structure remain.{like}"
+            f"the uncertainty: {brief(r.after * MM, 3)} of {brief(r.before * MM, 3)} mm rms remain;"
+            f" the instruments alone leave {brief(r.noise * MM, 3)} mm.{like}"
         )
     more = [name for name in r.names if name != r.verdict]
     also = f" Beside it: {', '.join(more)}." if more else ""
@@ -208,6 +210,10 @@ def _gap(r: GapResult) -> str:
         "                        before      after  after/noise  shrinks by",
         _row("fitted", r.before, r.after, r.noise),
     ]
+    if r.without_added is not None:
+        lines.append(_row("without what was added", r.before, r.without_added, r.noise))
+        if r.after > _MORE * r.without_added:
+            lines.append("  What was added is no explanation: more is left with it than without.")
     for h in r.held_out:
         low, high = h.ci95
         lines.append(

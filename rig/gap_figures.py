@@ -123,7 +123,7 @@ def curve(r: Shown, p: Points) -> Figure:
     noise = 2 * float(np.median(p.noise * scale))
     for (upper, lower), s in zip(grid, numbers, strict=True):
         _curve_panel(r, p, upper, s)
-        _gap_panel(r, p, lower, s, noise)
+        _gap_panel(r, p, lower, s)
         upper.set_title(r.setup_name(s), fontsize=10)
     noise_axis(grid[0][1], noise, float(np.abs(p.gap_before * scale).max()))  # they share it
     for upper, lower in first_column(grid):
@@ -164,16 +164,29 @@ def _curve_panel(r: Shown, p: Points, axes: Any, s: int) -> None:
                   label="_" if i else "simulated after (each run)")  # fmt: skip
 
 
-def _gap_panel(r: Shown, p: Points, axes: Any, s: int, noise: float) -> None:
-    """Measured minus simulated, before and after, run by run; noise: half as wide as its band."""
+def _gap_panel(r: Shown, p: Points, axes: Any, s: int) -> None:
+    """Measured minus simulated, before and after, run by run."""
     x, _, scale = _axes_of(r, p)
-    axes.axhspan(-noise, noise, color="0.88", zorder=0, label=_NOISE)
+    mine = np.flatnonzero(p.setup == s)
+    _noise_band(axes, x[mine], (p.noise * scale)[mine])
     axes.axhline(0, color="0.4", linewidth=0.8)
     for leg in legs(p, x, s):
         look = {"marker": "." if len(leg) == 1 else "", "markersize": 4}
         before, after = (p.gap_before * scale)[leg], (p.gap_after * scale)[leg]
         axes.plot(x[leg], before, linestyle="--", color="black", linewidth=0.9, **look)
         axes.plot(x[leg], after, linestyle="-", color=GREEN, linewidth=1.1, **look)
+
+
+def _noise_band(axes: Any, x: Any, noise: Any) -> None:
+    """Of every point its own, sd (n,): a soft direction turns the same force noise into more, a
+    hold of few samples averages less of it away."""
+    order = np.argsort(x, kind="stable")
+    edge = 2 * noise[order]
+    look = {"color": "0.5", "alpha": 0.25, "linewidth": 0, "zorder": 0, "label": _NOISE}
+    if np.ptp(x) > 0:
+        axes.fill_between(x[order], -edge, edge, **look)
+    else:  # nothing would be seen of it
+        axes.axhspan(-edge.max(), edge.max(), **look)
 
 
 def legs(p: Points, x: Any, s: int) -> Iterator[Any]:
@@ -193,12 +206,15 @@ def residual(r: Shown, p: Points) -> Figure:
     """What the chosen explanation leaves, over force and over the session's time."""
     figure = blank(11.0, 4.6)
     left, right = figure.subplots(1, 2, sharey=True)
-    band = 2 * float(np.median(p.noise))
     minutes, unit = session_clock(p)
     for axes, x in ((left, p.displacement if r.imposed else p.force), (right, minutes)):
-        axes.axhspan(-band, band, color="0.88", zorder=0, label=_NOISE)
         axes.axhline(0, color="0.4", linewidth=0.8, zorder=1)
         _residual_points(r, p, axes, x)
+    for s in range(len(r.setups)):
+        mine = p.setup == s
+        if mine.any():
+            _noise_band(left, (p.displacement if r.imposed else p.force)[mine], p.noise[mine])
+    _noise_band(right, minutes, p.noise)
     left.set_xlabel("Displacement in mm" if r.imposed else "Force in N")
     assumed = not r.clock and len(np.unique(p.run)) > 1
     right.set_xlabel(f"Time in the session in {unit}" + ", rests assumed" * assumed)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.forms import Form, Law, Term
+from identification.gap.forms import Form, Law, Term, lasting
 from identification.gap.words import WORDS
 from rig.errors import close_to, did_you_mean
 from rig.gap_keys import (
@@ -227,6 +227,16 @@ class ModelEffects:
 
     forms: tuple[Form, ...]
     contained: tuple[str, ...]
+
+    @property
+    def lasting(self) -> tuple[Form, ...]:
+        """What the next session meets again: the measured session's own left out."""
+        return tuple(f for f in map(lasting, self.forms) if f.law.terms)
+
+    @property
+    def left_behind(self) -> tuple[str, ...]:
+        """Words of which nothing lasts, each once."""
+        return tuple(dict.fromkeys(f.word for f in self.forms if not lasting(f).law.terms))
 
 
 def effects_of(model: ArmModel) -> ModelEffects:

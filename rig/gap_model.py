@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.diagnose import Effect, GapResult
-from identification.gap.forms import Form, describe
+from identification.gap.forms import Form, describe, lasting
 from rig.dataset import Dataset
 from rig.diagnose import Diagnosis
 from rig.diagnose_text import meanings
@@ -22,6 +22,7 @@ from rig.gap_keys import CONTAINED, SPRINGS
 from rig.storage.files import in_place_of
 
 _PLAIN = re.compile(r"(?!true|false|null)[a-z]{4,}(_[a-z]+)*")  # read as text by every YAML
+OF_THIS_SESSION = "of the measured session: rig simulate and rig diagnose --model leave it out"
 _LEAST = 0.02  # of a joint's compliance that a fit may leave of it
 # Of the published pair; what stands in a model file until somebody edits it.
 _ASSUMED_DISTANCE_MM = 1500.0
@@ -112,13 +113,19 @@ def forms(result: GapResult) -> list[Form]:
     ]
 
 
+def left_behind(result: GapResult) -> tuple[str, ...]:
+    """Effects of the measured session, which say nothing of the next; each once."""
+    return tuple(dict.fromkeys(f.word for f in forms(result) if not lasting(f).law.terms))
+
+
 def _effects(diagnosis: Diagnosis, dataset: Dataset) -> list[str]:
     entries = list(diagnosis.known_effects)
     comments = ["of the model that was given"] * len(entries)
     words = meanings(arm=diagnosis.result.bench.data.arm)
     for effect, form in zip(diagnosis.result.effects, forms(diagnosis.result), strict=True):
         entries.append(to_entry(form, _about(effect, dataset)))
-        comments.append(_comment(effect, words[effect.name]))
+        own = "" if lasting(form).law.terms else f"; {OF_THIS_SESSION}"
+        comments.append(_comment(effect, words[effect.name]) + own)
     if not entries:
         return ["effects: []"]
     lines = ["effects:"]

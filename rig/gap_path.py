@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints
-from identification.gap.forms import SESSION, Form, lawful, realise
+from identification.gap.forms import OF_SESSION, SESSION, Form, realise
 from identification.gap.forms.law import along
 from rig.gap_data import arm_setup
 from rig.model import ArmModel
@@ -43,23 +43,23 @@ class PlannedPath:
 def predict(
     model: ArmModel, forms: Sequence[Form], procedure: MeasurementProtocol, compliance: Array
 ) -> tuple[PlannedPath, tuple[str, ...]]:
-    """The path with its predicted displacements, and what was left out. compliance (runs,) m/N:
-    of the model's springs, links and mounting along each run's direction."""
+    """The path with its predicted displacements, and where a law is stretched. forms: what lasts
+    of each; compliance (runs,) m/N: of the model's springs, links and mounting along each run's
+    direction."""
     data = planned_data(model, procedure)
     bench = make_bench(replace(data, displacement=data.force * compliance[data.setup]))
-    kept = [lawful(f) for f in forms]
     moved = bench.rows.displacement.copy()
-    for f in kept:
+    for f in forms:
         if f.word not in _LAST:
             moved += realise(bench, f)[: bench.rows.n]
     # A gain is fitted as a share w of what the laser shows: shown = true + w shown.
-    share = sum(float(f.values.sum()) for f in kept if f.word == "displacement_scale")
+    share = sum(float(f.values.sum()) for f in forms if f.word == "displacement_scale")
     moved = moved / max(1 - share, _LEAST_GAIN)
     seen = replace(bench, response=moved)
-    for f in kept:
+    for f in forms:
         if f.word == "time_lag":
             moved = moved + realise(seen, f)[: bench.rows.n]
-    return _by_hold(bench, moved), (*_left_out(forms), *_beyond(bench, kept))
+    return _by_hold(bench, moved), _beyond(bench, forms)
 
 
 def _by_hold(bench: Bench, moved: Array) -> PlannedPath:
@@ -150,20 +150,23 @@ class _Walk:
 _CHANCE = {
     "place": "where the joint lies in its play while unloaded",
     "rest": "where it lies in its play when it is sent to a pose",
-    "shift": "jumps of the datum",
-    "drift_knot": "a drift without a law",
-    "drift_per_kelvin": "a drift with temperatures, which a procedure does not name",
 }
+_OF_RUNS = "what single runs had to themselves"
+_WORDS = {"zero_shift": "jumps of the datum", "force_drift": "how the amplifier drifted",
+          "thermal_drift": "how it drifted with time and temperature"}  # fmt: skip
 
 
-def _left_out(forms: Sequence[Form]) -> tuple[str, ...]:
+def left_out(forms: Sequence[Form]) -> tuple[str, ...]:
+    """What of these is no prediction, because it was the measured session's: a line each."""
     out = []
     for f in forms:
-        names = dict.fromkeys(t.coefficient for t in f.law.terms if t.coefficient in SESSION)
-        out += [f"{f.word}: {_CHANCE[n]} belongs to the measured session; left out." for n in names]
-        if f.word.endswith("drift") and not names:
-            out.append(f"{f.word}: as in the measured session, counted from the start of this one.")
-    return tuple(out)
+        if f.word in OF_SESSION:
+            whats = [_WORDS[f.word]]
+        else:
+            whats = [_CHANCE[t.coefficient] for t in f.law.terms if t.coefficient in SESSION]
+            whats += [_OF_RUNS for t in f.law.terms if "run" in t.shape]
+        out += [f"{f.word}: {w} belongs to the measured session; left out." for w in whats]
+    return tuple(dict.fromkeys(out))
 
 
 def _beyond(bench: Bench, forms: Sequence[Form]) -> tuple[str, ...]:

@@ -236,7 +236,17 @@ def _observations(
         )
     if not out:
         raise InputError(f"{name}: no pose and direction has a stiffness. {' '.join(notes)}")
-    return out, notes
+    bent = [f"{curve.pose}/{curve.direction}" for curve, result, _ in found if result.bent]
+    return out, notes + [_averages(name, bent)] * bool(bent)
+
+
+def _averages(name: str, bent: list[str]) -> str:
+    curve = "the curve of" if len(bent) == 1 else "the curves of"
+    verb = "is" if len(bent) == 1 else "are"
+    return (
+        f"{name}: {curve} {', '.join(bent)} {verb} not straight within the noise: the springs are "
+        "averages over what was loaded. rig diagnose separates springs from effects."
+    )
 
 
 def _left_out(result: Stiffness) -> list[str]:

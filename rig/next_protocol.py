@@ -37,20 +37,25 @@ _TRIES = 4
 def write_next(diagnosis: Diagnosis, dataset: Dataset, path: Path) -> str:
     """Writes the proposed procedure; what to tell the user. Without a proposal nothing is written,
     and the text says why. InputError for a rig without an arm, or if the folder refuses."""
+    check_arm(dataset)
     proposal = diagnosis.result.next_measurement
     if proposal is None:
         return f"{path}: not written. No two effects are left that a measurement should separate."
     if proposal.design is None:
         return f"{path}: not written. {proposal.text}"
-    if dataset.meta.robot == "none":
-        raise InputError(
-            f"{dataset.path or 'data set'}: robot: none. A protocol file is for an arm; what to do "
-            f"on this rig: {proposal.text}"
-        )
     text = next_text(proposal, dataset)
     with in_place_of(path) as temporary:
         temporary.write_text(text, "utf-8")
     return f"{path}: written. Next: rig check {path}"
+
+
+def check_arm(dataset: Dataset) -> None:
+    """Before the diagnosis; InputError where no protocol can come of it."""
+    if dataset.meta.robot == "none":
+        raise InputError(
+            f"{dataset.path or 'data set'}: robot: none. A protocol file is for an arm; leave "
+            "--next out, and the diagnosis itself says what to measure next."
+        )
 
 
 def next_text(proposal: NextMeasurement, dataset: Dataset) -> str:

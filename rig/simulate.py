@@ -3,7 +3,8 @@
 Linear statics: stiff links (unless the model has segments), six torsional springs, a compliant
 mounting where the model has one. Pose and point of load are the procedure's, not the model's.
 Effects of the model (`rig diagnose --write-model`) follow the procedure's whole path: loading and
-unloading, holds and rests, one repetition after the other.
+unloading, holds and rests, one repetition after the other. Those of the measured session alone
+(drifts, jumps of the datum) are left out, and said: the next session has its own.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from identification.arm import along, tool_offset
 from identification.gap.forms import Form
 from rig.errors import InputError
 from rig.gap_forms import effects_of
-from rig.gap_path import predict
+from rig.gap_path import left_out, predict
 from rig.model import ArmModel, load_model
 from rig.protocol import MeasurementProtocol, Run, load_protocol
 
@@ -114,11 +115,12 @@ def simulate(model: str | Path, protocol: str | Path) -> Simulation:
             "Give a model of the robot that the protocol names."
         )
     curves = tuple(_predict(read, procedure, run) for run in procedure.runs)
-    notes = _notes(read, procedure)
-    if effects.forms:
-        curves, more = _with_effects(read, effects.forms, procedure, curves)
+    lasting = effects.lasting
+    notes = (*_notes(read, procedure, lasting), *left_out(effects.forms))
+    if lasting:
+        curves, more = _with_effects(read, lasting, procedure, curves)
         notes = (*notes, *more)
-    names = tuple(dict.fromkeys([*effects.contained, *(f.word for f in effects.forms)]))
+    names = tuple(dict.fromkeys([*effects.contained, *(f.word for f in lasting)]))
     return Simulation(read.name, str(protocol), procedure.title, curves, notes, names)
 
 
@@ -166,7 +168,7 @@ def _with_effects(
     procedure: MeasurementProtocol,
     curves: tuple[PredictedCurve, ...],
 ) -> tuple[tuple[PredictedCurve, ...], tuple[str, ...]]:
-    """The curves with the effects along the path, and what was left out."""
+    """The curves with the effects along the path, and where their laws are stretched."""
     compliance = np.array([1 / c.stiffness for c in curves])
     try:
         path, notes = predict(model, forms, procedure, compliance)
@@ -187,9 +189,11 @@ def _with_effects(
     return tuple(out), notes
 
 
-def _notes(model: ArmModel, procedure: MeasurementProtocol) -> tuple[str, ...]:
+def _notes(
+    model: ArmModel, procedure: MeasurementProtocol, effects: tuple[Form, ...]
+) -> tuple[str, ...]:
     notes = [model.note] if model.note else []
-    if procedure.branches == "loading-unloading" and not model.effects:
+    if procedure.branches == "loading-unloading" and not effects:
         notes.append("Springs unload along the loading curve: each level stands once.")
     if any(run.stop_at_displacement_mm is not None for run in procedure.runs):
         notes.append("All levels are shown, also those beyond stop_at_displacement_mm.")

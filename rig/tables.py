@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import uuid
 from collections.abc import Callable, Mapping
 from datetime import datetime
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 _EMULATED_MARK = "# EMULATED:"
 _INCOMPLETE_MARK = "# INCOMPLETE:"
+# Of the identities of imported tables: any UUID would do, as long as it stays this one.
+_TABLES = uuid.UUID("5ddc5a0e-4c0a-4a3b-9c5e-0b7f3e1d6a42")
 _BIGGEST_COUNT = 2**53  # the largest number up to which float64 holds every whole number
 _EXPORT_ROWS = 50_000
 
@@ -47,8 +50,9 @@ def import_table(
     """The data set of a table and its META.yaml; written to `out` if that is given.
 
     A table that says it comes from emulated devices stays marked so. A column `discarded` (0 or 1)
-    is honoured; other unknown columns are kept and ignored. InputError names file, line, column
-    and value of the first thing wrong, or file and place in META.yaml.
+    is honoured; other unknown columns are kept and ignored. The same table and META give the same
+    UUID, however often and under whatever names they are imported. InputError names file, line,
+    column and value of the first thing wrong, or file and place in META.yaml.
     """
     document = read_document(meta_yaml, Meta)
     if out is not None:
@@ -90,7 +94,7 @@ def _dataset(
     events += [{"sample": 0, "kind": "note", "text": note} for note in table.notes]
     return Dataset(
         path=None,
-        uuid=str(uuid.uuid4()),
+        uuid=_identity(csv, meta_text),
         created=datetime.now().astimezone().isoformat(timespec="seconds"),
         origin=origin,
         complete=not incomplete,
@@ -104,6 +108,14 @@ def _dataset(
         stop_reason="said by the imported table" if incomplete else "imported",
         title=csv.name,
     )
+
+
+def _identity(csv: Path, meta_text: str) -> str:
+    """UUID of what was measured: of the bytes of the table and of META, not of their names."""
+    with csv.open("rb") as file:
+        table = hashlib.file_digest(file, "sha256").hexdigest()
+    meta = hashlib.sha256(meta_text.encode()).hexdigest()
+    return str(uuid.uuid5(_TABLES, f"{table} {meta}"))
 
 
 def _long_name(name: str) -> str:

@@ -105,3 +105,9 @@ class GapData:
     def joints(self) -> int:
         """Number of elastic elements."""
         return len(self.compliance)
+
+    def spring_name(self, j: int) -> str:
+        """`joint1`; without an arm, the direction in which the spring gives way."""
+        if self.arm:
+            return f"joint{j + 1}"
+        return next(s.direction for s in self.setups if s.lever[j])

@@ -64,8 +64,9 @@ class GapResult:
     """All lengths in m. before, after, noise: rms over samples. held_out: the main fold first.
 
     runners_up: word -> rms after on the main fold, of the best explanations by other words.
-    remainder: rms of repeatable structure that is left unexplained. looks_like: of an unknown gap,
-    where that is plain.
+    remainder: imperfection that the laws are taken to have, of no law for `unknown`; what is left
+    on average stands in `after`. looks_like: of an unknown gap, where that is plain. without_added:
+    `after` without the words that were to be added; None where there were none.
     """
 
     verdict: str
@@ -85,6 +86,7 @@ class GapResult:
     engine: Engine
     fit: Fit
     found: Found
+    without_added: float | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -101,8 +103,8 @@ def diagnose_gap(
     progress: Progress | None = None,
 ) -> GapResult:
     """The diagnosis of a data set. withhold: words taken out of the library; add: words that the
-    explanation must contain; others: setups that the rig could take up next. Raises ValueError for
-    unknown words."""
+    explanation must contain beside what it has; others: setups that the rig could take up next.
+    Raises ValueError for unknown words, NotShown for words to add that these data can't show."""
     _, whole = explain_gap(data, withhold=withhold, add=add, others=others, progress=progress)
     return whole()
 
@@ -125,6 +127,7 @@ def explain_gap(
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])
+    _check_shown(forced, variants)
     tell("comparing effects", 0.2)
     etas = eta_levels(bench, base, target)
     engine = Engine(bench, base, target, etas)
@@ -143,12 +146,12 @@ def explain_gap(
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
-    if forced:
-        chosen = force(engine, variants, found.explanations, forced)
-    else:
-        chosen = chosen_of(found, verdict)
+    plain = chosen_of(found, verdict)
+    chosen = force(engine, variants, found.explanations, plain, forced)
     chosen, known = settled(engine, variants, chosen, found.explanations)
     result = _with_twins(_result(found, verdict, chosen, known), chosen, out)
+    if not forced <= plain.words:
+        result = replace(result, without_added=_left(engine, fit(engine, plain)))
 
     def whole() -> GapResult:
         tell("what to measure next", 0.9)
@@ -157,6 +160,17 @@ def explain_gap(
         return replace(result, next_measurement=following)
 
     return result, whole
+
+
+class NotShown(ValueError):
+    """A word that the data at hand could not show."""
+
+
+def _check_shown(forced: frozenset[str], variants: list[Variant]) -> None:
+    shown = dict.fromkeys(v.word for v in variants)
+    for word in sorted(forced - shown.keys()):
+        raise NotShown(f"{word} is nothing that these data could show; they could: "
+                       f"{', '.join(shown) or 'no effect'}")  # fmt: skip
 
 
 def _silent(_: str, __: float) -> None:
@@ -174,7 +188,6 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
     engine, bench = found.engine, found.engine.bench
     n = bench.rows.n
     fitted = fit(engine, chosen)
-    predicted = bench.response - engine.target[:n] + fitted.response
     ways = folds(engine)
     held = tuple(held_out(engine, chosen, name, number) for name, number in ways.items())
     springs = fit(engine, next(e for e in found.explanations if not e.parts))
@@ -186,7 +199,7 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         where=NOWHERE if verdict == "none" else locate(engine, fitted, structural),
         noise=noise_of(bench),
         before=sample_rms(bench, stated_prediction(engine)),
-        after=sample_rms(bench, predicted),
+        after=_left(engine, fitted),
         held_out=held,
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,
@@ -198,6 +211,12 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         fit=fitted,
         found=found,
     )
+
+
+def _left(engine: Engine, fitted: Fit) -> float:
+    """rms m over samples."""
+    bench = engine.bench
+    return sample_rms(bench, bench.response - engine.target[: bench.rows.n] + fitted.response)
 
 
 def _likeness(found: Found, verdict: str) -> Likeness | None:

@@ -141,7 +141,8 @@ def _stiffness(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
         nats = TWO_SIDED * float(np.hypot(max(variance, 0.0) ** 0.5 / whole, stated))
         spread = np.exp(min(nats, -np.log(_LEAST)))
         value = whole if bench.imposed else 1 / whole
-        out[f"factor_joint{j + 1}"] = Parameter(value, value / spread, value * spread, "1")
+        name = bench.data.spring_name(j)
+        out[f"factor_{name}"] = Parameter(value, value / spread, value * spread, "1")
     return out
 
 

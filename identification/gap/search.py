@@ -11,7 +11,6 @@ from identification.gap.evidence import Engine
 from identification.gap.explanation import (
     Explanation,
     Found,
-    conditioned,
     explain,
     up_to_likeliest,
 )
@@ -101,23 +100,30 @@ def _hidden(engine: Engine) -> float:
 
 
 def force(
-    engine: Engine, variants: list[Variant], pool: tuple[Explanation, ...], words: frozenset[str]
+    engine: Engine,
+    variants: list[Variant],
+    pool: tuple[Explanation, ...],
+    start: Explanation,
+    words: frozenset[str],
 ) -> Explanation:
-    """The best explanation that contains all `words`, and what else it wants; where the search
-    found none, the words alone, one fitted after the other."""
-    with_all = [e for e in pool if words <= e.words]
+    """`start` with all `words` beside its own effects: the best that the search found, else with
+    one after the other fitted to what the others leave. None of them takes another's place."""
+    left = set(words - start.words)
+    if not left:
+        return start
+    with_all = [e for e in pool if words | start.words <= e.words]
     if with_all:
         return with_all[0]
-    parts: tuple[Part, ...] = ()
-    left, evidence = set(words), 0.0
+    parts, evidence, energy = start.parts, 0.0, 0.0
     while left:
-        levels, energy = conditioned(engine, parts)
+        levels, energy = up_to_likeliest(engine, parts)
         scored = score(engine, levels, [v for v in variants if v.word in left], energy)
         top = max(scored, key=lambda s: s.log_evidence)
         parts = (*parts, Part(top.variant, top.scale))
         left.discard(top.variant.word)
         evidence = marginal([s for s in scored if s.variant.word == top.variant.word])
-    return polished(engine, variants, explain(engine, parts, evidence))
+    taken = energy if len(parts) > 1 else None
+    return polished(engine, variants, explain(engine, parts, evidence, taken))
 
 
 def _seeds(pool: dict[frozenset[str], Explanation], most: int) -> list[Explanation]:

@@ -94,8 +94,11 @@ def import_(
     from rig.tables import import_table
     from rig.terminal import terminal_progress
 
+    replaced = output.exists()  # by an import only: a measurement is refused
     with terminal_progress() as progress:
         result = import_table(table, meta, output, progress)
+    if replaced:
+        say(f"{output}: replaced; an earlier import stood there")
     for event in result.events:
         if event["kind"] == "note":
             say(f"note: {event['text']}")

@@ -23,7 +23,7 @@ _Simulation = Annotated[
 ]
 _Add = Annotated[
     list[str] | None,
-    typer.Option(metavar="WORD", help="An effect that the explanation must contain."),
+    typer.Option(metavar="WORD", help="An effect to put beside those of the explanation."),
 ]
 _Withhold = Annotated[
     list[str] | None, typer.Option(metavar="WORD", help="An effect to take out of the library.")
@@ -90,6 +90,10 @@ def diagnose(
         measured = load(dataset)
         if write_model is not None:
             check_writable(measured, others=simulation is not None)
+        if next_file is not None:
+            from rig.next_protocol import check_arm
+
+            check_arm(measured)
         result = run_diagnose(
             measured, model=model, simulation=simulation,
             add=add or (), withhold=withhold or (), progress=progress,
@@ -109,9 +113,11 @@ def diagnose(
 def _write(result: Diagnosis, measured: Dataset, model: Path | None, protocol: Path | None) -> None:
     """The model with its effects and the next protocol, where asked for."""
     if model is not None:
-        from rig.gap_model import write_model
+        from rig.gap_model import OF_THIS_SESSION, left_behind, write_model
 
         write_model(result, measured, model)
+        for word in left_behind(result.result):
+            say(f"{model}: {word} is {OF_THIS_SESSION}")
         say(f"{model}: written. Next: rig simulate {model} PROTOCOL.yaml")
     if protocol is not None:
         from rig.next_protocol import write_next

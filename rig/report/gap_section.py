@@ -44,15 +44,14 @@ def _answer(found: Node) -> Rich:
     if verdict == "none":
         return (*start, "noise, gains and stiffnesses within their stated uncertainty explain all "
                 "that was measured. There is no gap to close.")  # fmt: skip
+    before, after, noise = (sizes[f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise"))
     if verdict == "unknown":
-        rest = found["remainder_mm"].number(3, unit="mm")
         return (*start, "there is a gap, and no effect of the library explains it down to the "
-                "uncertainty; about ", *rest, " rms of structure remain.",
-                *_alike(found))  # fmt: skip
+                "uncertainty: ", *after, " of ", *before, " mm rms remain; the instruments alone "
+                "leave ", *noise, " mm.", *_alike(found))  # fmt: skip
     named = dict.fromkeys(e["name"].text() for e in found["effects"])
     others = [name for name in named if name != verdict]
     beside = f" Beside it: {', '.join(others)}." if others else ""
-    before, after, noise = (sizes[f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise"))
     meaning = found["meanings"][verdict].text()
     return (*start, f"{meaning}.{beside} With it the gap shrinks from ", *before, " to ",
             *after, " mm rms; the instruments alone leave ", *noise, " mm.")  # fmt: skip

@@ -72,9 +72,10 @@ def _gap(data: Node) -> Cell:
     held = found["gap"]["held_out"]
     if verdict in ("none", "unknown") or not held:
         return words
-    shrinks = held["shrink_factor"].number(3)
+    low, high = (edge.number(3) for edge in held["ci95"])
+    shrinks = (*held["shrink_factor"].number(3), " [", *low, ", ", *high, "] times")
     meaning = f", {found['meanings'][verdict].text()}"
-    return (*words, meaning, "; with it the gap shrinks ", *shrinks, " times on withheld data")
+    return (*words, meaning, "; with it the gap shrinks ", *shrinks, " on withheld data")
 
 
 def _data(session: Session, data: Node) -> Rich:

@@ -285,6 +285,19 @@ def test_deleted_word_leaves_unknown(tmp_path: Path) -> None:
     assert found.verdict == "unknown"
 
 
+@pytest.mark.parametrize("word", ["joint_hysteresis", "load_misalignment"])
+def test_an_effect_that_is_added_takes_no_other_s_place(
+    tmp_path: Path, results: dict[str, GapResult], word: str
+) -> None:
+    """Nor is more left with it: the search may like the word alone better than both, for fewer."""
+    with_it = diagnose(measure(tmp_path, yields), add=[word]).result
+    plain = results["yield"]
+    assert set(with_it.names) >= {*plain.names, word}
+    assert with_it.after < 1.01 * plain.after
+    assert with_it.without_added == pytest.approx(plain.after, rel=1e-3)
+    assert plain.without_added is None
+
+
 def test_same_data_same_answer(tmp_path: Path, results: dict[str, GapResult]) -> None:
     again = diagnose(measure(tmp_path, seats)).result
     assert again.probabilities == results["seat"].probabilities

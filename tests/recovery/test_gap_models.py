@@ -14,7 +14,7 @@ from identification.gap.diagnose import Effect, GapResult
 from identification.gap.discriminate import NextMeasurement
 from identification.gap.effects import library
 from identification.gap.fit import Fit
-from identification.gap.forms import SESSION, law_of
+from identification.gap.forms import OF_SESSION, SESSION, law_of
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
 from identification.gap.variants import Variant
@@ -22,7 +22,14 @@ from identification.gap.words import WORDS
 from rig.dataset import Dataset, write
 from rig.diagnose import Diagnosis, diagnose
 from rig.errors import InputError
-from rig.gap_model import check_writable, model_text, springs, write_model
+from rig.gap_model import (
+    OF_THIS_SESSION,
+    check_writable,
+    left_behind,
+    model_text,
+    springs,
+    write_model,
+)
 from rig.gap_path import planned_data
 from rig.measured_meta import measured_meta
 from rig.model import MODELS, load_model
@@ -92,7 +99,10 @@ def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.
     if word in ("joint_stiffness_error", "displacement_scale", "time_lag"):
         w = 0.1 / (1 + np.arange(len(v.columns)))
     law, _ = law_of(bench, v)
-    kept = np.array([t.coefficient not in SESSION for t in law.terms])
+    kept = np.array([
+        word not in OF_SESSION and t.coefficient not in SESSION and "run" not in t.shape
+        for t in law.terms
+    ])  # fmt: skip
     base, b = result.fit.base, len(result.fit.base)
     fitted: Fit = replace(
         result.fit, parts=(Part(v, 1.0),), coefficients=w, covariance=np.diag(w**2) * 1e-4,
@@ -117,14 +127,23 @@ def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.
 def test_a_model_predicts_on_its_own_procedure_what_was_fitted(
     planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path, word: str, pick: int
 ) -> None:
-    """Springs and effect, hold by hold, through the file, to a hundredth of the effect."""
+    """Springs and effect, hold by hold, through the file, to a hundredth of the effect; what was
+    the session's own stands in the file, marked, and in no prediction."""
     procedure, dataset, diagnosis = planned
     result, parts = with_effect(diagnosis.result, word, pick)
     plain, effect = parts.T
     write_model(replace(diagnosis, result=result), dataset, tmp_path / "m.yaml")
     found = simulate(tmp_path / "m.yaml", procedure)
-    assert found.effects == (word,)
     rows = result.bench.rows
+    if word in OF_SESSION:
+        assert found.effects == ()
+        assert left_behind(result) == (word,)
+        assert f"; {OF_THIS_SESSION}\n  - name: {word}\n" in (tmp_path / "m.yaml").read_text()
+        top = [np.max(plain[rows.setup == s]) for s in range(4)]
+        np.testing.assert_allclose([c.displacement[-1] for c in found.curves], top, rtol=1e-3)
+        return
+    assert found.effects == (word,)
+    assert left_behind(result) == ()
     made = np.concatenate([c.displacement for c in found.curves])
     if word == "joint_stiffness_error":
         top = [np.max(plain[rows.setup == s] + effect[rows.setup == s]) for s in range(4)]
@@ -178,6 +197,21 @@ def test_a_model_with_its_effects_closes_the_gap_that_it_came_from(
     assert "The simulation has these effects already: contact_seating." in after.to_text()
     assert after.known_effects[0]["name"] == "contact_seating"
     assert "of the model that was given" in model_text(after, seated)
+
+
+def test_a_session_s_drift_is_no_part_of_the_simulation_of_the_next(
+    planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path
+) -> None:
+    """rig diagnose --model: it is left out, and not handed on into a further model."""
+    _, dataset, diagnosis = planned
+    result, _ = with_effect(diagnosis.result, "thermal_drift", 0)
+    write_model(replace(diagnosis, result=result), dataset, tmp_path / "m.yaml")
+    after = diagnose(dataset, model=tmp_path / "m.yaml")
+    assert after.known_effects == ()
+    said = "Left out of the model: thermal_drift, of the session that it was made from."
+    assert said in after.to_text()
+    assert "thermal_drift" not in model_text(after, dataset)
+    assert after.result.verdict == "none"
 
 
 def test_what_has_no_model_file_is_refused(

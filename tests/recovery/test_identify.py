@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from identification.joints import JointFit
 from rig.couple import couple
-from rig.dataset import write
+from rig.dataset import load, write
 from rig.errors import InputError
 from rig.identify import IdentifyResult, identify, prior_of
 from rig.identify_text import model_text, protocol_text, write_model, write_protocol
@@ -75,6 +75,23 @@ def test_the_published_pose_leaves_four_open(single: IdentifyResult) -> None:
     # whatever the other joints do: ky times the lever squared, less the uncertainty
     assert 30e3 < fit.lower_bound[0] < 0.75**2 * 57.42e3
     assert any(note.startswith("Joint 6 has no lever") for note in single.notes)
+
+
+def test_springs_of_bent_curves_are_said_to_be_averages(files: Path, tmp_path: Path) -> None:
+    straight = load(files / "rich.h5")
+    columns = dict(straight.columns)
+    bent = (columns["pose"] == "P2") & (columns["direction"] == "y")
+    more = np.where(bent, 1e-4 * columns["force_N"] ** 2, 0.0)  # 0.25 mm at 50 N
+    columns["displacement_mm"] = columns["displacement_mm"] + more
+    write(replace(straight, columns=columns), tmp_path / "bent.h5")
+    notes = [
+        identify([path], proposals=0).notes for path in (files / "rich.h5", tmp_path / "bent.h5")
+    ]
+    assert not any("not straight" in n for n in notes[0])
+    assert notes[1][0] == (
+        f"{tmp_path / 'bent.h5'}: the curve of P2/y is not straight within the noise: the springs "
+        "are averages over what was loaded. rig diagnose separates springs from effects."
+    )
 
 
 def test_joint_readings_count_where_they_see(files: Path) -> None:

@@ -143,7 +143,7 @@ def unexplained() -> Diagnosis:
                   (), False, 0.4)  # fmt: skip
     swings = Likeness("swings", 121.4, -80.0)
     return Diagnosis("id", _gap("unknown", 0.731, where=where, remainder=3.417e-5, before=8e-5,
-                                looks_like=swings))  # fmt: skip
+                                after=2.75e-5, looks_like=swings))  # fmt: skip
 
 
 SPEC = CouplingSpec(1.5, np.deg2rad(36.5), "mirror", "compliant", None, "beam, steel, 30 mm")

@@ -168,7 +168,10 @@ def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
     (files / "r.json").write_text("{}")
     assert rig("analyze", "d.h5", "--json", "r.json")[0] == 0
     assert json.loads((files / "r.json").read_text())["schema"] == "rig.analysis/1"
-    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+    status, _, err = rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    assert status == 0
+    assert "d.h5: replaced; an earlier import stood there" in err.splitlines()
+    assert "replaced" not in rig("import", "t.csv", "m.yaml", "-o", "new.h5")[2]
 
 
 @pytest.mark.parametrize(
@@ -400,6 +403,9 @@ def test_diagnose_gives_the_contracts_json(rig: Rig, files: Path) -> None:
     status, _, err = rig("diagnose", "d.h5", "--add", "joint_yeild")
     assert status == 2
     assert "joint_yield" in err
+    status, _, err = rig("diagnose", "d.h5", "--add", "base_slip")  # there is no arm, and no base
+    assert status == 2
+    assert err.startswith("--add: base_slip is nothing that these data could show; they could: ")
 
 
 def test_version(rig: Rig) -> None:
@@ -437,6 +443,16 @@ def test_what_cannot_become_a_model_is_said_before_the_work(rig: Rig, files: Pat
     assert (status, out) == (2, "")  # no result: nothing was diagnosed
     assert err == (
         "d.h5: robot: none. A model file holds an arm; write the diagnosis with --json.\n"
+    )
+
+
+def test_what_cannot_become_a_protocol_is_said_before_the_work(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    status, out, err = rig("diagnose", "d.h5", "--next", "next.yaml")
+    assert (status, out) == (2, "")  # no result: nothing was diagnosed
+    assert err == (
+        "d.h5: robot: none. A protocol file is for an arm; leave --next out, and the diagnosis "
+        "itself says what to measure next.\n"
     )
 
 

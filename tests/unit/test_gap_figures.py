@@ -19,7 +19,7 @@ from rig import cli
 from rig.dataset import write
 from rig.diagnose import Diagnosis, diagnose
 from rig.diagnose_text import _share
-from rig.gap_figures import change, curve, draw, legs
+from rig.gap_figures import change, curve, draw, legs, residual
 from rig.gap_layout import blank, noise_axis
 from rig.gap_map import _cells, _lines
 from rig.gap_points import (
@@ -118,6 +118,18 @@ def test_withheld_table_begins_with_the_fit_and_ends_with_the_rivals(slipped: Di
     assert t["before_rms_mm"][0] == pytest.approx(r.before * 1e3)
     assert list(t["explanation"][len(t["explanation"]) - len(r.runners_up) :]) == list(r.runners_up)
     assert t["after_rms_mm"][1] == pytest.approx(r.held_out[0].after * 1e3)
+
+
+def test_without_an_arm_a_spring_is_called_by_its_direction(tmp_path: Path) -> None:
+    wrong = META.replace(
+        "y: 60.0}, stiffness_relative_sd: 0.1", "y: 90.0}, stiffness_relative_sd: 0.05"
+    )
+    found = diagnosed(tmp_path, table(slip_mm=0), wrong)
+    (effect,) = found.to_json()["effects"]
+    assert (effect["name"], effect["form"]) == ("joint_stiffness_error", "direction y")
+    assert list(effect["parameters"]) == ["factor_y"]
+    assert effect["parameters"]["factor_y"]["value"] == pytest.approx(60 / 90, rel=0.01)
+    assert "\n    factor_y = 0.66" in found.to_text()
 
 
 def test_what_a_report_draws_travels_without_the_samples(tmp_path: Path) -> None:
@@ -283,6 +295,23 @@ def test_small_gaps_show_beside_large_ones() -> None:
     assert axes.get_yscale() == "symlog"
     assert axes.get_yticks().tolist() == [-1, -0.1, -0.01, 0, 0.01, 0.1, 1]
     assert axes.yaxis.get_major_formatter()(-0.01) == "\N{MINUS SIGN}0.01"
+
+
+def test_the_noise_band_is_as_wide_as_each_point_s_own_noise(slipped: Diagnosis) -> None:
+    """y is softer: there the same noise of the force is more of the displacement."""
+    r, p = shown(slipped.result), points(slipped.result)
+    x, y = (float(np.median(p.noise[p.setup == s])) for s in (0, 1))
+    assert y > 1.1 * x
+    each = [2 * p.noise[p.setup == s].max() for s in (0, 1)]
+    assert [b for axes in curve(r, p).axes for b in _bands(axes)] == pytest.approx(each)
+    left, right = residual(r, p).axes
+    assert _bands(left) == pytest.approx(each)
+    assert _bands(right) == pytest.approx([2 * p.noise.max()])
+
+
+def _bands(axes: Any) -> list[float]:
+    """Upper edges of what is filled."""
+    return [float(c.get_paths()[0].vertices[:, 1].max()) for c in axes.collections]
 
 
 def test_tables_keep_nine_digits_and_leave_out_what_is_not_defined(tmp_path: Path) -> None:

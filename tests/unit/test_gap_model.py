@@ -275,16 +275,40 @@ def test_what_cannot_be_foretold_is_left_out_and_said(tmp_path: Path) -> None:
             "terms": [{"along": [1, 0, 0], "time_constant_s": 900, "drift_mm": 0.05}]}  # fmt: skip
     bend = {"name": "joint_nonlinear_stiffness", "joint": 1, "measured_to_Nm": 20,
             "terms": [{"compliance_rad_per_Nm3": 1e-10}]}  # fmt: skip
-    found = simulate(model(tmp_path, shift, warm, bend), procedure(tmp_path))
+    askew = {"name": "load_misalignment",
+             "terms": [{"along": [1, 0, 0], "across": [0, 1, 0], "tangent": 0.01}]}  # fmt: skip
+    found = simulate(model(tmp_path, shift, warm, bend, askew), procedure(tmp_path))
+    assert found.effects == ("joint_nonlinear_stiffness", "load_misalignment")
     notes = " ".join(found.notes)
     assert "zero_shift: jumps of the datum belongs to the measured session; left out." in notes
-    assert "thermal_drift: as in the measured session" in notes
-    assert "thermal_drift: not measured along y; left out there." in notes
+    assert "thermal_drift: how it drifted with time and temperature belongs to the mea" in notes
+    assert "load_misalignment: not measured along y; left out there." in notes
     assert "seen to 20 Nm at joint 1, here up to 61.5 Nm" in notes
     for repetition in (1, 2):
         force, moved, springs = levels(found, "loading", repetition)
         bent = 1e-10 * 0.75 * (0.75 * force) ** 3
         np.testing.assert_allclose(moved - springs, bent, rtol=1e-3, atol=1e-9)
+
+
+def test_drifts_of_a_session_are_in_no_prediction_of_the_next(tmp_path: Path) -> None:
+    """Files that were written with them are read as before; what is predicted is the arm."""
+    drift = {"name": "force_drift", "path": "linear", "quantity": "force",
+             "terms": [{"drift_N_per_s": 1e-3}]}  # fmt: skip
+    warm = {"name": "thermal_drift", "path": "exponential", "quantity": "displacement",
+            "terms": [{"along": [0, 1, 0], "time_constant_s": 900, "drift_mm": 0.05}]}  # fmt: skip
+    term = {"along": [0, 1, 0], "across": [1, 0, 0], "tangent": 0.01, "run": 1}
+    each = {"name": "load_misalignment", "terms": [term]}
+    plain = simulate(model(tmp_path), procedure(tmp_path))
+    found = simulate(model(tmp_path, drift, warm, each), procedure(tmp_path))
+    assert found.effects == ()
+    np.testing.assert_array_equal(found.curves[0].displacement, plain.curves[0].displacement)
+    assert [n.split(":")[0] for n in found.notes if n.endswith("session; left out.")] == [
+        "force_drift", "thermal_drift", "load_misalignment"
+    ]  # fmt: skip
+    with_arm = simulate(model(tmp_path, YIELD, drift), procedure(tmp_path))
+    alone = simulate(model(tmp_path, YIELD), procedure(tmp_path))
+    for mine, other in zip(with_arm.curves, alone.curves, strict=True):
+        np.testing.assert_array_equal(mine.displacement, other.displacement)
 
 
 def test_numbers_that_stand_in_the_springs_count_once(tmp_path: Path) -> None:

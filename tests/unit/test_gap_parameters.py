@@ -455,8 +455,8 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
     engine.target = engine.target + 4.0 * bench.columns[0] + 2.0 * bench.columns[1]
     engine = Engine(bench, engine.base, engine.target, engine.etas)
     chosen = Explanation((Part(mine, 10.0), Part(rival, 1.0)), 0.0, 0.0, (1.0, 0.5), 0.0)
-    alone = known_of(engine, [mine, rival], chosen)[0].parameters["factor_joint1"]
-    both = known_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_joint1"]
+    alone = known_of(engine, [mine, rival], chosen)[0].parameters["factor_x"]
+    both = known_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_x"]
     assert both.value == pytest.approx(alone.value)
     assert both.high - both.low > 1.02 * (alone.high - alone.low)
 
@@ -485,7 +485,7 @@ def test_explanations_by_other_words_move_parameters_as_far_as_they_are_likely()
     def width(rival_weight: float) -> float:
         rival = Explanation((Part(mine, 0.3), Part(other, 1.0)), rival_weight, 0.0, (1.0, 0.5), 0.0)
         found = known_of(engine, [mine, other], chosen, [chosen, rival])[0].parameters
-        return found["factor_joint1"].high - found["factor_joint1"].low
+        return found["factor_x"].high - found["factor_x"].low
 
     assert width(0.0) > width(-2.0) > width(-9.0)
     assert width(-9.0) == width(-20.0)  # what hardly counts does not

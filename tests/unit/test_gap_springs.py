@@ -140,7 +140,7 @@ def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
                       repetition=1 + run, run=run, imposed="force")  # fmt: skip
     data = replace(data, instruments=replace(data.instruments, displacement=noise))
     (effect,) = diagnose_gap(data).effects
-    key, told = ("factor_joint1", times) if times > 1 else ("factor", 1 / times)
+    key, told = ("factor_x", times) if times > 1 else ("factor", 1 / times)
     factor = effect.parameters[key]
     assert factor.value == pytest.approx(told, rel=0.1)
     assert factor.low < told < factor.high

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,15 @@ def test_what_import_says_word_for_word(
     assert not ending.value.code
     out, said = capsys.readouterr()
     assert (out, said) == ("", (GOLDEN / "import_text.txt").read_text("utf-8"))
+
+
+def test_what_was_added_is_compared_with_the_explanation_without_it() -> None:
+    found = replace(shown.explained().result, without_added=4.6e-6)
+    lines = diagnose_text._gap(found).splitlines()
+    assert lines[3].split()[:4] == ["without", "what", "was", "added"]
+    assert "no explanation" not in lines[4]
+    worse = diagnose_text._gap(replace(found, after=5e-6)).splitlines()
+    assert worse[4] == "  What was added is no explanation: more is left with it than without."
 
 
 def test_what_each_of_many_runs_has_to_itself_is_one_line_with_its_range() -> None:

@@ -115,7 +115,7 @@ def test_instruments_are_the_same_only_if_they_say_so(tmp_path: Path) -> None:
 
 def test_the_page_tells_a_softer_bench(tmp_path: Path) -> None:
     paths = [
-        rewritten(bench(tmp_path / f"{name}.h5", linear(k)), devices=DEVICES)
+        rewritten(bench(tmp_path / f"{name}.h5", linear(k), comment=name), devices=DEVICES)
         for name, k in (("before", 80.0), ("after", 70.0), ("again", 80.0))
     ]
     report = make(paths, Wishes(gap=False))

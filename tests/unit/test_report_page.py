@@ -13,6 +13,7 @@ import pytest
 from matplotlib.figure import Figure as Plot
 
 from rig.dataset import load, write
+from rig.digits import number
 from rig.errors import InputError
 from rig.journal import journal_path
 from rig.report import pictures
@@ -37,6 +38,7 @@ from rig.report.html import escape, render
 from rig.report.pdf import pdf
 from rig.report.report import Report, checked, make, write_figures, write_html
 from rig.report.results import Node
+from rig.report.sections import _gap
 from rig.report.wishes import Wishes, named
 from tests.unit.example_data import write_journal
 from tests.unit.report_sets import META, SIMULATION, Page, bench, rewritten
@@ -175,7 +177,19 @@ def test_an_unknown_gap_is_said_what_it_looks_like(tmp_path: Path) -> None:
     found = report.to_json()["datasets"][0]["diagnose"]
     assert found["verdict"] == "unknown"
     assert found["looks_like"]["kind"] == "rough"
-    assert f"It looks like this: {found['looks_like']['text']}." in Page(report.to_html()).text
+    page = Page(report.to_html()).text
+    assert f"It looks like this: {found['looks_like']['text']}." in page
+    left, gap = (number(found["gap"][f"{k}_rms_mm"], 3) for k in ("after", "before"))
+    assert f"{left} of {gap} mm rms remain" in page  # as in the table below
+
+
+def test_in_short_the_gap_shrinks_with_its_interval() -> None:
+    found = {"verdict": "joint_yield", "probabilities": {"joint_yield": 0.97},
+             "meanings": {"joint_yield": "gives way"},
+             "gap": {"held_out": {"shrink_factor": 56.3, "ci95": [12.0, 101.5]}}}  # fmt: skip
+    rows = Facts((("Gap", _gap(Node({"diagnose": found}))),))
+    text = Page(render(Document("", "", (), (Section("s", "", (rows,)),), ""))).text
+    assert "the gap shrinks 56.3 [12.0, 102] times on withheld data" in text
 
 
 @pytest.mark.parametrize("places", [{"joint 1": 0.62, "joint 5": 0.38}, {"joint 3": 1.0}])
@@ -239,7 +253,7 @@ def test_same_data_same_page(tmp_path: Path) -> None:
 def test_two_files_of_one_name(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
-    paths = [bench(tmp_path / folder / "run.h5") for folder in "ab"]
+    paths = [bench(tmp_path / folder / "run.h5", comment=folder) for folder in "ab"]
     report = make(paths, QUIET)
     assert [s.label for s in report.gathered.sessions] == [str(p) for p in paths]
     files = [p.name for p in write_figures(report, tmp_path / "figures")]

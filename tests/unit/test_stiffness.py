@@ -316,3 +316,41 @@ def test_the_loop_of_a_cycle_without_zero_has_an_area_and_no_share() -> None:
     assert result.hysteresis is not None
     assert result.hysteresis.area == pytest.approx(80.0 * 1e-4, rel=1e-6)
     assert math.isnan(result.hysteresis.relative)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.3])
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_noise_does_not_make_k_larger(share: float, bend: float) -> None:
+    """Noise of a tenth and of half the first step: weights that follow it gave 0.3 and 7 % more."""
+    force = np.linspace(20.0, 220.0, 11)
+    true = force / 95e3 * (1 + bend * force / 220)
+    noise = np.full(11, share * true[0])
+    rng = np.random.default_rng(1)
+    ks = [
+        stiffness(Table(force, u, noise / 50, noise, np.full(11, np.nan)), Choice())
+        for u in true + noise * rng.standard_normal((2000, 11))
+    ]
+    error = float(np.mean(ks)) / stiffness(table(force, true), Choice()) - 1
+    assert abs(error) < 3 * np.std(ks) / np.mean(ks) / np.sqrt(len(ks)) + 0.05 * share**2
+
+
+def test_a_curve_is_bent_where_it_leaves_its_line_beyond_the_noise() -> None:
+    """Noise is what is stated, or what differs from run to run where that is more."""
+    noise = np.random.default_rng(3).normal(0, 1e-5, 15)  # five times what is stated
+    points = [
+        replace(p, displacement=p.displacement + e)
+        for p, e in zip(curve().points, noise, strict=True)
+    ]
+    assert not analyze_curve(curve()).bent
+    assert not analyze_curve(replace(curve(), points=tuple(points))).bent
+    assert analyze_curve(curve(lambda f: f / 1e5 + 1e-8 * f**2)).bent
+    assert not analyze_curve(curve(lambda f: f / 1e5 + 1e-10 * f**2)).bent  # 1 um: in the noise
+
+
+def test_a_curve_that_yields_in_its_first_run_only_is_bent() -> None:
+    """What has yielded stays: the runs after it are straight again."""
+    levels = [10.0 * i for i in range(1, 13)]
+    first = curve(lambda f: f / 1e5 + 5e-6 * max(f - 60, 0), levels, factors=(1.0,))
+    later = curve(levels=levels)
+    points = (*first.points, *(p for p in later.points if p.repetition > 1))
+    assert analyze_curve(replace(later, points=points)).bent

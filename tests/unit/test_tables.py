@@ -344,9 +344,19 @@ def test_measurements_are_never_written_over(tmp_path: Path) -> None:
     example.write_journal(tmp_path / "busy.h5", 1)
     with pytest.raises(InputError, match="a measurement is under way there"):
         bring(tmp_path, TABLE, out=tmp_path / "busy.h5")
-    first = bring(tmp_path, TABLE, out=tmp_path / "new.h5")
-    again = bring(tmp_path, TABLE, out=tmp_path / "new.h5")
-    assert load(tmp_path / "new.h5").uuid == again.uuid != first.uuid
+    bring(tmp_path, TABLE, out=tmp_path / "new.h5")
+    again = bring(tmp_path, TABLE.replace("10.1", "10.2"), out=tmp_path / "new.h5")
+    assert equal(load(tmp_path / "new.h5"), replace(again, path=tmp_path / "new.h5"))
+
+
+def test_the_same_table_and_meta_are_the_same_data_set(tmp_path: Path) -> None:
+    """Whatever the files are called; another value or another META makes another one."""
+    first = bring(tmp_path, TABLE).uuid
+    (tmp_path / "t.csv").rename(tmp_path / "other.csv")
+    assert import_table(tmp_path / "other.csv", tmp_path / "META.yaml").uuid == first
+    others = {bring(tmp_path, TABLE.replace("10.1", "10.2")).uuid}
+    others.add(bring(tmp_path, TABLE, example.META + "# remark\n").uuid)
+    assert len(others | {first}) == 3
 
 
 # ------------------------------------------------------------------ the two readers agree

@@ -18,6 +18,7 @@ from identification.gap.forms import elastic, friction, instruments, knees
 from identification.gap.forms.law import Columns, Describe, Law, Term
 from identification.gap.parts import Part
 from identification.gap.variants import Variant
+from identification.gap.words import DRIFTS
 
 __all__ = [
     "SESSION",
@@ -26,6 +27,7 @@ __all__ = [
     "Term",
     "about_springs",
     "describe",
+    "lasting",
     "law_of",
     "lawful",
     "realise",
@@ -54,6 +56,9 @@ _TABLE: dict[str, tuple[Describe, Columns]] = {
 }
 # Coefficients of one session that say nothing of the next: chance, or a path without a law.
 SESSION = frozenset({"place", "rest", "shift", "drift_knot", "drift_per_kelvin"})
+# Words of one session: their law holds for its course (what to do next is planned with it), and
+# another day the amplifier drifts otherwise, the room warms otherwise, the laser is zeroed anew.
+OF_SESSION = DRIFTS | {"zero_shift"}
 
 
 # What these do goes through the joints' springs: the law says which springs it counts from, so
@@ -132,11 +137,24 @@ def realise(bench: Bench, form: Form) -> Array:
 
 
 def lawful(form: Form) -> Form:
-    """The form without what belongs to its session alone."""
-    keep = [i for i, t in enumerate(form.law.terms) if t.coefficient not in SESSION]
-    law = Law(form.law.constants, tuple(form.law.terms[i] for i in keep))
+    """The form without the coefficients that say nothing of another procedure."""
+    return _of_terms(form, [t.coefficient not in SESSION for t in form.law.terms])
+
+
+def lasting(form: Form) -> Form:
+    """The form with what the arm and the instruments still do in another session; of a drift, of
+    jumps of the datum and of what single runs have to themselves nothing is left."""
+    stays = form.word not in OF_SESSION
+    keep = [stays and t.coefficient not in SESSION and "run" not in t.shape
+            for t in form.law.terms]  # fmt: skip
+    return _of_terms(form, keep)
+
+
+def _of_terms(form: Form, keep: list[bool]) -> Form:
+    mine = np.flatnonzero(keep)
+    law = Law(form.law.constants, tuple(form.law.terms[i] for i in mine))
     return replace(
-        form, law=law, values=form.values[keep], covariance=form.covariance[np.ix_(keep, keep)]
+        form, law=law, values=form.values[mine], covariance=form.covariance[np.ix_(mine, mine)]
     )
 
 
