@@ -37,7 +37,7 @@ from tests.conformance.gap_designs import (
     linear,
 )
 
-SHARED = ("__init__", "drift", "flow_back", "lost_motion", "specimens")  # no word's own
+SHARED = ("__init__", "drift", "flow_back", "flows", "lost_motion", "specimens")  # no word's own
 FILES = sorted(p.stem for p in Path(effects.__file__).parent.glob("*.py") if p.stem not in SHARED)
 
 # --- form --------------------------------------------------------------------------------------

@@ -80,8 +80,11 @@ def describe_force_drift(bench: Bench, v: Variant) -> tuple[Law, Array]:
     if v.info["names"] == ("",):
         along = {k: v.info[k] for k in ("along",) if k in v.info}
         return Law(law, tuple(replace(t, shape={**t.shape, **along}) for t in terms)), scale
-    each = [{**t.shape, "along": force_drift.AXES[name]} for name in v.info["names"] for t in terms]
-    named = tuple(Term(terms[0].coefficient, shape) for shape in each)
+    named = tuple(
+        replace(t, shape={**t.shape, "along": force_drift.AXES[name]})
+        for name in v.info["names"]
+        for t in terms
+    )
     return Law(law, named), np.tile(scale, len(v.info["names"]))
 
 
