@@ -24,6 +24,7 @@ _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _INFINITE = {"inf", "+inf", "-inf", "infinity", "+infinity", "-infinity"}
 _SPACE_AT_END = re.compile(rb"[ \t]+(?=[,\n])")
 _TRUTHS = (b"true", b"True", b"TRUE", b"false", b"False", b"FALSE")
+_GROUPED = re.compile(rb"\d_\d")  # a number to Python, and to pandas beside very large ones
 _QUOTED = 80
 
 
@@ -53,6 +54,8 @@ def _parse_fast(
     import pandas as pd
 
     raw = block.raw
+    if _GROUPED.search(raw):
+        return None
     if b'"' not in raw and (b" ," in raw or b" \n" in raw or b"\t" in raw):
         raw = _SPACE_AT_END.sub(b"", raw)
     names = [str(i) for i in range(len(file.names))]
