@@ -128,8 +128,8 @@ def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
         return below + sum(_wall(w * seen / float(s)) for w, s in zip(least, sizes, strict=True))
     elsewhere = np.array([p.word in _SHOWN_ELSEWHERE and not _bends(p) for p in parts], dtype=bool)
     sizes = np.maximum(np.where(elsewhere, found.moved, found.gap), 1e-300)
-    least = FAR_BELOW_NOISE if engine.bench.data.arm else _GUESSED
-    return sum(_wall(least * noise / float(size)) for size in sizes)
+    far_below = FAR_BELOW_NOISE if engine.bench.data.arm else _GUESSED
+    return sum(_wall(far_below * noise / float(size)) for size in sizes)
 
 
 def _bends(part: Part) -> bool:

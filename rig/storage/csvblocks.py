@@ -60,6 +60,12 @@ class CsvFile:
             self._file: BinaryIO = path.open("rb")
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}.") from error
+        if not self._file.seekable():
+            self._file.close()
+            raise InputError(
+                f"{path}: is a pipe, which can be read once only; a table is read more often. "
+                "Write it to a file, and import that."
+            )
         try:
             self.names = self._header()
         except InputError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import sys
 from dataclasses import replace
@@ -572,3 +573,13 @@ def test_tables_beside_the_project_come_in_and_go_out(tmp_path: Path) -> None:
     export_table(data, tmp_path / "o.csv")
     back = import_table(tmp_path / "o.csv", folder / "meta.yaml")
     assert all(example.same_values(v, back.columns[n]) for n, v in data.columns.items())
+
+
+def test_a_pipe_is_refused(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    end = os.open(pipe, os.O_RDWR)  # nobody has to wait for the other end
+    os.write(end, example.TABLE.encode())
+    with pytest.raises(InputError, match=r"pipe.csv: is a pipe, which can be read once only"):
+        csvblocks.CsvFile(pipe)
+    os.close(end)
