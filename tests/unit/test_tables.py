@@ -579,7 +579,7 @@ def test_a_pipe_is_refused(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe.csv"
     os.mkfifo(pipe)
     end = os.open(pipe, os.O_RDWR)  # nobody has to wait for the other end
-    os.write(end, example.TABLE.encode())
+    os.write(end, b"force_N,displacement_mm\n0,0\n")
     with pytest.raises(InputError, match=r"pipe.csv: is a pipe, which can be read once only"):
         csvblocks.CsvFile(pipe)
     os.close(end)
