@@ -70,6 +70,7 @@ CONSTANTS: dict[str, Key] = {
     "about_turn": Key("about_turn_rad", "vector"),
     "reads": Key("displacement_read_over_true", "positive"),
     "only_in": Key("only_in_pose", "text"),
+    "unread": Key("joint_readings_do_not_show_it", "flag"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
 }
 SHAPES: dict[str, Key] = {
@@ -137,7 +138,7 @@ for _name, _unit in _DRIFTS.items():
 
 
 MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent", "placed", "forgets",
-                  "only_in")  # fmt: skip
+                  "only_in", "unread")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -218,7 +219,7 @@ GRAMMAR: dict[str, Grammar] = {
         + tuple(("gives", ("along", *more)) for more in _GOES),
     ),
     "pose_error": Grammar(
-        ("about", "about_offset", "about_angles", "about_turn", "reads", "only_in"),
+        ("about", "about_offset", "about_angles", "about_turn", "reads", "only_in", "unread"),
         (("offset", ("axis",)), ("angle", ("joint",)), ("turn", ("axis",))),
     ),
     "force_scale": Grammar(("about",), (("gain", ()), ("gain", ("at_load",)), ("gain", ("axis",)))),

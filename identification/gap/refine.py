@@ -211,9 +211,9 @@ def _poses(word: _Word) -> list[Variant]:
     return [replace(v, prior=share) if v in same else v for v in finer]
 
 
-def _kind(variant: Variant) -> tuple[str, str]:
-    """What stands elsewhere, and in which pose only."""
-    return str(variant.info["kind"]), str(variant.info["pose"])
+def _kind(variant: Variant) -> tuple[str, str, bool]:
+    """What stands elsewhere, in which pose only, and whether readings show it."""
+    return str(variant.info["kind"]), str(variant.info["pose"]), bool(variant.info["read"])
 
 
 _BESIDE = 2  # words

@@ -1,14 +1,15 @@
 """The arm stands, or the tool is, elsewhere than simulated: wrong leverage.
 
 Tool offset d in the flange frame changes every lever by `R d . (n x z)`; a joint that stands off
-by e changes them by `dJ/dq e`, and its reading at zero load shows e. A base that stands turned by e
+by e changes them by `dJ/dq e`, and its reading at zero load shows e, unless it is the zero of its
+encoder that is off. A base that stands turned by e
 against the directions of the push sees these turned back: levers `J' exp(-e x) n`, and no reading
 shows it. The target moves with the square of the levers. Offsets of 5 to 300 mm, angles of 0.2 to 5
 degrees, of the base 1 to 15.
 
 Size: tools 5 to 300 mm off, joints 0.2 to 5 degrees, the base 1 to 15 degrees.
 Prior: either sign, sd out of OFFSETS_M, ANGLES_RAD or TURNS_RAD, equally likely; half of it on a
-base that is turned, and on joints that stand elsewhere in one pose only.
+base that is turned, and on joints that stand elsewhere in one pose only or without being read so.
 Source: wrong tool frames, zero positions of joints, bases and rigs lined up by eye.
 """
 
@@ -47,7 +48,21 @@ def variants(bench: Bench) -> list[Variant]:
     columns = [bench.add(c) for c in turned(bench, np.zeros(3), bench.compliance)]
     for size in TURNS_RAD:
         out.append(_variant(f"base {size:g} rad", columns, [size] * 3, 0.5, "base"))
-    return out + _in_one_pose(bench)
+    return out + _in_one_pose(bench) + _unread(bench)
+
+
+def _unread(bench: Bench) -> list[Variant]:
+    """Joints that stand elsewhere than their readings say: zeros of encoders that were lost."""
+    if not bench.has_q:
+        return []
+    at, joints = (np.zeros(3), np.zeros(bench.data.joints)), bench.data.joints
+    columns = [bench.add(c) for c in secants(bench, *at, bench.compliance, read=False)[3:]]
+    return [
+        _variant(
+            f"joints {size:g} rad, unread", columns, [size] * joints, 0.5, "joints", read=False
+        )
+        for size in ANGLES_RAD
+    ]
 
 
 def _in_one_pose(bench: Bench) -> list[Variant]:
@@ -82,7 +97,8 @@ def refined(bench: Bench, found: Variant, estimate: Callable[[Variant], Estimate
         if kind == "base":
             used = turned(bench, turn, compliance, reads)
         else:
-            columns = secants(bench, offset, angles, compliance, reads, str(found.info["pose"]))
+            pose, read = str(found.info["pose"]), bool(found.info["read"])
+            columns = secants(bench, offset, angles, compliance, reads, pose, read)
             used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
         out = replace(
             found, label=f"{found.label}, as they are", prior=3.0,
@@ -104,14 +120,14 @@ class Estimate(NamedTuple):
 
 def secants(
     bench: Bench, offset: Array, angles: Array, compliance: Array, reads: float = 1.0,
-    pose: str = "",
+    pose: str = "", read: bool = True,
 ) -> list[Array]:  # fmt: skip
     """Stacked columns per metre of tool offset (3) and radian of each joint that stands elsewhere.
 
     With levers l + dl the target moves by `c ((l + dl)^2 - l^2) F = 2 c (l + dl/2) dl F`: linear in
     the change with dl/2 held at where it is (offset (3,) m, angles (m,) rad), exact there. So is
     dl, to second order in both; compliance (m,) is that of the springs as they are. The
-    readings see c dl F, and where the joints stand.
+    readings see c dl F, and, if they are read so, where the joints stand.
     """
     setups, m = bench.data.setups, bench.data.joints
     shifts, turns = [], []  # per setup: change of the levers per metre (m, 3) and radian (m, m)
@@ -128,7 +144,7 @@ def secants(
     out = _through(bench, np.concatenate([moved, swung], axis=2), middle, compliance)
     for j in range(m):
         q = np.zeros((bench.rows.n, m))
-        q[:, j] = there
+        q[:, j] = there * read
         out[3 + j] = out[3 + j] + bench.stacked(q=q)
     return out
 
@@ -161,11 +177,13 @@ def _through(bench: Bench, change: Array, middle: Array, compliance: Array) -> l
 
 
 def _variant(
-    label: str, columns: list[int], sizes: list[float], prior: float, kind: str, pose: str = ""
-) -> Variant:
-    """pose: the only one in which it is so; "" all."""
+    label: str, columns: list[int], sizes: list[float], prior: float, kind: str, pose: str = "",
+    read: bool = True,
+) -> Variant:  # fmt: skip
+    """pose: the only one in which it is so; "" all. read: whether readings show where joints
+    stand."""
     return variant(
         WORD, label, columns, (1.0,), np.diag(sizes), positive=False, prior=prior, kind=kind,
         offset_m=np.zeros(3), angles_rad=np.zeros(6), turn_rad=np.zeros(3), reads=1.0,
-        pose=pose,
+        pose=pose, read=read,
     )  # fmt: skip

@@ -248,6 +248,8 @@ def describe_pose(bench: Bench, v: Variant) -> tuple[Law, Array]:
     }
     if v.info["pose"]:
         about["only_in"] = str(v.info["pose"])
+    if not v.info["read"]:
+        about["unread"] = True
     return Law(about, tuple(terms)), np.ones(len(terms))
 
 
@@ -256,7 +258,8 @@ def pose(bench: Bench, law: Law) -> list[Array]:
     at = np.array(law.constants["about_offset"]), np.array(law.constants["about_angles"])
     reads = float(law.constants["reads"])
     pose = str(law.constants.get("only_in", ""))
-    moved = pose_error.secants(bench, *at, bench.compliance, reads, pose)
+    read = not law.constants.get("unread", False)
+    moved = pose_error.secants(bench, *at, bench.compliance, reads, pose, read)
     about = np.array(law.constants.get("about_turn", (0.0, 0.0, 0.0)))
     turned = pose_error.turned(bench, about, bench.compliance, reads)
     columns = {"offset": moved[:3], "angle": moved[3:], "turn": turned}
