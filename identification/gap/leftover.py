@@ -45,9 +45,13 @@ def looked_up(found: Found) -> Found:
     judge = _still_good if engine.bench.data.arm else _judged
     first = _near(found.explanations)
     done = {e.words: judge(engine, e) for e in first if e.parts}
+    for none in (e for e in first if not e.parts):
+        fitted = fit(engine, none)
+        if engine.bench.data.arm:
+            done[none.words] = _unstrained(none, strain(engine, fitted, none.eta))
+        else:
+            done[none.words] = _as_simulated(engine, none, fitted)
     if engine.bench.data.arm:  # what these lose goes to those with fewer of their effects
-        for none in (e for e in first if not e.parts):
-            done[none.words] = _unstrained(none, strain(engine, fit(engine, none), none.eta))
         lost = [e.words for e in done.values() if not e.good]
         heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
         done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
@@ -84,6 +88,22 @@ def _unstrained(explanation: Explanation, asked: float) -> Explanation:
     """With as much of its weight as what it asks of its priors allows it."""
     kept = float(np.log(max(_share(asked, LIMIT), 1e-300)))
     return replace(explanation, log_good=explanation.log_good + kept)
+
+
+def _as_simulated(engine: Engine, none: Explanation, fitted: Fit) -> Explanation:
+    """Of a rig without an arm: nothing is wrong as long as its springs are as stiff as stated. What
+    is normal in the compliance is not in the stiffness: by both."""
+    off = 0.0
+    found = dict(zip(engine.base.names, fitted.base.tolist(), strict=True))
+    for j, sd in enumerate(engine.bench.data.compliance_relative_sd.tolist()):
+        softer = max(found.get(f"spring{j + 1}", 0.0), -_HALF)
+        off = max(off, abs(softer) / (1 + min(softer, 0.0)) / sd if sd > 0 else 0.0)
+    lost = float(np.log(_share(off, AS_STATED)))
+    return replace(none, log_weight=none.log_weight + lost, log_good=none.log_good + lost)
+
+
+_HALF = 0.5
+AS_STATED = 3.0  # standard deviations
 
 
 def _swings(fitted: Fit) -> bool:

@@ -92,6 +92,24 @@ def test_faces_that_seat_one_after_the_other() -> None:
     assert found.effects[0].parameters["depth"].value == pytest.approx(70e-3, rel=0.1)  # mm
 
 
+@pytest.mark.parametrize("design", ["rich", "bench"])
+def test_what_is_bedded_in_may_stay_so(design: str) -> None:
+    """Half of a seat comes back, half of it is pressed flat for good; of an arm in every direction
+    anew."""
+    data = linear(design)
+    push, so_far, last = np.abs(data.force), 0.0, -1
+    most = np.zeros(len(push))
+    for i, (f, setup) in enumerate(zip(push, data.setup, strict=True)):
+        so_far, last = max(f, so_far if setup == last else 0.0), int(setup)
+        most[i] = so_far
+    top = float(push.max())
+    depth = sum(3e-5 * (1 - np.exp(-size / (0.1 * top))) for size in (push, most))
+    found = diagnose_gap(replace(data, displacement=data.displacement + depth))
+    assert found.verdict == "contact_seating"
+    assert found.effects[0].label == "exponential 0.1, some stays"
+    assert found.effects[0].parameters["depth"].value == pytest.approx(60e-3, rel=0.1)  # mm
+
+
 def test_a_plate_may_open_anywhere() -> None:
     """Bends of the library's come near to one between them."""
     bench = make_bench(linear("rich"))

@@ -3,7 +3,8 @@
 The same function of the force in every direction and pose, ever flatter: `d (1 - exp(-F/F0))`,
 `d F / (F + F0)`, `d log(1 + F/F0)` of rough faces whose asperities take up the load one after the
 other, `d F^(2/3)` of a ball on a plate (Hertz 1881), or a gap that closes on a weak spring at F0;
-or several faces one after the other; unseen by encoders, 2 to 100 um.
+or several faces one after the other; unseen by encoders, 2 to 100 um. What is bedded in for the
+first time may stay so, all of it or some: then it goes by the largest force so far.
 
 Size: 2 to 100 um; 0.3 to 10 % of the deflection.
 Prior: depth positive, sd out of SHARES, equally likely; force scales and laws equally likely.
@@ -50,9 +51,14 @@ LAWS: dict[str, Callable[[Array], Array]] = {
 }
 
 
+STAYS = " that stays"
+LAWS |= {law + STAYS: LAWS[law] for law in SEATED}
+_STAYING = 0.25  # prior
+
+
 def variants(bench: Bench) -> list[Variant]:
-    """Per force scale and law, and a mixture of scales. What bears both ways is no seat: what is
-    slack there is a play."""
+    """Per force scale and law, also with some that stays, and a mixture of scales. What bears both
+    ways is no seat: what is slack there is a play."""
     top = float(np.abs(bench.load).max())
     if not top > 0 or not (bench.data.arm or bench.course.force_keeps_its_sign):
         return []
@@ -80,7 +86,20 @@ def variants(bench: Bench) -> list[Variant]:
     )
     if bench.data.arm:
         out.append(_one_after_the_other(bench, [s * top for s in STEPS], scales))
+    out += [v for share in forces for law in SEATED
+            if (v := _some_stays(bench, law, share * top, scales))]  # fmt: skip
     return [*out, *_slacks(bench)]
+
+
+def _some_stays(bench: Bench, law: str, f0: float, scales: tuple[float, ...]) -> Variant | None:
+    """A seat of which a part stays as it was pressed; None where no force comes back to show it."""
+    laws = ((law, f0), (law + STAYS, f0))
+    one, other = (lost(bench, *each) for each in laws)
+    if np.array_equal(one, other):
+        return None
+    columns = [bench.add(bench.outside_column(c)) for c in (one, other)]
+    label = f"{law} {f0 / float(np.abs(bench.load).max()):.3g}, some stays"
+    return variant(WORD, label, columns, scales, each=True, prior=_STAYING, force_N=f0, laws=laws)
 
 
 def _one_after_the_other(bench: Bench, forces: list[float], scales: tuple[float, ...]) -> Variant:
@@ -156,8 +175,25 @@ def _then_seats(bench: Bench, force: float, prior: float) -> Variant:
 
 def _late(bench: Bench, law: str, force: float) -> int:
     """Column of what is lost to one law of a force, or of a slack's stroke, N."""
+    return bench.add(bench.outside_column(lost(bench, law, force)))
+
+
+def lost(bench: Bench, law: str, force: float) -> Array:
+    """(n,) what one law of a force scale N takes of its depth."""
     size, sign = pressed(bench)
-    return bench.add(bench.outside_column(sign * LAWS[law](size / force)))
+    if law.endswith(STAYS):
+        size, sign = _so_far(bench, size, sign)
+    return np.asarray(sign * LAWS[law](size / force))
+
+
+def _so_far(bench: Bench, size: Array, sign: Array) -> tuple[Array, Array]:
+    """The largest of sizes (n,) since the rig was built, or turned, and its sign."""
+    most, way = size.copy(), sign.copy()
+    for part in np.split(np.arange(len(size)), np.flatnonzero(bench.rebuilt)[1:]):
+        most[part] = np.maximum.accumulate(size[part])
+        first = np.where(size[part] == most[part], np.arange(len(part)), 0)
+        way[part] = sign[part][np.maximum.accumulate(first)]
+    return most, way
 
 
 def _stroke(bench: Bench) -> float:

@@ -10,7 +10,7 @@ from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Setup
 from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import bent_column, moments
-from identification.gap.effects.contact_seating import LAWS, pressed
+from identification.gap.effects.contact_seating import lost
 from identification.gap.effects.joint_creep import in_session
 from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
@@ -168,11 +168,8 @@ def describe_seating(_: Bench, v: Variant) -> tuple[Law, Array]:
 
 def seating(bench: Bench, law: Law) -> list[Array]:
     """The saturating curves of `LAWS`, of the force on the seat."""
-    size, sign = pressed(bench)
-    return [
-        bench.outside_column(sign * LAWS[t.shape["law"]](size / t.shape["force_scale"]))
-        for t in law.terms
-    ]
+    each = [(str(t.shape["law"]), float(t.shape["force_scale"])) for t in law.terms]
+    return [bench.outside_column(lost(bench, *one)) for one in each]
 
 
 def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
