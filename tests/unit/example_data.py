@@ -10,6 +10,7 @@ import numpy as np
 
 from rig.dataset import Dataset, from_records
 from rig.journal import Journal, Record, journal_path, replay
+from rig.tables import import_table
 
 META = """robot: ur10e
 poses: {P1: {q_rad: [0.1, -1.2, 1.3, -0.4, 1.5, 0.6], tcp_xyz_mm: [0, 0, 50]}}
@@ -20,6 +21,12 @@ instruments:
 simulation:
   joint_stiffness_Nm_per_rad: [37000, 57000, 18000, 7100, 7500, 8000]
   joint_stiffness_relative_sd: 0.1
+"""
+TABLE = """time_s,session_s,pose,direction,repetition,branch,step,force_N,displacement_mm,q1_rad
+0.5,1.5,P1,x,1,zero,0,0.02,0,0.1
+1.5,2.5,P1,x,1,loading,1,10.1,0.1,0.1001
+2.5,3.5,P1,x,1,unloading,1,9.9,0.11,
+0.5,60.5,P1,y,2,cycle,,-5e-7,-1e-7,nan
 """
 META_SPECIMEN = """robot: none
 directions: {x: [1, 0, 0]}
@@ -101,3 +108,10 @@ def journal_records(path: Path) -> list[Record]:
 
 def same_values(a: np.ndarray[Any, Any], b: np.ndarray[Any, Any]) -> bool:
     return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+
+
+def bring(folder: Path, table: str | bytes, meta: str = META, **kw: Any) -> Dataset:
+    raw = table if isinstance(table, bytes) else table.encode()
+    (folder / "t.csv").write_bytes(raw)
+    (folder / "META.yaml").write_text(meta)
+    return import_table(folder / "t.csv", folder / "META.yaml", **kw)
