@@ -16,7 +16,7 @@ import pytest
 from identification.estimate import WEIGHTINGS
 from rig import cli
 from rig.software import software_version
-from tests.unit.test_runner import PROTOCOL
+from tests.unit.runner_bench import PROTOCOL
 
 HOME = Path(__file__).parents[2]
 META = """\
