@@ -31,7 +31,8 @@ from rig.other_setups import elsewhere
 from rig.other_simulator import with_curves
 
 MM = 1e3  # mm per m
-_JOINT = re.compile(r"joint (\d+)")  # as shapes are labelled, whatever their spring is called
+# As shapes are labelled, whatever their springs are called: joint 1, joints 1 and 2, joints but 3.
+_JOINT = re.compile(r"\bjoint(s?(?: but)?)(?: (\d+))?(?: and (\d+))?")
 Progress = Callable[[str, float], None]
 
 
@@ -189,7 +190,8 @@ def _looks_like(r: GapResult) -> dict[str, Any] | None:
 
 def _effect(e: Effect, data: GapData) -> dict[str, Any]:
     def direction(found: re.Match[str]) -> str:
-        return f"direction {data.spring_name(int(found[1]) - 1)}"
+        names = [data.spring_name(int(n) - 1) for n in found.groups()[1:] if n]
+        return f"direction{found[1]} {' and '.join(names)}".rstrip()
 
     return {
         "name": e.name,

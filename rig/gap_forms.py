@@ -236,7 +236,8 @@ class ModelEffects:
     @property
     def left_behind(self) -> tuple[str, ...]:
         """Words of which nothing lasts, each once."""
-        return tuple(dict.fromkeys(f.word for f in self.forms if not lasting(f).law.terms))
+        stay = {f.word for f in self.lasting}
+        return tuple(dict.fromkeys(f.word for f in self.forms if f.word not in stay))
 
 
 def effects_of(model: ArmModel) -> ModelEffects:

@@ -66,7 +66,8 @@ class GapResult:
     runners_up: word -> rms after on the main fold, of the best explanations by other words.
     remainder: imperfection that the laws are taken to have, of no law for `unknown`; what is left
     on average stands in `after`. looks_like: of an unknown gap, where that is plain. without_added:
-    `after` without the words that were to be added; None where there were none.
+    `after` without the words that were to be added; None where there were none, or the
+    explanation had them.
     """
 
     verdict: str

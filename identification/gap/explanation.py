@@ -203,7 +203,9 @@ def conditioned(
 
 def up_to_likeliest(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
     """The same as `conditioned`, at levels up to the likeliest: with an effect more, no more
-    imperfection is needed."""
+    imperfection is needed. All levels where there are no parts."""
+    if not parts:
+        return conditioned(engine, parts)
     energy = energies(engine, parts)
     likeliest = int(np.argmax(log_joints(engine, parts) + level_priors(engine.etas, energy)))
     return conditioned(engine, parts, engine.levels[: likeliest + 1])

@@ -7,11 +7,13 @@ that matter that is looked up in the data.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import log
 
 import numpy as np
 
+from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found
 from identification.gap.faults import faults
@@ -20,7 +22,7 @@ from identification.gap.hands import open_to_hands
 from identification.gap.noise import UNSURE
 from identification.gap.strain import LIMIT, strain
 from identification.gap.verdict import weighed
-from identification.gap.words import CURVES, FRICTION
+from identification.gap.words import CURVES, DRIFTS, FRICTION
 
 # An elastic curve that falls while it is pushed on, or a force that is nearly lost, as none is that
 # has made something yield or slide: a snap, a slip, a crack are likelier.
@@ -96,13 +98,14 @@ def _as_simulated(engine: Engine, none: Explanation, fitted: Fit) -> Explanation
     off = 0.0
     found = dict(zip(engine.base.names, fitted.base.tolist(), strict=True))
     for j, sd in enumerate(engine.bench.data.compliance_relative_sd.tolist()):
-        softer = max(found.get(f"spring{j + 1}", 0.0), -_HALF)
-        off = max(off, abs(softer) / (1 + min(softer, 0.0)) / sd if sd > 0 else 0.0)
-    lost = float(np.log(_share(off, AS_STATED)))
+        change = found.get(f"spring{j + 1}", 0.0)
+        of_the_inverse = change / max(1 + change, _TINY)
+        off = max(off, abs(change) / sd, abs(of_the_inverse) / sd) if sd > 0 else off
+    lost = float(np.log(max(_share(off, AS_STATED), 1e-300)))
     return replace(none, log_weight=none.log_weight + lost, log_good=none.log_good + lost)
 
 
-_HALF = 0.5
+_TINY = 1e-6
 AS_STATED = 3.0  # standard deviations
 
 
@@ -110,15 +113,11 @@ def _swings(fitted: Fit) -> bool:
     """Whether a drift comes and goes again and again: warming rigs and leaking charges do not,
     however they wander; air conditioning does, machines next door, and what a law leaves of every
     run."""
-    for i, part in enumerate(fitted.parts):
-        if part.variant.info.get("path") != "free":
-            continue
-        pieces = int(part.variant.info["pieces"])
-        path = fitted.of(i)[0].reshape(-1, pieces).T
-        path = path - path.mean(axis=0)
-        slow = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, pieces), _SLOW)
-        rest = path - slow @ np.linalg.lstsq(slow, path, rcond=None)[0]
-        if np.sum(rest**2) > _MOSTLY * np.sum(path**2):
+    for path in _free_paths(fitted, DRIFTS):
+        about = path - path.mean(axis=0)
+        slow = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, len(path)), _SLOW)
+        rest = about - slow @ np.linalg.lstsq(slow, about, rcond=None)[0]
+        if np.sum(rest**2) > _MOSTLY * np.sum(about**2):
             return True
     return False
 
@@ -126,22 +125,23 @@ def _swings(fitted: Fit) -> bool:
 def _hurries(engine: Engine, fitted: Fit) -> bool:
     """Whether a displacement is said to drift faster than anything warms up: somebody leans on the
     stand, something is moved."""
-    if not engine.bench.rows.clock:
-        return False
     span = engine.bench.course.session_span
-    for i, part in enumerate(fitted.parts):
-        if part.word != "thermal_drift" or part.variant.info.get("path") != "free":
-            continue
-        pieces = int(part.variant.info["pieces"])
-        path = fitted.of(i)[0].reshape(-1, pieces)
-        if np.abs(np.diff(path, axis=1)).max() > FASTEST * span / (pieces - 1):
-            return True
-    return False
+    return engine.bench.rows.clock and any(
+        np.abs(np.diff(path, axis=0)).max() > FASTEST * span / (len(path) - 1)
+        for path in _free_paths(fitted, frozenset({"thermal_drift"}))
+    )
 
 
 # Warm robots move by up to 400 um over hours, lasers by 1 um/K: some hundred times as fast is
 # no heat.
 FASTEST = 400e-6 / 60  # m/s
+
+
+def _free_paths(fitted: Fit, words: frozenset[str]) -> Iterator[Array]:
+    """(pieces, paths) of every part of these words that takes any path."""
+    for i, part in enumerate(fitted.parts):
+        if part.word in words and part.variant.info.get("path") == "free":
+            yield fitted.of(i)[0].reshape(-1, int(part.variant.info["pieces"])).T
 
 
 def _left(engine: Engine, fitted: Fit) -> float:

@@ -117,9 +117,9 @@ _WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
 def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats for every effect below the noise of a single sample of a rig without an arm,
     or of a running recording, steep below half of it, or all of it where a path may take any way:
-    thousands of samples would show it, but noise of low frequency wanders as far. Of an arm at rest
-    for every one far below that: that is no gap. What springs may hide, or other channels show,
-    counts by how far it moves."""
+    thousands of samples would show it, but noise of low frequency wanders as far. Of levels
+    at rest for every one far below what is stated: that is no gap. What springs may hide, or other
+    channels show, counts by how far it moves."""
     noise, seen = engine.bench.noise.stated, engine.bench.noise.seen
     if seen > 0:
         sizes = np.maximum(_counted(parts, found), 1e-300)

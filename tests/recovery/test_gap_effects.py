@@ -27,6 +27,7 @@ from rig.errors import InputError
 from rig.gap_data import gap_data
 from rig.model import load_robot
 from rig.tables import import_table
+from tests.conformance.gap_designs import linear
 
 Q = {"P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],
      "P2": [0.054, -1.480, -1.948, -1.284, 1.571, -1.336]}  # fmt: skip
@@ -296,6 +297,13 @@ def test_an_effect_that_is_added_takes_no_other_s_place(
     assert with_it.after < 1.01 * plain.after
     assert with_it.without_added == pytest.approx(plain.after, rel=1e-3)
     assert plain.without_added is None
+
+
+def test_two_words_may_be_added_to_nothing() -> None:
+    found = diagnose_gap(linear("rich"), add=["joint_creep", "zero_shift"])
+    assert found.verdict == "none"
+    assert set(found.names) == {"joint_creep", "zero_shift"}
+    assert found.without_added is not None
 
 
 def test_same_data_same_answer(tmp_path: Path, results: dict[str, GapResult]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import pickle
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -130,6 +131,20 @@ def test_without_an_arm_a_spring_is_called_by_its_direction(tmp_path: Path) -> N
     assert list(effect["parameters"]) == ["factor_y"]
     assert effect["parameters"]["factor_y"]["value"] == pytest.approx(60 / 90, rel=0.01)
     assert "\n    factor_y = 0.66" in found.to_text()
+
+
+@pytest.mark.parametrize(
+    ("label", "said"),
+    [("joint 2", "direction y"), ("joints 1 and 2", "directions x and y"),
+     ("all joints", "all directions"), ("all joints but 2", "all directions but y"),
+     ("joint 1 T 1.5 s", "direction x T 1.5 s")],
+)  # fmt: skip
+def test_shapes_name_directions_where_there_are_no_joints(
+    slipped: Diagnosis, label: str, said: str
+) -> None:
+    result = slipped.result
+    shown = replace(result, effects=(replace(result.effects[0], label=label),))
+    assert replace(slipped, result=shown).to_json()["effects"][0]["form"] == said
 
 
 def test_what_a_report_draws_travels_without_the_samples(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from identification.gap.effects.base_compliance import bent_column, moments
 from identification.gap.effects.force_scale import component
 from rig.model import load_robot
 from tests.conformance.gap_designs import TCP_MM, TRUE, Array, Q, linear
+from tests.unit.test_gap_running import SPRING, running
 
 
 def of_each(data: GapData, values: list[Array] | list[float]) -> Array:
@@ -108,6 +109,15 @@ def test_what_is_bedded_in_may_stay_so(design: str) -> None:
     assert found.verdict == "contact_seating"
     assert found.effects[0].label == "exponential 0.1, some stays"
     assert found.effects[0].parameters["depth"].value == pytest.approx(60e-3, rel=0.1)  # mm
+
+
+def test_no_seat_stays_where_nothing_comes_back() -> None:
+    """A pull whose force trembles."""
+    force = np.linspace(0.0, 60.0, 300) + np.random.default_rng(1).normal(0, 0.6, 300)
+    labels = [v.label for v in library(make_bench(running(force, force / SPRING, imposed="force")),
+                                       ["contact_seating"])]  # fmt: skip
+    assert labels
+    assert not any("stays" in label for label in labels)
 
 
 def test_a_plate_may_open_anywhere() -> None:

@@ -93,6 +93,19 @@ def test_every_component_of_the_force_that_is_recorded_drifts() -> None:
     assert names(replace(data, tangential=None)) == {("",)}
 
 
+def test_amplifiers_that_drift_alike_are_no_second_free_path() -> None:
+    """Where no component is recorded, and no direction pushed back."""
+    data = replace(arm_data(), tangential=None)
+    for one_way in (True, False):
+        first, *others = data.setups
+        turned = replace(others[0], unit_vector=-first.unit_vector)
+        bench = make_bench(data if one_way else replace(data, setups=(first, turned, *others[1:])))
+        columns = [v.columns for v in library(bench, ["force_drift"])]
+        assert len(set(columns)) == len(columns)
+        assert any(v.label.endswith("all components")
+                   for v in library(bench, ["force_drift"])) is not one_way  # fmt: skip
+
+
 def test_every_amplifier_may_drift_at_several_rates_of_its_own() -> None:
     """A push against an axis reads its amplifier the other way round than one along it."""
     data = replace(arm_data(), tangential=None)
@@ -147,13 +160,15 @@ def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("times", "word"),
-    [(1.38, "joint_stiffness_error"), (0.7, "joint_stiffness_error"), (1.1, "none"), (0.9, "none")],
-)
+    ("times", "sd", "word"),
+    [(1.38, 0.1, "joint_stiffness_error"), (0.7, 0.1, "joint_stiffness_error"),
+     (1.1, 0.1, "none"), (0.9, 0.1, "none"), (5.0, 0.4, "joint_stiffness_error"),
+     (1.6, 0.4, "none")],
+)  # fmt: skip
 def test_nothing_is_wrong_as_long_as_a_spring_is_about_as_stiff_as_stated(
-    times: float, word: str
+    times: float, sd: float, word: str
 ) -> None:
-    """To a tenth: 38 % stiffer is 2.8 standard deviations of the compliance and 3.8 of the
+    """38 % stiffer is 2.8 standard deviations of a tenth of the compliance and 3.8 of the
     stiffness."""
     step = np.tile(np.repeat(np.arange(9), 4), 3)
     u, run = 20.0 * step / SPRING / times, np.arange(len(step)) // 36
@@ -161,4 +176,5 @@ def test_nothing_is_wrong_as_long_as_a_spring_is_about_as_stiff_as_stated(
     data = bench_data(20.0 * step, read, step=step, branch=np.where(step > 0, 1, 0),
                       repetition=1 + run, run=run, imposed="force")  # fmt: skip
     meter = replace(data.instruments, displacement=1e-3 * float(u.max()))
-    assert diagnose_gap(replace(data, instruments=meter)).verdict == word
+    stated = replace(data, instruments=meter, compliance_relative_sd=np.array([sd]))
+    assert diagnose_gap(stated).verdict == word

@@ -321,7 +321,7 @@ def test_the_loop_of_a_cycle_without_zero_has_an_area_and_no_share() -> None:
 @pytest.mark.parametrize("bend", [0.0, 0.3])
 @pytest.mark.parametrize("share", [0.1, 0.5])
 def test_noise_does_not_make_k_larger(share: float, bend: float) -> None:
-    """Noise of a tenth and of half the first step: weights that follow it gave 0.3 and 7 % more."""
+    """Noise of a tenth and of half the first step: weights that follow it gave 0.3 and 6 % more."""
     force = np.linspace(20.0, 220.0, 11)
     true = force / 95e3 * (1 + bend * force / 220)
     noise = np.full(11, share * true[0])

@@ -53,7 +53,7 @@ LAWS: dict[str, Callable[[Array], Array]] = {
 
 STAYS = " that stays"
 LAWS |= {law + STAYS: LAWS[law] for law in SEATED}
-_STAYING = 0.25  # prior
+_STAYING, _BACK = 0.25, 0.3  # prior; of the largest force, by which it comes back
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -93,10 +93,11 @@ def variants(bench: Bench) -> list[Variant]:
 
 def _some_stays(bench: Bench, law: str, f0: float, scales: tuple[float, ...]) -> Variant | None:
     """A seat of which a part stays as it was pressed; None where no force comes back to show it."""
+    size, sign = pressed(bench)
+    if not np.any(_so_far(bench, size, sign)[0] - size > _BACK * size.max()):
+        return None
     laws = ((law, f0), (law + STAYS, f0))
     one, other = (lost(bench, *each) for each in laws)
-    if np.array_equal(one, other):
-        return None
     columns = [bench.add(bench.outside_column(c)) for c in (one, other)]
     label = f"{law} {f0 / float(np.abs(bench.load).max()):.3g}, some stays"
     return variant(WORD, label, columns, scales, each=True, prior=_STAYING, force_N=f0, laws=laws)

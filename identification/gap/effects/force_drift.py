@@ -11,13 +11,15 @@ Source: 0.05 pC/s and more in data sheets of charge amplifiers.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import (
+    FreePath,
     free_path,
     free_paths,
     free_variant,
@@ -32,51 +34,71 @@ SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
 
 
 def variants(bench: Bench) -> list[Variant]:
-    """Warm-up paths, several rates at once, and a free smooth path: alike in all directions, of all
-    amplifiers alike, or of every amplifier's own."""
+    """Warm-up paths, several rates at once, and a free smooth path: alike in all directions, of
+    every amplifier's own, or of all amplifiers alike."""
     top = float(np.abs(bench.rows.measured_force).max())
     scales = tuple(s * top for s in shares(bench, SHARES))
     if not top > 0:
         return []
-    axes = _axes(bench)
-
-    def column(path: Array) -> int:
-        return bench.add(drifting(bench, _tared(bench, path)))
-
-    def own(given: Iterable[Array]) -> list[int]:
-        return [bench.add(component(bench, a, path)) for a in axes.values() for path in given]
-
+    amplifiers, several = _Amplifiers(bench, _axes(bench)), len(_axes(bench)) > 1
+    named, free = {k: [path] for k, path in paths(bench).items()}, free_paths(bench)
+    if free:
+        named["rates"] = rates(bench)
     out = []
-    for label, path in paths(bench).items():
-        out.append(variant(WORD, label, [column(path)], scales, positive=False, path=label,
-                           names=("",)))  # fmt: skip
-        if len(axes) > 1:
-            out.append(variant(WORD, f"{label}, each component", own([path]), scales,
-                               positive=False, path=label, names=tuple(axes)))  # fmt: skip
+    for label, given in named.items():
+        same: dict[str, Any] = {"positive": False, "path": label}
+        often = 2.0 if label == "rates" else 1.0
+        out.append(variant(WORD, label, amplifiers.alike(given), scales, prior=often, names=("",),
+                           **same))  # fmt: skip
+        if several:
+            out.append(variant(WORD, f"{label}, each component", amplifiers.own(given), scales,
+                               names=tuple(amplifiers.axes), **same))  # fmt: skip
     out += _each_run(bench, scales)
-    free = free_paths(bench)
-    if not free:
+    return out + [v for k, way in free.items() for v in _free(amplifiers, k, way, scales)]
+
+
+def _free(
+    amplifiers: _Amplifiers, label: str, way: FreePath, scales: tuple[float, ...]
+) -> list[Variant]:
+    """A free path, of every kind that differs here."""
+    bench, axes = amplifiers.bench, amplifiers.axes
+    hats = free_path(bench, way.pieces).T
+    plain = amplifiers.alike(hats)
+    out = [free_variant(WORD, label, way, plain, scales, ("",))]
+    if len(axes) == 1:
         return out
-    every = [column(path) for path in rates(bench)]
-    out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
-                       names=("",)))  # fmt: skip
-    if len(axes) > 1:
-        out.append(variant(WORD, "rates, each component", own(rates(bench)), scales,
-                           positive=False, path="rates", names=tuple(axes)))  # fmt: skip
-    for label, way in free.items():
-        hats = free_path(bench, way.pieces).T
-        out.append(free_variant(WORD, label, way, [column(hat) for hat in hats], scales, ("",)))
-        if len(axes) > 1:
-            fewer = way._replace(pieces=min(way.pieces, EACH_PIECES))
-            each = own(free_path(bench, fewer.pieces).T)
-            named = f"{label}, each component"
-            out.append(free_variant(WORD, named, fewer, each, scales, tuple(axes), prior=1.0))
-            along = _alike(bench)
-            same = [bench.add(component(bench, along, hat)) for hat in hats]
-            together = free_variant(WORD, f"{label}, all components", way, same, scales, ("",),
-                                    prior=1.0)  # fmt: skip
-            out.append(replace(together, info={**together.info, "along": along}))
+    fewer = way._replace(pieces=min(way.pieces, EACH_PIECES))
+    own = amplifiers.own(free_path(bench, fewer.pieces).T)
+    out.append(free_variant(WORD, f"{label}, each component", fewer, own, scales, tuple(axes),
+                            prior=1.0))  # fmt: skip
+    together, along = amplifiers.together(hats), _alike(bench)
+    if together != plain:
+        v = free_variant(WORD, f"{label}, all components", way, together, scales, ("",), prior=1.0)
+        out.append(replace(v, info={**v.info, "along": along}))
     return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Amplifiers:
+    """Columns of drifts along paths (n,): alike in all directions, of every amplifier's own (axes:
+    name -> axis), of all amplifiers alike."""
+
+    bench: Bench
+    axes: dict[str, tuple[float, float, float]]
+
+    def alike(self, given: Iterable[Array]) -> list[int]:
+        """A column a path."""
+        return [self.bench.add(drifting(self.bench, _tared(self.bench, p))) for p in given]
+
+    def own(self, given: Iterable[Array]) -> list[int]:
+        """A column a path, axis by axis."""
+        every = [component(self.bench, a, p) for a in self.axes.values() for p in given]
+        return [self.bench.add(c) for c in every]
+
+    def together(self, given: Iterable[Array]) -> list[int]:
+        """A column a path."""
+        along = _alike(self.bench)
+        return [self.bench.add(component(self.bench, along, p)) for p in given]
 
 
 EACH_PIECES = 20  # at most, of one component's path
@@ -115,8 +137,8 @@ def _axes(bench: Bench) -> dict[str, tuple[float, float, float]]:
 
 
 def _alike(bench: Bench) -> tuple[float, float, float]:
-    """Amplifiers that drift alike, so that every direction that has no opposite reads the same: how
-    they are connected is a matter of cables."""
+    """Amplifiers that drift alike, so that every axis that is pushed in one sense only reads the
+    same: how they are connected is a matter of cables."""
     units = np.unique([s.unit_vector for s in bench.data.setups], axis=0)
     x, y, z = np.where(units.sum(axis=0) < -0.1, -1.0, 1.0).tolist()
     return x, y, z

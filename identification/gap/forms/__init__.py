@@ -21,6 +21,7 @@ from identification.gap.variants import Variant
 from identification.gap.words import DRIFTS
 
 __all__ = [
+    "OF_SESSION",
     "SESSION",
     "Form",
     "Law",
