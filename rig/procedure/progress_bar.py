@@ -27,6 +27,7 @@ class LoaderWithBar:
             BarColumn(),
             TextColumn("{task.completed:.0f} of {task.total:.0f} steps"),
             TimeRemainingColumn(),
+            TextColumn("left"),
             console=console,
             disable=not console.is_terminal,
         )
