@@ -125,6 +125,10 @@ def test_the_page_tells_a_softer_bench(tmp_path: Path) -> None:
     assert first["ratio"]["value"] == pytest.approx(70 / 80, rel=1e-3)
     assert first["same_instruments"]
     text = Page(report.to_html()).text
+    assert (
+        "Direction x: after.h5 is softer, 0.8750 times as stiff as before.h5 (95 %: 0.8661" in text
+    )
+    assert "Direction x: no difference is shown; again.h5 is 1.000 times as stiff as" in text
     assert "✗ differs" in text
     assert "○ no difference shown" in text
     assert "the gains cancel, since the instruments are the same" in text
