@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 
 import pytest
+from rich.console import Console
 
 from rig.cli.options import say, show
+from rig.procedure.progress_bar import Bar
 from rig.terminal import folded, folded_for
 
 
@@ -43,3 +45,11 @@ def test_results_and_messages_of_commands_are_folded(
     show("one two three")
     say("four five six")
     assert capsys.readouterr() == ("one two\nthree\n", "four five\nsix\n")
+
+
+def test_the_bar_leaves_room_for_what_ctrl_c_shows() -> None:
+    console = Console(width=80, file=Terminal(), force_terminal=True)
+    bar = Bar(console=console)
+    bar.add_task("P1 x 1/3 settling", total=69)
+    (line,) = console.render_lines(bar.get_renderable(), pad=False)
+    assert 60 < sum(segment.cell_length for segment in line) <= 77
