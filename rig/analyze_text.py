@@ -11,7 +11,7 @@ from identification.uncertainty import Quantity
 from rig.analyze import MM, N_PER_MM, Analysis, Direction
 from rig.digits import number
 
-WIDTH = 100
+WIDTH = 79  # of the narrowest terminal that is usual, less one
 
 
 def text(analysis: Analysis) -> str:
@@ -133,18 +133,27 @@ def _tables(r: Stiffness) -> Iterator[str]:
         for c in r.budget
     ]  # fmt: skip
     yield from _table(
-        "Uncertainty of k (in brackets: contained in another line)",
-        ("contribution", "type", "u N/mm", "degrees of freedom"),
+        "Uncertainty of k (dof: degrees of freedom; in brackets: within another line)",
+        ("contribution", "type", "u N/mm", "dof"),
         budget,
         words=2,
     )
     rivals = [
-        (a.choice.label, "all" if a.after_knee else "as above",
+        (_short(a.choice.label)[0], "all" if a.after_knee else "as above",
          number(a.value * N_PER_MM), number(a.u * N_PER_MM, 2))
         for a in r.alternatives
     ]  # fmt: skip
     header = ("weighting and origin", "steps", "k N/mm", "u N/mm")
     yield from _table("k under other choices", header, rivals, words=2)
+    meanings = dict.fromkeys(_short(a.choice.label)[1] for a in r.alternatives)
+    yield from wrap("; ".join(meanings), WIDTH, initial_indent="  ", subsequent_indent="  ")
+
+
+def _short(label: str) -> tuple[str, str]:
+    """A choice without what its weighting means, for a column; and that meaning."""
+    weighting, _, rest = label.partition(" (")
+    meaning, _, place = rest.partition(")")
+    return weighting + place, f"{weighting}: {meaning}"
 
 
 def _table(

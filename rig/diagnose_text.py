@@ -207,7 +207,7 @@ def _value(p: Parameter) -> str:
 def _gap(r: GapResult) -> str:
     lines = [
         "How far (rms, mm)",
-        "                        before      after  after/noise  shrinks by",
+        "                           before     after after/noise  shrinks by",
         _row("fitted", r.before, r.after, r.noise),
     ]
     if r.without_added is not None:
@@ -220,7 +220,7 @@ def _gap(r: GapResult) -> str:
             _row(f"withheld {h.fold}", h.before, h.after, r.noise)
             + f" ({brief(low, 3)} to {brief(high, 3)})"
         )
-    lines.append(f"  noise of the instruments {brief(r.noise * MM)}")
+    lines.append(f"  {'noise of the instruments':32s}{brief(r.noise * MM):>9s}")
     for word, after in r.runners_up.items():
         lines.append(f"  withheld, with {word} instead: {brief(after * MM)}")
     return "\n".join(lines)
@@ -229,8 +229,8 @@ def _gap(r: GapResult) -> str:
 def _row(name: str, before: float, after: float, noise: float) -> str:
     shrink = before / after if after > 0 else 1.0
     ratio = after / noise if noise > 0 else 1.0
-    shown = f"{brief(before * MM):>10s} {brief(after * MM):>10s} {ratio:10.2f}"
-    return f"  {name:22s}{shown}  {brief(shrink, 3):>10s}"
+    shown = f"{brief(before * MM):>9s} {brief(after * MM):>9s} {ratio:11.2f}"
+    return f"  {name:22s}{shown}  {brief(shrink, 3):>6s}"
 
 
 def _next(r: GapResult) -> str:

@@ -26,7 +26,7 @@ def text(result: IdentifyResult) -> str:
         f"Joint torsional stiffness of the {result.arm.name} from {len(result.observations)} "
         f"poses and directions; rank {fit.rank}, null space of dimension {6 - fit.rank}, "
         f"condition number {fit.condition_number:.3g}.",
-        "  joint   kNm/rad (standard uncertainty)   95 % interval        from data  at least",
+        "  joint  kNm/rad     u    95 % interval    from data  at least",
     ]
     for j in range(6):
         c, u = fit.stiffness[j] / 1e3, fit.stiffness[j] * fit.relative_sd[j] / 1e3
@@ -35,10 +35,12 @@ def text(result: IdentifyResult) -> str:
         share = max(0.0, 100 * fit.data_share[j])
         verdict = "identified" if fit.identified[j] else _not_identified(share)
         lines.append(
-            f"  {j + 1}       {c:9.2f} ({u:.2g})".ljust(42)
-            + f"{low:8.2f} to {high:8.2f}   {share:6.1f} %  {bound:>10}   {verdict}"
+            f"  {j + 1}    {c:9.2f} {u:5.2g}  {low:7.2f} to {high:6.2f}  {share:6.1f} %  {bound:>8}"
+            f"  {verdict}"
         )
-    lines.append(f"Prior: {fit.prior.source}, relative sd {_list(100 * fit.prior.relative_sd)} %.")
+    prior_sd = dict.fromkeys(f"{100 * sd:.4g}" for sd in fit.prior.relative_sd)
+    known = _list(100 * fit.prior.relative_sd) if len(prior_sd) > 1 else next(iter(prior_sd))
+    lines.append(f"Prior: {fit.prior.source}, relative sd {known} %. u: standard uncertainty.")
     if result.proposals:
         lines.append("Next poses that would tell most, in this order:")
         for p in result.proposals:
@@ -145,7 +147,7 @@ def _levers(result: IdentifyResult, q: object, direction: object) -> np.ndarray:
 def _not_identified(share: float) -> str:
     if share < 10:
         return "repeats the prior"
-    return "measured, not to 5 %" if share >= 90 else "partly seen, not identified"
+    return "known, not to 5 %" if share >= 90 else "partly seen"
 
 
 def _list(values: object, digits: int = 4) -> str:

@@ -266,7 +266,7 @@ def _assumptions(
 
 def _table(runs: Sequence[PlannedRun]) -> list[str]:
     head = ("run", "pose", "direction", "steps", "force N", "k N/mm", "u mm", "joint torque Nm",
-            "time each")  # fmt: skip
+            "takes")  # fmt: skip
     rows = [head]
     for n, run in enumerate(runs, start=1):
         j = run.worst_joint

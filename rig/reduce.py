@@ -355,7 +355,7 @@ def _notes(runs: list[_Run], zeros: list[list[_Plateau]], datum: str) -> list[st
         firsts = [z[0].displacement for z in zeros]
         apart = (max(firsts) - min(firsts)) / MM
         notes.append(
-            f"The unloaded positions before the repetitions lie {apart:.4g} mm apart; "
+            f"The unloaded positions before the repetitions lie {apart:.2g} mm apart; "
             "each repetition counts from its own."
         )
     return notes

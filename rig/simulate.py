@@ -96,7 +96,7 @@ class Simulation:
             lines.append(f"With the effects {', '.join(self.effects)}; k is that of the springs.")
         for c in self.curves:
             u = 1e-3 * c.stiffness * c.relative_u
-            k = f"{1e-3 * c.stiffness:.2f} N/mm (standard uncertainty {u:.2g})"
+            k = f"{1e-3 * c.stiffness:.2f} N/mm (standard uncertainty {u:.2g} N/mm)"
             lines.append(
                 f"\nPose {c.pose}, direction {c.direction}: "
                 + (k if np.isfinite(c.stiffness) else "the arm does not give way along it")

@@ -1,10 +1,13 @@
-"""Progress of long work: on standard error while that is a terminal, otherwise silence."""
+"""What only a terminal is given: progress of long work, and lines folded to its width."""
 
 from __future__ import annotations
 
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TextIO
 
 Progress = Callable[[str, float], None]  # what is being done, and how much of it is: 0 to 1
 
@@ -29,3 +32,25 @@ def terminal_progress() -> Iterator[Progress]:
             bars.update(task, description=what, completed=fraction)
 
         yield show
+
+
+def folded(text: str, width: int) -> str:
+    """Lines that are too long go on below, deeper by two, and no word is torn that has a place."""
+    return "\n".join(_fold(line, width) for line in text.split("\n"))
+
+
+def folded_for(stream: TextIO, text: str) -> str:
+    """Folded where the stream is a terminal; files and pipes get the lines whole."""
+    return folded(text, shutil.get_terminal_size().columns) if stream.isatty() else text
+
+
+def _fold(line: str, width: int) -> str:
+    inside = line.lstrip(" ")
+    indent = " " * (len(line) - len(inside))
+    deeper = indent if not indent else indent + "  "
+    if len(line) <= width or len(deeper) > width // 2:
+        return line
+    return textwrap.fill(
+        inside, width, initial_indent=indent, subsequent_indent=deeper, replace_whitespace=False,
+        expand_tabs=False, break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip

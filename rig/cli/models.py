@@ -17,6 +17,7 @@ from rig.cli.options import (
     give,
     list_written,
     say,
+    show,
 )
 
 _Path = Annotated[
@@ -59,7 +60,7 @@ def couple(
     give(result, json_file)
     placement = best_for(model) if best_placement else None
     if placement is not None and json_file != "-":
-        typer.echo(placement.to_text())
+        show(placement.to_text())
     if figures is not None:
         from rig.coupling_figures import draw
 

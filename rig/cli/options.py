@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
@@ -51,7 +52,16 @@ def version(
 
 def say(text: str) -> None:
     """Progress and notes go to standard error: standard output belongs to results."""
-    typer.echo(text, err=True)
+    from rig.terminal import folded_for
+
+    typer.echo(folded_for(sys.stderr, text), err=True)
+
+
+def show(text: str) -> None:
+    """A result in words."""
+    from rig.terminal import folded_for
+
+    typer.echo(folded_for(sys.stdout, text))
 
 
 def give(result: Any, json_file: str | None) -> None:
@@ -60,7 +70,7 @@ def give(result: Any, json_file: str | None) -> None:
     if json_file == "-":
         typer.echo(text)
         return
-    typer.echo(result.to_text())
+    show(result.to_text())
     if json_file is not None:
         _write_json(Path(json_file), text + "\n")
 

@@ -5,11 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from drivers.interfaces import Command, LiveView, Loader, Prompt
 from rig.protocol import MeasurementProtocol
+
+
+class _Narrower:
+    """Leaves room for the ^C that a terminal shows: else that begins a line, and the bar stays."""
+
+    def __init__(self, inner: RenderableType) -> None:
+        self._inner = inner
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """A little narrower than the terminal."""
+        width = max(1, options.max_width - len("^C") - 1)
+        yield from console.render(self._inner, options.update_width(width))
+
+
+class Bar(Progress):
+    """A progress bar that Ctrl-C leaves in its line."""
+
+    def get_renderable(self) -> RenderableType:
+        """The bar."""
+        return _Narrower(super().get_renderable())
 
 
 class LoaderWithBar:
@@ -22,11 +42,12 @@ class LoaderWithBar:
         self.name = loader.name
         self._loader = loader
         console = Console(stderr=True)
-        self._bar = Progress(
+        self._bar = Bar(
             TextColumn("{task.description}"),
             BarColumn(),
             TextColumn("{task.completed:.0f} of {task.total:.0f} steps"),
             TimeRemainingColumn(),
+            TextColumn("left"),
             console=console,
             disable=not console.is_terminal,
         )

@@ -203,7 +203,8 @@ def compared_curves(
             if mine:
                 axes.errorbar([p.force for p in mine], [p.displacement * MM for p in mine],
                               np.nan_to_num([p.sd * MM for p in mine]), linestyle=line,
-                              marker=MARKERS[i % len(MARKERS)], markersize=4, capsize=3,
+                              marker=MARKERS[i % len(MARKERS)], capsize=3,
+                              markersize=4 + 3 * min(2, len(sets) - 1 - i), markerfacecolor="none",
                               color=COLOURS[i % len(COLOURS)], linewidth=1,
                               label=f"{label}: {branch}")  # fmt: skip
     axes.set_title(f"Direction {name}", fontsize=10)

@@ -130,10 +130,12 @@ def joints(session: Session, data: Node, pictures: Pictures) -> Section:
         return Section("joints", "Joints", (Paragraph((reason,), "warning"),), banners)
     condition = found["condition_number"]
     size = ("condition number ", *condition.number(3)) if condition else ("singular",)
+    free = found["null_dimension"]
     blocks: list[Block] = [
         Paragraph(
             ("These data determine ", *found["rank"].number(), " of 6 combinations of springs; ",
-             *found["null_dimension"].number(), " stay free (", *size, ")."), "answer",
+             *free.number(), " stays" if free.value == 1 else " stay", " free (", *size, ")."),
+            "answer",
         ),
         pictures.joints([session]),
         _joint_table(found),
@@ -175,7 +177,7 @@ def _verdict(identified: bool, share: float) -> Word:
         return Word("identified", "good")
     if share < 0.1:
         return Word("repeats the prior", "bad")
-    words = "measured, not to 5 %" if share >= 0.9 else "partly seen, not identified"
+    words = "known, not to 5 %" if share >= 0.9 else "partly seen"
     return Word(words, "open")
 
 

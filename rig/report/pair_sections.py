@@ -5,7 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rig.report.compare import aligned
-from rig.report.document import Block, Bullets, Facts, Paragraph, Row, Section, Table, Word, row
+from rig.report.document import (
+    Block,
+    Bullets,
+    Facts,
+    Paragraph,
+    Rich,
+    Row,
+    Section,
+    Table,
+    Word,
+    row,
+)
 from rig.report.findings import K
 from rig.report.gather import Gathered, Session
 from rig.report.pictures import Pictures
@@ -89,7 +100,12 @@ def comparison(gathered: Gathered, data: Node, pictures: Pictures) -> Section:
     blocks: list[Block] = [_overview(sessions, data)]
     pairs = list(data["comparison"])
     if pairs:
-        blocks += [_tested(gathered, pairs), *_remarks(gathered, pairs), *_how_tested(pairs)]
+        blocks += [
+            _in_words(gathered, pairs),
+            _tested(gathered, pairs),
+            *_remarks(gathered, pairs),
+            *_how_tested(pairs),
+        ]
     else:
         words = "No pose and direction has a stiffness in the first data set and in another one."
         blocks.append(Paragraph((words,), "warning"))
@@ -115,6 +131,23 @@ def _overview(sessions: Sequence[Session], data: Node) -> Table:
         rows.append(row(session.label, where, one["origin"].text(), state, verdict, *cells))
     header = ("data set", "date", "origin", "state", "verdict", *(f"k in {n} N/mm" for n in names))
     return Table("The data sets", header, tuple(rows), 5)
+
+
+def _in_words(gathered: Gathered, pairs: Sequence[Node]) -> Block:
+    """What the tests found, one sentence a comparison."""
+    return Bullets(tuple(_sentence(gathered, p) for p in pairs))
+
+
+def _sentence(gathered: Gathered, pair: Node) -> Rich:
+    first, second = (gathered.sessions[pair[side].value].label for side in ("first", "second"))
+    ratio, low, high = pair["ratio"]["value"], *pair["ratio"]["ci95"]
+    shown = (*ratio.number(), " times as stiff as ", first)
+    within = (" (95 %: ", *low.number(), " to ", *high.number(), " times)")
+    head = f"Direction {pair['direction'].text()}: "
+    if pair["differs"].value:
+        word = "stiffer" if pair["difference_N_per_mm"]["value"].value > 0 else "softer"
+        return (head, Word(f"{second} is {word}", "strong"), ", ", *shown, *within, ".")
+    return (head, "no difference is shown; ", second, " is ", *shown, *within, ".")
 
 
 def _tested(gathered: Gathered, pairs: Sequence[Node]) -> Table:

@@ -100,14 +100,14 @@ def _block(block: Block) -> dict[str, Any]:
 
 def _table(table: Table) -> dict[str, Any]:
     width = range(len(table.header))
-    long = [any(_length(row[i]) > _LONG for row in table.rows) for i in width]
+    longest = [max((_length(row[i]) for row in table.rows), default=0) for i in width]
     return {
         "kind": "table",
         "caption": _clean(table.caption),
         "header": [_clean(h) for h in table.header],
         "rows": [[{"parts": _parts(c)} for c in row] for row in table.rows],
         "words": table.words,
-        "long": long,
+        "long": [n if n > _LONG else 0 for n in longest],  # their shares of the room; 0: as needed
     }
 
 

@@ -49,6 +49,7 @@ class Feed:
         self.end: dict[str, str] | None = None
         self.viewers = 0
         self.resumed: list[int] = []  # items that a viewer had when it opened each stream
+        self.clients: list[str] = []  # who opened each stream
         self._server: _Server | None = None
         self.start()
 
@@ -148,6 +149,7 @@ class _Handler(BaseHTTPRequestHandler):
         last = self.headers.get("Last-Event-ID") or query.get("last", ["0"])[0]
         told, seq = int(last), 0
         feed.resumed.append(told)
+        feed.clients.append(client)
         if not told:
             self._event({"reset": "run"})
         if feed.recent:

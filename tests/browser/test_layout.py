@@ -59,6 +59,36 @@ return ids.filter((id) => {
 """
 
 
+@pytest.mark.parametrize("size", [(1920, 1080), (1024, 768), (960, 540), (844, 390), (780, 437)])
+@pytest.mark.parametrize("kind", ["mount", "unload"])
+def test_set_up_shows_force_what_to_do_and_the_drawing_at_once(
+    page: Viewer, feed: Feed, size: tuple[int, int], kind: str
+) -> None:
+    resize(page.here(), *size)
+    unload = replace(scenes.prompting(scenes.UNLOAD), turn=Turn("out", nan, nan, nan))
+    feed.state = scenes.setting_up() if kind == "mount" else unload
+    page.wait(partial(scene_shown, page, feed.state), "the scene")
+    time.sleep(0.3)
+    assert page.script(OUT_OF_SIGHT) == []
+    arrow = page.script("return document.querySelector('#arm .push').getBoundingClientRect().width")
+    assert arrow > 20
+
+
+# Selectors of what isn't wholly between the head of the page and the buttons at its foot.
+OUT_OF_SIGHT = """
+const wanted = ["#force", "#target", "#gauge-scale", "#prompt-text", "#prompt-choices", "#cue",
+  "#arm .push", "#arm .push-head", "#arm .link", "#facts", "#displacement"];
+const end = document.querySelector("footer").getBoundingClientRect().top;
+return wanted.filter((selector) => {
+  const e = document.querySelector(selector);
+  if (selector === "#cue" && !e.checkVisibility()) return false;
+  const box = e.getBoundingClientRect();
+  return box.height + box.width === 0 || box.top < 0 || box.bottom > end + 1 || box.left < 0
+    || box.right > innerWidth;
+});
+"""
+
+
 @pytest.mark.parametrize("size", [(390, 844), (844, 390)])
 def test_phone_keeps_controls_in_sight(page: Viewer, size: tuple[int, int]) -> None:
     resize(page.here(), *size)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from functools import partial
 from typing import Any, cast
 
 import pytest
@@ -23,6 +25,10 @@ document.addEventListener("visibilitychange", () => {
 """
 
 
+def live(window: Viewer) -> bool:
+    return not window.looks_old("force")
+
+
 def test_the_seventh_tab_loads_and_the_first_one_aborts(page: Viewer, feed: Feed) -> None:
     for _ in range(CONNECTIONS):
         last = Viewer(page.here(), feed.url, new="tab")
@@ -37,13 +43,32 @@ def test_a_command_finds_a_connection_though_all_are_taken(page: Viewer, feed: F
     for _ in range(CONNECTIONS - 1):
         last = Viewer(page.here(), feed.url, new="window")
         last.wait_for("viewer-text", "somebody else is the operator")
-    assert feed.viewers == CONNECTIONS
+    page.wait(lambda: feed.viewers == CONNECTIONS, "all streams")
     last.click("take")
     last.wait(lambda: last.seen("controls"), "the controls after taking over")
     last.press(ABORT)
     last.wait(lambda: commands(feed) == ["take_over", "abort"], "both commands")
     last.wait(lambda: last.text("alarms") == "", "live again")
     last.wait(lambda: feed.viewers == CONNECTIONS, "its stream in place of the one let go")
+
+
+def test_the_seventh_window_in_sight_loads_and_all_stay_live(page: Viewer, feed: Feed) -> None:
+    windows = [page]
+    for _ in range(CONNECTIONS):
+        windows.append(Viewer(page.here(), feed.url, new="window"))
+        windows[-1].wait_for("force-number", "126.4")
+    feed.show(force=Force(131.0, 0.0, 140.0, 1.4, stale=False))
+    for window in windows:
+        window.wait_for("force-number", "131.0")
+        window.wait(partial(live, window), "live")
+    assert feed.clients.count(feed.operator) == 1, "who operates never takes turns"
+
+
+def test_windows_take_no_turns_while_there_are_connections(page: Viewer, feed: Feed) -> None:
+    other = Viewer(page.here(), feed.url, new="window")
+    other.wait_for("force-number", "126.4")
+    time.sleep(3.0)
+    assert len(feed.resumed) == 2
 
 
 def test_a_hidden_tab_is_not_live_and_then_has_the_whole_run(page: Viewer, feed: Feed) -> None:

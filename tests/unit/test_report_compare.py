@@ -15,8 +15,10 @@ from scipy import stats
 from identification.estimate import Choice
 from identification.stiffness import Stiffness
 from identification.uncertainty import Contribution, Quantity, combined
+from rig.analyze import analyze
 from rig.dataset import Dataset, load
 from rig.report.compare import Pair, adjusted, aligned, paired, probability, same_instruments
+from rig.report.figures import compared_curves
 from rig.report.report import make
 from rig.report.wishes import Wishes
 from tests.unit.report_sets import Page, bench, linear, rewritten
@@ -125,6 +127,10 @@ def test_the_page_tells_a_softer_bench(tmp_path: Path) -> None:
     assert first["ratio"]["value"] == pytest.approx(70 / 80, rel=1e-3)
     assert first["same_instruments"]
     text = Page(report.to_html()).text
+    assert (
+        "Direction x: after.h5 is softer, 0.8750 times as stiff as before.h5 (95 %: 0.8661" in text
+    )
+    assert "Direction x: no difference is shown; again.h5 is 1.000 times as stiff as" in text
     assert "✗ differs" in text
     assert "○ no difference shown" in text
     assert "the gains cancel, since the instruments are the same" in text
@@ -158,3 +164,11 @@ def test_the_same_pose_and_direction_are_one_under_any_name() -> None:
     elsewhere = named(x="Q x")  # poses by other names
     assert aligned([one, elsewhere]) == {"x": ["x", "x"], "y": ["y", None]}
     assert aligned([]) == {}
+
+
+def test_of_curves_over_each_other_the_lower_one_stays_visible(tmp_path: Path) -> None:
+    sets = [(name, analyze(load(bench(tmp_path / name)))) for name in ("a.h5", "b.h5")]
+    axes = compared_curves("x", ["x", "x"], sets, ()).axes[0]
+    lines = [c.lines[0] for c in axes.containers]
+    assert [line.get_markerfacecolor() for line in lines] == ["none", "none"]
+    assert lines[0].get_markersize() > lines[1].get_markersize() + 2

@@ -359,6 +359,17 @@ def test_pdf_takes_dangerous_words_as_words(evil: Report) -> None:
     assert len(content) > 50_000
 
 
+def test_on_paper_columns_of_words_share_the_room_by_their_length() -> None:
+    pytest.importorskip("typst", reason="the PDF needs typst")
+
+    def pages(first: int, second: int) -> int:
+        table = Table("t", ("a", "b"), (("stiffness " * first, "k " * second),) * 40, 2)
+        content = pdf(Document("", "", (), (Section("s", "", (table,)),), ""))
+        return int(re.search(rb"/Count (\d+)", content).group(1))  # type: ignore[union-attr]
+
+    assert pages(9, 10) == pages(5, 10), "a long text beside a short one needs no second line"
+
+
 def test_on_paper_text_fills_the_page_that_has_no_room_for_a_figure() -> None:
     pytest.importorskip("typst", reason="the PDF needs typst")
     svg = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100" width="100" height="100"/>'

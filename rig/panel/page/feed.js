@@ -3,6 +3,10 @@
 export const STALE_S = 1.0;
 const RECONNECT_S = 4.0;
 const YIELD_MS = 500; // what has not got through by then lacks a connection
+const CONNECTIONS = 6;
+const HEARD_S = 5; // a window that was not heard of for so long is gone
+const TURN_S = 2; // a crowded window holds its stream for so long,
+const PAUSE_MS = 300; // and leaves its connection to others for so long: less than turns a value old
 // Two clocks drift apart by some 100 ppm: the smallest delay seen may rise by twice that.
 const CREEP = 2e-4;
 
@@ -48,6 +52,9 @@ export class Freshness {
  * Browsers allow six connections to a server, all tabs together, and a stream holds one. So a
  * hidden tab lets go of its stream once there are other tabs, and every tab does for a command
  * that finds no connection. `away`: let go on purpose, and nothing has come since.
+ *
+ * Where as many windows are in sight as there are connections, one more could not even load. So
+ * those that only look on then take turns: each pauses now and then, too shortly to be seen.
  */
 export class Feed {
   constructor(address, handlers) {
@@ -60,9 +67,14 @@ export class Feed {
     this.source = null;
     this.last = "";
     this.company = false; // another tab of this browser has been heard of
+    this.operates = false;
+    this.pausing = 0; // the timer of a turn left to others
     this.tabs = new BroadcastChannel("panel-stream");
-    this.tabs.onmessage = () => {
+    this.name = Math.random();
+    this.heard_s = new Map(); // when each other tab was heard last
+    this.tabs.onmessage = ({ data }) => {
       this.company = true;
+      this.heard_s.set(data, nowS());
       if (document.hidden) this.release();
     };
     document.addEventListener("visibilitychange", () => {
@@ -76,7 +88,7 @@ export class Feed {
     this.source?.close();
     this.since_s = nowS();
     this.source = new EventSource(this.address(this.last));
-    this.tabs.postMessage("connects");
+    this.tabs.postMessage(this.name);
     this.source.onopen = () => {
       this.connected = true;
       this.since_s = nowS();
@@ -91,8 +103,10 @@ export class Feed {
 
   /** Lets go of the connection; the values are no longer live. */
   release() {
-    if (this.source === null) return;
-    this.source.close();
+    if (this.source === null && !this.pausing) return;
+    clearTimeout(this.pausing);
+    this.pausing = 0;
+    this.source?.close();
     this.source = null;
     this.connected = false;
     this.away = true;
@@ -118,11 +132,33 @@ export class Feed {
   /** To be called a few times a second: replaces a connection that brings nothing. */
   check() {
     if (this.ended || this.source === null) return;
+    if (this.#crowded() && this.source.readyState === EventSource.OPEN && nowS() - this.since_s > TURN_S) {
+      this.#pause();
+      return;
+    }
     const silent_s = nowS() - Math.max(this.since_s, this.freshness.lastArrival_s ?? 0);
     if (silent_s > RECONNECT_S) this.connect();
   }
 
+  /** Whether windows in sight take all connections, and this one only looks on. */
+  #crowded() {
+    if (nowS() - (this.told_s ?? 0) > 1) {
+      this.told_s = nowS();
+      this.tabs.postMessage(this.name);
+    }
+    const others = [...this.heard_s.values()].filter((at_s) => nowS() - at_s < HEARD_S);
+    return !this.operates && others.length >= CONNECTIONS - 1;
+  }
+
+  /** Lets go for a moment. What waited for a connection comes first, then this stream again. */
+  #pause() {
+    this.source.close();
+    this.source = null;
+    this.pausing = setTimeout(() => { this.pausing = 0; this.resume(); }, PAUSE_MS);
+  }
+
   #receive(message) {
+    if (message.operator) this.operates = message.operator.you;
     if (typeof message.t_s === "number") {
       this.freshness.arrived(message.t_s);
       this.away = false;
