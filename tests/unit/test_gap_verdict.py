@@ -31,8 +31,7 @@ from identification.gap.verdict import (
     BENCH_DOUBT,
     DOUBT,
     EXPLAINED,
-    TAKES_LINEAR,
-    TAKES_THREE,
+    TAKES_MORE,
     TAKES_TWO,
     THREE,
     _heir,
@@ -153,19 +152,12 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         assert found_out == pytest.approx(share - doubted)
     # two of them explain nearly as much: then they are meant, whatever the third does
     third = said(three, (1e-5, 1e-5, 5e-6), 0.0)
-    for worth, unknown in ((TAKES_THREE - 1, 0.0), (TAKES_THREE + 1, 0.9)):
+    for worth, unknown in ((TAKES_MORE - 1, 0.0), (TAKES_MORE + 1, 0.9)):
         two = said(three[1:], (2e-5, 1e-6), -worth)
         both = replace(found, explanations=(third, two), unknown=-800.0, alone={})
         p = weighed(both, {}).probabilities
         assert p["unknown"] == pytest.approx(unknown, abs=0.1)
         assert (p["thermal_drift"] > 0.9) == (unknown == 0)
-    # what is linear can stand for more that the others' laws lack
-    links = tuple(part(w, [0]) for w in ("base_compliance", "link_flexibility", "pose_error"))
-    third = said(links, (1e-5, 1e-5, 5e-6), 0.0)
-    for worth, unknown in ((TAKES_LINEAR - 1, 0.0), (TAKES_LINEAR + 1, 0.9)):
-        both = replace(found, explanations=(third, said(links[1:], (2e-5, 1e-6), -worth)),
-                       unknown=-800.0, alone={})  # fmt: skip
-        assert weighed(both, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
 
 
 def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> None:
@@ -174,7 +166,7 @@ def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> N
     found = search(small_engine_of(bench), variants)
     on_arm = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=True)))
     gain, link, knee = (part(w, [0]) for w in ("force_scale", "link_flexibility", "joint_yield"))
-    for second, most in ((knee, TAKES_TWO), (link, TAKES_LINEAR)):
+    for second, most in ((knee, TAKES_TWO), (link, TAKES_MORE)):
         for worth in (most - 1, most + 1):
             pair, one = said((gain, second), (3e-5, 3e-6)), said((second,), (1e-5,), -worth)
             both = replace(found, explanations=(pair, one), unknown=-800.0, alone={})
