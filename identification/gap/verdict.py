@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.explanation import Explanation, Found
+from identification.gap.explanation import LAW_REMAINDER, Explanation, Found
 from identification.gap.noise import UNSURE
 from identification.gap.penalties import LEAST_SHARE, joints_of
 from identification.gap.words import LINEAR, WORDS
@@ -105,6 +105,7 @@ TELLING = LEAST_SHARE  # of the largest: what is smaller is no trouble beside it
 TAKES_TWO = 8.0
 # Nats that a third effect has to bring beyond which it takes all three: of 900 hidden cases, known
 # effects had asked for a third by 13 to 75 nats, what stood in for a missing word by 91 and 613.
+# Laws that are off by LAW_REMAINDER of what they do ask for more where the gap stands out far.
 # Of some that are linear, two as well, each may be what the others' laws lack: links that bend
 # otherwise than beams do had asked for a gain of the laser by 36 and 52 nats.
 TAKES_MORE = 80.0
@@ -120,6 +121,9 @@ def _simpler(
     if many < (_TWO if arm else _MANY):
         return None
     most = TAKES_MORE if many >= _MANY or e.words <= LINEAR else TAKES_TWO
+    if many >= _MANY:
+        none = next((f.log_weight for f in ranked if not f.parts), e.log_weight)
+        most = max(most, LAW_REMAINDER**2 * (e.log_weight - none))
     near = (
         f
         for f in ranked

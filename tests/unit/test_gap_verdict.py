@@ -14,7 +14,12 @@ from identification.gap.choice import chosen_of, foresees
 from identification.gap.compare import Scored, log_mean
 from identification.gap.effects import library
 from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation, _counted, up_to_likeliest
+from identification.gap.explanation import (
+    LAW_REMAINDER,
+    Explanation,
+    _counted,
+    up_to_likeliest,
+)
 from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes, log_joints
 from identification.gap.penalties import _apart, _on_its_own
@@ -158,6 +163,12 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         p = weighed(both, {}).probabilities
         assert p["unknown"] == pytest.approx(unknown, abs=0.1)
         assert (p["thermal_drift"] > 0.9) == (unknown == 0)
+    # of a gap that stands out far, what the laws of two are off asks for more
+    none = replace(third, parts=(), sizes=(), log_weight=-1e6, log_good=-1e6)
+    for share, unknown in ((0.9, 0.0), (1.1, 0.9)):
+        two = said(three[1:], (2e-5, 1e-6), -share * LAW_REMAINDER**2 * 1e6)
+        both = replace(found, explanations=(third, two, none), unknown=-1e5, alone={})
+        assert weighed(both, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
 
 
 def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> None:
