@@ -78,7 +78,7 @@ def test_every_command_stands_in_the_readme_and_the_changelog() -> None:
 def test_the_readmes_blind_figures_are_those_of_the_page() -> None:
     readme, page = ((HOME / n).read_text("utf-8") for n in ("README.md", "docs/blind.md"))
     rows = readme.partition("## Blind check")[2].partition("| measure |")[2].partition("\n\n")[0]
-    first = page.partition("\n## 300 cases")[2].partition("\n## ")[0]
+    first = re.split(r"\n## (?=\d+ cases)", page)[1]  # of 300 one or two may not have been drawn
     figures = re.findall(r"(\d\.\d+) \((\d+ of \d+)\) \| (\d\.\d+ to \d\.\d+)", rows)
     assert "| exactly the true word | " in rows  # the least flattering one, too
     assert len(figures) >= 4
