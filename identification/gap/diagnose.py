@@ -197,7 +197,7 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         verdict=verdict,
         probabilities=found.probabilities,
         effects=_effects(found, chosen, known),
-        where=NOWHERE if verdict == "none" else locate(engine, fitted, structural),
+        where=NOWHERE if verdict == "none" else locate(engine, fitted, chosen.sizes, structural),
         noise=noise_of(bench),
         before=sample_rms(bench, stated_prediction(engine)),
         after=_left(engine, fitted),

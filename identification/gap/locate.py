@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,8 +33,9 @@ class Where:
 NOWHERE = Where((), (), {}, (), (), (), None, 0.0)
 
 
-def locate(engine: Engine, fit: Fit, gap: Array) -> Where:
-    """From the main effect's contribution; without one, from the gap (n,) that springs leave."""
+def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Where:
+    """From the main effect's contribution; without one, from the gap (n,) that springs leave.
+    sizes: of the effects, rms m."""
     bench, n = engine.bench, engine.bench.rows.n
     main = fit.contribution(engine, 0)[:n] if fit.parts else gap
     per_setup = _size_per(bench.rows.setup, _visible(engine, fit, main), len(bench.data.setups))
@@ -52,7 +54,7 @@ def locate(engine: Engine, fit: Fit, gap: Array) -> Where:
         force=_ranges(engine, rows),
         branches=tuple(BRANCH_NAMES[b] for b in np.unique(bench.rows.branch[rows])),
         repetitions=tuple(int(r) for r in np.unique(bench.rows.repetition[rows])),
-        joints=_joints(engine, fit),
+        joints=_joints(engine, fit, sizes),
         seen_by_encoders=(word.startswith("joint_") if bench.has_q and word and
                           word not in INSTRUMENTS else None),
         share=inside / total if total > 0 else 0.0,
@@ -93,12 +95,15 @@ def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
     return out
 
 
-def _joints(engine: Engine, fit: Fit) -> tuple[int, ...]:
-    """Joints (from 1) in which the joint effects of the explanation sit; of a bench, none."""
+def _joints(engine: Engine, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]:
+    """Joints (from 1) in which those joint effects of the explanation sit that matter beside its
+    largest effect, by their sizes (rms m); of a bench, none."""
     if not engine.bench.data.arm:
         return ()
     out: list[int] = []
     for i, p in enumerate(fit.parts):
+        if sizes[i] < _COUNTS * max(sizes):
+            continue
         if "joint" in p.variant.info:
             out.append(int(p.variant.info["joint"]) + 1)
         elif "joints" in p.variant.info and p.word == "joint_stiffness_error":
@@ -107,6 +112,9 @@ def _joints(engine: Engine, fit: Fit) -> tuple[int, ...]:
             shows = (np.abs(w) > 2 * np.sqrt(np.diag(cov))) & (part >= _SHOWS * part.max())
             out += [j + 1 for j, s in zip(p.variant.info["joints"], shows, strict=True) if s]
     return tuple(dict.fromkeys(out))
+
+
+_COUNTS = 0.1  # of the largest effect, a hundredth of its square: there the gap does not lie
 
 
 def _moved(engine: Engine, variant: Variant) -> Array:
