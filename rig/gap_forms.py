@@ -5,7 +5,7 @@ Inside, laws are SI (`identification.gap.forms`); here lengths are mm, joints co
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -236,8 +236,13 @@ class ModelEffects:
     @property
     def left_behind(self) -> tuple[str, ...]:
         """Words of which nothing lasts, each once."""
-        stay = {f.word for f in self.lasting}
-        return tuple(dict.fromkeys(f.word for f in self.forms if f.word not in stay))
+        return left_behind(self.forms)
+
+
+def left_behind(forms: Sequence[Form]) -> tuple[str, ...]:
+    """Words of which nothing lasts beyond the measured session, each once."""
+    stay = {f.word for f in forms if lasting(f).law.terms}
+    return tuple(dict.fromkeys(f.word for f in forms if f.word not in stay))
 
 
 def effects_of(model: ArmModel) -> ModelEffects:

@@ -113,11 +113,6 @@ def forms(result: GapResult) -> list[Form]:
     ]
 
 
-def left_behind(result: GapResult) -> tuple[str, ...]:
-    """Effects of the measured session, which say nothing of the next; each once."""
-    return tuple(dict.fromkeys(f.word for f in forms(result) if not lasting(f).law.terms))
-
-
 def _effects(diagnosis: Diagnosis, dataset: Dataset) -> list[str]:
     entries = list(diagnosis.known_effects)
     comments = ["of the model that was given"] * len(entries)

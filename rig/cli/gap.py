@@ -113,10 +113,11 @@ def diagnose(
 def _write(result: Diagnosis, measured: Dataset, model: Path | None, protocol: Path | None) -> None:
     """The model with its effects and the next protocol, where asked for."""
     if model is not None:
-        from rig.gap_model import OF_THIS_SESSION, left_behind, write_model
+        from rig.gap_forms import left_behind
+        from rig.gap_model import OF_THIS_SESSION, forms, write_model
 
         write_model(result, measured, model)
-        for word in left_behind(result.result):
+        for word in left_behind(forms(result.result)):
             say(f"{model}: {word} is {OF_THIS_SESSION}")
         say(f"{model}: written. Next: rig simulate {model} PROTOCOL.yaml")
     if protocol is not None:

@@ -22,10 +22,11 @@ from identification.gap.words import WORDS
 from rig.dataset import Dataset, write
 from rig.diagnose import Diagnosis, diagnose
 from rig.errors import InputError
+from rig.gap_forms import left_behind
 from rig.gap_model import (
     OF_THIS_SESSION,
     check_writable,
-    left_behind,
+    forms,
     model_text,
     springs,
     write_model,
@@ -137,13 +138,13 @@ def test_a_model_predicts_on_its_own_procedure_what_was_fitted(
     rows = result.bench.rows
     if word in OF_SESSION:
         assert found.effects == ()
-        assert left_behind(result) == (word,)
+        assert left_behind(forms(result)) == (word,)
         assert f"; {OF_THIS_SESSION}\n  - name: {word}\n" in (tmp_path / "m.yaml").read_text()
         top = [np.max(plain[rows.setup == s]) for s in range(4)]
         np.testing.assert_allclose([c.displacement[-1] for c in found.curves], top, rtol=1e-3)
         return
     assert found.effects == (word,)
-    assert left_behind(result) == ()
+    assert left_behind(forms(result)) == ()
     made = np.concatenate([c.displacement for c in found.curves])
     if word == "joint_stiffness_error":
         top = [np.max(plain[rows.setup == s] + effect[rows.setup == s]) for s in range(4)]

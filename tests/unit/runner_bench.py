@@ -118,3 +118,12 @@ def at(bench: Bench, step: int, act: Any, phase: str = "sampling", samples: int 
             act()
 
     bench.loader.script = script
+
+
+def resumed(bench: Bench) -> int:
+    """Mends what is broken and goes on; how many samples there were before."""
+    before = len(bench.records("sample"))
+    bench.arm.broken.clear()
+    bench.loader.script = lambda _view: None
+    bench.run()
+    return before

@@ -12,7 +12,7 @@ from drivers.errors import ReadTimeout, SafetyStop
 from drivers.interfaces import Command, LiveView
 from rig.errors import MeasurementStopped
 from rig.protocol import parse_protocol
-from tests.unit.runner_bench import ALL, MOVING, PROTOCOL, Bench, at
+from tests.unit.runner_bench import ALL, MOVING, PROTOCOL, Bench, at, resumed
 
 
 @pytest.fixture
@@ -65,10 +65,7 @@ def test_resume_goes_on_at_the_interrupted_step(bench: Bench, step: int) -> None
     at(bench, step, lambda: bench.arm.broken.update(laser=error))
     with pytest.raises(ReadTimeout):
         bench.run()
-    before = len(bench.records("sample"))
-    bench.arm.broken.clear()
-    bench.loader.script = lambda _view: None
-    bench.run()
+    before = resumed(bench)
     assert bench.steps() == ALL
     assert len(bench.records("sample")) > before
     settled = [r for r in bench.good() if r["step"] == step and r["values"]["settled"]]
@@ -168,10 +165,7 @@ def test_resume_does_not_repeat_what_is_done(bench: Bench) -> None:
     bench.loader.script = script
     with pytest.raises(ReadTimeout):
         bench.run()
-    before = len(bench.records("sample"))
-    bench.arm.broken.clear()
-    bench.loader.script = lambda _view: None
-    bench.run()
+    before = resumed(bench)
     assert bench.steps() == ALL
     assert {r["repetition"] for r in bench.records("sample")[before:]} == {2}
     assert {r["step"] for r in bench.records("sample")[before:]} == {0, 2, 3}

@@ -86,19 +86,21 @@ def variants(bench: Bench) -> list[Variant]:
     )
     if bench.data.arm:
         out.append(_one_after_the_other(bench, [s * top for s in STEPS], scales))
-    out += [v for share in forces for law in SEATED
-            if (v := _some_stays(bench, law, share * top, scales))]  # fmt: skip
+    if _comes_back(bench):
+        out += [_some_stays(bench, law, share * top, scales) for share in forces for law in SEATED]
     return [*out, *_slacks(bench)]
 
 
-def _some_stays(bench: Bench, law: str, f0: float, scales: tuple[float, ...]) -> Variant | None:
-    """A seat of which a part stays as it was pressed; None where no force comes back to show it."""
+def _comes_back(bench: Bench) -> bool:
+    """Whether the force does, to show what stays."""
     size, sign = pressed(bench)
-    if not np.any(_so_far(bench, size, sign)[0] - size > _BACK * size.max()):
-        return None
+    return bool(np.any(_so_far(bench, size, sign)[0] - size > _BACK * size.max()))
+
+
+def _some_stays(bench: Bench, law: str, f0: float, scales: tuple[float, ...]) -> Variant:
+    """A seat of which a part stays as it was pressed."""
     laws = ((law, f0), (law + STAYS, f0))
-    one, other = (lost(bench, *each) for each in laws)
-    columns = [bench.add(bench.outside_column(c)) for c in (one, other)]
+    columns = [_late(bench, *each) for each in laws]
     label = f"{law} {f0 / float(np.abs(bench.load).max()):.3g}, some stays"
     return variant(WORD, label, columns, scales, each=True, prior=_STAYING, force_N=f0, laws=laws)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -30,14 +31,15 @@ class Flow:
     weight: Array | None = None
     square: bool = False
 
-    @property
+    @cached_property
     def key(self) -> bytes:
         """The same of flows that are the same."""
         weight = 0.0 if self.weight is None else self.weight
         given = (self.load, self.radius, self.time, self.fresh, weight, self.square)
         return b"".join(np.asarray(v).tobytes() for v in given)
 
-    def alike(self) -> bytes:
+    @property
+    def kind(self) -> bytes:
         """The same of flows that can be made in one go."""
         weight = b"" if self.weight is None else self.weight.tobytes()
         return self.fresh.tobytes() + weight
@@ -63,7 +65,7 @@ def make(bench: Bench, flows: Sequence[Flow]) -> None:
     by_kind: dict[bytes, dict[bytes, Flow]] = {}
     for flow in flows:
         if flow.time > 0 and flow.key not in bench.flows:
-            by_kind.setdefault(flow.alike(), {})[flow.key] = flow
+            by_kind.setdefault(flow.kind, {})[flow.key] = flow
     for many in by_kind.values():
         first, size = next(iter(many.values())), [len(f.radius) for f in many.values()]
         every = flowing_play(

@@ -40,7 +40,7 @@ def variants(bench: Bench) -> list[Variant]:
     scales = tuple(s * top for s in shares(bench, SHARES))
     if not top > 0:
         return []
-    amplifiers, several = _Amplifiers(bench, _axes(bench)), len(_axes(bench)) > 1
+    amplifiers = _Amplifiers(bench, _axes(bench))
     named, free = {k: [path] for k, path in paths(bench).items()}, free_paths(bench)
     if free:
         named["rates"] = rates(bench)
@@ -50,7 +50,7 @@ def variants(bench: Bench) -> list[Variant]:
         often = 2.0 if label == "rates" else 1.0
         out.append(variant(WORD, label, amplifiers.alike(given), scales, prior=often, names=("",),
                            **same))  # fmt: skip
-        if several:
+        if len(amplifiers.axes) > 1:
             out.append(variant(WORD, f"{label}, each component", amplifiers.own(given), scales,
                                names=tuple(amplifiers.axes), **same))  # fmt: skip
     out += _each_run(bench, scales)
@@ -71,7 +71,8 @@ def _free(
     own = amplifiers.own(free_path(bench, fewer.pieces).T)
     out.append(free_variant(WORD, f"{label}, each component", fewer, own, scales, tuple(axes),
                             prior=1.0))  # fmt: skip
-    together, along = amplifiers.together(hats), _alike(bench)
+    along = _alike(bench)
+    together = amplifiers.together(hats, along)
     if together != plain:
         v = free_variant(WORD, f"{label}, all components", way, together, scales, ("",), prior=1.0)
         out.append(replace(v, info={**v.info, "along": along}))
@@ -95,9 +96,8 @@ class _Amplifiers:
         every = [component(self.bench, a, p) for a in self.axes.values() for p in given]
         return [self.bench.add(c) for c in every]
 
-    def together(self, given: Iterable[Array]) -> list[int]:
-        """A column a path."""
-        along = _alike(self.bench)
+    def together(self, given: Iterable[Array], along: tuple[float, float, float]) -> list[int]:
+        """A column a path; along: of which all read the same."""
         return [self.bench.add(component(self.bench, along, p)) for p in given]
 
 
