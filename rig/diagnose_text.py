@@ -72,6 +72,9 @@ LOOKS_LIKE = {
     "bumps, cross-talk or a damaged instrument; to be sure, measure between these levels",
     "jumps": "the displacement jumps between holds, elsewhere in every run: see to what sticks and "
     "lets go, and to the laser's mounting; to be sure, hold one load for long",
+    "settles": "the displacement goes on while the load stands, and no joint does that: see to "
+    "what rig and laser stand on, and to glue, rubber or wood; to be sure, hold one load for long, "
+    "then none",
     "jerks": "it jumps at a few places, and stays there: a grip that slips, a part that cracks, a "
     "counter that loses pulses; to be sure, look at the curve there, and repeat the run",
     "damage": "it gets softer for good, the further it was loaded: fibres or bonds that break; to "

@@ -5,10 +5,9 @@ from __future__ import annotations
 from identification.gap.earned import FREE, noise_of
 from identification.gap.explanation import Explanation, Found
 from identification.gap.penalties import LEAST_SHARE
-from identification.gap.verdict import TAKES_MORE
+from identification.gap.verdict import TAKES_MORE, TAKES_TWO
 from identification.gap.words import LINEAR
 
-FAR_WORSE = 12.0  # nats
 WORTH = 3.0  # nats that one effect more has to bring before it is named;
 # a third one more: what it does to some channel may be how far the other two's laws are off.
 WORTH_OF_THIRD = 10.0
@@ -26,7 +25,7 @@ def chosen_of(found: Found, verdict: str) -> Explanation:
     mine = [e for e in found.explanations if verdict in e.words]
     mine = [e for e in mine if not _needless(found, e)] or mine
     first = [e for e in mine if e.parts[0].word == verdict]
-    most = TAKES_MORE if mine[0].words <= LINEAR else FAR_WORSE
+    most = TAKES_MORE if mine[0].words <= LINEAR else TAKES_TWO
     if first and first[0].log_weight > mine[0].log_weight - most:
         mine = first
     held = [e for e in mine if foresees(found, e)]

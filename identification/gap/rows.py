@@ -128,6 +128,9 @@ def reduce_rows(data: GapData) -> Rows:
     still = partial(_still, bins, hold, holds)
     steadied, steady = still(data.force, data.instruments.force)
     rested, rests = still(data.displacement, data.instruments.displacement)
+    meter = data.instruments
+    stretch = _consecutive(_ids(np.column_stack([run, branch, step])))
+    on_its_way = _on_its_way(force, displacement, stretch, meter.force, meter.displacement)
     return Rows(
         time=mean(data.time), session=mean(_session(data)), clock=data.session is not None, run=run,
         setup=setup, repetition=first(data.repetition), branch=branch, step=step, hold=holds,
@@ -140,9 +143,27 @@ def reduce_rows(data: GapData) -> Rows:
         displacement_trend=bins.trend(data.time, data.displacement),
         tangential=bins.mean_of(data.tangential), q=bins.mean_of(data.q),
         temperature=bins.mean_of(data.temperature), simulated=bins.mean_of(data.simulated),
-        zero=(branch == ZERO) & (step <= 0), continuous=bins.running, starts=_changes(run),
-        hold_starts=_changes(holds),
+        zero=(branch == ZERO) & (step <= 0) & ~on_its_way,
+        continuous=bins.running, starts=_changes(run), hold_starts=_changes(holds),
     )  # fmt: skip
+
+
+def _on_its_way(
+    force: Array, displacement: Array, level: Ints, sd_force: float, sd_displacement: float
+) -> Flags:
+    """(n,) rows at a level (n,) at which the load is not yet there: what is recorded all the time
+    bears the name of the next level at once. Force and displacement are both where neither ends,
+    about as far: a drift or a lag moves one of them, creep the other. sd: of one sample."""
+    last = np.append(np.flatnonzero(np.diff(level)), len(level) - 1)[level]
+    off_f, off_u = force - force[last], displacement - displacement[last]
+    seen = (np.abs(off_f) > _SEEN * sd_force) & (np.abs(off_u) > _SEEN * sd_displacement)
+    f, u = np.abs(off_f) / (np.ptp(force) or 1.0), np.abs(off_u) / (np.ptp(displacement) or 1.0)
+    alike = (f < _ABOUT * u) & (u < _ABOUT * f)
+    return np.asarray(seen & (np.maximum(f, u) > _AWAY) & alike, dtype=bool)
+
+
+_SEEN = 3.0  # standard deviations
+_AWAY, _ABOUT = 0.01, 4.0  # of the range; as far, by shares of the range, to a factor
 
 
 def _still(

@@ -47,8 +47,10 @@ def size_of(engine: Engine, fitted: Fit, index: int) -> float:
         moved = moved - moved[_zeroed_at(engine)]
     root = np.sqrt(rows.weight / rows.weight.sum())
     A = (engine.base.columns[: rows.n, springs] * engine.base.sd[springs]) * root[:, None]
-    pulls = fitted.pulls[springs]
-    limits = np.minimum(-BOUND - pulls, -_ROOM), np.maximum(BOUND - pulls, _ROOM)
+    pulls, bound = fitted.pulls[springs], BOUND * engine.base.sd[springs]
+    # what is stated of a stiffness: its inverse goes further to the soft side
+    softest = BOUND / np.maximum(1 - bound, _LEAST)
+    limits = np.minimum(-BOUND / (1 + bound) - pulls, -_ROOM), np.maximum(softest - pulls, _ROOM)
     triangle = np.asarray(np.linalg.qr(np.column_stack([A, moved * root]), mode="r"))
     A, y = triangle[:, :-1], triangle[:, -1]
     left = float(np.sqrt(2 * lsq_linear(A, y, limits, method="bvls").cost))
@@ -56,6 +58,7 @@ def size_of(engine: Engine, fitted: Fit, index: int) -> float:
 
 
 _ROOM = 1e-6  # a spring at its limit
+_LEAST = 0.05  # of a stiffness: less is not stated
 
 
 def _zeroed_at(engine: Engine) -> Ints:

@@ -25,12 +25,13 @@ from identification.gap.data import Array
 from identification.gap.effects.drift import by_direction, free_path, path_root
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Found, Likeness
+from identification.gap.history import retarded
 from identification.gap.parts import Part, part_sizes
 from identification.gap.priors import LOG_UNKNOWN
-from identification.gap.variants import Variant, variant
+from identification.gap.variants import Variant, smooth_root, variant
 from identification.gap.verdict import weighed
 
-KINDS = 5
+KINDS = 6
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the largest response
 # Of fewer periods (in the direction that was measured least, the setup with the shortest stroke) a
 # swing is a drift, and a wave an elastic curve.
@@ -72,7 +73,7 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     if bench.course.rests:
         return swings
     waves = _waves(bench, base, target)
-    return [*_slopes(bench), *swings, *waves, *_rough(bench), *_jumps(bench)]
+    return [*_slopes(bench), *swings, *waves, *_rough(bench), *_jumps(bench), *_settles(bench)]
 
 
 def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[Likeness, ...]:
@@ -172,6 +173,28 @@ def _jumps(bench: Bench) -> list[Variant]:
         for k in first
     ]
     return [variant("jumps", "between holds", columns, _scales(bench), positive=False)]
+
+
+def _settles(bench: Bench) -> list[Variant]:
+    """The displacement goes on after every change of the load, in every setup by amounts and times
+    of its own; what went on goes back between two runs, as the session's clock tells."""
+    rows = bench.rows
+    inner = np.diff(rows.time)
+    step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 0.0
+    if not step > 0:
+        return []
+    times = step * np.array(SETTLING)
+    times = times[times < bench.course.session_span / 3]
+    line = np.tile((bench.slope * bench.load)[:, None], (1, len(times)))
+    z = retarded(line, times, rows, bench.rest, None)
+    z /= float(np.abs(z).max()) or 1.0
+    masks = [(rows.setup == s).astype(float) for s in np.unique(rows.setup)]
+    columns = [bench.add(bench.outside_column(m * c)) for m in masks for c in z.T]
+    root = np.asarray(np.kron(np.eye(len(masks)), smooth_root(len(times), 0.5)), dtype=float)
+    return [variant("settles", "each setup", columns, _scales(bench), root, positive=False)]
+
+
+SETTLING = (3.0, 9.0, 27.0, 81.0, 243.0)  # times s of a reading each second
 
 
 def _periodic(

@@ -92,7 +92,19 @@ def jumps(rows: pd.DataFrame) -> Array:
     return out
 
 
+def settles(rows: pd.DataFrame) -> Array:
+    """The stand goes on under the load, by a time of 20 s, and goes back between the runs."""
+    share, run = share_of(rows), run_of(rows)
+    kept = np.exp(-np.diff(rows["session_s"], prepend=0.0) / 20.0)
+    load = np.where(np.diff(run, prepend=-1) == 0, share, 0.0)
+    out = np.zeros(len(rows))
+    for i in range(1, len(rows)):
+        out[i] = load[i] + kept[i] * (out[i - 1] - load[i])
+    return out
+
+
 KINDS: dict[str, Added] = {
+    "settles": settles,
     "jumps": jumps,
     "swings": swing(61.0),
     "slopes": slopes,

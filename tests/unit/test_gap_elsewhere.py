@@ -99,6 +99,18 @@ def test_what_is_far_worse_beside_the_best_is_not_looked_at_again() -> None:
     assert max(logs) - min(logs) < 61.0  # 60, and what priors do
 
 
+def test_what_a_controller_takes_back_it_had_clamped() -> None:
+    """It gives way at once, and no metal flows back."""
+    bench = make_bench(arm_data())
+    sharp = [v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp"]
+    for taken in (False, True):
+        mine = [v for v in sharp if ("taken back" in v.label) == taken]
+        assert mine
+        finer = joint_yield.refined(bench, mine[0])
+        assert any("flows back" in v.label for v in (*mine, *finer)) != taken
+        assert any(v.info["flow_s"] > 0 for v in finer) != taken
+
+
 def test_a_place_without_load_has_no_knee() -> None:
     bench = make_bench(arm_data(directions="x"))
     sharp = [v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp"]

@@ -19,6 +19,7 @@ from identification.gap.forms.friction import _net, describe_backlash
 from identification.gap.refine import refine
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
 from tests.unit.test_gap_weights import UP, hanging
 
@@ -165,3 +166,14 @@ def test_a_play_within_a_load_from_one_side_is_seldom_and_sharp(runs_on: bool) -
     odds = np.exp(-20.0) if runs_on else 0.05
     assert coarse[False] == pytest.approx(odds * coarse[True])
     assert fine[False] == pytest.approx(odds * fine[True])
+
+
+@pytest.mark.parametrize("pulled", [False, True])
+def test_what_is_slack_and_smooth_under_a_load_from_one_side_is_a_seat(pulled: bool) -> None:
+    step = np.repeat([*range(1, 9), *range(7, 0, -1)], 3)
+    force = 8.0 * step - (32.0 if pulled else 0.0)
+    bench = make_bench(bench_data(force, force * SPRING, step=step))
+    assert not bench.rows.continuous
+    kinds = {v.info["kind"] for v in library(bench, ["joint_backlash"])}
+    assert {"free", "friction"} <= kinds
+    assert ({"soft", "slow", "arctan"} <= kinds) == pulled

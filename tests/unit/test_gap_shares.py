@@ -52,11 +52,18 @@ def rms(engine: Engine, values: Array) -> float:
     return engine.bench.rows.rms(values)
 
 
-@pytest.mark.parametrize(("pull", "left"), [(0.0, 5 - BOUND), (2.0, 4.0), (-2.0, LEAST * 5)])
-def test_what_a_spring_can_take_within_its_bounds_is_no_gap(pull: float, left: float) -> None:
-    line = by_spring(engine_with())
-    found = size(engine_with(5 * line), "link_flexibility", pull)
-    assert found == pytest.approx(left * rms(engine_with(), line), rel=1e-6)
+@pytest.mark.parametrize("pull", [-8.0, -2.0, 0.0, 2.0])
+@pytest.mark.parametrize("moved", [5.0, -5.0])
+def test_what_a_spring_can_take_within_its_bounds_is_no_gap(pull: float, moved: float) -> None:
+    """Of a stiffness three standard deviations are stated, either way."""
+    engine = engine_with()
+    line, (spring,) = by_spring(engine), engine.base.index("spring")
+    sd = float(engine.base.sd[spring])
+    softest, stiffest = (1 / (1 - BOUND * sd) - 1) / sd, (1 / (1 + BOUND * sd) - 1) / sd
+    found = size(engine_with(moved * line), "link_flexibility", pull)
+    room = max(softest - pull, 0.0) if moved > 0 else max(pull - stiffest, 0.0)
+    left = max(abs(moved) - room, LEAST * abs(moved))
+    assert found == pytest.approx(left * rms(engine, line), rel=1e-6)
 
 
 def test_a_jump_of_the_datum_counts_from_the_reading_at_which_it_was_zeroed() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -87,3 +89,29 @@ def test_after_of_a_rig_that_settles_does_not_count_its_settling() -> None:
     moves = np.sqrt(bench.rows.weight @ bench.scatter / bench.rows.weight.sum())
     assert found.after < 0.7 * moves
     assert found.held_out[0].after < 0.7 * moves
+
+
+def ramped(reads_late: bool = False, drift: float = 0.0) -> tuple[Array, Array, Array]:
+    """Force N, displacement m and step, recorded all the time: from 60 N the load takes three
+    samples to each lower level, of which they bear the name, and at last to none."""
+    levels = [60.0, 30.0, 0.0]
+    force, step = [np.full(8, 60.0)], [np.full(8, 2)]
+    for i, (a, b) in enumerate(pairwise(levels)):
+        force.append(np.concatenate([a + (b - a) * np.array([0.25, 0.5, 0.75]), np.full(17, b)]))
+        step.append(np.full(20, 1 - i))
+    true, steps = np.concatenate(force), np.concatenate(step)
+    read = np.append(true[:1], true[:-1]) if reads_late else true
+    return read + drift * np.arange(len(true)), SPRING * true, steps
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_load_on_its_way_to_none_is_no_zero(late: bool) -> None:
+    """But a force that is read late, or drifts, is one that nobody loads."""
+    force, u, step = ramped(late, drift=0.02)
+    branch = np.where(step > 0, 2, 0)
+    rows = reduce_rows(bench_data(force, u, step=step, branch=branch))
+    at_zero = (rows.branch == 0) & (rows.step <= 0)
+    loaded = at_zero & (rows.displacement > 1e-6)
+    assert loaded.any()
+    np.testing.assert_array_equal(rows.zero, at_zero & ~loaded)
+    assert (np.abs(rows.measured_force[rows.zero]) > 0.5).all()  # as it drifted

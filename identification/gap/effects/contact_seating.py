@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array
+from identification.gap.data import Array, Flags
 from identification.gap.variants import Variant, variant
 
 WORD = "contact_seating"
@@ -51,8 +51,9 @@ LAWS: dict[str, Callable[[Array], Array]] = {
 }
 
 
-STAYS = " that stays"
-LAWS |= {law + STAYS: LAWS[law] for law in SEATED}
+# What stays as it was pressed: for good, or until the load is taken away before the next run.
+STAYS, WHILE_LOADED = " that stays", " that stays while loaded"
+LAWS |= {law + kept: LAWS[law] for law in SEATED for kept in (STAYS, WHILE_LOADED)}
 _STAYING, _BACK = 0.25, 0.3  # prior; of the largest force, by which it comes back
 
 
@@ -87,21 +88,24 @@ def variants(bench: Bench) -> list[Variant]:
     if bench.data.arm:
         out.append(_one_after_the_other(bench, [s * top for s in STEPS], scales))
     if _comes_back(bench):
-        out += [_some_stays(bench, law, share * top, scales) for share in forces for law in SEATED]
+        kept = [STAYS] if np.sum(bench.rest) == np.sum(bench.rebuilt) else [STAYS, WHILE_LOADED]
+        out += [_some_stays(bench, law, share * top, scales, kind)
+                for kind in kept for share in forces for law in SEATED]  # fmt: skip
     return [*out, *_slacks(bench)]
 
 
 def _comes_back(bench: Bench) -> bool:
     """Whether the force does, to show what stays."""
     size, sign = pressed(bench)
-    return bool(np.any(_so_far(bench, size, sign)[0] - size > _BACK * size.max()))
+    most, _ = _so_far(size, sign, bench.rebuilt)
+    return bool(np.any(most - size > _BACK * size.max()))
 
 
-def _some_stays(bench: Bench, law: str, f0: float, scales: tuple[float, ...]) -> Variant:
-    """A seat of which a part stays as it was pressed."""
-    laws = ((law, f0), (law + STAYS, f0))
+def _some_stays(bench: Bench, law: str, f0: float, scales: tuple[float, ...], kept: str) -> Variant:
+    """A seat of which a part stays as it was pressed (kept: STAYS or WHILE_LOADED)."""
+    laws = ((law, f0), (law + kept, f0))
     columns = [_late(bench, *each) for each in laws]
-    label = f"{law} {f0 / float(np.abs(bench.load).max()):.3g}, some stays"
+    label = f"{law} {f0 / float(np.abs(bench.load).max()):.3g}, some{kept.removeprefix(' that')}"
     return variant(WORD, label, columns, scales, each=True, prior=_STAYING, force_N=f0, laws=laws)
 
 
@@ -184,15 +188,16 @@ def _late(bench: Bench, law: str, force: float) -> int:
 def lost(bench: Bench, law: str, force: float) -> Array:
     """(n,) what one law of a force scale N takes of its depth."""
     size, sign = pressed(bench)
-    if law.endswith(STAYS):
-        size, sign = _so_far(bench, size, sign)
+    for kept, fresh in ((STAYS, bench.rebuilt), (WHILE_LOADED, bench.rebuilt | bench.rest)):
+        if law.endswith(kept):
+            size, sign = _so_far(size, sign, fresh)
     return np.asarray(sign * LAWS[law](size / force))
 
 
-def _so_far(bench: Bench, size: Array, sign: Array) -> tuple[Array, Array]:
-    """The largest of sizes (n,) since the rig was built, or turned, and its sign."""
+def _so_far(size: Array, sign: Array, fresh: Flags) -> tuple[Array, Array]:
+    """The largest of sizes (n,) since what was pressed was fresh (n,), and its sign."""
     most, way = size.copy(), sign.copy()
-    for part in np.split(np.arange(len(size)), np.flatnonzero(bench.rebuilt)[1:]):
+    for part in np.split(np.arange(len(size)), np.flatnonzero(fresh)[1:]):
         most[part] = np.maximum.accumulate(size[part])
         first = np.where(size[part] == most[part], np.arange(len(part)), 0)
         way[part] = sign[part][np.maximum.accumulate(first)]

@@ -37,6 +37,7 @@ WORD = "joint_backlash"
 PLACED = ("gap", "held", "dragged")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
 _REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow")
+SMOOTH = ("soft", "slow", "arctan")
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 _PRELOADS = 8  # over the range of the net torque
@@ -65,6 +66,8 @@ def variants(bench: Bench) -> list[Variant]:
     inside = running and _pressed(bench)
     # a bench is pushed along one direction after another, each on a part of its own
     kinds, out = tuple(k for k in KINDS if bench.data.arm or k not in KEPT), []
+    if _pressed(bench):
+        kinds = tuple(k for k in kinds if k not in SMOOTH)
     for j in bench.moving_joints():
         torque = bench.true_torque[:, j]
         span = bench.reach_of(torque)

@@ -154,7 +154,9 @@ def knee_at(
     """What knees on a load (n,) have in common at a place: memory, load, column, `top` of what
     flows back, and `back`, its columns by the share of `top` beyond which it has yielded."""
     top = _range(bench, load) if top is None else top
-    back = flowing_back(bench, load, column, top, _fresh(bench, memory))
+    # what a controller takes back it had clamped: no metal that flows back
+    metal = memory != TAKEN_BACK
+    back = flowing_back(bench, load, column, top, _fresh(bench, memory)) if metal else {}
     return {"memory": memory, "load": load, "column": column, "top": top, "back": back}
 
 
@@ -277,7 +279,7 @@ def is_sharp(v: Variant) -> bool:
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Finely spaced thresholds and flow times about a variant that was found. close: share of the
     steps; below 1 only of what flows, between the times that were looked at."""
-    info, ways = dict(found.info), _ways(bench)
+    info, ways = dict(found.info), _ways(bench, str(found.info["memory"]))
     if close < 1:
         flow, square = float(info["flow_s"]), bool(info.get("square"))
         ways = [(flow * 2.0**step, square) for step in _BETWEEN if flow > 0]
@@ -381,9 +383,10 @@ CLOSE = (0.4,)  # of a closer look
 _BETWEEN = (-0.5, -0.25, 0.25, 0.5)  # powers of two of a flow time
 
 
-def _ways(bench: Bench) -> list[flows.Way]:
-    """What flows at once, and in all times that are looked for."""
-    if bench.rows.continuous or bench.course.timeless:
+def _ways(bench: Bench, memory: str) -> list[flows.Way]:
+    """What flows at once, and in all times that are looked for. A controller gives way at once."""
+    clamped = memory in (TAKEN_BACK, BACK_UNDER_WEIGHT)
+    if clamped or bench.rows.continuous or bench.course.timeless:
         return [(0.0, False)]
     # what slows down so under a load that stands, a single spring can't tell from creep
     squared = SQUARE_S if bench.data.arm else ()

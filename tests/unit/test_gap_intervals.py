@@ -1,0 +1,230 @@
+"""Intervals of parameters: over the shapes that the data leave open, and what stands beside."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap import posterior
+from identification.gap.evidence import Engine
+from identification.gap.explanation import Explanation
+from identification.gap.interval import NOMINAL, Parameter
+from identification.gap.parameters import parameters
+from identification.gap.parts import Part
+from identification.gap.posterior import (
+    DEFINED,
+    FLOWING,
+    SHARING,
+    _mixture,
+    _stretched,
+    _wider,
+    settled,
+)
+from identification.gap.variants import Variant
+from tests.unit.test_gap_evidence import small_bench, small_engine
+from tests.unit.test_gap_parameters import known_of, sd
+
+
+def test_a_mixture_spans_what_its_parts_span() -> None:
+    each = [Parameter(10.0, 8.04, 11.96, "Nm"), Parameter(20.0, 18.04, 21.96, "Nm")]
+    both = _mixture(each, np.array([0.5, 0.5]))
+    assert both.low == pytest.approx(8.36, abs=0.05)  # 5 % of the lower one lie below
+    assert both.high == pytest.approx(21.64, abs=0.05)
+    assert both.ci90 == pytest.approx((8.72, 21.28), abs=0.02)
+    seldom = _mixture(each, np.array([0.06, 0.94]))
+    assert seldom.ci90[0] == pytest.approx(10.97, abs=0.02)  # by the normal law of its 95 %: 11.4
+    more = (15 - np.hypot(6.28, 1.645 * 2), 15 + np.hypot(6.28, 1.645 * 2))
+    assert _wider(both, 4.0).ci90 == pytest.approx(more, abs=0.02)
+    assert _stretched(both).ci90[0] == pytest.approx(15 * (8.72 / 15) ** SHARING, abs=0.02)
+    plain = Parameter(10.0, 8.04, 11.96, "Nm")
+    assert plain.ci90 == pytest.approx((10 - 1.645, 10 + 1.645), abs=1e-3)
+    almost = _mixture(each, np.array([0.999, 0.001]))
+    assert (almost.value, almost.high) == pytest.approx((10.0, 11.96), abs=0.02)
+
+
+def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
+    """The same column under two names of thresholds: neither the data nor the prior decide."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    common = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0}
+    low, high = (
+        Variant("joint_yield", f"at {c}", (0,), (1.0,), np.eye(1),
+                info={**common, "centre": c, "joint": j}, prior=0.5)
+        for c, j in ((30.0, 0), (60.0, 1))
+    )  # fmt: skip
+    chosen = Explanation((Part(low, 1.0),), 0.0, 0.0, (0.0,), 0.0)
+    found = known_of(engine, [low, high], chosen)[0].parameters["threshold"]
+    assert found.value == pytest.approx(30.0, rel=0.01)  # where the explanation says
+    assert found.low < 30.0
+    assert found.high > 60.0
+
+
+def test_no_interval_of_a_threshold_reaches_below_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However much it moves with what stands beside it."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    info = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
+    v = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**info, "joint": 0})
+    monkeypatch.setattr("identification.gap.posterior._moves", lambda *_: 100.0**2)
+    chosen = Explanation((Part(v, 1.0),), 0.0, 0.0, (0.0,), 0.0)
+    found = known_of(engine, [v], chosen)[0].parameters
+    assert found["threshold"].low == found["threshold"].ci90[0] == 0.0
+    assert found["threshold"].high > 200.0
+    assert found["slope_beyond_over_elastic"].low < 0.0
+
+
+def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> None:
+    """One column in two joints: of one there are forty shapes, of the other a single one."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    common = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
+    many = [
+        Variant("joint_yield", f"at {k}", (0,), (1.0,), np.eye(1), info={**common, "joint": 0},
+                prior=0.5 / 40)
+        for k in range(40)
+    ]  # fmt: skip
+    one = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**common, "joint": 4},
+                  prior=0.5)  # fmt: skip
+    chosen = Explanation((Part(many[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
+    found = known_of(engine, [*many, one], chosen)[0].places
+    assert found == {"joint 1": pytest.approx(0.5), "joint 5": pytest.approx(0.5)}
+    seldom = replace(one, prior=0.02)
+    found = known_of(engine, [*many, seldom], chosen)[0].places
+    assert found == {"joint 1": pytest.approx(0.5 / 0.52), "joint 5": pytest.approx(0.02 / 0.52)}
+    far = replace(one, columns=(1,), prior=1e-6)
+    assert known_of(engine, [*many, far], chosen)[0].places == {"joint 1": pytest.approx(1)}
+    # what is said of it is said of where it sits most likely
+    for variants, joint in (([*many, seldom], 0), ([*many, replace(one, prior=2.0)], 4)):
+        said, known = settled(engine, variants, chosen)
+        assert said.parts[0].variant.info["joint"] == joint
+        assert next(iter(known[0].places)) == f"joint {joint + 1}"
+        assert (said is chosen) == (joint == 0)
+
+
+def test_an_effect_does_not_move_to_a_joint_where_it_would_do_nothing() -> None:
+    """Two that share a joint are charged for that; but what leaves it must still be an effect."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    idle = bench.add(1e-9 * engine.bench.columns[1])
+    target = engine.target + 4.0 * bench.columns[0]
+    engine = Engine(bench, engine.base, target, engine.etas)
+    info = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
+    here, there = (
+        Variant("joint_yield", "at 30", (k,), (1.0,), np.eye(1), info={**info, "joint": j})
+        for k, j in ((0, 0), (idle, 4))
+    )
+    curve = Variant("joint_nonlinear_stiffness", "bend", (0,), (1.0,), np.eye(1), info={
+        "joint": 0, "kinds": ("cubic",), "torque": 1.0, "hinges": (),
+    })  # fmt: skip
+    parts = (Part(here, 1.0), Part(curve, 1.0))
+    said, known = settled(
+        engine, [here, there, curve], Explanation(parts, 0.0, 0.0, (0.0,) * 2, 0.0)
+    )
+    assert said.parts[0].variant is here
+    assert known[0].places == {"joint 1": pytest.approx(1)}
+
+
+def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> None:
+    """Data that exclude all thresholds of a grid but one say no more than where it stands on it."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    engine.target = engine.target + 4.0 * engine.bench.columns[0]
+    family = [
+        Variant("joint_yield", f"at {c}", (k,), (1.0,), np.eye(1), prior=prior, info={
+            "radius": np.array([c]), "load": bench.load, "flow_s": 0.0, "centre": c, "joint": 0,
+        })
+        for k, c, prior in ((0, 30.0, 1.0), (1, 36.0, 1e-12))
+    ]  # fmt: skip
+    chosen = Explanation((Part(family[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
+    alone = known_of(engine, family[:1], chosen)[0].parameters["threshold"]
+    found = known_of(engine, family, chosen)[0].parameters["threshold"]
+    assert found.value == pytest.approx(30.0, rel=0.01)
+    assert sd(found) == pytest.approx(np.hypot(sd(alone), 6.0 / 12**0.5), rel=0.01)
+    assert found.high - 30.0 == pytest.approx(30.0 - found.low)
+
+
+def test_beside_another_effect_intervals_are_wider(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = small_engine(small_bench())
+    family = [
+        Variant(word, word, (k,), (1.0,), np.eye(1), info=info)
+        for word, k, info in (
+            ("joint_stiffness_error", 0, {"joints": [0], "joint": 0}),
+            ("force_scale", 1, {}),
+        )
+    ]
+    parts = tuple(Part(v, 1.0) for v in family)
+    both = Explanation(parts, 0.0, 0.0, (1.0, 0.5), 0.0)
+    wide = known_of(engine, family, both)[1].parameters["factor"]
+    alone = known_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,)))
+    monkeypatch.setattr(posterior, "SHARING", 1.0)
+    narrow = known_of(engine, family, both)[1].parameters["factor"]
+    assert SHARING > 1.2
+    assert np.log(wide.high / wide.value) == pytest.approx(
+        SHARING * np.log(narrow.high / narrow.value)
+    )
+    assert known_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,))) == alone
+
+
+def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
+    """Beside it, two shapes of another word that the data leave alike take more or less from it."""
+    engine = small_engine(small_bench())
+    bench = engine.bench
+    mine = Variant("joint_stiffness_error", "joint 1", (0,), (10.0,), np.eye(1),
+                   info={"joints": [0], "joint": 0})  # fmt: skip
+    rival = Variant("joint_creep", "T 3", (1,), (1.0,), np.eye(1),
+                    info={"joint": 0, "times_s": [3.0]})  # fmt: skip
+    place = bench.add(bench.columns[1] + 0.2 * bench.columns[0])
+    twice = replace(rival, label="T 4", columns=(place,))
+    engine.target = engine.target + 4.0 * bench.columns[0] + 2.0 * bench.columns[1]
+    engine = Engine(bench, engine.base, engine.target, engine.etas)
+    chosen = Explanation((Part(mine, 10.0), Part(rival, 1.0)), 0.0, 0.0, (1.0, 0.5), 0.0)
+    alone = known_of(engine, [mine, rival], chosen)[0].parameters["factor_x"]
+    both = known_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_x"]
+    assert both.value == pytest.approx(alone.value)
+    assert both.high - both.low > 1.02 * (alone.high - alone.low)
+
+
+def test_intervals_of_effects_that_share_a_gap_are_wider() -> None:
+    above, across = Parameter(2.0, 1.0, 3.0, "1"), Parameter(1.0, -1.0, 3.0, "1")
+    assert _stretched(above).low == pytest.approx(2 * 0.5**SHARING)
+    assert _stretched(above).high == pytest.approx(2 * 1.5**SHARING)
+    assert (_stretched(across).low, _stretched(across).high) == (1 - 2 * SHARING, 1 + 2 * SHARING)
+
+
+def test_explanations_by_other_words_move_parameters_as_far_as_they_are_likely() -> None:
+    engine = small_engine(small_bench())
+    bench = engine.bench
+    engine.target = engine.target + 4.0 * bench.columns[0]
+    engine = Engine(bench, engine.base, engine.target, engine.etas)
+    mine, other = (
+        Variant(word, word, (k,), (10.0,), np.eye(1), info=info)
+        for word, k, info in (
+            ("joint_stiffness_error", 0, {"joints": [0], "joint": 0}),
+            ("joint_creep", 1, {"joint": 0, "times_s": [3.0]}),
+        )
+    )
+    chosen = Explanation((Part(mine, 10.0),), 0.0, 0.0, (1.0,), 0.0)
+
+    def width(rival_weight: float) -> float:
+        rival = Explanation((Part(mine, 0.3), Part(other, 1.0)), rival_weight, 0.0, (1.0, 0.5), 0.0)
+        found = known_of(engine, [mine, other], chosen, [chosen, rival])[0].parameters
+        return found["factor_x"].high - found["factor_x"].low
+
+    assert width(0.0) > width(-2.0) > width(-9.0)
+    assert width(-9.0) == width(-20.0)  # what hardly counts does not
+
+
+@pytest.mark.parametrize(("flow", "share"), [(0.0, DEFINED), (10.0, FLOWING)])
+def test_nobody_sees_begin_what_gives_way_slowly(flow: float, share: float) -> None:
+    """A threshold means what it does to so much of itself, if nothing else is unsure."""
+    bench = small_bench()
+    engine = small_engine(bench)
+    info = {"radius": np.array([30.0]), "load": bench.load, "flow_s": flow, "centre": 30.0}
+    v = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**info, "joint": 0})
+    part = Part(v, 1.0)
+    found = known_of(engine, [v], Explanation((part,), 0.0, 0.0, (0.0,), 0.0))[0].parameters
+    alone = parameters(bench, part, np.ones(1), np.zeros((1, 1)), NOMINAL)["threshold"]
+    wanted = np.hypot(sd(alone), share * 30.0)
+    assert sd(found["threshold"]) == pytest.approx(wanted, rel=1e-3)
