@@ -114,10 +114,13 @@ def resume(
     if speed is not None:
         station = _at_speed(station, speed)
     progress = read_progress(records)
-    with _opened(protocol, station, progress, say, panel) as rig:
+    # The journal comes first: devices with which another measurement is busy are left alone.
+    with (
+        Journal.reopen(journal_file, _synced(station)) as journal,
+        _opened(protocol, station, progress, say, panel) as rig,
+    ):
         for record in records:  # the page shows the whole run, not only what is still to come
             rig.onlooker.record(record.kind, record.data)
-        journal = Journal.reopen(journal_file, _synced(station))
         journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
         return _carry_out(Job(path, protocol, station, journal, progress), rig, say)
 
@@ -288,7 +291,17 @@ def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bo
         else:
             recorder.event("stopped", reason)
     job.journal.close()
-    stored = datasets.finish(job.output)
+    try:
+        stored = datasets.finish(job.output)
+    except InputError as error:
+        kept = (
+            f"What was measured is kept in {journal_path(job.output)}. To go on once that is "
+            f"mended: rig measure --resume {job.output}"
+        )
+        if complete:
+            raise InputError(f"{error} {kept}") from error
+        say(f"{error} {kept}")  # and then why the measurement ended
+        return
     if not stored.complete:
         say(f"{counted(stored.rows, 'row')} kept. To go on: rig measure --resume {job.output}")
 
@@ -296,7 +309,10 @@ def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bo
 def _build(job: Job) -> None:
     """Brings the data set up to date; the journal goes on."""
     records = replay(journal_path(job.output))
-    datasets.write(datasets.from_records(records, job.output), job.output)
+    try:
+        datasets.write(datasets.from_records(records, job.output), job.output)
+    except InputError as error:  # a full disk, say: the journal would be next
+        raise MeasurementStopped(f"{error} {UNLOAD}") from error
 
 
 @contextmanager
