@@ -91,6 +91,9 @@ def test_without_a_stop_record_it_is_incomplete() -> None:
     assert cut.banners()[1] == (
         "INCOMPLETE: the measurement did not reach its end (it was cut off)."
     )
+    told = ("event", {"kind": "stopped", "text": "laser: silent for 1.0 s. Check it, then resume."})
+    banner = from_records(example.records(3, told)).banners()[1]
+    assert banner.endswith("its end (laser: silent for 1.0 s).")  # no remedy of that day
     stopped = ("event", {"kind": "stopped", "text": "force limit"})
     assert from_records(example.records(3, stopped)).stop_reason == "force limit"
     stop = ("stop", {"reason": "done", "complete": True})
