@@ -214,6 +214,8 @@ def _holds(c: PredictedCurve, path: CurvePath) -> list[str]:
         f"  {'repetition':>10} {'branch':<10} {'force in N':>12} {'displacement in mm':>20} "
         f"{'springs alone':>15}"
     ]
+    if len(set(path.repetition) - shown) > 0:
+        lines.insert(0, "  The first and the last repetition; --csv and --json hold all.")
     for i, repetition in enumerate(path.repetition):
         if repetition in shown:
             lines.append(

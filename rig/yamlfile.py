@@ -95,8 +95,13 @@ def read_text(path: Path) -> str:
 
 
 def _neighbours(path: Path) -> str:
-    near = sorted(p.name for p in path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
-    return did_you_mean(path.name, near[:40]) if near else ""
+    """The file that may have been meant, by what stands before the ending, or those there are."""
+    found = sorted(path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
+    near = {p.stem: p.name for p in found[:40]}
+    close = get_close_matches(path.stem, near, n=1)
+    if close:
+        return f' Did you mean "{near[close[0]]}"?'
+    return f" Known: {', '.join(near.values())}." if near else ""
 
 
 def _decode(raw: bytes, name: str) -> str:
@@ -139,6 +144,7 @@ _KINDS = {
     "rig.station": "a station",
     "rig.robot": "a robot's nominal model",
 }
+_NAMELESS = {"Meta": "the META of a table", "ModelFile": "a model"}  # no schema, by their class
 
 
 def _check_kind(data: dict[str, object], reader: Reader, schema: words.Schema, name: str) -> None:
@@ -148,7 +154,8 @@ def _check_kind(data: dict[str, object], reader: Reader, schema: words.Schema, n
     wanted = next((k for k in map(_kind, consts) if k is not None), None)
     if kind is None or kind == wanted:
         return
-    other = "another kind of file" if wanted is None else _KINDS[wanted]
+    nameless = _NAMELESS.get(str(schema.get("title")), "another kind of file")
+    other = nameless if wanted is None else _KINDS[wanted]
     what = f"this is {_KINDS[kind]}; wanted: {other}. Give that file's path."
     refuse(name, [_problem(reader.places, ("schema",), what)])
 

@@ -239,6 +239,9 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 
     (tmp_path / "station.yaml").write_text("laser: {port: x}")
     assert said(tmp_path / "stations.yaml") == ': no such file. Did you mean "station.yaml"?'
+    assert said(tmp_path / "station.yml") == ': no such file. Did you mean "station.yaml"?'
+    # no likeness by the ending alone
+    assert said(tmp_path / "missing.yaml") == ": no such file. Known: station.yaml."
     assert said(tmp_path / "no" / "f.yaml") == ": no such file."
     assert said(tmp_path) == ": a folder; a YAML file is wanted."
     assert said(Path("/dev/null")) == ": not a regular file; a YAML file is wanted."
