@@ -255,8 +255,12 @@ class _Judge:
             what = str(error.get("ctx", {}).get("error", error["msg"]))
             what = what if what.endswith((".", "?")) else f"{what}."
             reader.complain(path, reader.places[path], what)
-        else:
+        elif kind != "literal_error" or not self._fits_another(path):
             self._value_problem(path, self._at(path))
+
+    def _fits_another(self, path: Key) -> bool:
+        """Whether a word is one of another alternative, of which something else is wrong."""
+        return self._at(path) in _texts(words.schemas_at(self._schema, path))
 
     def _missing(self, path: Key) -> None:
         key, above = path[-1], path[:-1]

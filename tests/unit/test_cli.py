@@ -194,6 +194,12 @@ def test_options_that_contradict_each_other_are_refused(
     assert err.startswith(says)
 
 
+def test_the_list_of_commands_cuts_no_sentence(rig: Rig) -> None:
+    status, out, _ = rig("--help")
+    assert status == 0
+    assert "..." not in out.partition("Commands:")[2]
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 @pytest.mark.parametrize("words", [[], ["--json", "-"]])
 def test_a_full_disk_behind_standard_output_is_no_bug(

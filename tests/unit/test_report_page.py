@@ -203,6 +203,25 @@ def test_where_an_effect_may_sit_is_said_with_the_numbers_of_the_json(
     assert ("leave open: joint 1 (62.0 %), joint 5 (38.0 %)." in text) == (len(places) > 1)
 
 
+def test_what_many_runs_have_to_themselves_is_its_range() -> None:
+    drift = {
+        f"drift_x_run{r}": {"unit": "N", "value": v, "ci95": [v - 0.1, v + 0.1]}
+        for r, v in ((1, 0.5), (2, -3.25), (3, 2.75), (4, 1.0))
+    }
+    one = {"name": "force_drift", "probability": 1.0, "share_of_gap": 1.0, "parameters": drift,
+           "indistinguishable_from": [], "places": {}}  # fmt: skip
+    (table,) = _effects(Node({"effects": [one]}, "/gap"))
+    assert isinstance(table, Table)
+    assert [cells[1] for cells in table.rows] == [
+        "drift_x_run2, the least of 4 runs",
+        "drift_x_run3, the largest of 4 runs",
+    ]
+    drift.pop("drift_x_run1"), drift.pop("drift_x_run4")
+    (table,) = _effects(Node({"effects": [one]}, "/gap"))
+    assert isinstance(table, Table)
+    assert [cells[1] for cells in table.rows] == ["drift_x_run2", "drift_x_run3"]
+
+
 def test_without_the_gap(tmp_path: Path) -> None:
     page = Page(make([bench(tmp_path / "a.h5")], QUIET).to_html())
     assert "Left out, as asked for (--no-gap)." in page.text
