@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import re
 import sys
 from dataclasses import replace
@@ -35,6 +36,7 @@ from rig.report.drawing import alone, style, svg_of
 from rig.report.gap_section import _effects
 from rig.report.gather import gather
 from rig.report.html import escape, render
+from rig.report.measured_section import _places
 from rig.report.pdf import pdf
 from rig.report.report import Report, checked, make, write_figures, write_html
 from rig.report.results import Node
@@ -220,6 +222,14 @@ def test_what_many_runs_have_to_themselves_is_its_range() -> None:
     (table,) = _effects(Node({"effects": [one]}, "/gap"))
     assert isinstance(table, Table)
     assert [cells[1] for cells in table.rows] == ["drift_x_run2", "drift_x_run3"]
+
+
+def test_poses_are_in_degrees_as_in_protocols() -> None:
+    pose = {"q_rad": [0.0, -math.pi / 2, math.pi / 3, 0.0, 0.0, 0.2344], "tcp_xyz_mm": [0, 0, 0]}
+    table, _ = _places(Node({"poses": {"P1": pose}, "directions": {"x": [1, 0, 0]}}))
+    assert table.header[1:7] == tuple(f"q{j} deg" for j in range(1, 7))
+    shown = [cell[0].text for cell in table.rows[0][1:7] if isinstance(cell[0], Number)]
+    assert [float(text) for text in shown] == [0.0, -90.0, 60.0, 0.0, 0.0, 13.43]
 
 
 def test_without_the_gap(tmp_path: Path) -> None:
