@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.model import told_first
+
 if TYPE_CHECKING:
     from rig.couple import CouplingResult
 
@@ -26,10 +28,11 @@ INCONSISTENT = (
 
 def text(result: CouplingResult) -> str:
     """Everything that a terminal shows."""
-    parts = [_stiffness(result), _workspace(result), _decisions(result), _schedule(result)]
+    first, others = told_first(result.notes)
+    parts = [*first, _stiffness(result), _workspace(result), _decisions(result), _schedule(result)]
     if is_published_setup(result):
         parts.append(published(result))
-    parts += [f"Note: {note}" for note in result.notes]
+    parts += [f"Note: {note}" for note in others]
     return "\n\n".join(p for p in parts if p)
 
 
