@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import uuid
 from collections.abc import Callable, Iterator
@@ -143,6 +144,10 @@ def _check_output(path: Path) -> None:
             "Choose another name with -o, or go on with an interrupted one by --resume."
         )
     check_folder(path)
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(
+            f"{path}: nothing may be written into the folder {path.parent}. Choose another with -o."
+        )
 
 
 @dataclass(frozen=True)
