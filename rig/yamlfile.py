@@ -144,7 +144,10 @@ _KINDS = {
     "rig.station": "a station",
     "rig.robot": "a robot's nominal model",
 }
-_NAMELESS = {"Meta": "the META of a table", "ModelFile": "a model"}  # no schema, by their class
+_NAMELESS = {
+    "Meta": "the META of a table",
+    "ModelFile": "an arm's model, as `rig identify --write-model` writes",
+}
 
 
 def _check_kind(data: dict[str, object], reader: Reader, schema: words.Schema, name: str) -> None:
@@ -152,6 +155,11 @@ def _check_kind(data: dict[str, object], reader: Reader, schema: words.Schema, n
     kind = _kind(data.get("schema"))
     consts = [node.get("const") for node in words.schemas_at(schema, ("schema",))]
     wanted = next((k for k in map(_kind, consts) if k is not None), None)
+    if wanted is not None and "schema" not in data:
+        known = words.known_keys(words.schemas_at(schema, ()))
+        if 2 * sum(key in known for key in data) <= len(data):
+            what = f"this is not {_KINDS[wanted]}: it says no schema, and most of its keys are "
+            refuse(name, [Problem(1, 1, f"{what}others. Check the name.")])
     if kind is None or kind == wanted:
         return
     nameless = _NAMELESS.get(str(schema.get("title")), "another kind of file")
