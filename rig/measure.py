@@ -79,7 +79,7 @@ def measure(
     plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
     path = output or default_output(protocol_file)
     _check_output(path)
-    start = {
+    start: dict[str, object] = {
         "uuid": str(uuid.uuid4()),
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "origin": "emulated" if station.emulation else "measured",
@@ -89,6 +89,8 @@ def measure(
         "station": station.text,
         "meta": measured_meta(protocol, station).model_dump_json(indent=2, exclude_none=True),
     }
+    if speed is not None:  # the station's text says another one
+        start["speed"] = speed
     # The devices come first: a run that never began leaves no file behind.
     with _opened(protocol, station, Progress(), say, panel) as rig:
         journal = Journal.create(journal_path(path), start, _synced(station))
@@ -112,6 +114,7 @@ def resume(
     start = records[0].data
     protocol = parse_protocol(start["protocol"], path)
     station = parse_station(start["station"], path)
+    speed = speed or start.get("speed")
     if speed is not None:
         station = _at_speed(station, speed)
     progress = read_progress(records)
@@ -283,6 +286,8 @@ def _descriptor(rig: _Rig) -> dict[str, object]:
     devices = {device.name: dict(device.identity()) for device in rig.devices.all()}
     columns = [asdict(signal) for device in rig.devices.all() for signal in device.signals]
     operator = {rig.loader.name: dict(rig.loader.identity())}
+    if rig.station.emulation is not None:
+        operator[rig.loader.name]["clock"] = f"{rig.station.emulation.speed:g} times real time"
     settings = {"dynamometer": rig.station.dynamometer, "laser": rig.station.laser}
     calibration = {name: asdict(each) for name, each in settings.items() if each is not None}
     return {"devices": devices | operator, "signals": columns, "calibration": calibration}

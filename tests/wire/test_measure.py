@@ -145,6 +145,16 @@ def test_a_full_disk_ends_with_what_to_do_and_resumes(tmp_path: Path) -> None:
     assert steps_of(load(tmp_path / "run.h5")) == STEPS
 
 
+def test_the_speed_that_was_asked_for_is_told_and_kept(tmp_path: Path) -> None:
+    process = started(tmp_path, [*write_files(tmp_path), "--speed", "20"])
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert load(tmp_path / "run.h5").devices["operator"]["clock"] == "20 times real time"
+    again = run_rig("measure", "--resume", "run.h5", cwd=tmp_path)
+    assert again.status == 0, again.stderr
+    assert load(tmp_path / "run.h5").devices["operator"]["clock"] == "20 times real time"
+
+
 def test_a_second_one_leaves_the_devices_of_the_first_alone(tmp_path: Path) -> None:
     process = started(tmp_path, write_files(tmp_path))
     second = run_rig("measure", "--resume", "run.h5", cwd=tmp_path)
