@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.model import told_first
+
 if TYPE_CHECKING:
     from rig.couple import CouplingResult
 
@@ -18,18 +20,19 @@ PUBLISHED_TIMES_Y = 37.19
 PUBLISHED_WORKSPACE = (3.50, 1.06, 30.23)  # m^3, m^3, percent
 HALF_BALL_M3 = 4.6014  # of the stated reach, 1.300 m: 2/3 pi R^3
 INCONSISTENT = (
-    "follows: gains from the published stiffnesses, the single workspace from the stated reach of",
-    "1.3 m, the ratio from the two stated volumes. The stated gains do not follow from the stated",
-    "stiffnesses; the definition behind 3.50 m^3 is not published.",
+    "follows: gains from the published stiffnesses, the single workspace from the stated reach of "
+    "1.3 m, the ratio from the two stated volumes. The stated gains do not follow from the stated "
+    "stiffnesses; the definition behind 3.50 m^3 is not published."
 )
 
 
 def text(result: CouplingResult) -> str:
     """Everything that a terminal shows."""
-    parts = [_stiffness(result), _workspace(result), _decisions(result), _schedule(result)]
+    first, others = told_first(result.notes)
+    parts = [*first, _stiffness(result), _workspace(result), _decisions(result), _schedule(result)]
     if is_published_setup(result):
         parts.append(published(result))
-    parts += [f"Note: {note}" for note in result.notes]
+    parts += [f"Note: {note}" for note in others]
     return "\n\n".join(p for p in parts if p)
 
 
@@ -144,4 +147,4 @@ def published(result: CouplingResult) -> str:
             f"  {row.quantity + ', ' + row.unit:<20}{row.stated:>10g}{follows:>10}"
             f"{row.model:>12.{row.digits}f}"
         )
-    return "\n".join([*lines, *(f"  {words}" for words in INCONSISTENT)])
+    return "\n".join([*lines, f"  {INCONSISTENT}"])

@@ -76,7 +76,8 @@ class Dataset:
                 "EMULATED: these values come from simulated devices; nothing was measured."
             )
         if not self.complete:
-            reason = f" ({self.stop_reason})" if self.stop_reason else ""
+            first = self.stop_reason.partition(". ")[0].rstrip(".")  # no remedy of that day
+            reason = f" ({first})" if first else ""
             lines.append(f"INCOMPLETE: the measurement did not reach its end{reason}.")
         return tuple(lines)
 

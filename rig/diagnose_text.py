@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rig.digits import brief
 
@@ -170,8 +170,9 @@ def _one_effect(e: Effect, title: str) -> list[str]:
     return lines
 
 
+T = TypeVar("T")
 _OF_RUN = re.compile(r"(.+)_run\d+$")
-_EACH = 2  # runs that are listed one by one
+EACH = 2  # runs that are listed one by one
 
 
 def _share(value: float) -> str:
@@ -180,15 +181,20 @@ def _share(value: float) -> str:
     return "less than 1%" if text == "0%" else text
 
 
-def _parameters(found: Mapping[str, Parameter]) -> list[str]:
-    """A line each; what many runs have each to themselves is one line, its range."""
-    families: dict[str, dict[str, Parameter]] = {}
+def families(found: Mapping[str, T]) -> dict[str, dict[str, T]]:
+    """Parameters by their names; what runs have each to themselves under one name."""
+    out: dict[str, dict[str, T]] = {}
     for name, p in found.items():
         of_run = _OF_RUN.match(name)
-        families.setdefault(of_run[1] if of_run else name, {})[name] = p
+        out.setdefault(of_run[1] if of_run else name, {})[name] = p
+    return out
+
+
+def _parameters(found: Mapping[str, Parameter]) -> list[str]:
+    """A line each; what many runs have each to themselves is one line, its range."""
     lines = []
-    for family, members in families.items():
-        if len(members) <= _EACH:
+    for family, members in families(found).items():
+        if len(members) <= EACH:
             lines += [f"    {name} = {_value(p)}" for name, p in members.items()]
             continue
         each = list(members.values())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -52,11 +52,13 @@ class Entry:
 
 @dataclass(frozen=True)
 class Listing:
-    """Entries by file, and (file, reason) of what was left out."""
+    """Entries by file, and (file, reason) of what was left out. width: columns of a terminal; a
+    table that is wider gives each file two lines."""
 
     folder: Path
     entries: tuple[Entry, ...]
     skipped: tuple[tuple[str, str], ...]
+    width: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Schema rig.list/1; null for what is not known yet."""
@@ -88,7 +90,12 @@ class Listing:
             yield f"{self.folder}: no data sets ({', '.join(ENDINGS)})."
             return
         yield from self.banners()
-        yield from _table([_HEADER, *map(_cells, self.entries)])
+        rows = [_HEADER, *map(_cells, self.entries)]
+        table = list(_table(rows, range(len(_HEADER))))
+        if self.width is None or max(map(len, table)) <= self.width:
+            yield from table
+        else:
+            yield from _narrow(rows)
         if any(e.stiffness is None for e in self.entries):
             yield "k -: not analysed yet; `rig list --analyze` or `rig analyze FILE` does it."
 
@@ -218,11 +225,15 @@ def _cells(e: Entry) -> tuple[str, ...]:
     )
 
 
-def _table(rows: list[tuple[str, ...]]) -> Iterator[str]:
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+def _table(rows: list[tuple[str, ...]], columns: Iterable[int]) -> Iterator[str]:
+    widths = {i: max(len(row[i]) for row in rows) for i in columns}
     for row in rows:
-        cells = (
-            cell.rjust(w) if i == 6 else cell.ljust(w)
-            for i, (cell, w) in enumerate(zip(row, widths, strict=True))
-        )
+        cells = (row[i].rjust(w) if i == 6 else row[i].ljust(w) for i, w in widths.items())
         yield "  ".join(cells).rstrip()
+
+
+def _narrow(rows: list[tuple[str, ...]]) -> Iterator[str]:
+    """Two lines a file: what it is, and what is known of it."""
+    for row, line in zip(rows, _table(rows, (0, 1, 2, 6)), strict=True):
+        yield line
+        yield "  " + "; ".join((row[7], *row[3:6]))

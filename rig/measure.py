@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import uuid
 from collections.abc import Callable, Iterator
@@ -78,7 +79,7 @@ def measure(
     plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take
     path = output or default_output(protocol_file)
     _check_output(path)
-    start = {
+    start: dict[str, object] = {
         "uuid": str(uuid.uuid4()),
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "origin": "emulated" if station.emulation else "measured",
@@ -88,6 +89,8 @@ def measure(
         "station": station.text,
         "meta": measured_meta(protocol, station).model_dump_json(indent=2, exclude_none=True),
     }
+    if speed is not None:  # the station's text says another one
+        start["speed"] = speed
     # The devices come first: a run that never began leaves no file behind.
     with _opened(protocol, station, Progress(), say, panel) as rig:
         journal = Journal.create(journal_path(path), start, _synced(station))
@@ -111,13 +114,17 @@ def resume(
     start = records[0].data
     protocol = parse_protocol(start["protocol"], path)
     station = parse_station(start["station"], path)
+    speed = speed or start.get("speed")
     if speed is not None:
         station = _at_speed(station, speed)
     progress = read_progress(records)
-    with _opened(protocol, station, progress, say, panel) as rig:
+    # The journal comes first: devices with which another measurement is busy are left alone.
+    with (
+        Journal.reopen(journal_file, _synced(station)) as journal,
+        _opened(protocol, station, progress, say, panel) as rig,
+    ):
         for record in records:  # the page shows the whole run, not only what is still to come
             rig.onlooker.record(record.kind, record.data)
-        journal = Journal.reopen(journal_file, _synced(station))
         journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
         return _carry_out(Job(path, protocol, station, journal, progress), rig, say)
 
@@ -140,6 +147,10 @@ def _check_output(path: Path) -> None:
             "Choose another name with -o, or go on with an interrupted one by --resume."
         )
     check_folder(path)
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(
+            f"{path}: nothing may be written into the folder {path.parent}. Choose another with -o."
+        )
 
 
 @dataclass(frozen=True)
@@ -275,6 +286,8 @@ def _descriptor(rig: _Rig) -> dict[str, object]:
     devices = {device.name: dict(device.identity()) for device in rig.devices.all()}
     columns = [asdict(signal) for device in rig.devices.all() for signal in device.signals]
     operator = {rig.loader.name: dict(rig.loader.identity())}
+    if rig.station.emulation is not None:
+        operator[rig.loader.name]["clock"] = f"{rig.station.emulation.speed:g} times real time"
     settings = {"dynamometer": rig.station.dynamometer, "laser": rig.station.laser}
     calibration = {name: asdict(each) for name, each in settings.items() if each is not None}
     return {"devices": devices | operator, "signals": columns, "calibration": calibration}
@@ -288,7 +301,17 @@ def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bo
         else:
             recorder.event("stopped", reason)
     job.journal.close()
-    stored = datasets.finish(job.output)
+    try:
+        stored = datasets.finish(job.output)
+    except InputError as error:
+        kept = (
+            f"What was measured is kept in {journal_path(job.output)}. To go on once that is "
+            f"mended: rig measure --resume {job.output}"
+        )
+        if complete:
+            raise InputError(f"{error} {kept}") from error
+        say(f"{error} {kept}")  # and then why the measurement ended
+        return
     if not stored.complete:
         say(f"{counted(stored.rows, 'row')} kept. To go on: rig measure --resume {job.output}")
 
@@ -296,7 +319,10 @@ def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bo
 def _build(job: Job) -> None:
     """Brings the data set up to date; the journal goes on."""
     records = replay(journal_path(job.output))
-    datasets.write(datasets.from_records(records, job.output), job.output)
+    try:
+        datasets.write(datasets.from_records(records, job.output), job.output)
+    except InputError as error:  # a full disk, say: the journal would be next
+        raise MeasurementStopped(f"{error} {UNLOAD}") from error
 
 
 @contextmanager

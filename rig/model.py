@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -101,6 +101,12 @@ def load_robot(name_or_path: str | Path) -> Arm:
 def robot_reach(name_or_path: str | Path) -> float:
     """Nominal reach about the shoulder in m, as the maker states it."""
     return _robot(name_or_path)[1]
+
+
+def told_first(notes: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Notes that have to be read before any number (where it comes from), and the others."""
+    first = [note for note in notes if note.startswith(("EMULATED:", "INCOMPLETE:"))]
+    return first, [note for note in notes if note not in first]
 
 
 def load_model(path: str | Path) -> ArmModel:

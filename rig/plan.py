@@ -261,7 +261,10 @@ def _assumptions(
     if np.max(arm.joint_stiffness_relative_sd) > 0:
         percent = 100 * float(np.max(arm.joint_stiffness_relative_sd))
         yield f"u and k expected from the nominal joint springs of {arm.name}, sd {percent:.0f} %"
-    yield "joint torque: held at the top force, weight of the links included, of what is allowed"
+    yield (
+        "joint torque: of the joint J nearest to its limit, of what is allowed; held at the top "
+        "force, weight of the links included"
+    )
 
 
 def _table(runs: Sequence[PlannedRun]) -> list[str]:
@@ -275,7 +278,7 @@ def _table(runs: Sequence[PlannedRun]) -> list[str]:
         rows.append((
             f"{n}", run.pose, f"{run.direction} ({vector})", f"{run.steps}",
             f"{run.forces_N[0]:g} to {run.forces_N[-1]:g}", f"{run.stiffness_N_per_mm:.1f}",
-            f"{run.displacement_mm:.2f}", f"{hold:.0f} of {limit:g} (joint {j + 1})",
+            f"{run.displacement_mm:.2f}", f"J{j + 1} {hold:.0f} of {limit:g}",
             _time(run.duration_s),
         ))  # fmt: skip
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]

@@ -21,7 +21,7 @@ from identification.gap.forms import Form
 from rig.errors import InputError
 from rig.gap_forms import effects_of
 from rig.gap_path import left_out, predict
-from rig.model import ArmModel, load_model
+from rig.model import ArmModel, load_model, told_first
 from rig.protocol import MeasurementProtocol, Run, load_protocol
 
 Array = NDArray[np.float64]
@@ -91,7 +91,8 @@ class Simulation:
 
     def to_text(self) -> str:
         """One line a curve, then its levels."""
-        lines = [f"Predicted by {self.model} for: {self.title}"]
+        first, others = told_first(self.notes)
+        lines = [*(f"{note}\n" for note in first), f"Predicted by {self.model} for: {self.title}"]
         if self.effects:
             lines.append(f"With the effects {', '.join(self.effects)}; k is that of the springs.")
         for c in self.curves:
@@ -102,7 +103,7 @@ class Simulation:
                 + (k if np.isfinite(c.stiffness) else "the arm does not give way along it")
             )
             lines += _levels(c) if c.path is None else _holds(c, c.path)
-        return "\n".join([*lines, *(f"\nNote: {note}" for note in self.notes)])
+        return "\n".join([*lines, *(f"\nNote: {note}" for note in others)])
 
 
 def simulate(model: str | Path, protocol: str | Path) -> Simulation:
@@ -214,6 +215,8 @@ def _holds(c: PredictedCurve, path: CurvePath) -> list[str]:
         f"  {'repetition':>10} {'branch':<10} {'force in N':>12} {'displacement in mm':>20} "
         f"{'springs alone':>15}"
     ]
+    if len(set(path.repetition) - shown) > 0:
+        lines.insert(0, "  The first and the last repetition; --csv and --json hold all.")
     for i, repetition in enumerate(path.repetition):
         if repetition in shown:
             lines.append(

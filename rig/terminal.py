@@ -39,9 +39,15 @@ def folded(text: str, width: int) -> str:
     return "\n".join(_fold(line, width) for line in text.split("\n"))
 
 
+def width_of(stream: TextIO) -> int | None:
+    """Columns of a terminal; None for files and pipes, whose lines stay whole."""
+    return shutil.get_terminal_size().columns if stream.isatty() else None
+
+
 def folded_for(stream: TextIO, text: str) -> str:
-    """Folded where the stream is a terminal; files and pipes get the lines whole."""
-    return folded(text, shutil.get_terminal_size().columns) if stream.isatty() else text
+    """Folded where the stream is a terminal."""
+    width = width_of(stream)
+    return text if width is None else folded(text, width)
 
 
 def _fold(line: str, width: int) -> str:

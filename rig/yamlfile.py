@@ -95,8 +95,13 @@ def read_text(path: Path) -> str:
 
 
 def _neighbours(path: Path) -> str:
-    near = sorted(p.name for p in path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
-    return did_you_mean(path.name, near[:40]) if near else ""
+    """The file that may have been meant, by what stands before the ending, or those there are."""
+    found = sorted(path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
+    near = {p.stem: p.name for p in found[:40]}
+    close = get_close_matches(path.stem, near, n=1)
+    if close:
+        return f' Did you mean "{near[close[0]]}"?'
+    return f" Known: {', '.join(near.values())}." if near else ""
 
 
 def _decode(raw: bytes, name: str) -> str:
@@ -139,6 +144,10 @@ _KINDS = {
     "rig.station": "a station",
     "rig.robot": "a robot's nominal model",
 }
+_NAMELESS = {
+    "Meta": "the META of a table",
+    "ModelFile": "an arm's model, as `rig identify --write-model` writes",
+}
 
 
 def _check_kind(data: dict[str, object], reader: Reader, schema: words.Schema, name: str) -> None:
@@ -146,9 +155,15 @@ def _check_kind(data: dict[str, object], reader: Reader, schema: words.Schema, n
     kind = _kind(data.get("schema"))
     consts = [node.get("const") for node in words.schemas_at(schema, ("schema",))]
     wanted = next((k for k in map(_kind, consts) if k is not None), None)
+    if wanted is not None and "schema" not in data:
+        known = words.known_keys(words.schemas_at(schema, ()))
+        if 2 * sum(key in known for key in data) <= len(data):
+            what = f"this is not {_KINDS[wanted]}: it says no schema, and most of its keys are "
+            refuse(name, [Problem(1, 1, f"{what}others. Check the name.")])
     if kind is None or kind == wanted:
         return
-    other = "another kind of file" if wanted is None else _KINDS[wanted]
+    nameless = _NAMELESS.get(str(schema.get("title")), "another kind of file")
+    other = nameless if wanted is None else _KINDS[wanted]
     what = f"this is {_KINDS[kind]}; wanted: {other}. Give that file's path."
     refuse(name, [_problem(reader.places, ("schema",), what)])
 
@@ -248,8 +263,12 @@ class _Judge:
             what = str(error.get("ctx", {}).get("error", error["msg"]))
             what = what if what.endswith((".", "?")) else f"{what}."
             reader.complain(path, reader.places[path], what)
-        else:
+        elif kind != "literal_error" or not self._fits_another(path):
             self._value_problem(path, self._at(path))
+
+    def _fits_another(self, path: Key) -> bool:
+        """Whether a word is one of another alternative, of which something else is wrong."""
+        return self._at(path) in _texts(words.schemas_at(self._schema, path))
 
     def _missing(self, path: Key) -> None:
         key, above = path[-1], path[:-1]

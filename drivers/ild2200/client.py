@@ -145,6 +145,7 @@ class Ild2200:
                 stopbits=serial.STOPBITS_ONE,
                 timeout=READ_TIMEOUT_S,
                 write_timeout=1.0,
+                exclusive=True,  # two readers would each miss what the other took
             )
         except (OSError, ValueError) as error:
             raise complaints.no_port(settings.port, settings.baud, error) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections import Counter
 
@@ -28,6 +29,8 @@ def no_port(port: str, baud: int, error: Exception) -> CannotConnect:
     """The serial port cannot be opened."""
     number = getattr(error, "errno", None)
     reason = os.strerror(number) if number else str(error)
+    if number == errno.EWOULDBLOCK:
+        reason = "another program has it open"
     return CannotConnect(
         DEVICE,
         f"cannot open the serial port {port} at {baud} baud ({reason})",

@@ -175,7 +175,10 @@ def _live(
     style = "grey42" if old else "bold white"
     force = f"{view.force_N:.1f} N" if math.isfinite(view.force_N) else "--- N"
     word, far = hint(view, pitch_mm)
-    if old:
+    idle = asked == "mount" and not stale_s  # nothing is loaded, and no value looked at
+    if idle:
+        word, far = "SET UP", "as the question below says"
+    elif old:
         word, far = "STOP", "values are old"
     elif asked == "unload":
         word, far = "LOOSEN", "until the force no longer answers"
@@ -191,7 +194,7 @@ def _live(
         Align.center(bar(view)),
         Align.center(Text(target)),
         Text(),
-        Align.center(Text(f"{arrow}{word}", style="bold red" if old else colour)),
+        Align.center(Text(f"{arrow}{word}", style="bold red" if old and not idle else colour)),
         Align.center(Text(far or " ")),
         Text(),
         _facts(view, style),
@@ -199,7 +202,7 @@ def _live(
     ]
     for device, seconds in stale_s.items():
         parts.append(Text(f"{device}: no fresh value for {seconds:.1f} s", style="bold red"))
-    if age_s > 1.0:
+    if age_s > 1.0 and not idle:
         parts.append(Text(f"the values are {age_s:.0f} s old", style="bold red"))
     if view.message:
         parts.append(Text(view.message, style="yellow"))
@@ -224,7 +227,7 @@ def _facts(view: LiveView, style: str) -> Table:
 
 def _limits(view: LiveView) -> list[RenderableType]:
     """How much is left of each limit, the closest first; none while nothing is watched."""
-    watched = [level for level in view.limits if level.limit > 0]
+    watched = [v for v in view.limits if v.limit > 0 and math.isfinite(v.value)]
     if not watched:
         return []
     line = Text("left of the limits: ", style="dim")

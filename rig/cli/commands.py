@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import typer
 
 from rig.cli import files, gap, measuring, models, stiffness
@@ -17,16 +19,23 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.callback()(version)
-app.command(cls=Guarded)(measuring.measure)
-app.command(cls=Guarded)(measuring.check)
-app.command(cls=Guarded)(measuring.emulate)
-app.command(cls=Guarded)(stiffness.analyze)
-app.command(cls=Guarded)(stiffness.identify)
-app.command(cls=Guarded)(models.couple)
-app.command(cls=Guarded)(models.simulate)
-app.command(cls=Guarded)(gap.diagnose)
-app.command(cls=Guarded)(gap.blind)
-app.command(cls=Guarded)(files.report)
-app.command("list", cls=Guarded)(files.list_)
-app.command("import", cls=Guarded)(files.import_)
-app.command(cls=Guarded)(files.export)
+
+
+def _add(command: Callable[..., None], name: str | None = None, brief: str | None = None) -> None:
+    """brief: for the list of commands, where the first sentence of its own help is too long."""
+    app.command(name, cls=Guarded, short_help=brief)(command)
+
+
+_add(measuring.measure, brief="Carry out a procedure on a station, and write the data set.")
+_add(measuring.check, brief="The plan of a protocol, and whether every device is ready.")
+_add(measuring.emulate)
+_add(stiffness.analyze, brief="Curve, stiffness k, pointwise k, anisotropy; uncertainties.")
+_add(stiffness.identify, brief="Joint stiffnesses, and what the data can't tell of them.")
+_add(models.couple, brief="Two coupled arms: workspace, stiffness, when to couple.")
+_add(models.simulate)
+_add(gap.diagnose, brief="The sim-to-real gap: where it lies, and what causes it.")
+_add(gap.blind, brief="Draw hidden effects, diagnose, open the answers, score.")
+_add(files.report, brief="One page to send to a colleague; data sets are compared.")
+_add(files.list_, "list", brief="The data sets of a folder, with what is known of them.")
+_add(files.import_, "import")
+_add(files.export)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -77,11 +79,11 @@ def list_(
 ) -> None:
     """The data sets of a folder: date, robot, directions, k, verdict, complete or not."""
     from rig.listing import list_folder
-    from rig.terminal import terminal_progress
+    from rig.terminal import terminal_progress, width_of
 
     with terminal_progress() as progress:
         result = list_folder(folder, analyze=analyze, progress=progress)
-    give(result, json_file)
+    give(replace(result, width=width_of(sys.stdout)), json_file)
 
 
 def import_(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from collections.abc import Iterable
@@ -61,14 +62,29 @@ def show(text: str) -> None:
     """A result in words."""
     from rig.terminal import folded_for
 
-    typer.echo(folded_for(sys.stdout, text))
+    _put_out(folded_for(sys.stdout, text))
+
+
+def _put_out(text: str) -> None:
+    """To standard output; InputError where a disk behind it refuses. A reader that has left is
+    typer's business."""
+    from rig.errors import InputError
+
+    try:
+        typer.echo(text)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        sys.stdout = io.StringIO()  # or Python would try again at its end
+        reason = error.strerror or error
+        raise InputError(f"standard output: cannot be written: {reason}.") from error
 
 
 def give(result: Any, json_file: str | None) -> None:
     """Prints the text of a result, and writes its JSON where asked; on stdout that is all."""
     text = "" if json_file is None else json.dumps(result.to_json(), indent=2, allow_nan=False)
     if json_file == "-":
-        typer.echo(text)
+        _put_out(text)
         return
     show(result.to_text())
     if json_file is not None:

@@ -19,7 +19,7 @@ from rig.report.document import (
 )
 from rig.report.gather import Session
 from rig.report.pictures import Pictures
-from rig.report.results import NOTHING, Node, quantity
+from rig.report.results import DEGREES, NOTHING, Node, quantity
 
 K = 1e-3  # Nm/rad in kNm/rad
 
@@ -185,12 +185,12 @@ def _next_poses(found: Node) -> list[Block]:
     rows = tuple(
         row(
             p["why"].text(),
-            *(q.number() for q in p["q_rad"]),
+            *(q.number(5, DEGREES) for q in p["q_rad"]),
             *(v.stated() for v in p["direction"]),
             p["force_N"].number(),
         )
         for p in found["next_poses"]
     )
-    header = ("why", *(f"q{j} rad" for j in range(1, 7)), "x", "y", "z", "to N")
+    header = ("why", *(f"q{j} deg" for j in range(1, 7)), "x", "y", "z", "to N")
     caption = "Next poses and directions that would tell most, in this order"
     return [Table(caption, header, rows)] if rows else []

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from rig.diagnose_text import EACH, families
 from rig.report.document import (
     Block,
     Bullets,
@@ -96,7 +99,7 @@ def _effects(found: Node) -> list[Block]:
         parameters = [
             (key, p["unit"].text(), p["value"].number(), p["ci95"][0].number(),
              p["ci95"][1].number())
-            for key, p in e["parameters"].items()
+            for key, p in _told(e["parameters"])
         ] or [("", "", empty, empty, empty)]  # fmt: skip
         for i, (key, unit, *numbers) in enumerate(parameters):
             lead = head if i == 0 else ("", "", "")
@@ -111,6 +114,18 @@ def _effects(found: Node) -> list[Block]:
     header = ("effect", "parameter", "unit", "value", "95 % from", "to", "present", "of the gap")
     blocks: list[Block] = [Table("Effects of the chosen explanation", header, tuple(rows), 3)]
     return [*blocks, Bullets(tuple(alike))] if alike else blocks
+
+
+def _told(parameters: Node) -> Iterator[tuple[str, Node]]:
+    """Parameters by what they are called; of what many runs have each to themselves the ends of the
+    range. The JSON lists all."""
+    for members in families(dict(parameters.items())).values():
+        if len(members) <= EACH:
+            yield from members.items()
+            continue
+        ranked = sorted(members.items(), key=lambda member: member[1]["value"].value)
+        for (name, node), end in ((ranked[0], "least"), (ranked[-1], "largest")):
+            yield f"{name}, the {end} of {len(ranked)} runs", node
 
 
 def _places(name: str, places: Node) -> Rich:

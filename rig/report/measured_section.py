@@ -19,7 +19,7 @@ from rig.report.document import (
 )
 from rig.report.gather import Session
 from rig.report.pictures import Pictures
-from rig.report.results import NOTHING, Node
+from rig.report.results import DEGREES, NOTHING, Node
 from rig.report.setup_drawing import Load
 
 _MOST_DRAWN = 6  # poses with a drawing of their own; all stand in the table
@@ -108,9 +108,13 @@ def _places(meta: Node) -> Iterator[Table]:
     if meta.get("poses"):
         yield Table(
             "Poses: joint positions, and the point of load in the flange's frame",
-            ("pose", *(f"q{j} rad" for j in range(1, 7)), "tool x mm", "y mm", "z mm"),
+            ("pose", *(f"q{j} deg" for j in range(1, 7)), "tool x mm", "y mm", "z mm"),
             tuple(
-                row(name, *(q.number() for q in p["q_rad"]), *(v.stated() for v in p["tcp_xyz_mm"]))
+                row(
+                    name,
+                    *(q.number(5, DEGREES) for q in p["q_rad"]),
+                    *(v.stated() for v in p["tcp_xyz_mm"]),
+                )
                 for name, p in meta["poses"].items()
             ),
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,6 +10,7 @@ from rig.digits import number
 from rig.report.document import Inline, Number, Rich
 
 NOTHING = "-"
+DEGREES = 180 / math.pi  # in a radian: protocols and pendants have degrees
 
 
 class Node:

@@ -48,12 +48,21 @@ def write_file(dataset: Dataset, path: Path) -> None:
     """See `rig.dataset.write`."""
     _check_lengths(dataset)
     with in_place_of(path) as temporary:
-        with h5py.File(temporary, "w", libver=("earliest", "v110")) as file:
-            _write_root(file, dataset)
-            _write_samples(file.create_group(SAMPLES), dataset)
-            _write_texts(file, dataset)
-            _write_manifest(file)
+        temporary.write_bytes(_image(dataset))
         _write_seal(temporary)
+
+
+def _image(dataset: Dataset) -> bytes:
+    """The file's bytes. Made in memory: on a disk that fills up, the library itself prints pages
+    of errors and may crash the process."""
+    version = ("earliest", "v110")
+    with h5py.File("image", "w", libver=version, driver="core", backing_store=False) as file:
+        _write_root(file, dataset)
+        _write_samples(file.create_group(SAMPLES), dataset)
+        _write_texts(file, dataset)
+        _write_manifest(file)
+        file.flush()
+        return bytes(file.id.get_file_image())
 
 
 def _check_lengths(dataset: Dataset) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import random
@@ -191,6 +192,28 @@ def test_options_that_contradict_each_other_are_refused(
     status, _, err = rig(*words.split())
     assert status == 2
     assert err.startswith(says)
+
+
+def test_the_list_of_commands_cuts_no_sentence(rig: Rig) -> None:
+    status, out, _ = rig("--help")
+    assert status == 0
+    assert "..." not in out.partition("Commands:")[2]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize("words", [[], ["--json", "-"]])
+def test_a_full_disk_behind_standard_output_is_no_bug(
+    rig: Rig, files: Path, words: list[str]
+) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run(
+            [sys.executable, "-m", "rig", "analyze", "d.h5", *words], cwd=files, stdout=full,
+            stderr=subprocess.PIPE, text=True, check=False,
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        )  # fmt: skip
+    said = f"standard output: cannot be written: {os.strerror(errno.ENOSPC)}.\n"
+    assert (ended.returncode, ended.stderr) == (2, said)
 
 
 def test_json_that_cannot_be_written_costs_no_result(

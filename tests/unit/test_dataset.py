@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import random
+import subprocess
+import sys
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -88,6 +91,9 @@ def test_without_a_stop_record_it_is_incomplete() -> None:
     assert cut.banners()[1] == (
         "INCOMPLETE: the measurement did not reach its end (it was cut off)."
     )
+    told = ("event", {"kind": "stopped", "text": "laser: silent for 1.0 s. Check it, then resume."})
+    banner = from_records(example.records(3, told)).banners()[1]
+    assert banner.endswith("its end (laser: silent for 1.0 s).")  # no remedy of that day
     stopped = ("event", {"kind": "stopped", "text": "force limit"})
     assert from_records(example.records(3, stopped)).stop_reason == "force limit"
     stop = ("stop", {"reason": "done", "complete": True})
@@ -230,6 +236,26 @@ def test_a_failing_disk_leaves_the_older_file(path: Path, monkeypatch: pytest.Mo
         assert [p.name for p in path.parent.iterdir()] == ["run.h5"]
     with pytest.raises(InputError, match="cannot be written: No such file"):
         write(example.dataset(7), path.parent / "none" / "x.h5")
+
+
+def test_a_disk_that_fills_up_is_one_error(tmp_path: Path) -> None:
+    program = (
+        "import resource; from pathlib import Path; from rig.dataset import load, write; "
+        "from rig.errors import InputError; data = load(Path('a.h5'));\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY))\n"
+        "try: write(data, Path('b.h5'))\n"
+        "except InputError as error: print(error)"
+    )
+    write(example.dataset(1000), tmp_path / "a.h5")
+    assert (tmp_path / "a.h5").stat().st_size > 60_000
+    ended = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )  # fmt: skip
+    assert ended.stderr == ""
+    reason = os.strerror(errno.EFBIG)
+    assert ended.stdout.startswith(f"b.h5: cannot be written: {reason}. Choose another folder")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
 
 
 def test_the_new_file_is_on_disk_before_it_takes_its_place(

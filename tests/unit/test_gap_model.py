@@ -243,6 +243,14 @@ def test_yield_along_a_path_is_its_closed_form(tmp_path: Path) -> None:
     _, after, _ = levels(found, "zero", 1)
     assert after[0] == 0.0
     assert after[1] == pytest.approx(1e-4 * lever * top, rel=1e-3)
+    assert "hold all" not in found.to_text()
+
+
+def test_the_text_says_that_repetitions_are_left_out(tmp_path: Path) -> None:
+    path = procedure(tmp_path)
+    path.write_text(path.read_text().replace("repetitions: 2", "repetitions: 3"))
+    text = simulate(model(tmp_path, YIELD), path).to_text()
+    assert "  The first and the last repetition; --csv and --json hold all.\n  repetition" in text
 
 
 def test_creep_needs_the_time_that_the_procedure_gives_it(tmp_path: Path) -> None:

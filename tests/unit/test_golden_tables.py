@@ -39,6 +39,15 @@ def test_the_text_word_for_word(command: str) -> None:
     assert found == (GOLDEN / f"{command}_text.txt").read_text("utf-8")
 
 
+def test_where_the_numbers_come_from_is_said_first() -> None:
+    notes = ("Another note.", shown.EMULATED)
+    for result in (shown.coupled(), shown.predicted()):
+        text = replace(result, notes=notes).to_text()
+        assert text.startswith(f"{shown.EMULATED}\n\n")
+        assert text.count("EMULATED") == 1
+        assert text.endswith("\nNote: Another note.")
+
+
 IMPORTED = """session_s,time_s,repetition,branch,step,force_N,displacement_mm,temprature1_C
 0,0,1,zero,0,0.0,0.0,7
 1,1,1,loading,1,20.0,0.25,7

@@ -75,6 +75,20 @@ def test_text_word_for_word(folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert len(listing.entries) == 3
 
 
+def test_a_narrow_terminal_gets_two_lines_a_file(folder: Path) -> None:
+    listing = list_folder(folder)
+    wide = max(map(len, listing.to_text().splitlines()[1:5]))
+    assert replace(listing, width=wide).to_text() == listing.to_text()
+    narrow = replace(listing, width=wide - 1).to_text().splitlines()
+    assert narrow[1:5] == [
+        "file             date              robot  samples",
+        "  state; directions; k N/mm; verdict",
+        "arm.h5           2026-03-01 10:00  ur10e        5",
+        "  complete, EMULATED; x y; -; -",
+    ]
+    assert len(narrow) == len(listing.to_text().splitlines()) + 4
+
+
 def test_json_has_units_and_null_for_what_nobody_knows(folder: Path) -> None:
     found = list_folder(folder).to_json()
     assert found["schema"] == "rig.list/1"

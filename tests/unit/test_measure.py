@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -42,6 +43,16 @@ def test_a_data_set_is_named_as_one(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"x\.csv: a data set is an HDF5 file; allowed endings"):
         measure.measure(PROTOCOL, "emulated", tmp_path / "x.csv", print)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_refuses_is_told_before_a_device_is_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.access", lambda _path, mode: mode != os.W_OK)
+    monkeypatch.setattr(measure, "_opened", lambda *_: pytest.fail("devices were opened"))
+    words = rf"x\.h5: nothing may be written into the folder {tmp_path}\. Choose another with -o\."
+    with pytest.raises(InputError, match=words):
+        measure.measure(PROTOCOL, "emulated", tmp_path / "x.h5", print)
 
 
 @pytest.mark.parametrize(("speed", "synced"), [(50.0, False), (1.0, True), (0.5, True)])

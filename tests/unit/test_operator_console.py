@@ -94,14 +94,26 @@ def test_old_values_do_not_look_live() -> None:
     assert "STOP" not in shown(known(40.0, 60.0, force_age_s=0.7), age_s=0.2)
 
 
+def test_while_the_rig_is_set_up_no_value_is_missed() -> None:
+    mount = Prompt("mount", "Bring the arm to pose P1.")
+    text = shown(known(float("nan"), float("nan")), age_s=40.0, prompt=mount)
+    assert "SET UP" in text
+    assert "STOP" not in text
+    assert "s old" not in text
+    assert "STOP" in shown(known(40.0, 60.0), stale_s={"laser": 2.5}, prompt=mount)
+    assert "STOP" in shown(known(40.0, 60.0), age_s=40.0, prompt=Prompt("paused", "Paused."))
+
+
 def test_limits_show_how_much_is_left_the_closest_first() -> None:
     levels = (
         LimitLevel("force", 60.0, 240.0, "N", "stop"),
         LimitLevel("displacement", 8.1, 9.0, "mm", "stop"),
         LimitLevel("unlimited", 1.0, 0.0, "mm", "warn"),
+        LimitLevel("not read yet", float("nan"), 9.0, "mm", "warn"),
     )
     text = shown(known(40.0, 60.0, limits=levels))
     assert "left of the limits: displacement 10 %   force 75 %" in text
+    assert "nan" not in text
     assert "left of the limits" not in shown(known(40.0, 60.0))
 
 

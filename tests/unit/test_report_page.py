@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import re
 import sys
 from dataclasses import replace
@@ -35,6 +36,7 @@ from rig.report.drawing import alone, style, svg_of
 from rig.report.gap_section import _effects
 from rig.report.gather import gather
 from rig.report.html import escape, render
+from rig.report.measured_section import _places
 from rig.report.pdf import pdf
 from rig.report.report import Report, checked, make, write_figures, write_html
 from rig.report.results import Node
@@ -201,6 +203,33 @@ def test_where_an_effect_may_sit_is_said_with_the_numbers_of_the_json(
     blocks = tuple(_effects(Node({"effects": [one]}, "/gap")))
     text = Page(render(Document("", "", (), (Section("s", "", blocks),), ""))).text
     assert ("leave open: joint 1 (62.0 %), joint 5 (38.0 %)." in text) == (len(places) > 1)
+
+
+def test_what_many_runs_have_to_themselves_is_its_range() -> None:
+    drift = {
+        f"drift_x_run{r}": {"unit": "N", "value": v, "ci95": [v - 0.1, v + 0.1]}
+        for r, v in ((1, 0.5), (2, -3.25), (3, 2.75), (4, 1.0))
+    }
+    one = {"name": "force_drift", "probability": 1.0, "share_of_gap": 1.0, "parameters": drift,
+           "indistinguishable_from": [], "places": {}}  # fmt: skip
+    (table,) = _effects(Node({"effects": [one]}, "/gap"))
+    assert isinstance(table, Table)
+    assert [cells[1] for cells in table.rows] == [
+        "drift_x_run2, the least of 4 runs",
+        "drift_x_run3, the largest of 4 runs",
+    ]
+    drift.pop("drift_x_run1"), drift.pop("drift_x_run4")
+    (table,) = _effects(Node({"effects": [one]}, "/gap"))
+    assert isinstance(table, Table)
+    assert [cells[1] for cells in table.rows] == ["drift_x_run2", "drift_x_run3"]
+
+
+def test_poses_are_in_degrees_as_in_protocols() -> None:
+    pose = {"q_rad": [0.0, -math.pi / 2, math.pi / 3, 0.0, 0.0, 0.2344], "tcp_xyz_mm": [0, 0, 0]}
+    table, _ = _places(Node({"poses": {"P1": pose}, "directions": {"x": [1, 0, 0]}}))
+    assert table.header[1:7] == tuple(f"q{j} deg" for j in range(1, 7))
+    shown = [cell[0].text for cell in table.rows[0][1:7] if isinstance(cell[0], Number)]
+    assert [float(text) for text in shown] == [0.0, -90.0, 60.0, 0.0, 0.0, 13.43]
 
 
 def test_without_the_gap(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from rig.errors import InputError
 from rig.meta import Meta
+from rig.model import load_model
 from rig.protocol import load_protocol
 from rig.station import STATIONS, load_station, parse_station, station_names
 from rig.yamlfile import load_yaml
@@ -133,7 +134,11 @@ def test_a_station_without_devices_is_none() -> None:
 
 @pytest.mark.parametrize(
     ("read", "wanted"),
-    [(load_protocol, "a protocol"), (partial(load_yaml, type_=Meta), "another kind of file")],
+    [
+        (load_protocol, "a protocol"),
+        (load_model, "an arm's model, as `rig identify --write-model` writes"),
+        (partial(load_yaml, type_=Meta), "the META of a table"),
+    ],
 )
 def test_a_file_of_another_kind_is_one_line(read: Callable[[Path], object], wanted: str) -> None:
     """Not one for each of its keys."""
@@ -143,3 +148,12 @@ def test_a_file_of_another_kind_is_one_line(read: Callable[[Path], object], want
     place, what = str(caught.value).split(": schema: ")
     assert place.startswith(f"{path}:")
     assert what == f"this is a station; wanted: {wanted}. Give that file's path."
+
+
+def test_a_file_without_a_kind_is_one_line_too() -> None:
+    """An arm's model, in place of a protocol."""
+    path = STATIONS.parents[1] / "data" / "models" / "F1.yaml"
+    with pytest.raises(InputError) as caught:
+        load_protocol(path)
+    said = "this is not a protocol: it says no schema, and most of its keys are others."
+    assert str(caught.value) == f"{path}:1:1: {said} Check the name."

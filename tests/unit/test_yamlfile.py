@@ -189,6 +189,37 @@ def test_a_missing_key_says_what_is_wanted_and_where() -> None:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Gauge:
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    driver: Literal["gauge"]
+    port: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wire:
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    driver: Literal["wire"]
+    port: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    sensor: Gauge | Wire
+
+
+def test_of_two_drivers_only_a_word_that_neither_has_is_wrong() -> None:
+    assert message("sensor: {driver: wire, prt: COM3}", Bench) == (
+        'F:1:24: sensor.prt: unknown key. Did you mean "port"?'
+    )
+    assert message("sensor: {driver: wirr, port: COM3}", Bench) == (
+        'F:1:18: sensor.driver: the text "wirr" is not allowed; wanted: "gauge" or "wire". '
+        'Did you mean "wire"?'
+    )
+
+
 def test_a_value_under_a_mistyped_key_is_checked_too() -> None:
     assert laser("rate_Hs: 1000").splitlines() == [
         'F:1:21: laser.rate_Hs: unknown key. Did you mean "rate_Hz"?',
@@ -239,6 +270,9 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 
     (tmp_path / "station.yaml").write_text("laser: {port: x}")
     assert said(tmp_path / "stations.yaml") == ': no such file. Did you mean "station.yaml"?'
+    assert said(tmp_path / "station.yml") == ': no such file. Did you mean "station.yaml"?'
+    # no likeness by the ending alone
+    assert said(tmp_path / "missing.yaml") == ": no such file. Known: station.yaml."
     assert said(tmp_path / "no" / "f.yaml") == ": no such file."
     assert said(tmp_path) == ": a folder; a YAML file is wanted."
     assert said(Path("/dev/null")) == ": not a regular file; a YAML file is wanted."

@@ -64,10 +64,13 @@ class Outcome:
     stderr: str
 
 
-def run_rig(*words: str, cwd: Path, timeout: float = 90) -> Outcome:
-    """`rig` in a process of its own."""
+def run_rig(
+    *words: str, cwd: Path, timeout: float = 90, largest_file: int | None = None
+) -> Outcome:
+    """`rig` in a process of its own. largest_file: bytes at which the disk refuses."""
+    limited = [] if largest_file is None else ["prlimit", f"--fsize={largest_file}"]
     result = subprocess.run(
-        [sys.executable, "-m", "rig", *words],
+        [*limited, sys.executable, "-m", "rig", *words],
         cwd=cwd, capture_output=True, text=True, timeout=timeout, check=False,
         stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(HOME)},
     )  # fmt: skip

@@ -78,6 +78,17 @@ def until(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
     return False
 
 
+def test_a_port_in_use_is_refused_and_left_alone(bench: Bench) -> None:
+    _, port = bench.emulator()
+    first, second = bench.client(port), bench.client(port)
+    first.open()
+    words = "another program has it open.*no other program"
+    with pytest.raises(CannotConnect, match=words):
+        second.open()
+    time.sleep(2 * STALE_S)  # nobody took its values
+    assert first.latest().count > 0
+
+
 def test_identifies_itself_and_measures(bench: Bench) -> None:
     _, port = bench.emulator(linearity_um=0.0)
     laser = bench.client(port)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -121,6 +123,48 @@ def test_being_ended_writes_the_file(tmp_path: Path, number: int) -> None:
     assert "Traceback" not in errors
     assert not load(tmp_path / "run.h5").complete
     assert no_process_left(tmp_path)
+
+
+def test_a_full_disk_ends_with_what_to_do_and_resumes(tmp_path: Path) -> None:
+    words = write_files(tmp_path)
+    full = run_rig(*words, cwd=tmp_path, largest_file=100_000)
+    assert full.status == 4, full.stderr
+    reason = os.strerror(errno.EFBIG)
+    data, end = full.stderr.splitlines()[-2:]
+    assert data == (
+        f"run.h5: cannot be written: {reason}. Choose another folder, or make room. What was "
+        "measured is kept in run.h5.journal. To go on once that is mended: rig measure --resume "
+        "run.h5"
+    )
+    assert end.startswith("Stopped: run.h5")
+    assert f": {reason}." in end
+    assert re.search("Unload the arm|Turn the screw back", end)
+    assert len(full.stderr.splitlines()) < 15
+    again = run_rig("measure", "--resume", "run.h5", cwd=tmp_path)
+    assert again.status == 0, again.stderr
+    assert steps_of(load(tmp_path / "run.h5")) == STEPS
+
+
+def test_the_speed_that_was_asked_for_is_told_and_kept(tmp_path: Path) -> None:
+    process = started(tmp_path, [*write_files(tmp_path), "--speed", "20"])
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert load(tmp_path / "run.h5").devices["operator"]["clock"] == "20 times real time"
+    again = run_rig("measure", "--resume", "run.h5", cwd=tmp_path)
+    assert again.status == 0, again.stderr
+    assert load(tmp_path / "run.h5").devices["operator"]["clock"] == "20 times real time"
+
+
+def test_a_second_one_leaves_the_devices_of_the_first_alone(tmp_path: Path) -> None:
+    process = started(tmp_path, write_files(tmp_path))
+    second = run_rig("measure", "--resume", "run.h5", cwd=tmp_path)
+    assert second.status == 2
+    assert second.stderr.splitlines() == [
+        "run.h5.journal: another measurement is writing this journal. End it, or choose another "
+        "name."
+    ]
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
 
 
 def test_kill_then_resume_measures_the_same_steps(tmp_path: Path) -> None:
