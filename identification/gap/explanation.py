@@ -151,7 +151,7 @@ def explain(
     weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
     weight -= within_stated(engine, parts, sizes)
     if len(parts) > 1:
-        weight -= pettiness(engine, parts, sizes) + cancelling(engine, parts, each)
+        weight -= pettiness(engine, parts, sizes) + cancelling(engine, parts, sizes, each)
         weight += signs_kept(levels[best], parts)
     return Explanation(
         tuple(parts[i] for i in order),

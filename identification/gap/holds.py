@@ -96,7 +96,8 @@ def noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
 
 def steadied(hold: Ints, values: Array, weight: Array, sd: float) -> tuple[Array, Flags]:
     """Values (n,) with their mean in holds in which they stand still within noise; these (n,)."""
-    mean = np.bincount(hold, weights=weight * values) / np.bincount(hold, weights=weight)
+    count = np.maximum(np.bincount(hold, weights=weight), 1e-300)
+    mean = np.bincount(hold, weights=weight * values) / count
     square = np.bincount(hold, weights=weight * (values - mean[hold]) ** 2) / sd**2
     steady = (square <= _STEADY_PER_ROW * np.bincount(hold) + _STEADY_ONCE)[hold]
     return np.where(steady, mean[hold], values), steady

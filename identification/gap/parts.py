@@ -38,12 +38,14 @@ class Part:
 class Sizes:
     """rms (m) of each part's most probable contribution: to the gap, where what springs would take
     over is none, unless the effect is linear itself; and as it moves. energy: mean square (m^2) of
-    all contributions, what is a law counted by its imperfection. signed: whether the most probable
-    coefficients of each part have the sign that physics wants."""
+    all contributions, what is a law counted by its imperfection. linear: how far those that are
+    linear move it together. signed: whether the most probable coefficients of each part have the
+    sign that physics wants."""
 
     gap: Array
     moved: Array
     energy: float
+    linear: float = 0.0
     signed: tuple[bool, ...] = ()
 
 
@@ -58,6 +60,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     rows = engine.bench.rows
     precision = float(np.sum(1 / engine.sigma[: rows.n] ** 2))
     sizes, moves, signed, energy, start = [], [], [], 0.0, 0
+    linear = np.zeros(rows.n)
     between = sum(p.word in _BETWEEN_RUNS for p in parts)  # of two, one may undo the other
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
@@ -66,6 +69,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
         moved, faulty = rows.moved(does).T
         moves.append(rows.rms(moved))
         if p.word in LINEAR:
+            linear += moved
             sizes.append(_beyond_springs(engine, moved))
         else:
             mine = slice(start, start + k)
@@ -78,7 +82,9 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
         start += k
         limit = p.variant.positive
         signed.append(limit is None or float(limit @ part) >= p.variant.least)
-    return Sizes(np.array(sizes), np.array(moves), min(energy, engine.most), tuple(signed))
+    return Sizes(
+        np.array(sizes), np.array(moves), min(energy, engine.most), rows.rms(linear), tuple(signed)
+    )
 
 
 def _beyond_springs(engine: Engine, moved: Array) -> float:

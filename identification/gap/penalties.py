@@ -42,15 +42,27 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     return penalty
 
 
-def cancelling(engine: Engine, parts: tuple[Part, ...], sizes: Array) -> float:
+def cancelling(engine: Engine, parts: tuple[Part, ...], found: Sizes, sizes: Array) -> float:
     """Penalty in nats for effects that are larger than the gap and take each other back; what is
-    linear the springs of the base take back from it, and it is left alone; as is a single effect
-    beside it on an arm, whose springs may hide most of either."""
+    linear the springs of the base take back from it, and it is left alone but where another takes
+    back nearly all of it; as is a single effect beside it on an arm, whose springs may hide most of
+    either."""
     bent = [float(s) for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR]
     if engine.bench.data.arm and len(bent) < _TWO:
-        return 0.0
+        return _taken_back(parts, found)
     share = max(max(bent, default=0.0) / max(engine.structural, 1e-300), 1e-6)
     return _wall(share / CANCELLING)
+
+
+def _taken_back(parts: tuple[Part, ...], found: Sizes) -> float:
+    """Penalty in nats, a steep wall, for linear effects of which hardly anything is left."""
+    moved = [float(m) for p, m in zip(parts, found.moved, strict=True) if p.word in LINEAR]
+    if len(moved) < _TWO:
+        return 0.0
+    return _wall(_LEFT * max(moved) / max(found.linear, 1e-300))
+
+
+_LEFT = 0.3  # of what the larger one moves
 
 
 _TWO = 2  # to take each other back

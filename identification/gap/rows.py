@@ -125,12 +125,11 @@ def reduce_rows(data: GapData) -> Rows:
         level = _continuous_levels(setup, force)
     else:
         level = _ids(np.column_stack([setup, branch, step, *_approach(run, branch, holds, force)]))
-    still = partial(_still, bins, hold, holds)
-    steadied, steady = still(data.force, data.instruments.force)
-    rested, rests = still(data.displacement, data.instruments.displacement)
-    meter = data.instruments
-    stretch = _consecutive(_ids(np.column_stack([run, branch, step])))
+    stretch, meter = _consecutive(_ids(np.column_stack([run, branch, step]))), data.instruments
     on_its_way = _on_its_way(force, displacement, stretch, meter.force, meter.displacement)
+    still = partial(_still, bins, hold, holds, ~on_its_way)
+    steadied, steady = still(data.force, meter.force)
+    rested, rests = still(data.displacement, meter.displacement)
     return Rows(
         time=mean(data.time), session=mean(_session(data)), clock=data.session is not None, run=run,
         setup=setup, repetition=first(data.repetition), branch=branch, step=step, hold=holds,
@@ -151,30 +150,36 @@ def reduce_rows(data: GapData) -> Rows:
 def _on_its_way(
     force: Array, displacement: Array, level: Ints, sd_force: float, sd_displacement: float
 ) -> Flags:
-    """(n,) rows at a level (n,) at which the load is not yet there: what is recorded all the time
-    bears the name of the next level at once. Force and displacement are both where neither ends,
-    about as far: a drift or a lag moves one of them, creep the other. sd: of one sample."""
-    last = np.append(np.flatnonzero(np.diff(level)), len(level) - 1)[level]
-    off_f, off_u = force - force[last], displacement - displacement[last]
-    seen = (np.abs(off_f) > _SEEN * sd_force) & (np.abs(off_u) > _SEEN * sd_displacement)
+    """(n,) rows at a level (n,) at which the load may not be there yet: what is recorded all the
+    time bears the name of the next level at once. Force and displacement are both where neither
+    ends, about as far (a drift or a lag moves one of them, creep the other); or the displacement
+    has much of its step to go, whatever a force says that scatters. sd: of one sample."""
+    ends = np.append(np.flatnonzero(np.diff(level)), len(level) - 1)
+    off_f, off_u = force - force[ends][level], displacement - displacement[ends][level]
+    moved = np.abs(off_f) / sd_force, np.abs(off_u) / sd_displacement
     f, u = np.abs(off_f) / (np.ptp(force) or 1.0), np.abs(off_u) / (np.ptp(displacement) or 1.0)
-    alike = (f < _ABOUT * u) & (u < _ABOUT * f)
-    return np.asarray(seen & (np.maximum(f, u) > _AWAY) & alike, dtype=bool)
+    alike = (moved[0] > 1) & (moved[1] > 1) & (f < _ABOUT * u) & (u < _ABOUT * f)
+    both = alike & (np.hypot(*moved) > _SEEN) & (np.maximum(f, u) > _AWAY)
+    step = np.abs(np.diff(displacement[ends], prepend=0.0))[level]
+    return np.asarray(both | ((moved[1] > _SEEN) & (np.abs(off_u) > _TO_GO * step) & (step > 0)))
 
 
-_SEEN = 3.0  # standard deviations
+_SEEN = 4.0  # standard deviations, of both together
 _AWAY, _ABOUT = 0.01, 4.0  # of the range; as far, by shares of the range, to a factor
+_TO_GO = 0.25  # of a step
 
 
 def _still(
-    bins: Bins, hold: Ints, holds: Ints, values: Array, stated: float
+    bins: Bins, hold: Ints, holds: Ints, there: Flags, values: Array, stated: float
 ) -> tuple[Array, Flags]:
-    """A channel (k,) with its mean in holds in which it stands still within its noise; these. What
-    runs has none: a slow pull would be read as stairs."""
+    """A channel (k,) with its mean in holds in which it stands still within its noise, once it is
+    there (k,); these. What runs has none: a slow pull would be read as stairs."""
     if bins.running:
         return bins.mean(values), np.zeros(len(bins.edges), dtype=bool)
     sd = noise_in_holds(values, hold, stated)
-    return steadied(holds, bins.mean(values), bins.count.astype(float), sd)
+    weight, mean = bins.count * there, bins.mean(values)
+    still, steady = steadied(holds, mean, weight.astype(float), sd)
+    return np.where(there, still, mean), steady & there
 
 
 def _blocks(run: Ints) -> Ints:

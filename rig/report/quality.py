@@ -87,6 +87,7 @@ def assess(dataset: Dataset) -> Quality:
         "duration_s": _duration(dataset),
         "lateness_s": _lateness(dataset),
         "slots_missed": _total(dataset, "slots_missed"),
+        "clock": next((d["clock"] for d in dataset.devices.values() if "clock" in d), None),
         "devices": _devices(dataset),
         "unsettled_levels": _unsettled(dataset),
         "force_zero": _force_zero(zeros),

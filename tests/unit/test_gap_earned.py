@@ -134,15 +134,23 @@ def test_effects_that_take_each_other_back_are_charged_and_springs_are_not() -> 
     mine = explained([0], "joint_nonlinear_stiffness", 0.0).parts
     spring = explained([1], "joint_stiffness_error", 0.0).parts
     other = explained([0], "joint_yield", 0.0).parts
-    both = np.array([e.structural, e.structural])
-    assert cancelling(e, mine + other, both) == 0.0
-    assert cancelling(e, mine + other, np.array([big, e.structural])) > 50
-    assert cancelling(e, mine + other + spring, np.array([e.structural, big, big])) > 50
+
+    def charged(parts: tuple[Part, ...], *sizes: float, linear: float = 0.0) -> float:
+        each = np.array(sizes)
+        return cancelling(e, parts, Sizes(each, each, 0.0, linear), each)
+
+    assert charged(mine + other, e.structural, e.structural) == 0.0
+    assert charged(mine + other, big, e.structural) > 50
+    assert charged(mine + other + spring, e.structural, big, big) > 50
     # a bench's one spring hides little; an arm's may hide most of a single effect
-    assert cancelling(e, mine + spring, np.array([big, big])) > 50
+    assert charged(mine + spring, big, big) > 50
     e.bench = replace(e.bench, data=replace(e.bench.data, arm=True))
-    assert cancelling(e, mine + spring, np.array([big, big])) == 0.0
-    assert cancelling(e, mine + other, np.array([big, big])) > 50
+    assert charged(mine + spring, big, big) == 0.0
+    assert charged(mine + other, big, big) > 50
+    # of two that are linear something must be left
+    gain = explained([0], "force_scale", 0.0).parts
+    assert charged(gain + spring, big, big, linear=0.4 * big) == 0.0
+    assert charged(gain + spring, big, big, linear=0.1 * big) > 50
 
 
 def test_a_drift_alone_need_not_foresee_what_another_run_brings() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -115,3 +116,17 @@ def test_a_load_on_its_way_to_none_is_no_zero(late: bool) -> None:
     assert loaded.any()
     np.testing.assert_array_equal(rows.zero, at_zero & ~loaded)
     assert (np.abs(rows.measured_force[rows.zero]) > 0.5).all()  # as it drifted
+
+
+def test_a_load_on_its_way_is_none_of_its_level() -> None:
+    """A force that scatters by a third of the step hides it; the displacement does not."""
+    step = np.repeat(np.arange(1, LEVELS + 1), HOLD)
+    true = 10.0 * step - np.where(np.arange(len(step)) % HOLD == 0, 5.0, 0.0)
+    rng = np.random.default_rng(5)
+    force = true + rng.normal(0, 3.0, len(step))
+    data = bench_data(force, SPRING * true, step=step)
+    rows = reduce_rows(replace(data, instruments=replace(data.instruments, force=3.0)))
+    first, others = rows.hold_starts & (rows.step > 1), ~rows.hold_starts
+    np.testing.assert_array_equal(rows.force[first], rows.measured_force[first])
+    settled = [force[HOLD * k + 1 : HOLD * (k + 1)].mean() for k in range(LEVELS)]
+    np.testing.assert_allclose(rows.force[others], np.array(settled)[rows.hold[others]])

@@ -39,6 +39,13 @@ def test_what_was_not_recorded_is_null(plain: Dataset) -> None:
     assert facts["devices"] == facts["discards"] == facts["events"] == []
 
 
+def test_how_fast_the_clock_of_an_emulated_run_went() -> None:
+    found = measured(5)
+    assert assess(found).facts["clock"] is None
+    devices = {**found.devices, "hand": {"clock": "50 times real time"}}
+    assert assess(replace(found, devices=devices)).facts["clock"] == "50 times real time"
+
+
 def test_discards_and_events(plain: Dataset) -> None:
     discarded = plain.columns["discarded"].copy()
     discarded[3:6] = True

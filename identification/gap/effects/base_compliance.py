@@ -7,7 +7,7 @@ Unseen by encoders. 5e5 to 2e6 Nm/rad.
 
 Size: 5e-7 to 2e-6 rad/Nm; tables and stands up to ten times softer.
 Prior: compliances positive, sd out of SCALES, equally likely; turned axes at 0.5, single ones at
-0.3, feet that bend at 0.3: by BENDS at each of BENDS_AT, the slope positive throughout.
+0.3, feet that bend at 0.3: by BENDS at each of BENDS_AT, STIFFEST of the slope left throughout.
 Source: stiffness of bolted mountings of arms, 5e5 to 2e6 Nm/rad.
 """
 
@@ -37,6 +37,9 @@ SCALES = (3e-7, 1e-6, 3e-6, 1e-5)  # rad/Nm
 # Of the largest moment: where feet stiffen, or bolts let go.
 BENDS_AT = (0.1, 0.2, 0.3, 0.42, 0.55, 0.7)
 BENDS = 0.6  # of the compliance without a moment: what it changes by there
+# Of that compliance so much is left at least: feet bear the arm's weight before they are pushed.
+# What hardly gives any more is a seat.
+STIFFEST = 0.5
 
 
 def moments(bench: Bench, depth: float) -> Array:
@@ -99,12 +102,12 @@ def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
     root = np.zeros((k + len(bent), k + len(bent)))
     root[:k, :k] = stand.root
     root[k:, k:] = BENDS * np.eye(len(bent))
-    # the slope stays positive up to the largest moment
+    # what a large moment presses, or lets go of, still gives
     within = np.zeros((len(stand.within) + len(bent), len(root)))
     within[: len(stand.within), :k] = stand.within
     for i, (axis, at) in enumerate(bends):
         row = within[len(stand.within) + i]
-        row[stand.info["axes"].index(axis)] = 1.0
+        row[stand.info["axes"].index(axis)] = 1.0 - STIFFEST
         row[k:] = [float(a == axis and b <= at) for a, b in bends]
     positive = None if stand.positive is None else np.append(stand.positive, np.zeros(len(bent)))
     return variant(
