@@ -10,7 +10,14 @@ import numpy as np
 
 from identification.gap.bins import Bins
 from identification.gap.data import CYCLE, ZERO, Array, Flags, GapData, Ints
-from identification.gap.holds import hold_ids, is_continuous, noise_in_holds, side_of, steadied
+from identification.gap.holds import (
+    hold_ids,
+    is_continuous,
+    noise_in_holds,
+    on_its_way,
+    side_of,
+    steadied,
+)
 from identification.gap.turns import rises
 
 _LEVELS = 12  # force classes of a continuous recording, per sense of motion
@@ -126,8 +133,8 @@ def reduce_rows(data: GapData) -> Rows:
     else:
         level = _ids(np.column_stack([setup, branch, step, *_approach(run, branch, holds, force)]))
     stretch, meter = _consecutive(_ids(np.column_stack([run, branch, step]))), data.instruments
-    on_its_way = _on_its_way(force, displacement, stretch, meter.force, meter.displacement)
-    still = partial(_still, bins, hold, holds, ~on_its_way)
+    coming = on_its_way(force, displacement, stretch, meter.force, meter.displacement)
+    still = partial(_still, bins, hold, holds, ~coming)
     steadied, steady = still(data.force, meter.force)
     rested, rests = still(data.displacement, meter.displacement)
     return Rows(
@@ -142,31 +149,9 @@ def reduce_rows(data: GapData) -> Rows:
         displacement_trend=bins.trend(data.time, data.displacement),
         tangential=bins.mean_of(data.tangential), q=bins.mean_of(data.q),
         temperature=bins.mean_of(data.temperature), simulated=bins.mean_of(data.simulated),
-        zero=(branch == ZERO) & (step <= 0) & ~on_its_way,
+        zero=(branch == ZERO) & (step <= 0) & ~coming,
         continuous=bins.running, starts=_changes(run), hold_starts=_changes(holds),
     )  # fmt: skip
-
-
-def _on_its_way(
-    force: Array, displacement: Array, level: Ints, sd_force: float, sd_displacement: float
-) -> Flags:
-    """(n,) rows at a level (n,) at which the load may not be there yet: what is recorded all the
-    time bears the name of the next level at once. Force and displacement are both where neither
-    ends, about as far (a drift or a lag moves one of them, creep the other); or the displacement
-    has much of its step to go, whatever a force says that scatters. sd: of one sample."""
-    ends = np.append(np.flatnonzero(np.diff(level)), len(level) - 1)
-    off_f, off_u = force - force[ends][level], displacement - displacement[ends][level]
-    moved = np.abs(off_f) / sd_force, np.abs(off_u) / sd_displacement
-    f, u = np.abs(off_f) / (np.ptp(force) or 1.0), np.abs(off_u) / (np.ptp(displacement) or 1.0)
-    alike = (moved[0] > 1) & (moved[1] > 1) & (f < _ABOUT * u) & (u < _ABOUT * f)
-    both = alike & (np.hypot(*moved) > _SEEN) & (np.maximum(f, u) > _AWAY)
-    step = np.abs(np.diff(displacement[ends], prepend=0.0))[level]
-    return np.asarray(both | ((moved[1] > _SEEN) & (np.abs(off_u) > _TO_GO * step) & (step > 0)))
-
-
-_SEEN = 4.0  # standard deviations, of both together
-_AWAY, _ABOUT = 0.01, 4.0  # of the range; as far, by shares of the range, to a factor
-_TO_GO = 0.25  # of a step
 
 
 def _still(

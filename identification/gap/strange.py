@@ -191,9 +191,11 @@ def _settles(bench: Bench) -> list[Variant]:
     masks = [(rows.setup == s).astype(float) for s in np.unique(rows.setup)]
     columns = [bench.add(bench.outside_column(m * c)) for m in masks for c in z.T]
     root = np.asarray(np.kron(np.eye(len(masks)), smooth_root(len(times), 0.5)), dtype=float)
-    return [variant("settles", "each setup", columns, _scales(bench), root, positive=False)]
+    return [variant("settles", "each setup", columns, _scales(bench), root, positive=False,
+                    prior=SELDOM)]  # fmt: skip
 
 
+SELDOM = 0.1  # what settles is mostly a joint
 SETTLING = (3.0, 9.0, 27.0, 81.0, 243.0)  # times s of a reading each second
 
 
