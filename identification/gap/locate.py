@@ -55,10 +55,19 @@ def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Wher
         branches=tuple(BRANCH_NAMES[b] for b in np.unique(bench.rows.branch[rows])),
         repetitions=tuple(int(r) for r in np.unique(bench.rows.repetition[rows])),
         joints=_joints(engine, fit, sizes),
-        seen_by_encoders=(word.startswith("joint_") if bench.has_q and word and
-                          word not in INSTRUMENTS else None),
+        seen_by_encoders=_seen(engine, word),
         share=inside / total if total > 0 else 0.0,
     )  # fmt: skip
+
+
+def _seen(engine: Engine, word: str) -> bool | None:
+    """Whether readings of the joints show an effect; None where they can't tell. What no joint does
+    none of them shows, whichever side of the gear they are on."""
+    if engine.bench.data.q is None or not word or word in INSTRUMENTS:
+        return None
+    if not word.startswith("joint_"):
+        return False
+    return True if engine.bench.has_q else None
 
 
 def _visible(engine: Engine, fit: Fit, main: Array) -> Array:

@@ -165,3 +165,14 @@ def test_a_joint_that_hardens_alike_in_both_senses_gives_way_to_new_loads_only()
     found = diagnose_gap(replace(data, displacement=data.displacement + lever * give, q=q))
     assert found.verdict == "joint_yield"
     assert found.where.joints == (1,)
+
+
+@pytest.mark.parametrize(("encoder", "seen"), [("output", False), ("motor", False), ("", None)])
+def test_what_no_joint_does_no_reading_shows(encoder: str, seen: bool | None) -> None:
+    data = linear("rich")
+    depth = 3e-5 * np.sign(data.force) * (1 - np.exp(-np.abs(data.force) / 6))
+    data = replace(data, displacement=data.displacement + depth,
+                   output_encoder=encoder == "output", q=data.q if encoder else None)  # fmt: skip
+    found = diagnose_gap(data)
+    assert found.verdict == "contact_seating"
+    assert found.where.seen_by_encoders is seen
