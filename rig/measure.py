@@ -111,6 +111,9 @@ def resume(
             f"{hint}"
         )
     records = replay(journal_file)
+    if datasets.from_records(records, path).complete:  # its file alone could not be written
+        datasets.finish(path)
+        return path
     start = records[0].data
     protocol = parse_protocol(start["protocol"], path)
     station = parse_station(start["station"], path)

@@ -262,8 +262,8 @@ def _assumptions(
         percent = 100 * float(np.max(arm.joint_stiffness_relative_sd))
         yield f"u and k expected from the nominal joint springs of {arm.name}, sd {percent:.0f} %"
     yield (
-        "joint torque: of the joint J nearest to its limit, of what is allowed; held at the top "
-        "force, weight of the links included"
+        "joint torque: of the joint (J) that comes nearest to its limit, of what is allowed, at "
+        "the top force, weight of the links included"
     )
 
 

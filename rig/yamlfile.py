@@ -157,7 +157,7 @@ def _check_kind(data: dict[str, object], reader: Reader, schema: words.Schema, n
     wanted = next((k for k in map(_kind, consts) if k is not None), None)
     if wanted is not None and "schema" not in data:
         known = words.known_keys(words.schemas_at(schema, ()))
-        if 2 * sum(key in known for key in data) <= len(data):
+        if 2 * sum(key in known for key in data) < len(data):
             what = f"this is not {_KINDS[wanted]}: it says no schema, and most of its keys are "
             refuse(name, [Problem(1, 1, f"{what}others. Check the name.")])
     if kind is None or kind == wanted:
@@ -214,12 +214,17 @@ class _Judge:
         self._schema = schema
         self._renames: dict[Key, str | None] = {}  # unknown key -> known one, None: to be dropped
         self._words: dict[Key, str] = {}  # mistyped word -> the one that was probably meant
+        self._put_off: list[Key] = []  # words of another alternative, of which something is wrong
 
     def add(self, errors: Sequence[Any]) -> None:
         """Words a validation's errors; places that have a problem already are left alone."""
         # Unknown keys first: what they stand for is then not called missing.
         for error in sorted(errors, key=lambda e: str(e["type"]) not in _UNKNOWN_KEY):
             self._error(str(error["type"]), self._path(error["loc"]), error)
+        if not self._reader.problems:  # then it is they that don't go together
+            for path in self._put_off:
+                what = f'"{self._at(path)}" does not go with what stands beside it.'
+                self._reader.complain(path, self._reader.places[path], what)
         # JSON's true equals the literal 1 to the validator; to whoever wrote it, it does not.
         for path, value in _leaves(self._data, ()):
             if isinstance(value, bool):
@@ -263,7 +268,9 @@ class _Judge:
             what = str(error.get("ctx", {}).get("error", error["msg"]))
             what = what if what.endswith((".", "?")) else f"{what}."
             reader.complain(path, reader.places[path], what)
-        elif kind != "literal_error" or not self._fits_another(path):
+        elif kind == "literal_error" and self._fits_another(path):
+            self._put_off.append(path)
+        else:
             self._value_problem(path, self._at(path))
 
     def _fits_another(self, path: Key) -> bool:

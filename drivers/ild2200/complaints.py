@@ -29,14 +29,15 @@ def no_port(port: str, baud: int, error: Exception) -> CannotConnect:
     """The serial port cannot be opened."""
     number = getattr(error, "errno", None)
     reason = os.strerror(number) if number else str(error)
+    remedy = (
+        "Plug the adapter in, correct `port` in the station file, and check that you may use it "
+        "(on Linux: membership of the group dialout)."
+    )
     if number == errno.EWOULDBLOCK:
         reason = "another program has it open"
-    return CannotConnect(
-        DEVICE,
-        f"cannot open the serial port {port} at {baud} baud ({reason})",
-        "Plug the adapter in, correct `port` in the station file, and check that you may use it "
-        "(on Linux: membership of the group dialout) and that no other program has it open.",
-    )
+        remedy = "End the other program, a running `rig measure` or `rig check` perhaps."
+    fault = f"cannot open the serial port {port} at {baud} baud ({reason})"
+    return CannotConnect(DEVICE, fault, remedy)
 
 
 def unplugged(port: str, error: Exception) -> ReadTimeout:

@@ -95,11 +95,13 @@ def noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
 
 
 def steadied(hold: Ints, values: Array, weight: Array, sd: float) -> tuple[Array, Flags]:
-    """Values (n,) with their mean in holds in which they stand still within noise; these (n,)."""
+    """Values (n,) with their mean in holds in which they stand still within noise; these (n,).
+    weight (n,): 0 of what does not count."""
     count = np.maximum(np.bincount(hold, weights=weight), 1e-300)
     mean = np.bincount(hold, weights=weight * values) / count
     square = np.bincount(hold, weights=weight * (values - mean[hold]) ** 2) / sd**2
-    steady = (square <= _STEADY_PER_ROW * np.bincount(hold) + _STEADY_ONCE)[hold]
+    rows = np.bincount(hold, weights=weight > 0)
+    steady = (square <= _STEADY_PER_ROW * rows + _STEADY_ONCE)[hold]
     return np.where(steady, mean[hold], values), steady
 
 

@@ -48,10 +48,12 @@ def cancelling(engine: Engine, parts: tuple[Part, ...], found: Sizes, sizes: Arr
     back nearly all of it; as is a single effect beside it on an arm, whose springs may hide most of
     either."""
     bent = [float(s) for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR]
-    if engine.bench.data.arm and len(bent) < _TWO:
-        return _taken_back(parts, found)
+    arm = engine.bench.data.arm
+    linear = _taken_back(parts, found) if arm else 0.0  # of a bench the sizes say it already
+    if arm and len(bent) < _TWO:
+        return linear
     share = max(max(bent, default=0.0) / max(engine.structural, 1e-300), 1e-6)
-    return _wall(share / CANCELLING)
+    return linear + _wall(share / CANCELLING)
 
 
 def _taken_back(parts: tuple[Part, ...], found: Sizes) -> float:
@@ -70,7 +72,7 @@ _TWO = 2  # to take each other back
 
 def _wall(beyond: float) -> float:
     """Nats for what is so many times beyond its limit."""
-    return 60.0 * max(0.0, float(np.log(beyond)))
+    return 60.0 * max(0.0, float(np.log(max(beyond, 1e-300))))
 
 
 def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:

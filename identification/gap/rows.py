@@ -132,8 +132,11 @@ def reduce_rows(data: GapData) -> Rows:
         level = _continuous_levels(setup, force)
     else:
         level = _ids(np.column_stack([setup, branch, step, *_approach(run, branch, holds, force)]))
-    stretch, meter = _consecutive(_ids(np.column_stack([run, branch, step]))), data.instruments
-    coming = on_its_way(force, displacement, stretch, meter.force, meter.displacement)
+    meter, at_zero = data.instruments, (branch == ZERO) & (step <= 0)
+    # of what runs, holds are but stretches; a run that begins unloaded comes from nowhere
+    stay = _consecutive(_ids(np.column_stack([run, branch, step]))) if bins.running else holds
+    begins = (stay == stay[_changes(run)][_consecutive(run)]) & at_zero
+    coming = on_its_way(force, displacement, stay, meter.force, meter.displacement) & ~begins
     still = partial(_still, bins, hold, holds, ~coming)
     steadied, steady = still(data.force, meter.force)
     rested, rests = still(data.displacement, meter.displacement)
@@ -149,7 +152,7 @@ def reduce_rows(data: GapData) -> Rows:
         displacement_trend=bins.trend(data.time, data.displacement),
         tangential=bins.mean_of(data.tangential), q=bins.mean_of(data.q),
         temperature=bins.mean_of(data.temperature), simulated=bins.mean_of(data.simulated),
-        zero=(branch == ZERO) & (step <= 0) & ~coming,
+        zero=at_zero & ~coming,
         continuous=bins.running, starts=_changes(run), hold_starts=_changes(holds),
     )  # fmt: skip
 

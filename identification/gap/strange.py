@@ -176,15 +176,16 @@ def _jumps(bench: Bench) -> list[Variant]:
 
 
 def _settles(bench: Bench) -> list[Variant]:
-    """The displacement goes on after every change of the load, in every setup by amounts and times
-    of its own; what went on goes back between two runs, as the session's clock tells."""
+    """The displacement of an arm goes on after every change of the load, in every setup by amounts
+    and times of its own; what went on goes back between two runs, as the session's clock tells.
+    Without an arm there is but one spring, whose creep that is."""
     rows = bench.rows
     inner = np.diff(rows.time)
     step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 0.0
-    if not step > 0:
-        return []
     times = step * np.array(SETTLING)
     times = times[times < bench.course.session_span / 3]
+    if not (bench.data.arm and step > 0 and times.size):
+        return []
     line = np.tile((bench.slope * bench.load)[:, None], (1, len(times)))
     z = retarded(line, times, rows, bench.rest, None)
     z /= float(np.abs(z).max()) or 1.0

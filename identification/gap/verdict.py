@@ -56,9 +56,10 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
         good *= kept.get(e.words, 1.0)
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
-        said = found.foretold.get(e.words) or _simpler(e, ranked, kept, arm) or e
+        fewer = _simpler(e, ranked, kept, arm)
+        said = found.foretold.get(e.words) or fewer or e
         many = THREE if _tells_of_three(said) else 1.0
-        for word, share in _main(said, arm).items():
+        for word, share in _main(_of(e, fewer.words) if fewer is said else said, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
         mass[_heir(e, ranked, kept, found.engine.bench.noise.stated)] += whole - good
@@ -152,6 +153,14 @@ def _tells_of_three(explanation: Explanation) -> bool:
 
 
 FLANKS = frozenset({"joint_backlash", "joint_nonlinear_stiffness"})
+
+
+def _of(explanation: Explanation, words: frozenset[str]) -> Explanation:
+    """With the effects of these words alone, as large as they are beside the others."""
+    kept = [
+        (p, s) for p, s in zip(explanation.parts, explanation.sizes, strict=True) if p.word in words
+    ]
+    return replace(explanation, parts=tuple(p for p, _ in kept), sizes=tuple(s for _, s in kept))
 
 
 def _main(explanation: Explanation, arm: bool) -> dict[str, float]:

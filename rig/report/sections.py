@@ -98,8 +98,8 @@ def data_quality(session: Session, data: Node, pictures: Pictures) -> Section:
         ("Levels that never settled", _count(q["unsettled_levels"])),
     ]
     if q["clock"].value is not None:
-        told = (q["clock"].text(), ": slots are late and missed for that")
-        rows.append(("Clock of the emulated station", told))
+        told = f"{q['clock'].text()}; late slots are late by that much more"
+        rows.append(("Clock of the emulated station", (told,)))
     drift = q["force_zero"]
     if drift:
         parts = ("at most ", *drift["largest_change_N"].number(3, unit="N"), " within a run, ")

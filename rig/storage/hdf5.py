@@ -53,8 +53,8 @@ def write_file(dataset: Dataset, path: Path) -> None:
 
 
 def _image(dataset: Dataset) -> bytes:
-    """The file's bytes. Made in memory: on a disk that fills up, the library itself prints pages
-    of errors and may crash the process."""
+    """The file's bytes. Made in memory, twice for a moment: on a disk that fills up, the library
+    itself prints pages of errors and may crash the process."""
     version = ("earliest", "v110")
     with h5py.File("image", "w", libver=version, driver="core", backing_store=False) as file:
         _write_root(file, dataset)

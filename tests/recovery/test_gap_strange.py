@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -184,6 +185,24 @@ def test_slow_swings_are_left_to_the_drifts() -> None:
     span = float(np.ptp(measured(slopes).session))
     result = diagnose_gap(measured(swing(span / 1.5)))
     assert result.verdict == "thermal_drift"
+
+
+def test_a_coarse_clock_shows_no_settling() -> None:
+    """Times to the half hour."""
+    data = linear("paper")
+    coarse = 1800.0 * (np.arange(len(data.time)) >= len(data.time) // 2)
+    bench = make_bench(replace(data, time=coarse, session=coarse))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    assert not any(v.word == "settles" for v in strangers(bench, base, target))
+
+
+def test_what_settles_without_an_arm_is_its_spring() -> None:
+    data = measured(settles)
+    alone = replace(linear("bench"), session=None)
+    for each, seen in ((data, True), (alone, False)):
+        bench = make_bench(each)
+        base, target = base_columns(bench), bench.observed - prediction(bench)
+        assert any(v.word == "settles" for v in strangers(bench, base, target)) is seen
 
 
 def test_every_kind_has_its_words() -> None:

@@ -96,11 +96,11 @@ def test_faces_that_seat_one_after_the_other() -> None:
 @pytest.mark.parametrize(
     ("design", "until", "label"),
     [("rich", "setup", "some stays"), ("bench", "setup", "some stays"),
-     ("rich", "run", "some stays while loaded")],
+     ("rich", "run", "some stays until the next run")],
 )  # fmt: skip
 def test_what_is_bedded_in_may_stay_so(design: str, until: str, label: str) -> None:
-    """Half of a seat comes back, half of it is pressed flat for good, or until the screw is taken
-    off for the next run; of an arm in every direction anew."""
+    """Half of a seat comes back, half of it is pressed flat for good, or until the screw is set on
+    anew for the next run; of an arm in every direction anew."""
     data = linear(design)
     push, so_far, last = np.abs(data.force), 0.0, -1
     most = np.zeros(len(push))
@@ -176,3 +176,23 @@ def test_what_no_joint_does_no_reading_shows(encoder: str, seen: bool | None) ->
     found = diagnose_gap(data)
     assert found.verdict == "contact_seating"
     assert found.where.seen_by_encoders is seen
+
+
+def test_feet_under_a_weight_do_not_stop_giving() -> None:
+    bench = make_bench(linear("rich"))
+    for v in library(bench, ["base_compliance"]):
+        if v.label.endswith("on feet"):
+            only = np.zeros(len(v.columns))
+            only[: len(v.info["axes"])] = 1.0
+            first = len(only) - len(v.info["bends_Nm"])
+            for left, allowed in ((0.6, True), (0.4, False)):
+                pressed = only.copy()
+                pressed[first] = left - 1
+                assert bool(np.all(v.within @ pressed >= 0)) is allowed
+
+
+def test_a_laser_changes_its_gain_beyond_a_quarter_of_its_reading() -> None:
+    labels = [v.label for v in library(make_bench(linear("rich")), ["displacement_scale"])]
+    shares = [float(v.split(" at ")[1]) for v in labels if "changes" in v]
+    assert shares
+    assert min(shares) >= 0.25

@@ -11,6 +11,7 @@ import pytest
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array
 from identification.gap.diagnose import diagnose_gap
+from identification.gap.holds import steadied
 from identification.gap.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
@@ -130,3 +131,29 @@ def test_a_load_on_its_way_is_none_of_its_level() -> None:
     np.testing.assert_array_equal(rows.force[first], rows.measured_force[first])
     settled = [force[HOLD * k + 1 : HOLD * (k + 1)].mean() for k in range(LEVELS)]
     np.testing.assert_allclose(rows.force[others], np.array(settled)[rows.hold[others]])
+
+
+def test_a_run_that_begins_unloaded_comes_from_nowhere() -> None:
+    """While it warms up, and its force drifts with that: all of it is read at no load."""
+    warm = 1 - np.exp(-np.arange(30) / 10.0)
+    data = bench_data(3 * warm, 3e-5 * warm, step=np.zeros(30, dtype=int), branch=np.zeros(30, int))
+    assert reduce_rows(data).zero.all()
+
+
+def test_steps_of_one_number_to_and_fro_are_two_levels() -> None:
+    step = np.repeat([1, 1, 2, 2], HOLD)
+    true = np.repeat([20.0, -20.0, 40.0, -40.0], HOLD)
+    force = true + np.random.default_rng(1).normal(0, 1.0, len(true))
+    branch = np.full(len(true), 3)
+    data = bench_data(force, SPRING * true, step=step, branch=branch)
+    rows = reduce_rows(replace(data, instruments=replace(data.instruments, force=1.0)))
+    assert rows.steady.all()
+    means = [force[HOLD * k : HOLD * (k + 1)].mean() for k in range(4)]
+    np.testing.assert_allclose(rows.force, np.array(means)[rows.hold])
+
+
+def test_what_does_not_count_makes_nothing_steady() -> None:
+    values = np.concatenate([np.zeros(35), np.linspace(0.0, 12.0, 5)])
+    weight, hold = np.repeat([0.0, 1.0], [35, 5]), np.zeros(40, dtype=int)
+    assert not steadied(hold, values, weight, 1.0)[1].any()
+    assert not steadied(hold[35:], values[35:], weight[35:], 1.0)[1].any()

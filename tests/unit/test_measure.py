@@ -11,10 +11,12 @@ from types import SimpleNamespace
 import pytest
 
 from rig import measure
+from rig.dataset import journal_path, load
 from rig.errors import InputError
 from rig.procedure.progress import Progress
 from rig.protocol import load_protocol
 from rig.station import load_station
+from tests.unit.example_data import write_journal
 
 PROTOCOL = Path(__file__).parents[2] / "protocols" / "paper_xy.yaml"
 
@@ -65,3 +67,14 @@ def test_only_a_clock_that_runs_ahead_does_not_wait_for_the_disk(
 
 def test_a_real_station_waits_for_the_disk() -> None:
     assert measure._synced(replace(load_station("emulated"), emulation=None))
+
+
+def test_a_complete_run_whose_file_could_not_be_written_needs_no_device(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(measure, "_opened", lambda *_: pytest.fail("devices were opened"))
+    target = tmp_path / "a.h5"
+    write_journal(target, 4, stop=True)
+    assert measure.resume(target, print) == target
+    assert load(target).complete
+    assert not journal_path(target).exists()

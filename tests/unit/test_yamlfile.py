@@ -220,6 +220,30 @@ def test_of_two_drivers_only_a_word_that_neither_has_is_wrong() -> None:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Fast:
+    kind: Literal["a"]
+    mode: Literal["x"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slow:
+    kind: Literal["b"]
+    mode: Literal["y"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Either:
+    sensor: Fast | Slow
+
+
+def test_words_that_do_not_go_together_are_told() -> None:
+    assert message("sensor: {kind: a, mode: y}", Either).splitlines() == [
+        'F:1:16: sensor.kind: "a" does not go with what stands beside it.',
+        'F:1:25: sensor.mode: "y" does not go with what stands beside it.',
+    ]
+
+
 def test_a_value_under_a_mistyped_key_is_checked_too() -> None:
     assert laser("rate_Hs: 1000").splitlines() == [
         'F:1:21: laser.rate_Hs: unknown key. Did you mean "rate_Hz"?',

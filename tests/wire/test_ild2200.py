@@ -82,7 +82,7 @@ def test_a_port_in_use_is_refused_and_left_alone(bench: Bench) -> None:
     _, port = bench.emulator()
     first, second = bench.client(port), bench.client(port)
     first.open()
-    words = "another program has it open.*no other program"
+    words = "another program has it open.*End the other program"
     with pytest.raises(CannotConnect, match=words):
         second.open()
     time.sleep(2 * STALE_S)  # nobody took its values

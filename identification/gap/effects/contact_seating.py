@@ -51,9 +51,9 @@ LAWS: dict[str, Callable[[Array], Array]] = {
 }
 
 
-# What stays as it was pressed: for good, or until the load is taken away before the next run.
-STAYS, WHILE_LOADED = " that stays", " that stays while loaded"
-LAWS |= {law + kept: LAWS[law] for law in SEATED for kept in (STAYS, WHILE_LOADED)}
+# What stays as it was pressed: for good, or until the next run.
+STAYS, IN_A_RUN = " that stays", " that stays until the next run"
+LAWS |= {law + kept: LAWS[law] for law in SEATED for kept in (STAYS, IN_A_RUN)}
 _STAYING, _BACK = 0.25, 0.3  # prior; of the largest force, by which it comes back
 
 
@@ -88,7 +88,7 @@ def variants(bench: Bench) -> list[Variant]:
     if bench.data.arm:
         out.append(_one_after_the_other(bench, [s * top for s in STEPS], scales))
     if _comes_back(bench):
-        kept = [STAYS] if np.sum(bench.rest) == np.sum(bench.rebuilt) else [STAYS, WHILE_LOADED]
+        kept = [STAYS, IN_A_RUN] if np.any(bench.rest & ~bench.rebuilt) else [STAYS]
         out += [_some_stays(bench, law, share * top, scales, kind)
                 for kind in kept for share in forces for law in SEATED]  # fmt: skip
     return [*out, *_slacks(bench)]
@@ -102,7 +102,7 @@ def _comes_back(bench: Bench) -> bool:
 
 
 def _some_stays(bench: Bench, law: str, f0: float, scales: tuple[float, ...], kept: str) -> Variant:
-    """A seat of which a part stays as it was pressed (kept: STAYS or WHILE_LOADED)."""
+    """A seat of which a part stays as it was pressed (kept: STAYS or IN_A_RUN)."""
     laws = ((law, f0), (law + kept, f0))
     columns = [_late(bench, *each) for each in laws]
     label = f"{law} {f0 / float(np.abs(bench.load).max()):.3g}, some{kept.removeprefix(' that')}"
@@ -188,7 +188,7 @@ def _late(bench: Bench, law: str, force: float) -> int:
 def lost(bench: Bench, law: str, force: float) -> Array:
     """(n,) what one law of a force scale N takes of its depth."""
     size, sign = pressed(bench)
-    for kept, fresh in ((STAYS, bench.rebuilt), (WHILE_LOADED, bench.rebuilt | bench.rest)):
+    for kept, fresh in ((STAYS, bench.rebuilt), (IN_A_RUN, bench.rebuilt | bench.rest)):
         if law.endswith(kept):
             size, sign = _so_far(size, sign, fresh)
     return np.asarray(sign * LAWS[law](size / force))
