@@ -111,7 +111,8 @@ def resume(
             f"{hint}"
         )
     records = replay(journal_file)
-    if datasets.from_records(records, path).complete:  # its file alone could not be written
+    last = records[-1]
+    if last.kind == "stop" and last.data["complete"]:  # its file alone could not be written
         datasets.finish(path)
         return path
     start = records[0].data

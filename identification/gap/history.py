@@ -286,10 +286,13 @@ def half_sample(rows: Rows) -> float:
 
 def sampling_time(rows: Rows) -> float:
     """Time between two samples of a hold; of a running recording, between most of its rows, s."""
-    if not rows.continuous:
-        return 2 * half_sample(rows)
+    return (row_time(rows) or 1.0) if rows.continuous else 2 * half_sample(rows)
+
+
+def row_time(rows: Rows) -> float:
+    """Time between most neighbouring rows, s; 0 where no time goes by."""
     step: Array = np.diff(rows.time)
-    return float(np.median(step[step > 0])) if np.any(step > 0) else 1.0
+    return float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
 
 
 def delayed(values: Array, delay: float, rows: Rows) -> Array:

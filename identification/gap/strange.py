@@ -25,7 +25,7 @@ from identification.gap.data import Array
 from identification.gap.effects.drift import by_direction, free_path, path_root
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Found, Likeness
-from identification.gap.history import retarded
+from identification.gap.history import retarded, row_time
 from identification.gap.parts import Part, part_sizes
 from identification.gap.priors import LOG_UNKNOWN
 from identification.gap.variants import Variant, smooth_root, variant
@@ -179,9 +179,7 @@ def _settles(bench: Bench) -> list[Variant]:
     """The displacement of an arm goes on after every change of the load, in every setup by amounts
     and times of its own; what went on goes back between two runs, as the session's clock tells.
     Without an arm there is but one spring, whose creep that is."""
-    rows = bench.rows
-    inner = np.diff(rows.time)
-    step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 0.0
+    rows, step = bench.rows, row_time(bench.rows)
     times = step * np.array(SETTLING)
     times = times[times < bench.course.session_span / 3]
     if not (bench.data.arm and step > 0 and times.size):

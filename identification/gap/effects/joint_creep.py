@@ -22,7 +22,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
-from identification.gap.history import half_sample, retarded
+from identification.gap.history import half_sample, retarded, row_time
 from identification.gap.variants import SET_UP_ANEW, Variant, smooth_root, variant
 
 WORD = "joint_creep"
@@ -34,8 +34,7 @@ def times(bench: Bench) -> np.ndarray:
     """Retardation times s: from one sample to a third of the session, by factors of three, and of
     an arm one that flows; of a recording that runs on, or a bench's, to three times its length, by
     when a viscous flow looks like a line."""
-    inner = np.diff(bench.rows.time)
-    step = float(np.median(inner[inner > 0])) if np.any(inner > 0) else 1.0
+    step = row_time(bench.rows) or 1.0
     longest = min(bench.course.session_span / 3, 1000.0 * max(step, 1.0))
     if not (bench.data.arm or bench.rows.continuous):
         step = 2 * half_sample(bench.rows)  # of rows there are the fewer, the longer it stood
