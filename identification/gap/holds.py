@@ -41,7 +41,8 @@ def is_continuous(data: GapData, hold: Ints) -> bool:
     edges = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
     count = np.diff(np.append(edges, len(hold)))
     width = np.maximum.reduceat(data.force, edges) - np.minimum.reduceat(data.force, edges)
-    span = float(np.ptp(data.force))
+    # of one side of no load, where holds end (`hold_ids`)
+    span = max(float(np.ptp(np.clip(data.force * sign, 0.0, None))) for sign in (1.0, -1.0))
     return bool(np.any((count > 2) & (width > _RUNNING_SHARE * span) & (span > 0)))
 
 
