@@ -21,9 +21,9 @@ from numpy.polynomial.chebyshev import chebvander
 
 from identification.gap.base import Base
 from identification.gap.bench import Bench
-from identification.gap.data import Array
+from identification.gap.data import Array, Flags
 from identification.gap.explanation import Found, Likeness
-from identification.gap.turns import rises
+from identification.gap.turns import rises, turns
 from identification.gap.variants import Variant, variant
 from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING
 
@@ -118,12 +118,13 @@ def jump_rows(bench: Bench, base: Base, target: Array, most: int) -> list[int]:
         """Product of whitened values (n, ...) with the jump at every row."""
         return np.asarray(np.cumsum((white * values.T).T[::-1], axis=0)[::-1])
 
+    turned = _just_turned(bench)
     square = from_here_on(white)
     new = square - np.sum(from_here_on(known) ** 2, axis=1)
     out: list[int] = []
     for _ in range(min(most, n - 1)):
         able = new > _NOTHING_NEW * square
-        able[bench.rows.starts] = False
+        able[bench.rows.starts | turned] = False
         if not able.any():
             break
         gain = np.where(able, from_here_on(left) ** 2 / np.where(able, new, 1.0), -1.0)
@@ -137,6 +138,26 @@ def jump_rows(bench: Bench, base: Base, target: Array, most: int) -> list[int]:
         new = new - from_here_on(jump) ** 2
         out.append(k)
     return out
+
+
+def _just_turned(bench: Bench) -> Flags:
+    """(n,) rows of an imposed stroke that has just begun or turned: there the force changes fast
+    because of friction and flow, and jerks are no news."""
+    out, load = np.zeros(bench.rows.n, dtype=bool), bench.load
+    if not bench.imposed:
+        return out
+    for run in np.unique(bench.rows.run):
+        mine = np.flatnonzero(bench.rows.run == run)
+        legs = [0, *turns(load[mine]), len(mine)]
+        near = _TURNED * float(np.ptp(load[mine]))
+        for a, b in pairwise(legs):
+            left = np.abs(load[mine[a:b]] - load[mine[a]]) > near
+            end = a + int(left.argmax()) if left.any() else b
+            out[mine[max(a - _BEFORE, 0) : end + 1]] = True
+    return out
+
+
+_TURNED, _BEFORE = 0.1, 2  # of the stroke's range; rows
 
 
 def _spread(values: Array) -> Array:

@@ -34,7 +34,7 @@ class Rarer(NamedTuple):
 
 
 _HYSTERESIS, _YIELD = frozenset({"joint_hysteresis"}), frozenset({"joint_yield"})
-_LATE = frozenset({"joint_creep", "time_lag"})
+_CREEP, _LAG = frozenset({"joint_creep"}), frozenset({"time_lag"})
 _TOUCHES = frozenset({"contact_seating", "joint_backlash"})
 _ANY, _NO_WORD = frozenset(WORDS), frozenset[str]()
 # Evidence of running recordings is tempered: 10 nats there are odds of about 3, 20 of 10, 30 of 40.
@@ -44,7 +44,8 @@ RARER = (
     # A target that warms up while it is held in place.
     Rarer(log(0.05), frozenset({"thermal_drift"}), _NO_WORD, lambda c: c.imposed),
     # Loops at one rate are commonly friction; what comes late differs from it in details only.
-    Rarer(-30.0, _LATE, _NO_WORD, lambda c: c.one_rate),
+    Rarer(-30.0, _CREEP, _NO_WORD, lambda c: c.one_rate),
+    Rarer(-30.0, _LAG, _NO_WORD, lambda c: c.one_rate),
     # A single pull that ends nearly flat: of 12 such records of others, 11 were of what yields.
     Rarer(-20.0, CURVES, _YIELD, lambda c: c.flows_out),
     # The force falls while the stroke goes on, which of what is elastic only what snaps over does:

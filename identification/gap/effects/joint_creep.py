@@ -27,6 +27,7 @@ from identification.gap.variants import SET_UP_ANEW, Variant, smooth_root, varia
 
 WORD = "joint_creep"
 SCALES = (0.02, 0.06, 0.2, 0.6)
+_OF_A_STROKE = 0.05  # what follows as closely at one rate is no slower than friction
 VISCOUS = 10.0  # times the session: what gives way as slowly flows, and does not come back
 
 
@@ -41,6 +42,8 @@ def times(bench: Bench) -> np.ndarray:
     if not (bench.data.arm or bench.course.always_moves):
         longest = 3 * bench.course.session_span
     first = max(step * 3 if bench.course.always_moves else step, 1e-6)
+    if bench.course.one_rate and bench.course.returns:
+        first = max(first, _OF_A_STROKE * bench.course.stroke_s)
     count = max(2, int(np.ceil(np.log(max(longest / first, 3.0)) / np.log(3))))
     out = np.asarray(first * 3.0 ** np.arange(count))
     return np.append(out, VISCOUS * bench.course.session_span) if bench.data.arm else out
