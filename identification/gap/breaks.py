@@ -157,7 +157,7 @@ def _just_turned(bench: Bench) -> Flags:
     return out
 
 
-_TURNED, _BEFORE = 0.1, 2  # of the stroke's range; rows
+_TURNED, _BEFORE = 0.05, 2  # of the stroke's range; rows
 
 
 def _spread(values: Array) -> Array:

@@ -34,6 +34,7 @@ class Rarer(NamedTuple):
 
 
 _HYSTERESIS, _YIELD = frozenset({"joint_hysteresis"}), frozenset({"joint_yield"})
+_PLAY = frozenset({"joint_backlash"})
 _CREEP, _LAG = frozenset({"joint_creep"}), frozenset({"time_lag"})
 _TOUCHES = frozenset({"contact_seating", "joint_backlash"})
 _ANY, _NO_WORD = frozenset(WORDS), frozenset[str]()
@@ -51,6 +52,8 @@ RARER = (
     # The force falls while the stroke goes on, which of what is elastic only what snaps over does:
     # of 13 such records of others (by a fortieth to a fifth) none was.
     Rarer(-20.0, CURVES, _YIELD, lambda c: c.gives_in),
+    # Slack that a single pull takes up is a seat: of play one sees how it comes back.
+    Rarer(-30.0, _PLAY, _NO_WORD, lambda c: c.pulled_once),
     # A way at no force before all of it: what is not there yet has no curve.
     Rarer(-20.0, _ANY, _TOUCHES, lambda c: c.approaches),
     # Loaded from one side and let go again and again: friction that is seen the first time only.

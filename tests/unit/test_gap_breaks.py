@@ -10,7 +10,7 @@ from scipy.special import erf
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
-from identification.gap.breaks import jump_rows, strangers
+from identification.gap.breaks import _just_turned, jump_rows, strangers
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.priors import LOG_UNKNOWN, prior_of
@@ -60,6 +60,14 @@ def test_rows_of_jumps_are_found_one_after_the_other() -> None:
     first = np.searchsorted(bench.rows.time, np.array([211, 456, 771]) - 0.5)
     assert sorted(rows) == pytest.approx(first.tolist(), abs=1)
     assert abs(rows[0] - first[1]) <= 1  # the largest
+
+
+def test_where_a_stroke_turns_the_force_of_friction_jumps_and_nothing_jerked() -> None:
+    sense = np.where(np.arange(N) % 100 < 50, 1.0, -1.0)  # of each stroke of 50 readings
+    bench, rows = looked_for(pulled(SPRING * (STROKE + 4e-5 * sense)))
+    since = bench.rows.time[rows] % 50
+    assert since.min() > 2 and since.max() < 48
+    assert not _just_turned(make_bench(replace(bench.data, imposed="force"))).any()
 
 
 def test_no_jump_is_looked_for_where_a_run_begins() -> None:

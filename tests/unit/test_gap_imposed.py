@@ -198,7 +198,7 @@ def weight_on_and_off(t: Array) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize(
     ("rig", "costs", "driven"),
-    [(damper, (-5.0, -4.9), True), (damper, (-6.0, -4.9), False),
+    [(damper, (-6.5, -4.9), True), (damper, (-8.0, -4.9), False),
      (lambda t: (triangle(t, 3), triangle(t, 3) ** 3), (-5.0, -4.9), False)],
     ids=["slides", "slides, but the force is far simpler", "springs"],
 )  # fmt: skip

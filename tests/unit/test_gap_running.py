@@ -314,6 +314,8 @@ def test_passes_that_go_about_as_fast_go_at_one_rate(slower: float, one: bool) -
     assert bench.course.one_rate is one
     slow = prior_of(frozenset(["joint_creep"]), bench)
     assert (slow < prior_of(frozenset(["joint_creep"])) - 20) is one
+    both = frozenset(["joint_creep", "time_lag"])
+    assert (prior_of(both, bench) < prior_of(both) - 50) is one
 
 
 def test_what_was_held_goes_at_no_rate() -> None:
@@ -430,3 +432,17 @@ def test_a_long_table_of_numbered_readings_runs() -> None:
     arm = bench_data(np.arange(80.0), np.arange(80.0) / SPRING, step=np.arange(80))
     assert is_continuous(arm, hold_ids(arm))
     assert not is_continuous(replace(arm, arm=True), hold_ids(arm))  # is read as it was planned
+
+
+@pytest.mark.parametrize("creeps", [0.4, 0.6])
+def test_a_force_that_runs_through_zero_under_one_step_runs(creeps: float) -> None:
+    """Where the force changes its side from one reading to the next, a hold ends; and on neither
+    side it runs through half of what it does on both."""
+    force = 100 * np.sin(np.arange(300) / 2)
+    data = replace(running(force, force / SPRING), step=np.ones(300, dtype=int))
+    assert hold_ids(data)[-1] > 1
+    assert is_continuous(data, hold_ids(data))
+    levels = np.repeat([0.0, 50, 100, 50, 0, -50, -100, -50, 0, 50], 30)
+    levels *= 1 - creeps * np.tile(np.linspace(0, 1, 30), 10)  # a screw that relaxes at each
+    held = replace(running(levels, levels / SPRING), step=np.repeat(np.arange(10), 30))
+    assert is_continuous(held, hold_ids(held)) is (creeps > 0.5)
