@@ -66,7 +66,8 @@ def test_where_a_stroke_turns_the_force_of_friction_jumps_and_nothing_jerked() -
     sense = np.where(np.arange(N) % 100 < 50, 1.0, -1.0)  # of each stroke of 50 readings
     bench, rows = looked_for(pulled(SPRING * (STROKE + 4e-5 * sense)))
     since = bench.rows.time[rows] % 50
-    assert since.min() > 2 and since.max() < 48
+    assert since.min() > 2
+    assert since.max() < 48
     assert not _just_turned(make_bench(replace(bench.data, imposed="force"))).any()
 
 
