@@ -82,6 +82,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         follows = scatter_within(data.displacement - float(np.median(slope)) * data.force, hold)
         raised = max(1.0, min(white, follows or 0.0) / meter.displacement)
     rounded = 0.0 if rows.continuous or imposed else _rounded(data, hold)
+    per_sample = np.maximum(per_sample, rounded)  # next to an edge, one is a whole step off
     return Noise(
         response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
         hold=np.hypot(max(HOLD_SHARE * stated, rounded), common), run=RUN_SHARE * stated,

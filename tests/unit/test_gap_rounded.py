@@ -45,6 +45,13 @@ def test_divisions_of_a_dial_are_no_effect(weight: float) -> None:
     assert diagnose_gap(stepped(0.02 * DIAL, weight=weight)).verdict == "none"
 
 
+def test_a_reading_next_to_an_edge_is_a_whole_division_off() -> None:
+    edges = stepped(0.02 * DIAL, weight=2.5 * DIAL * SPRING)  # every second level lies on one
+    bench = make_bench(edges)
+    assert bench.noise.response * bench.rows.weight**0.5 == pytest.approx(DIAL / 12**0.5, rel=0.05)
+    assert diagnose_gap(edges).verdict == "none"
+
+
 def test_a_drift_is_over_only_after_some_readings() -> None:
     few = make_bench(stepped(0.0, readings=1, times=3))
     many = make_bench(stepped(0.0, readings=60, times=3))
