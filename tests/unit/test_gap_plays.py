@@ -137,6 +137,23 @@ def test_a_play_with_long_flanks_is_taken_up_slowly() -> None:
     assert shape[:3] == pytest.approx([0.25, far, -far])
 
 
+def test_a_spring_in_the_play_gives_way_in_proportion() -> None:
+    bench = hanging(UP)
+    x = np.resize([0.5, 3.0, -3.0], bench.rows.n)
+    shape = Play(bench, x, 1.0).place("sprung")
+    assert shape[:3] == pytest.approx([0.125, 0.5, -0.5])
+
+
+def test_no_tool_hangs_on_a_rig_without_an_arm() -> None:
+    force = 60 * np.sin(np.arange(400) / 30)
+    bench = make_bench(running(force, force / SPRING, imposed="force"))
+    plays = [v for v in library(bench, ["joint_backlash"]) if not v.info["preload_Nm"]]
+    closer = [v for p in plays for v in joint_backlash.refined(bench, p)]
+    assert not any("weight" in v.label or "tool" in v.label for v in (*plays, *closer))
+    shapes = {v.label for v in plays}
+    assert len(shapes) == len(plays)  # each once
+
+
 def test_a_preload_puts_a_play_into_a_recording_from_one_side() -> None:
     """Of a force that runs; what is slack where a displacement begins is a seat."""
     force = np.concatenate([np.linspace(0, 60, 200), np.linspace(60, 0, 200)])
@@ -161,7 +178,8 @@ def test_a_play_within_a_load_from_one_side_is_seldom_and_sharp(runs_on: bool) -
         assert bench.course.one_sided is not both
         plays = [v for v in library(bench, ["joint_backlash"]) if v.info["preload_Nm"]]
         closer = joint_backlash.refined(bench, plays[0])
-        assert {v.info["kind"] for v in closer} == ({"free", "soft", "slow"} if both else {"free"})
+        beside = {"free", "soft", "slow", "sprung"}
+        assert {v.info["kind"] for v in closer} == (beside if both else {"free"})
         coarse[both], fine[both] = (sum(v.prior for v in vs) for vs in (plays, closer))
     odds = np.exp(-20.0) if runs_on else 0.05
     assert coarse[False] == pytest.approx(odds * coarse[True])

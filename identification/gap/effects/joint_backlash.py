@@ -3,9 +3,10 @@
 Net torque = load and, in an upright arm, its own weight. The joint lies at one side of its play w
 or at the other: `w/2 tanh((tau - tau_0) / zone)`; with friction it stays where it was pushed until
 the torque has turned: a play of radius `zone`, or half of it, on the torque, cut at the ends of
-the play, or of 0.7 zones with soft ends; flanks that approach slowly leave `zone / |tau|` of the
-play to be taken up, of all of it or after an arc tangent. Gears with play rub too: a stop operator
-of the zone's strength rides along.
+the play, or of 0.7 zones with soft ends; a spring in the play gives way in proportion, over two
+zones to either side; flanks that approach slowly leave `zone / |tau|` of the play to be taken up,
+of all of it or after an arc tangent. Gears with play rub too: a stop operator of the zone's
+strength rides along.
 Without torque the joint lies anywhere in its play, a free place per setup at its first zero load
 and at later ones, or where the rubbing, or the push before, left it: it is sent to where its
 reading is as commanded, another zero of that reading in every pose. The tool's mass is not known:
@@ -36,8 +37,8 @@ from identification.gap.variants import Variant, variant
 WORD = "joint_backlash"
 PLACED = ("gap", "held", "dragged")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
-_REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow")
-SMOOTH = ("soft", "slow", "arctan")
+_REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow", "sprung")
+SMOOTH = ("soft", "slow", "arctan", "sprung")
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 _PRELOADS = 8  # over the range of the net torque
@@ -99,7 +100,10 @@ def _by_preload(bench: Bench) -> float:
 
 
 def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Array, float]]:
-    """What may cross zero: name, mass of the tool, torque (n,), prior."""
+    """What may cross zero: name, mass of the tool, torque (n,), prior. Nothing hangs on a rig
+    without an arm."""
+    if not bench.data.arm:
+        return [("load", TOOL_KG, bench.true_torque[:, j], 2.0)]
     torque, plain, per_kg = bench.true_torque[:, j], bench.weight(j, 0.0), bench.weight_per_kg(j)
     masses = TOOLS_KG if np.abs(per_kg).max() * max(TOOLS_KG) > ZONES[0] * span else (TOOL_KG,)
     net = [(kg, torque + plain + kg * per_kg) for kg in masses]
@@ -202,7 +206,8 @@ def _finer(
     for mass, more, zone in product(kg.tolist(), Nm.tolist(), zones.tolist()):
         x = net(bench, j, info["crossing"], mass, more)
         exact = info | {"zone_Nm": zone, "tool_kg": mass, "preload_Nm": more, "closely": True}
-        where = f"preload {more:.3g} Nm" if preload else f"{info['crossing']} tool {mass:.2f} kg"
+        where = f"preload {more:.3g} Nm" if preload else str(info["crossing"])
+        where += "" if preload or not bench.data.arm else f" tool {mass:.2f} kg"
         label, size = f"joint {j + 1} {where}", f"{zone:.3g} Nm fine"
         out += _zone(bench, x, kinds, label, size, share, exact, places)
     return out

@@ -40,6 +40,8 @@ class Play:
             return np.tanh(x / zone) / 2
         if kind == "slow":
             return np.asarray(x / (np.abs(x) + zone) / 2)
+        if kind == "sprung":
+            return np.asarray(np.clip(x / (2 * zone), -1, 1)) / 2
         if kind == "arctan":
             return np.arctan(x / zone) / np.pi
         up, down = UNEVEN.get(kind, (1.0, 1.0))
