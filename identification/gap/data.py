@@ -73,7 +73,8 @@ class GapData:
     across it. q (n, m) rad or None: joint readings minus commanded pose. temperature (n, m) degC.
     compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
     simulated (n,) m or None: displacement that another simulator predicts for every sample.
-    timed: whether `time` was recorded; it counts samples otherwise.
+    timed: whether `time` was recorded; it counts samples otherwise. on_the_way (n,) or None:
+    samples of ramps that were recorded before holds.
     """
 
     arm: bool
@@ -99,6 +100,7 @@ class GapData:
     imposed: Literal["force", "displacement"] | None = None
     simulated: Array | None = None
     timed: bool = True
+    on_the_way: Flags | None = None
     notes: tuple[str, ...] = field(default=())
 
     @property

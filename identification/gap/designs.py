@@ -171,7 +171,7 @@ def planned(design: Design, bench: Bench) -> GapData:
         tangential=np.zeros((n, 2)) if design.components else None,
         q=np.zeros((n, data.joints)) if design.readings else None,
         output_encoder=design.readings or data.output_encoder, temperature=None, simulated=None,
-        imposed="displacement" if bench.imposed else "force",
+        on_the_way=None, imposed="displacement" if bench.imposed else "force",
     )  # fmt: skip
 
 

@@ -106,23 +106,14 @@ def steadied(hold: Ints, values: Array, weight: Array, sd: float) -> tuple[Array
     return np.where(steady, mean[hold], values), steady
 
 
-def on_its_way(
-    force: Array, displacement: Array, level: Ints, sd_force: float, sd_displacement: float
-) -> Flags:
-    """(n,) rows at a level (n,) at which the load may not be there yet: what is recorded all the
-    time bears the name of the next level at once. Force and displacement are both where neither
-    ends, about as far (a drift or a lag moves one of them, creep the other); or the displacement
-    has much of its step to go, whatever a force says that scatters. sd: of one sample."""
+def much_to_go(displacement: Array, level: Ints, sd: float) -> Flags:
+    """(n,) rows at a level (n,) at which the displacement has much of its step to go, whatever a
+    force says that scatters: the load may not be there yet. sd: of one sample."""
     ends = np.append(np.flatnonzero(np.diff(level)), len(level) - 1)
-    off_f, off_u = force - force[ends][level], displacement - displacement[ends][level]
-    moved = np.abs(off_f) / sd_force, np.abs(off_u) / sd_displacement
-    f, u = np.abs(off_f) / (np.ptp(force) or 1.0), np.abs(off_u) / (np.ptp(displacement) or 1.0)
-    alike = (moved[0] > 1) & (moved[1] > 1) & (f < _ABOUT * u) & (u < _ABOUT * f)
-    both = alike & (np.hypot(*moved) > _SEEN) & (np.maximum(f, u) > _AWAY)
+    off = np.abs(displacement - displacement[ends][level])
     step = np.abs(np.diff(displacement[ends], prepend=0.0))[level]
-    return np.asarray(both | ((moved[1] > _SEEN) & (np.abs(off_u) > _TO_GO * step) & (step > 0)))
+    return np.asarray((off > _SEEN * sd) & (off > _TO_GO * step) & (step > 0))
 
 
-_SEEN = 4.0  # standard deviations, of both together
-_AWAY, _ABOUT = 0.01, 4.0  # of the range; as far, by shares of the range, to a factor
+_SEEN = 4.0  # standard deviations
 _TO_GO = 0.25  # of a step

@@ -113,10 +113,12 @@ _SAME = 1e-9  # of the range: digits that a conversion of units leaves
 
 
 def _swings(data: GapData, rows: Rows, hold: Ints) -> float:
-    """What an arm's displacement swings about its holds, over what is stated; 0 where it runs."""
+    """What an arm's displacement swings about its holds, ramps before them left out, over what is
+    stated; 0 where it runs."""
     if rows.continuous or not data.arm:
         return 0.0
-    return swing_within(data.displacement, hold) / data.instruments.displacement
+    rests = slice(None) if data.on_the_way is None else ~data.on_the_way
+    return swing_within(data.displacement[rests], hold[rests]) / data.instruments.displacement
 
 
 def _encoders(data: GapData, rows: Rows, hold: Ints) -> Array:

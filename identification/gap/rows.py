@@ -13,8 +13,8 @@ from identification.gap.data import CYCLE, ZERO, Array, Flags, GapData, Ints
 from identification.gap.holds import (
     hold_ids,
     is_continuous,
+    much_to_go,
     noise_in_holds,
-    on_its_way,
     side_of,
     steadied,
 )
@@ -28,7 +28,8 @@ class Rows:
     """n rows. weight (n,): samples behind a row; hold, level, run, setup (n,): consecutive ids.
 
     level: same setup, branch and step (or class of force and sense of motion): what repeats from
-    repetition to repetition shares a level. session (n,) s is always there: `clock` says whether
+    repetition to repetition shares a level. on_the_way (n,): rows of ramps that were recorded
+    before holds. session (n,) s is always there: `clock` says whether
     it was recorded. force: of a hold whose samples scatter by no more than their noise, the mean
     of the hold in all its rows (its noise would else pass for a small friction or a lag);
     measured_force: as it is. steady (n,): such holds. rested (n,) m: the displacement with its
@@ -58,6 +59,7 @@ class Rows:
     temperature: Array | None
     simulated: Array | None
     zero: Flags
+    on_the_way: Flags
     steady: Flags
     rests: Flags
     hold_weight: Array
@@ -136,7 +138,8 @@ def reduce_rows(data: GapData) -> Rows:
     # of what runs, holds are but stretches; a run that begins unloaded comes from nowhere
     stay = _consecutive(_ids(np.column_stack([run, branch, step]))) if bins.running else holds
     begins = (stay == stay[_changes(run)][_consecutive(run)]) & at_zero
-    coming = on_its_way(force, displacement, stay, meter.force, meter.displacement) & ~begins
+    ramp = np.zeros(len(run), bool) if data.on_the_way is None else first(data.on_the_way)
+    coming = ramp | (much_to_go(displacement, stay, meter.displacement) & ~begins)
     still = partial(_still, bins, hold, holds, ~coming)
     steadied, steady = still(data.force, meter.force)
     rested, rests = still(data.displacement, meter.displacement)
@@ -153,6 +156,7 @@ def reduce_rows(data: GapData) -> Rows:
         tangential=bins.mean_of(data.tangential), q=bins.mean_of(data.q),
         temperature=bins.mean_of(data.temperature), simulated=bins.mean_of(data.simulated),
         zero=at_zero & ~coming,
+        on_the_way=ramp,
         continuous=bins.running, starts=_changes(run), hold_starts=_changes(holds),
     )  # fmt: skip
 

@@ -104,7 +104,7 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
     if channel != _driven(bench):
         line = _smooth(bench, bench.line)
         return bench.stacked(_behind(bench, line[:, None], kind, lag)[:, 0] - line)
-    if bench.rows.continuous:
+    if bench.rows.continuous or bench.rows.on_the_way.any():
         ahead = _ahead(bench, _smooth(bench, bench.load), kind, lag)
     else:
         ahead = _true_force(bench, kind, lag) - bench.load
