@@ -182,7 +182,11 @@ def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
         ("measure --resume d.h5 -o e.h5", "-o e.h5: a measurement that is resumed"),
         ("diagnose d.h5 --add joint_yield --withhold joint_yield",
          "--add joint_yield, --withhold joint_yield: exclude each other."),
-        ("diagnose d.h5 --add joint_yeld", '--add: "joint_yeld" is no effect; known: joint_yield'),
+        ("diagnose d.h5 --add joint_yeld",
+         '--add: "joint_yeld" is no effect. Did you mean "joint_yield"?'),
+        ("diagnose d.h5 --withhold time_lag --withhold zeroshift",
+         '--withhold: "zeroshift" is no effect. Did you mean "zero_shift"?'),
+        ("diagnose d.h5 --add xyz", '--add: "xyz" is no effect. Known: base_compliance, base_slip'),
     ],
 )  # fmt: skip
 def test_options_that_contradict_each_other_are_refused(
@@ -255,6 +259,12 @@ def test_wrong_words_are_status_2(rig: Rig, words: list[str]) -> None:
     status, _, err = rig(*words)
     assert status == 2
     assert "Traceback" not in err
+
+
+def test_a_mistyped_command_is_told_the_one_that_was_meant(rig: Rig) -> None:
+    status, _, err = rig("diagnos", "d.h5")
+    assert status == 2
+    assert "No such command 'diagnos'. Did you mean 'diagnose'?" in err
 
 
 def test_an_unknown_weighting_names_the_known_ones(rig: Rig, files: Path) -> None:
