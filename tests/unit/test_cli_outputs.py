@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
-from tests.unit.cli_bench import Rig
+from tests.unit.cli_bench import HOME, TABLE, Rig
 
 
 @pytest.mark.parametrize(
@@ -68,7 +69,8 @@ def test_no_result_takes_the_place_of_an_input_or_a_measurement(
 def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
     assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
     (files / "r.json").write_text("{}")
-    assert rig("analyze", "d.h5", "--json", "r.json")[0] == 0
+    status, _, err = rig("analyze", "d.h5", "--json", "r.json")
+    assert (status, err) == (0, "r.json: replaced; an earlier JSON stood there\n")
     assert json.loads((files / "r.json").read_text())["schema"] == "rig.analysis/1"
     status, _, err = rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     assert status == 0
@@ -76,11 +78,77 @@ def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
     assert "replaced" not in rig("import", "t.csv", "m.yaml", "-o", "new.h5")[2]
 
 
+ARM_META = """\
+robot: ur10e
+poses: {P1: {q_rad: [0.234398, -1.742537, -1.886701, -1.083151, 1.570796, -1.336399]}}
+directions: {x: [1, 0, 0]}
+instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
+simulation: {joint_stiffness_Nm_per_rad: [37000, 57000, 18000, 7100, 7500, 8000]}
+"""
+WRITTEN = [
+    ("diagnose a.h5 --write-model", "f.yaml", "model written by rig"),
+    ("diagnose a.h5 --next", "f.yaml", "protocol written by rig"),
+    ("identify a.h5 --write-model", "f.yaml", "model written by rig"),
+    ("identify a.h5 --write-protocol", "f.yaml", "protocol written by rig"),
+    ("identify a.h5 --proposals 0 --export-mujoco", "f.xml", "arm exported by rig"),
+    ("identify a.h5 --proposals 0 --export-urdf", "f.urdf", "arm exported by rig"),
+    ("simulate F1.yaml p.yaml --csv", "f.csv", "table of curves"),
+    ("report a.h5 --no-gap -o", "f.html", "page"),
+    ("report a.h5 --no-gap --pdf", "f.pdf", "PDF"),
+    ("export a.h5 -o", "f.csv", "table exported by rig"),
+    ("export a.h5 -o", "f.parquet", "Parquet table"),
+]
+
+
+@pytest.fixture
+def arm(rig: Rig, files: Path) -> Path:
+    (files / "arm.yaml").write_text(ARM_META)
+    shutil.copy(HOME / "data" / "models" / "F1.yaml", files)
+    # It gives way at the last level, or something drifts: there is something to tell apart.
+    (files / "k.csv").write_text(TABLE.replace(",100,1.", ",100,1.5"))
+    assert rig("import", "k.csv", "arm.yaml", "-o", "a.h5")[0] == 0
+    return files
+
+
+@pytest.mark.parametrize(("words", "name", "kind"), WRITTEN)
+def test_a_result_replaces_its_own_kind_only_and_says_so(
+    rig: Rig, arm: Path, words: str, name: str, kind: str
+) -> None:
+    told = f"{name}: replaced; an earlier {kind} stood there"
+    for earlier in (False, True):
+        status, _, err = rig(*words.split(), name)
+        assert status == 0, err
+        assert (told in err.splitlines()) == earlier
+    for other in ("F1.yaml", "p.yaml", "t.csv"):  # written by hand, or measured
+        shutil.copy(arm / other, arm / name)
+        status, out, err = rig(*words.split(), name)
+        assert (status, out) == (2, "")
+        option = "--output" if words.endswith("-o") else words.rsplit(maxsplit=1)[-1]
+        assert err == (
+            f"{option} {name}: exists and is no {kind}, so it is not replaced. "
+            "Give another name, or move it away.\n"
+        )
+        assert (arm / name).read_bytes() == (arm / other).read_bytes()
+
+
+def test_a_report_under_its_own_name_says_what_it_replaced(rig: Rig, arm: Path) -> None:
+    told = "a_report.html: replaced; an earlier page stood there"
+    for earlier in (False, True):
+        assert (told in rig("report", "a.h5", "--no-gap")[2].splitlines()) == earlier
+
+
+def test_nothing_is_said_of_a_file_that_still_stands(rig: Rig, arm: Path) -> None:
+    (arm / "m.json").write_text("{}")
+    status, _, err = rig("simulate", "F1.yaml", "none.yaml", "--json", "m.json")
+    assert status == 2
+    assert "replaced" not in err
+
+
 def test_json_that_cannot_be_written_costs_no_result(
     rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
-    (files / "r.json").write_text("older")
+    (files / "r.json").write_text("{}")
 
     def full(*_: object, **__: object) -> int:
         raise OSError(28, "No space left on device")
@@ -90,7 +158,8 @@ def test_json_that_cannot_be_written_costs_no_result(
     assert status == 2
     assert "N/mm" in out
     assert err.startswith("r.json: cannot be written: No space left on device.")
-    assert (files / "r.json").read_text() == "older"
+    assert (files / "r.json").read_text() == "{}"
+    assert "replaced" not in err
     (files / "link.json").symlink_to("r.json")
     status, _, err = rig("analyze", "d.h5", "--json", "link.json")
     assert (status, err) == (2, "link.json: cannot be written: No space left on device.\n")
@@ -99,7 +168,7 @@ def test_json_that_cannot_be_written_costs_no_result(
 def test_json_goes_into_a_pipe_and_through_a_link(rig: Rig, files: Path) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     (files / "link.json").symlink_to("real.json")
-    (files / "real.json").write_text("older")
+    (files / "real.json").write_text("{}")
     os.mkfifo("pipe.json")
     pipe = os.open("pipe.json", os.O_RDONLY | os.O_NONBLOCK)
     for place in ("pipe.json", "link.json"):
