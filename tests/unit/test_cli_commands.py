@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from drivers.errors import CannotConnect, ReadTimeout
+from rig.check import Check, DeviceState
+from rig.plan import plan
+from rig.protocol import load_protocol
 from tests.unit.cli_bench import HOME, Rig
 from tests.unit.runner_bench import PROTOCOL
 
@@ -158,3 +162,22 @@ def test_diagnose_believes_the_model_it_is_given(rig: Rig, files: Path) -> None:
         before[name] = json.loads(out)["gap"]["before_rms_mm"]
     # The table is a spring of 100 N/mm; F1 has 95.96 along x, META's arm twice that.
     assert before["model"] < 0.2 * before["meta"]
+
+
+def test_check_names_every_device_that_is_not_ready(
+    rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = Check(
+        plan(load_protocol(files / "p.yaml")), "ur10e_lab", False,
+        (
+            DeviceState("robot", {}, CannotConnect("robot", "no answer", "Switch it on.")),
+            DeviceState("dynamometer", {"model": "9257B"}),
+            DeviceState("laser", {}, ReadTimeout("laser", "it is silent", "Check its cable.")),
+        ),
+    )  # fmt: skip
+    monkeypatch.setattr("rig.check.check", lambda *_: found)
+    status, out, err = rig("check", "p.yaml")
+    assert status == 3
+    assert err == "robot: no answer. Switch it on.\nlaser: it is silent. Check its cable.\n"
+    assert "laser        NOT READY" in out
+    assert isinstance(found.failure, CannotConnect)  # the first decides over the status
