@@ -225,3 +225,31 @@ def test_the_help_names_every_weighting(rig: Rig) -> None:
     said = " ".join(rig("analyze", "--help")[1].split()).replace("- ", "-")  # wrapped lines
     for word in WEIGHTINGS:
         assert word in said.split("how the points are weighted")[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "both", "ends"),
+    [
+        ("--help", False, 141),
+        ("analyze d.h5", False, 141),
+        ("analyze d.h5 --json -", False, 141),
+        ("list . --json -", True, 141),
+        ("export d.h5 -o d.csv", True, 141),
+        ("frobnicate", True, 141),
+        ("analyze none.h5", True, 2),
+    ],
+)
+def test_a_reader_that_has_left_is_no_bug(
+    rig: Rig, files: Path, words: str, both: bool, ends: int
+) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    reader, pipe = os.pipe()
+    os.close(reader)
+    ended = subprocess.run(
+        [sys.executable, "-m", "rig", *words.split()], cwd=files, stdout=pipe, text=True,
+        stderr=pipe if both else subprocess.PIPE, check=False,
+        env={**os.environ, "PYTHONPATH": str(HOME), "TMPDIR": str(files)},
+    )  # fmt: skip
+    os.close(pipe)
+    assert (ended.returncode, ended.stderr) == (ends, None if both else "")
+    assert not list(files.glob("rig-bug-*"))
