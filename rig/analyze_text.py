@@ -1,17 +1,15 @@
-"""The text of an analysis: plain tables that survive a pipe and a mail."""
+"""The text of an analysis: plain tables that survive a pipe and a mail. Lines are whole; a terminal
+folds them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from textwrap import wrap
 
 from identification.stiffness import Exclusion, Stiffness
 from identification.uncertainty import Quantity
 from rig.analyze import MM, N_PER_MM, Analysis, Direction
 from rig.digits import number
-
-WIDTH = 79  # of the narrowest terminal that is usual, less one
 
 
 def text(analysis: Analysis) -> str:
@@ -19,7 +17,7 @@ def text(analysis: Analysis) -> str:
     lines = [*analysis.banners]
     if lines:
         lines.append("")
-    lines += wrap(f"{analysis.name}: {answer(analysis)}", WIDTH)
+    lines.append(f"{analysis.name}: {answer(analysis)}")
     for key, direction in analysis.directions.items():
         lines += ["", *_direction(key, direction)]
     return "\n".join(lines)
@@ -57,7 +55,7 @@ def _direction(key: str, direction: Direction) -> Iterator[str]:
     yield title
     yield "-" * len(title)
     if r.sentence:
-        yield from wrap(r.sentence, WIDTH)
+        yield r.sentence
     if r.k is not None:
         yield from _stiffness(r, r.k)
     if r.knee is not None:
@@ -74,8 +72,7 @@ def _direction(key: str, direction: Direction) -> Iterator[str]:
             f"Loop between loading and unloading: {number(loop.area * MM)} N mm{share}; "
             "k is that of loading."
         )
-    for note in r.notes:
-        yield from wrap(note, WIDTH)
+    yield from r.notes
     yield from _tables(r)
 
 
@@ -86,7 +83,7 @@ def _stiffness(r: Stiffness, k: Quantity) -> Iterator[str]:
         f"k = {number(value)} N/mm, standard uncertainty {number(k.u * N_PER_MM, 2, value)} N/mm, "
         f"95 % from {low} to {high} N/mm"
     )
-    yield from wrap(f"Line: {r.choice.label}; {r.choice_reason}.", WIDTH)
+    yield f"Line: {r.choice.label}; {r.choice_reason}."
     if r.choice.intercept:
         yield f"Intercept: {number(r.intercept * MM)} mm"
     if len(r.by_repetition) > 1:
@@ -101,8 +98,7 @@ def _excluded(excluded: Sequence[Exclusion]) -> Iterator[str]:
         by_reason.setdefault(e.reason, []).append(e.step)
     for reason, steps in by_reason.items():
         word = "step" if len(steps) == 1 else "steps"
-        line = f"Not counted: {word} {', '.join(map(str, steps))}: {reason}."
-        yield from wrap(line, WIDTH)
+        yield f"Not counted: {word} {', '.join(map(str, steps))}: {reason}."
 
 
 def _tables(r: Stiffness) -> Iterator[str]:
@@ -146,7 +142,8 @@ def _tables(r: Stiffness) -> Iterator[str]:
     header = ("weighting and origin", "steps", "k N/mm", "u N/mm")
     yield from _table("k under other choices", header, rivals, words=2)
     meanings = dict.fromkeys(_short(a.choice.label)[1] for a in r.alternatives)
-    yield from wrap("; ".join(meanings), WIDTH, initial_indent="  ", subsequent_indent="  ")
+    if meanings:
+        yield f"  {'; '.join(meanings)}"
 
 
 def _short(label: str) -> tuple[str, str]:

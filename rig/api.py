@@ -8,7 +8,7 @@
     run.diagnose().probabilities
 
 Every answer holds the result as JSON (`json`), the text of the command (`text`) and tables. What
-comes from simulated devices or an unfinished measurement says so wherever it is printed.
+comes from simulated devices or an incomplete measurement says so wherever it is printed.
 """
 
 from __future__ import annotations

@@ -39,9 +39,15 @@ class Check:
     devices: tuple[DeviceState, ...]
 
     @property
-    def first_error(self) -> DeviceError | None:
-        """What decides over the exit status."""
-        return next((d.error for d in self.devices if d.error is not None), None)
+    def failure(self) -> DeviceError | None:
+        """Of all devices that are not ready; of the first one's kind, which decides over the exit
+        status."""
+        errors = [d.error for d in self.devices if d.error is not None]
+        if not errors:
+            return None
+        first, *others = errors
+        remedy = "\n".join([first.remedy, *map(str, others)])
+        return type(first)(first.device, first.fault, remedy)
 
     def to_text(self) -> str:
         """Plan and devices for the terminal."""

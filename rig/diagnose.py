@@ -14,15 +14,15 @@ from identification.gap.diagnose import (
     Effect,
     GapResult,
     NotShown,
-    check_words,
     diagnose_gap,
     explain_gap,
 )
 from identification.gap.forms.known import less_known
 from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
+from identification.gap.words import WORDS
 from rig.dataset import Dataset
-from rig.errors import InputError
+from rig.errors import InputError, did_you_mean
 from rig.gap_data import gap_data
 from rig.gap_forms import effects_of
 from rig.meta import Simulation
@@ -117,10 +117,9 @@ def diagnose(
         data = with_curves(data, simulation)
     out, forced = tuple(withhold), tuple(add)
     for option, words in (("--withhold", out), ("--add", forced)):
-        try:
-            check_words(set(words))
-        except ValueError as error:
-            raise InputError(f"{option}: {error}.") from error
+        for word in words:
+            if word not in WORDS:
+                raise InputError(f'{option}: "{word}" is no effect.{did_you_mean(word, WORDS)}')
     for word in (w for w in forced if w in out):
         raise InputError(f"--add {word}, --withhold {word}: exclude each other. Leave one out.")
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
 
@@ -14,13 +14,21 @@ class MeasurementStopped(Exception):
     """The measurement ended early, for safety or by the operator; data kept. Exit status 4."""
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """` Did you mean "x"?` for a mistyped word, or the list of known ones."""
+def did_you_mean(word: str, known: Iterable[str], called: Callable[[str], str] = str) -> str:
+    """` Did you mean "x"?` for a mistyped word, or the list of known ones. called: what the message
+    calls them, where they are compared by less (a file by what stands before its ending)."""
     names = sorted(known)
-    return close_to(word, names) or " Known: " + ", ".join(names) + "."
+    if not names:
+        return ""
+    return close_to(word, names, called) or f" Known: {', '.join(map(called, names))}."
 
 
-def close_to(word: str, known: Iterable[str]) -> str:
+def close_to(word: str, known: Iterable[str], called: Callable[[str], str] = str) -> str:
     """` Did you mean "x"?`, or nothing: for messages that list the known words anyway."""
-    close = get_close_matches(word, sorted(known), n=1)
-    return f' Did you mean "{close[0]}"?' if close else ""
+    meant = closest(word, known)
+    return "" if meant is None else f' Did you mean "{called(meant)}"?'
+
+
+def closest(word: str, known: Iterable[str]) -> str | None:
+    """The known word that was probably meant, where one is near enough."""
+    return next(iter(get_close_matches(word, sorted(known), n=1)), None)

@@ -322,7 +322,8 @@ def _above(axes: Any, x: float, y: float, text: str) -> None:
     low, high = np.log(axes.get_xlim())
     share = (np.log(x) - low) / (high - low)
     side = "right" if share > 0.75 else "left" if share < 0.25 else "center"
-    axes.annotate(text, (x, y), xytext=(0, 5), textcoords="offset points", ha=side, fontsize=8)
+    axes.annotate(text, (x, y), xytext=(0, 7), textcoords="offset points", ha=side, va="bottom",
+                  fontsize=8)  # fmt: skip
 
 
 def remaining(r: Shown, p: Points, m: Remainder) -> Figure:

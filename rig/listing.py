@@ -36,7 +36,7 @@ class Entry:
     def state(self) -> str:
         """What must not be overlooked."""
         s = self.summary
-        whole = "UNFINISHED" if self.open else "complete" if s.complete else "INCOMPLETE"
+        whole = "complete" if s.complete else "INCOMPLETE"
         return f"{whole}, EMULATED" if s.origin == "emulated" else f"{whole}, {s.origin}"
 
     @property
@@ -96,6 +96,9 @@ class Listing:
             yield from table
         else:
             yield from _narrow(rows)
+        begun = ", ".join(e.file for e in self.entries if e.open)
+        if begun:
+            yield f"With a journal: {begun}; `rig measure --resume FILE` goes on there."
         if any(e.stiffness is None for e in self.entries):
             yield "k -: not analysed yet; `rig list --analyze` or `rig analyze FILE` does it."
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from drivers.clock import Clock
 from drivers.errors import DeviceError
@@ -27,6 +27,7 @@ from rig.plan import plan
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.devices import Devices, make_devices, make_loader, open_devices, station_clock
 from rig.procedure.limits import UNLOAD
+from rig.procedure.pace import Pace
 from rig.procedure.progress import Progress, read_progress
 from rig.procedure.progress_bar import LoaderWithBar
 from rig.procedure.recorder import Recorder
@@ -255,9 +256,13 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     rate_Hz, progress = job.protocol.sampling.rate_Hz, job.progress
     acquisition = Acquisition(rig.devices, rig.clock, rate_Hz, progress.session_s)
     sign = rig.station.laser.sign if rig.station.laser else 1
-    recorder = Recorder(
-        job.journal, rig.devices, acquisition.now, sign, progress.rows, rig.onlooker.record
-    )
+    pace = Pace(rig.clock.speed, lambda text: rig.loader.notify(text, "warning"))
+
+    def listen(kind: str, data: Mapping[str, Any]) -> None:
+        rig.onlooker.record(kind, data)
+        pace.record(kind, data)
+
+    recorder = Recorder(job.journal, rig.devices, acquisition.now, sign, progress.rows, listen)
     runner = Runner(job.protocol, acquisition, rig.loader, recorder, progress, lambda: _build(job))
     reason, complete = "a bug", False
     try:
@@ -281,7 +286,10 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
     finally:
         rig.loader.close()  # what is said from here on must not be painted over
         with _signals(_patience(say), _patience(say)):
-            _finish(job, recorder, reason, say, complete=complete)
+            behind = pace.text()
+            _finish(job, recorder, reason, say, behind, complete=complete)
+        if behind is not None:
+            say(behind)
     return job.output
 
 
@@ -297,9 +305,14 @@ def _descriptor(rig: _Rig) -> dict[str, object]:
     return {"devices": devices | operator, "signals": columns, "calibration": calibration}
 
 
-def _finish(job: Job, recorder: Recorder, reason: str, say: Say, *, complete: bool) -> None:
-    """Stop record and data set; the journal goes when that is complete and has been read back."""
+def _finish(
+    job: Job, recorder: Recorder, reason: str, say: Say, behind: str | None, *, complete: bool
+) -> None:
+    """Stop record and data set; the journal goes when that is complete and has been read back.
+    behind: that the machine could not keep up."""
     with suppress(JournalError):  # a disk that refuses has been reported; what it holds counts
+        if behind is not None:
+            recorder.event("behind", behind)
         if complete:
             recorder.stop(reason, complete=True)
         else:

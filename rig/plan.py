@@ -90,8 +90,10 @@ class Plan:
         """A table of the runs, duration with its assumptions, warnings."""
         station = f", station {self.station}" if self.station else ""
         steps = sum(run.steps for run in self.runs)
-        lines = [f"Plan: {self.title} (robot {self.robot}{station})", "", *_table(self.runs), ""]
+        lines = [f"Plan: {self.title}", f"Robot {self.robot}{station}", "", *_table(self.runs)]
         lines += [
+            f"Directions in the base frame: {'; '.join(_vectors(self.runs))}",
+            "",
             f"Together: {counted(len(self.runs), 'run')} of {counted(steps, 'step')}, "
             f"{counted(self.repetitions, 'time')}; "
             f"at least {self.samples} samples",
@@ -262,21 +264,26 @@ def _assumptions(
         percent = 100 * float(np.max(arm.joint_stiffness_relative_sd))
         yield f"u and k expected from the nominal joint springs of {arm.name}, sd {percent:.0f} %"
     yield (
-        "joint torque: of the joint (J) that comes nearest to its limit, of what is allowed, at "
+        "torque: of the joint (J) that comes nearest to its limit, of what is allowed, at "
         "the top force, weight of the links included"
     )
 
 
+def _vectors(runs: Sequence[PlannedRun]) -> dict[str, None]:
+    """Each direction once: `+x (1, 0, 0)`. In the table they would make it too wide for 80."""
+    return dict.fromkeys(
+        f"{run.direction} ({', '.join(f'{v:.4g}' for v in run.unit_vector)})" for run in runs
+    )
+
+
 def _table(runs: Sequence[PlannedRun]) -> list[str]:
-    head = ("run", "pose", "direction", "steps", "force N", "k N/mm", "u mm", "joint torque Nm",
-            "takes")  # fmt: skip
+    head = ("run", "pose", "direction", "steps", "force N", "k N/mm", "u mm", "torque Nm", "takes")
     rows = [head]
     for n, run in enumerate(runs, start=1):
         j = run.worst_joint
         hold, limit = abs(run.hold_torque_Nm[j]), run.torque_limit_Nm[j]
-        vector = ", ".join(f"{v:.4g}" for v in run.unit_vector)
         rows.append((
-            f"{n}", run.pose, f"{run.direction} ({vector})", f"{run.steps}",
+            f"{n}", run.pose, run.direction, f"{run.steps}",
             f"{run.forces_N[0]:g} to {run.forces_N[-1]:g}", f"{run.stiffness_N_per_mm:.1f}",
             f"{run.displacement_mm:.2f}", f"J{j + 1} {hold:.0f} of {limit:g}",
             _time(run.duration_s),

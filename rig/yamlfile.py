@@ -12,14 +12,13 @@ import json
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from rig import yamlwords as words
-from rig.errors import InputError, close_to, did_you_mean
+from rig.errors import InputError, close_to, closest, did_you_mean
 from rig.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, refuse
 
 T = TypeVar("T")
@@ -98,10 +97,7 @@ def _neighbours(path: Path) -> str:
     """The file that may have been meant, by what stands before the ending, or those there are."""
     found = sorted(path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
     near = {p.stem: p.name for p in found[:40]}
-    close = get_close_matches(path.stem, near, n=1)
-    if close:
-        return f' Did you mean "{near[close[0]]}"?'
-    return f" Known: {', '.join(near.values())}." if near else ""
+    return did_you_mean(path.stem, near, near.__getitem__)
 
 
 def _decode(raw: bytes, name: str) -> str:
@@ -295,7 +291,7 @@ class _Judge:
         if key.isdecimal() and self._at(path) is None:  # {range_mm: 1,5}
             hint = " A comma ends a value here; write a point as decimal mark."
         reader.complain(path, reader.keys.get(path, reader.places[path]), f"unknown key.{hint}")
-        self._renames[path] = _closest(key, free)
+        self._renames[path] = closest(key, free)
 
     def _value_problem(self, path: Key, value: object) -> None:
         if self._reader.is_bad(path):
@@ -306,7 +302,7 @@ class _Judge:
         what = f"{words.value_words(value, unit)} is not allowed"
         what += f"; wanted: {allowed}." if allowed else "."
         self._reader.complain(path, self._reader.places[path], what + _hint(value, nodes))
-        meant = _closest(value, _texts(nodes)) if isinstance(value, str) else None
+        meant = closest(value, _texts(nodes)) if isinstance(value, str) else None
         if meant is not None:
             self._words[path] = meant
 
@@ -350,10 +346,6 @@ def _hint(value: object, nodes: Sequence[words.Schema]) -> str:
         options = _texts(nodes)
         return close_to(value, options) if len(options) > 1 else ""
     return ""
-
-
-def _closest(word: str, known: Sequence[str]) -> str | None:
-    return next(iter(get_close_matches(word, sorted(known), n=1)), None)
 
 
 def _texts(nodes: Sequence[words.Schema]) -> list[str]:

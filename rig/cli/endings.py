@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 import tempfile
 import traceback
@@ -11,6 +12,8 @@ import typer
 
 from rig.cli.commands import app
 from rig.cli.options import say
+
+_UNREAD = 141  # as shells show the end of usual tools (128 + SIGPIPE): 1 would be a bug
 
 
 def main() -> None:
@@ -38,6 +41,12 @@ def _run() -> None:
         # Ends the process itself: 0 done, 2 wrong arguments, 130 interrupted. Calling `app`
         # would put typer's hook, which prints tracebacks, in place of ours.
         typer.main.get_command(app)()
+    except SystemExit as ending:
+        if isinstance(ending.__context__, BrokenPipeError):  # typer's 1 for it
+            _end_unread(_UNREAD)
+        raise
+    except BrokenPipeError:
+        _end_unread(_UNREAD)
     except SafetyStop as error:
         _end(4, f"Stopped for safety. {error}")
     except DeviceError as error:
@@ -45,7 +54,16 @@ def _run() -> None:
 
 
 def _end(status: int, message: str) -> None:
-    say(message)
+    try:
+        say(message)
+    except BrokenPipeError:
+        _end_unread(status)
+    sys.exit(status)
+
+
+def _end_unread(status: int) -> None:
+    """Whoever read what is printed has left (`rig list | head -1`): nothing more is said."""
+    sys.stdout = sys.stderr = io.StringIO()  # or Python would try again at its end
     sys.exit(status)
 
 

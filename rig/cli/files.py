@@ -49,6 +49,7 @@ def report(
     from rig.terminal import terminal_progress
 
     page = reports.checked(output or reports.default_output(datasets), pdf)
+    replaced = output is None and page.exists()  # the guard tells it of a page that was given
     with terminal_progress() as progress:
         wishes = reports.Wishes(
             couple=couple,
@@ -65,6 +66,8 @@ def report(
                 remember_result(session.path, found)
     reports.write_html(result, page)
     list_written([page])
+    if replaced:
+        say(f"{page}: replaced; an earlier page stood there")
     if pdf is not None:
         reports.write_pdf(result, pdf)
         list_written([pdf])

@@ -1,5 +1,5 @@
 """Before the work: no result takes the place of what it is computed from, nor of any measurement,
-and every place can be written to."""
+nor of another kind of file, and every place can be written to. After it: what was replaced."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 from typer.core import TyperCommand
 
+from rig.cli.kinds import replacing
 from rig.errors import InputError
 
 _READ = {"model", "simulation", "couple", "resume", "station", "prior", "path"}
@@ -22,10 +23,11 @@ class Guarded(TyperCommand):
     """A command that looks at its output paths before it begins."""
 
     def invoke(self, ctx: Any) -> Any:
-        """InputError where a result would overwrite an input, or a data set, or could not be
-        written once the work is done."""
-        inputs = [path for _, path in _paths(ctx, written=False)]
-        for option, path in _paths(ctx, written=True):
+        """InputError where a result would overwrite an input, a data set or another kind of file,
+        or could not be written once the work is done."""
+        inputs = [path for _, _, path in _paths(ctx, written=False)]
+        places = list(_paths(ctx, written=True))
+        for option, _, path in places:
             if any(_same(path, other) for other in inputs):
                 raise InputError(
                     f"{option} {path}: is read by this command, and would be overwritten. "
@@ -39,7 +41,8 @@ class Guarded(TyperCommand):
             _check_file(option, path)
         for option, path in _folders(ctx):
             _check_may_be_made(option, path)
-        return super().invoke(ctx)
+        with replacing([] if self.name in _MAKES_DATA else places):
+            return super().invoke(ctx)
 
 
 def _check_file(option: str, path: Path) -> None:
@@ -77,8 +80,8 @@ def _folders(ctx: Any) -> Iterator[tuple[str, Path]]:
             yield parameter.opts[-1], path
 
 
-def _paths(ctx: Any, *, written: bool) -> Iterator[tuple[str, Path]]:
-    """Option and path of everything that is written, or read."""
+def _paths(ctx: Any, *, written: bool) -> Iterator[tuple[str, str, Path]]:
+    """Option, its parameter and the path of everything that is written, or read."""
     for parameter in ctx.command.params:
         name, value = str(parameter.name), ctx.params.get(str(parameter.name))
         reads = parameter.param_type_name == "argument" or name in _READ
@@ -87,7 +90,7 @@ def _paths(ctx: Any, *, written: bool) -> Iterator[tuple[str, Path]]:
         option = parameter.opts[-1] if parameter.opts else name
         for one in value if isinstance(value, list | tuple) else [value]:
             if isinstance(one, Path) or (name == "json_file" and one not in (None, "-")):
-                yield option, Path(one)
+                yield option, name, Path(one)
 
 
 def _same(path: Path, other: Path) -> bool:

@@ -76,8 +76,8 @@ def check(
 
     result = run_check(protocol, station)
     give(result, json_file)
-    if result.first_error is not None:
-        raise result.first_error
+    if result.failure is not None:
+        raise result.failure
 
 
 def emulate(station: Annotated[str, typer.Argument(metavar="STATION.yaml")] = "emulated") -> None:

@@ -13,6 +13,7 @@ from rig.analyze import Analysis, Options, analyze, weighting
 from rig.digits import brief, number
 from rig.errors import InputError
 from rig.figures import curve, draw, pointwise
+from rig.terminal import folded
 from tests.unit.stiffness_tables import Table, run, table
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "analyze_text.txt"
@@ -54,8 +55,12 @@ def test_the_text_word_for_word(analysis: Analysis) -> None:
     assert analysis.to_text() + "\n" == GOLDEN.read_text(encoding="utf-8")
 
 
-def test_no_line_is_wider_than_a_terminal_of_130(analysis: Analysis) -> None:
-    assert max(len(line) for line in analysis.to_text().splitlines()) <= 130
+def test_sentences_are_lines_and_a_terminal_folds_them_but_no_table(analysis: Analysis) -> None:
+    lines = analysis.to_text().splitlines()
+    after = [line for line in lines if line.startswith("Not counted")]
+    assert [line[-1] for line in after] == ["."]
+    tables = [line for line in lines if line.startswith("  ") and ";" not in line]
+    assert set(tables) <= set(folded("\n".join(lines), 80).splitlines())
 
 
 def test_json_has_what_other_programs_rely_on(analysis: Analysis) -> None:

@@ -20,7 +20,7 @@ from rig import cli
 from rig.dataset import write
 from rig.diagnose import Diagnosis, diagnose
 from rig.diagnose_text import _share
-from rig.gap_figures import change, curve, draw, legs, residual
+from rig.gap_figures import change, curve, draw, legs, residual, withheld
 from rig.gap_layout import blank, noise_axis
 from rig.gap_map import _cells, _lines
 from rig.gap_points import (
@@ -119,6 +119,23 @@ def test_withheld_table_begins_with_the_fit_and_ends_with_the_rivals(slipped: Di
     assert t["before_rms_mm"][0] == pytest.approx(r.before * 1e3)
     assert list(t["explanation"][len(t["explanation"]) - len(r.runners_up) :]) == list(r.runners_up)
     assert t["after_rms_mm"][1] == pytest.approx(r.held_out[0].after * 1e3)
+
+
+def test_labels_over_short_changes_touch_no_marker(slipped: Diagnosis) -> None:
+    """A change by a quarter: its label is wider than the line between its markers."""
+    view = replace(shown(slipped.result), after=0.8 * slipped.result.before)
+    figure = withheld(view)
+    figure.canvas.draw()
+    (axes,), point = figure.axes, figure.dpi / 72
+    markers = [
+        (x, y, (line.get_markersize() / 2 + line.get_markeredgewidth() / 2) * point)
+        for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata())
+        for x, y in axes.transData.transform(line.get_xydata())
+    ]  # fmt: skip
+    for box in (text.get_window_extent() for text in axes.texts):
+        for x, y, radius in markers:
+            beside = x + radius < box.x0 or x - radius > box.x1
+            assert beside or y + radius + point < box.y0 or y - radius - point > box.y1
 
 
 def test_without_an_arm_a_spring_is_called_by_its_direction(tmp_path: Path) -> None:

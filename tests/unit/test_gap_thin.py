@@ -13,7 +13,7 @@ from rig.dataset import Origin, load
 from rig.diagnose import diagnose
 from rig.gap_data import gap_data
 from rig.tables import import_table
-from tests.unit.test_cli import META, TABLE
+from tests.unit.cli_bench import META, TABLE
 from tests.unit.test_gap_operators import bench_data
 
 

@@ -38,7 +38,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A measured set, an imported specimen below, an unfinished run, and three that are none."""
+    """A measured set, an imported specimen below, an incomplete run, and three that are none."""
     here = tmp_path / "data"
     (here / "old").mkdir(parents=True)
     (here / ".hidden").mkdir()
@@ -152,7 +152,7 @@ def test_an_open_run_is_never_taken_from_the_catalogue(folder: Path) -> None:
     write_journal(path, 2)
     entry = next(e for e in list_folder(folder).entries if e.file == "arm.h5")
     assert (entry.open, entry.stiffness, entry.summary.rows) == (True, None, 2)
-    assert "UNFINISHED, EMULATED" in list_folder(folder).to_text()
+    assert "INCOMPLETE, EMULATED" in list_folder(folder).to_text()
 
 
 def test_what_a_journal_tells_is_not_remembered_of_the_older_file(folder: Path) -> None:

@@ -12,7 +12,7 @@ from rig.errors import InputError
 from rig.gap_data import gap_data
 from rig.other_simulator import with_curves
 from rig.tables import import_table
-from tests.unit.test_cli import META, TABLE
+from tests.unit.cli_bench import META, TABLE
 
 HEAD = "direction,force_N,displacement_mm\n"
 

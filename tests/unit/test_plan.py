@@ -47,6 +47,14 @@ def test_every_ready_protocol_has_a_plan_without_warnings(lab: Station) -> None:
         assert plan(load_protocol(file), lab).warnings == ()
 
 
+@pytest.mark.parametrize("file", sorted(PROTOCOLS.glob("*.yaml")), ids=lambda file: file.stem)
+def test_the_plan_of_a_ready_protocol_fits_80_columns(file: Path, lab: Station) -> None:
+    """A terminal would tear the rows of a wider table."""
+    lines = plan(load_protocol(file), lab).to_text().splitlines()
+    end = next(i for i, line in enumerate(lines) if line.startswith("Directions"))
+    assert max(map(len, lines[:end])) <= 80
+
+
 def test_torques_by_hand(paper: MeasurementProtocol) -> None:
     # y: 82 N at 0.75 m from axis 1, which stands upright and carries no weight.
     along_y = plan(paper).runs[1]

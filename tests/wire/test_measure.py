@@ -64,6 +64,15 @@ def test_a_short_run_ends_complete_and_marked_as_emulated(tmp_path: Path) -> Non
     assert no_process_left(tmp_path)
 
 
+def test_a_speed_that_no_machine_keeps_is_said_to_be_too_high(tmp_path: Path) -> None:
+    outcome = run_rig(*write_files(tmp_path), "--speed", "400", cwd=tmp_path)
+    assert outcome.status in (0, 3), outcome.stderr  # devices may seem to fail at such a speed
+    said = re.findall(r"This machine can't keep up with 400 times real time: .*", outcome.stderr)
+    assert len(said) == 2  # when it is noticed, and at the end
+    noted = [e["text"] for e in load(tmp_path / "run.h5").events if e["kind"] == "behind"]
+    assert noted == said[1:]
+
+
 def test_an_amplifier_without_a_line_is_switched_by_the_emulated_hand(tmp_path: Path) -> None:
     words = write_files(tmp_path, reset_line="null", speed=60)
     outcome = run_rig(*words, cwd=tmp_path)

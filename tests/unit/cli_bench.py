@@ -1,0 +1,21 @@
+"""A small table with its META, and what the tests of the command line are given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+HOME = Path(__file__).parents[2]
+META = """\
+robot: none
+directions: {x: [1, 0, 0]}
+instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
+simulation: {stiffness_N_per_mm: {x: 95.0}, stiffness_relative_sd: 0.1}
+"""
+TABLE = "time_s,repetition,branch,step,force_N,displacement_mm\n" + "".join(
+    f"{10 * r + s},{r},{'zero' if s == 0 else 'loading'},{s},{20 * s},{0.2 * s + 0.001 * r}\n"
+    for r in (1, 2, 3)
+    for s in range(6)
+)
+
+Rig = Callable[..., tuple[int, str, str]]

@@ -1,0 +1,179 @@
+"""The command line: what is written where, and what it may take the place of."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.unit.cli_bench import HOME, TABLE, Rig
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("analyze no.h5 --json no/such/r.json",
+         "--json no/such/r.json: the folder no/such does not exist. Create it"),
+        ("analyze no.h5 --json .",
+         "--json .: is a folder. Give the name of a file, or - for stdout."),
+        ("analyze no.h5 --json shut/r.json",
+         "--json shut/r.json: nothing may be written into the folder shut."),
+        ("diagnose no.h5 --figures m.yaml", "--figures m.yaml: m.yaml is a file, no folder."),
+        ("diagnose no.h5 --figures m.yaml/f", "--figures m.yaml/f: m.yaml is a file, no folder."),
+        ("diagnose no.h5 --figures shut/f", "--figures shut/f: nothing may be written into the"),
+        ("diagnose no.h5 --write-model no/m.yaml", "--write-model no/m.yaml: the folder no does"),
+        ("report no.h5 --pdf no/r.pdf", "--pdf no/r.pdf: the folder no does not exist."),
+        ("export no.h5 -o .", "--output .: is a folder. Give the name of a file."),
+        ("export no.h5 -o -", "--output -: this one goes to a file only. Give its name."),
+    ],
+)  # fmt: skip
+def test_places_that_could_not_be_written_to_are_said_before_the_work(
+    rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch, words: str, says: str
+) -> None:
+    (files / "shut").mkdir()
+    monkeypatch.setattr(os, "access", lambda folder, _mode: folder != "shut")
+    status, out, err = rig(*words.split())
+    assert (status, out) == (2, "")
+    assert err.startswith(says)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("analyze d.h5 --json d.h5", "--json d.h5: is read by this command"),
+        ("diagnose d.h5 --write-model ./d.h5", "--write-model d.h5: is read by this command"),
+        ("analyze d.h5 --json other.h5", "--json other.h5: is a data set;"),
+        ("list . --json d.h5", "--json d.h5: is a data set;"),
+        ("export d.h5 -o d.h5", "--output d.h5: is read by this command"),
+        ("import t.csv m.yaml -o m.yaml", "--output m.yaml: is read by this command"),
+        ("check p.yaml --json p.yaml", "--json p.yaml: is read by this command"),
+        ("simulate model.yaml p.yaml --csv p.yaml", "--csv p.yaml: is read by this command"),
+    ],
+)
+def test_no_result_takes_the_place_of_an_input_or_a_measurement(
+    rig: Rig, files: Path, words: str, says: str
+) -> None:
+    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+    assert rig("import", "t.csv", "m.yaml", "-o", "other.h5")[0] == 0
+    before = {p.name: p.read_bytes() for p in files.iterdir()}
+    status, out, err = rig(*words.split())
+    assert (status, out) == (2, "")
+    assert err.startswith(says)
+    assert "Give another name." in err
+    assert {p.name: p.read_bytes() for p in files.iterdir()} == before
+
+
+def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
+    assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
+    (files / "r.json").write_text("{}")
+    status, _, err = rig("analyze", "d.h5", "--json", "r.json")
+    assert (status, err) == (0, "r.json: replaced; an earlier JSON stood there\n")
+    assert json.loads((files / "r.json").read_text())["schema"] == "rig.analysis/1"
+    status, _, err = rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    assert status == 0
+    assert "d.h5: replaced; an earlier import stood there" in err.splitlines()
+    assert "replaced" not in rig("import", "t.csv", "m.yaml", "-o", "new.h5")[2]
+
+
+ARM_META = """\
+robot: ur10e
+poses: {P1: {q_rad: [0.234398, -1.742537, -1.886701, -1.083151, 1.570796, -1.336399]}}
+directions: {x: [1, 0, 0]}
+instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
+simulation: {joint_stiffness_Nm_per_rad: [37000, 57000, 18000, 7100, 7500, 8000]}
+"""
+WRITTEN = [
+    ("diagnose a.h5 --write-model", "f.yaml", "model written by rig"),
+    ("diagnose a.h5 --next", "f.yaml", "protocol written by rig"),
+    ("identify a.h5 --write-model", "f.yaml", "model written by rig"),
+    ("identify a.h5 --write-protocol", "f.yaml", "protocol written by rig"),
+    ("identify a.h5 --proposals 0 --export-mujoco", "f.xml", "arm exported by rig"),
+    ("identify a.h5 --proposals 0 --export-urdf", "f.urdf", "arm exported by rig"),
+    ("simulate F1.yaml p.yaml --csv", "f.csv", "table of curves"),
+    ("report a.h5 --no-gap -o", "f.html", "page"),
+    ("report a.h5 --no-gap --pdf", "f.pdf", "PDF"),
+    ("export a.h5 -o", "f.csv", "table exported by rig"),
+    ("export a.h5 -o", "f.parquet", "Parquet table"),
+]
+
+
+@pytest.fixture
+def arm(rig: Rig, files: Path) -> Path:
+    (files / "arm.yaml").write_text(ARM_META)
+    shutil.copy(HOME / "data" / "models" / "F1.yaml", files)
+    # It gives way at the last level, or something drifts: there is something to tell apart.
+    (files / "k.csv").write_text(TABLE.replace(",100,1.", ",100,1.5"))
+    assert rig("import", "k.csv", "arm.yaml", "-o", "a.h5")[0] == 0
+    return files
+
+
+@pytest.mark.parametrize(("words", "name", "kind"), WRITTEN)
+def test_a_result_replaces_its_own_kind_only_and_says_so(
+    rig: Rig, arm: Path, words: str, name: str, kind: str
+) -> None:
+    told = f"{name}: replaced; an earlier {kind} stood there"
+    for earlier in (False, True):
+        status, _, err = rig(*words.split(), name)
+        assert status == 0, err
+        assert (told in err.splitlines()) == earlier
+    for other in ("F1.yaml", "p.yaml", "t.csv"):  # written by hand, or measured
+        shutil.copy(arm / other, arm / name)
+        status, out, err = rig(*words.split(), name)
+        assert (status, out) == (2, "")
+        option = "--output" if words.endswith("-o") else words.rsplit(maxsplit=1)[-1]
+        assert err == (
+            f"{option} {name}: exists and is no {kind}, so it is not replaced. "
+            "Give another name, or move it away.\n"
+        )
+        assert (arm / name).read_bytes() == (arm / other).read_bytes()
+
+
+def test_a_report_under_its_own_name_says_what_it_replaced(rig: Rig, arm: Path) -> None:
+    told = "a_report.html: replaced; an earlier page stood there"
+    for earlier in (False, True):
+        assert (told in rig("report", "a.h5", "--no-gap")[2].splitlines()) == earlier
+
+
+def test_nothing_is_said_of_a_file_that_still_stands(rig: Rig, arm: Path) -> None:
+    (arm / "m.json").write_text("{}")
+    status, _, err = rig("simulate", "F1.yaml", "none.yaml", "--json", "m.json")
+    assert status == 2
+    assert "replaced" not in err
+
+
+def test_json_that_cannot_be_written_costs_no_result(
+    rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    (files / "r.json").write_text("{}")
+
+    def full(*_: object, **__: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    status, out, err = rig("analyze", "d.h5", "--json", "r.json")
+    assert status == 2
+    assert "N/mm" in out
+    assert err.startswith("r.json: cannot be written: No space left on device.")
+    assert (files / "r.json").read_text() == "{}"
+    assert "replaced" not in err
+    (files / "link.json").symlink_to("r.json")
+    status, _, err = rig("analyze", "d.h5", "--json", "link.json")
+    assert (status, err) == (2, "link.json: cannot be written: No space left on device.\n")
+
+
+def test_json_goes_into_a_pipe_and_through_a_link(rig: Rig, files: Path) -> None:
+    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
+    (files / "link.json").symlink_to("real.json")
+    (files / "real.json").write_text("{}")
+    os.mkfifo("pipe.json")
+    pipe = os.open("pipe.json", os.O_RDONLY | os.O_NONBLOCK)
+    for place in ("pipe.json", "link.json"):
+        assert rig("analyze", "d.h5", "--json", place)[0] == 0
+    assert os.read(pipe, 60_000).startswith(b'{\n  "schema": "rig.analysis/1"')
+    os.close(pipe)
+    assert (files / "link.json").is_symlink()
+    assert json.loads((files / "real.json").read_text())["schema"] == "rig.analysis/1"
