@@ -61,10 +61,10 @@ _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: zone, with and without friction, crossing where weight and load balance, or a
-    preload; in a recording that runs on from one side nowhere else: what is slack at its ends is a
-    seat."""
+    preload; of a rig without an arm that is loaded from one side nowhere else: what is slack at the
+    ends of its load is a seat."""
     running = not bench.data.arm and bench.rows.continuous
-    inside = running and _pressed(bench)
+    inside = _pressed(bench)
     # a bench is pushed along one direction after another, each on a part of its own
     kinds, out = tuple(k for k in KINDS if bench.data.arm or k not in KEPT), []
     if _pressed(bench):
@@ -128,14 +128,16 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
     step, out = (high - low) / _PRELOADS, list[Variant]()
     if not step > 0:
         return []
-    for preload in -(start + way * (np.arange(_PRELOADS) + 0.5) * step):
+    # what is slack before a one-sided load has grown is a seat
+    first = _PRELOADS // 4 if _pressed(bench) else 0
+    for preload in -(start + way * (np.arange(first, _PRELOADS) + 0.5) * step):
         if abs(preload) < by_tool:
             continue
         for zone in zones:
             info = {"joint": j, "zone_Nm": zone * span, "crossing": "weight", "tool_kg": TOOL_KG,
                     "preload_Nm": float(preload), "step_Nm": step}  # fmt: skip
             label = f"joint {j + 1} preload {way * preload / (high - low):.2g}"
-            share = _by_preload(bench) / _PRELOADS
+            share = _by_preload(bench) / (_PRELOADS - first)
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
     return out
 
