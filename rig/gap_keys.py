@@ -216,6 +216,7 @@ GRAMMAR: dict[str, Grammar] = {
     "load_misalignment": Grammar(
         ("about",),
         tuple(("tangent", ("along", "across", *more)) for more in (*_GOES, ("run",)))
+        + tuple(("tangent", ("along", "across", *more, "pose")) for more in _GOES[:3])
         + tuple(("gives", ("along", *more)) for more in _GOES),
     ),
     "pose_error": Grammar(

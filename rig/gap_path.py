@@ -9,9 +9,9 @@ from math import ceil
 import numpy as np
 
 from identification.gap.bench import Bench, make_bench
-from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints
+from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
 from identification.gap.forms import OF_SESSION, SESSION, Form, realise
-from identification.gap.forms.law import along
+from identification.gap.forms.law import along, in_pose
 from rig.gap_data import arm_setup
 from rig.model import ArmModel
 from rig.plan import AMPLIFIER_S, MOUNT_S, SCREW_S, TARE_S, UNLOAD_S
@@ -181,12 +181,21 @@ def _beyond(bench: Bench, forms: Sequence[Form]) -> tuple[str, ...]:
                     f"{f.word}: seen to {seen:.4g} Nm at joint {f.law.constants['joint'] + 1}, "
                     f"here up to {top:.4g} Nm; the curve goes on as it ended."
                 )
-        vectors = {t.shape["along"] for t in f.law.terms if "along" in t.shape}
-        if vectors:
+        where = {(t.shape["along"], t.shape.get("pose")) for t in f.law.terms if "along" in t.shape}
+        if where:
             one_sense = f.word == "load_misalignment"
-            signs = [along(bench, v) for v in vectors]
-            known = np.any([s > 0 if one_sense else s != 0 for s in signs], axis=0)
-            blind = sorted({bench.data.setups[s].direction for s in bench.rows.setup[~known]})
+            sides = [along(bench, v) for v, _ in where]
+            known = np.any(
+                [((s > 0) if one_sense else (s != 0)) & in_pose(bench, pose)
+                 for s, (_, pose) in zip(sides, where, strict=True)], axis=0,
+            )  # fmt: skip
+            by_pose = any(pose is not None for _, pose in where)
+            blind = sorted({_called(bench.data.setups[s], by_pose)
+                            for s in bench.rows.setup[~known]})  # fmt: skip
             if blind:
                 out.append(f"{f.word}: not measured along {', '.join(blind)}; left out there.")
     return tuple(out)
+
+
+def _called(setup: Setup, by_pose: bool) -> str:
+    return f"{setup.direction} in {setup.pose}" if by_pose else setup.direction

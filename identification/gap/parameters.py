@@ -194,7 +194,10 @@ def _seating(bench: Bench, part: Part, found: Found) -> dict[str, Parameter]:
 
 def _misalignment(_: Bench, part: Part, found: Found) -> dict[str, Parameter]:
     """Tangents at the largest load, as it was come to; of single runs their mean."""
-    names, count = part.variant.info["directions"], len(part.variant.info["shapes"][0])
+    info = part.variant.info
+    names, count = list(info["directions"]), len(info["shapes"][0])
+    if "poses" in info:
+        names = [f"{name}_{pose}" for name, pose in zip(names, info["poses"], strict=True)]
     common = np.eye(2 * len(names) * count, len(found.w))
     rows = common.reshape(len(names), count, 2, -1).sum(axis=1)
     return {

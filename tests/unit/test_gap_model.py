@@ -298,6 +298,22 @@ def test_what_cannot_be_foretold_is_left_out_and_said(tmp_path: Path) -> None:
         np.testing.assert_allclose(moved - springs, bent, rtol=1e-3, atol=1e-9)
 
 
+def test_a_load_that_was_askew_in_one_pose_is_so_in_that_pose(tmp_path: Path) -> None:
+    def askew(pose: str) -> dict[str, object]:
+        term = {"along": [0, 1, 0], "across": [1, 0, 0], "tangent": 0.05, "pose": pose}
+        return {"name": "load_misalignment", "terms": [term]}
+
+    there, elsewhere = (
+        simulate(model(tmp_path, askew(pose)), procedure(tmp_path)) for pose in ("P1", "P7")
+    )
+    _, moved, springs = levels(there, "loading", 1)
+    assert np.abs(moved - springs).max() > 1e-6
+    assert not any("not measured" in note for note in there.notes)
+    _, moved, springs = levels(elsewhere, "loading", 1)
+    np.testing.assert_array_equal(moved, springs)
+    assert any("not measured along y in P1; left out there" in n for n in elsewhere.notes)
+
+
 def test_drifts_of_a_session_are_in_no_prediction_of_the_next(tmp_path: Path) -> None:
     """Files that were written with them are read as before; what is predicted is the arm."""
     drift = {"name": "force_drift", "path": "linear", "quantity": "force",

@@ -1,7 +1,8 @@
 """The load does not act along the nominal direction: a share t of it acts across.
 
 The target then moves along the direction by `F n' C t`; recorded force components grow with the
-load by t F. Screws on floors and stands are set up within 1 to 15 degrees. A tip that drags on its
+load by t F. Screws on floors and stands are set up within 1 to 15 degrees, and in every pose anew;
+what is askew may be the tool, which turns with the pose. A tip that drags on its
 pad pulls the other way when the load goes back; one that is let go between runs finds another seat.
 Nothing is known of how a rig without an arm gives way across: it is spoken of only where the force
 across was recorded, and what was moves the target by about as much as the same force along.
@@ -27,7 +28,7 @@ SCALES = (0.03, 0.1, 0.25)
 DRAGS = (0.05, 0.12, 0.25)
 _BETWEEN_RUNS = 0.5  # of the sd of the mean: by how much tips of single runs differ
 _ALL = 0.6  # prior of all directions
-_DRAGS_SHARE = _EACH_RUN_SHARE = 0.2  # of the prior
+_DRAGS_SHARE = _EACH_RUN_SHARE = _EACH_POSE_SHARE = 0.2  # of the prior
 
 
 class Shape(NamedTuple):
@@ -63,7 +64,31 @@ def variants(bench: Bench) -> list[Variant]:
         for names, label, prior in groups
         for each in zip(*(known[name] for name in names), strict=True)
     ]  # fmt: skip
+    out += _each_pose(bench)
     return out + _each_run(bench, {name: kinds[0] for name, kinds in known.items()})
+
+
+def _each_pose(bench: Bench) -> list[Variant]:
+    """All directions, each in every pose by tangents of its own: the rig is set up anew there, or
+    what is askew is fixed to the tool. Only where the force across was recorded, or joint readings
+    show what it does: to the target alone anything does the same that differs between poses."""
+    setups, rows = bench.data.setups, bench.rows
+    shown = rows.tangential is not None or bench.has_q
+    if not shown or len({s.pose for s in setups}) < 2:
+        return []
+    tops = [float(np.abs(bench.load[rows.setup == k]).max(initial=0.0)) or 1.0
+            for k in range(len(setups))]  # fmt: skip
+    out = []
+    for label, powers, share in (("", (1,), 1.0), (", turning", (1, 2, 3), 0.7)):
+        shapes = [tuple(Shape(p, top) for p in powers) for top in tops]
+        columns = [_columns(bench, each, rows.setup == k) for k, each in enumerate(shapes)]
+        out.append(
+            variant(WORD, f"each pose{label}", [c for mine in columns for c in mine], SCALES,
+                    positive=False, prior=_ALL * _EACH_POSE_SHARE * share,
+                    directions=[s.direction for s in setups], poses=[s.pose for s in setups],
+                    shapes=shapes, read=[()] * len(setups))
+        )  # fmt: skip
+    return out
 
 
 def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:

@@ -21,7 +21,7 @@ from identification.gap.effects.load_misalignment import (
     gives,
     pulled,
 )
-from identification.gap.forms.law import ANEW, Law, Term, along, scaled
+from identification.gap.forms.law import ANEW, Law, Term, along, in_pose, scaled
 from identification.gap.history import retarded
 from identification.gap.variants import Variant
 
@@ -176,10 +176,14 @@ def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
     shares reached at a load, in proportion to it or to a power of it; shares that drag; what a rig
     without an arm gives way under these; shares of single runs (numbers from 0) beyond these."""
-    setups = [next(s for s in bench.data.setups if s.direction == d) for d in v.info["directions"]]
+    names = v.info["directions"]
+    setups = [next(s for s in bench.data.setups if s.direction == d) for d in names]
+    poses = [{"pose": p} if p else {} for p in v.info.get("poses", [""] * len(names))]
     terms, given = [], []
-    for s, shapes in zip(setups, v.info["shapes"], strict=True):
-        terms += [Term("tangent", _sideways(s, k) | _goes(how)) for how in shapes for k in range(2)]
+    for s, pose, shapes in zip(setups, poses, v.info["shapes"], strict=True):
+        terms += [
+            Term("tangent", _sideways(s, k) | _goes(how) | pose) for how in shapes for k in range(2)
+        ]
     for s, shapes, read in zip(setups, v.info["shapes"], v.info["read"], strict=True):
         along_it = {"along": _triple(s.unit_vector)}
         given += [
@@ -215,7 +219,7 @@ def misalignment(bench: Bench, law: Law) -> list[Array]:
         drags, at = t.shape.get("drags_over", 0.0), t.shape.get("at_load")
         power = 1.0 if at is None else 0.0 if drags else 1 + t.shape.get("power", 1.0)
         how = Shape(power, at or 1.0, drags)
-        there = along(bench, t.shape["along"]) > 0
+        there = (along(bench, t.shape["along"]) > 0) & in_pose(bench, t.shape.get("pose"))
         if "run" in t.shape:
             there &= bench.rows.run == t.shape["run"]
         load = np.where(there, across(bench, how), 0.0)
