@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
 from identification.gap.holds import ENOUGH, hold_ids, scatter_within, swing_within
 from identification.gap.rows import Rows
+from identification.gap.turns import turns
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -293,11 +295,15 @@ _REPEATED = 0.3  # of the readings are the one before again
 
 
 def _means(rows: Rows, values: Array, reach: int) -> Array:
-    """(n,) means over up to `reach` rows to either side, as many to both: of a straight path they
-    lie on it."""
+    """(n,) means over up to `reach` rows to either side, as many to both, and none beyond where a
+    path turns: of straight ones they lie on it."""
     a, b = _about(rows, reach)
     number = np.arange(rows.n)
     side = np.minimum(number - a, b - number)
+    edges = np.append(np.flatnonzero(rows.starts), rows.n)
+    for start, end in pairwise(edges):
+        for turn in turns(values[start:end]):
+            side = np.minimum(side, np.abs(number - (start + turn)))
     total = np.concatenate([[0.0], np.cumsum(values)])
     return np.asarray((total[number + side + 1] - total[number - side]) / (2 * side + 1))
 

@@ -121,6 +121,18 @@ def test_a_path_that_goes_slowly_against_its_noise_is_read_from_its_means() -> N
     assert np.mean(standing(rows, jump, 1e-3) != jump) < 0.2  # which means would smear
 
 
+def test_where_a_straight_path_turns_its_means_stay_within_its_legs() -> None:
+    """Rounded tips would make every spring stiffer near the largest stroke."""
+    path = 1e-3 * triangle(400, 6)
+    noise = np.random.default_rng(8).normal(0, 2e-5, 400)
+    rows = reduce_rows(running(SPRING * path, path + noise))
+    off = standing(rows, rows.displacement, 2e-5) - path
+    assert np.std(off) < 0.7 * np.std(noise)  # they are means
+    tips = path > 0.97e-3
+    assert tips.sum() > 10
+    assert np.mean(off[tips]) == pytest.approx(np.mean(noise[tips]), abs=1e-5)
+
+
 def test_what_goes_straight_on_is_read_from_its_means_however_fast() -> None:
     """Else an effect that smooths it explains its noise; where it turns, means would blunt it."""
     rng = np.random.default_rng(8)
