@@ -64,7 +64,7 @@ def variants(bench: Bench) -> list[Variant]:
     preload; of a rig without an arm that is loaded from one side nowhere else: what is slack at the
     ends of its load is a seat."""
     running = not bench.data.arm and bench.rows.continuous
-    inside = _pressed(bench)
+    inside = _pressed(bench) and (running or not bench.imposed)
     # a bench is pushed along one direction after another, each on a part of its own
     kinds, out = tuple(k for k in KINDS if bench.data.arm or k not in KEPT), []
     if _pressed(bench):
@@ -170,6 +170,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     if kind in PLACED:
         return []
     beside = _REFINED if bench.data.arm else () if _pressed(bench) else _BENCH_REFINED
+    if found.info["preload_Nm"]:  # straight and soft anywhere else, it is a curve
+        beside = tuple(k for k in beside if k != "sprung")
     kinds = tuple(dict.fromkeys([kind, *(beside if close >= CLOSE[0] else ())]))
     return _finer(bench, found, kinds, close)
 
