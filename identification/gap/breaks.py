@@ -141,23 +141,24 @@ def jump_rows(bench: Bench, base: Base, target: Array, most: int) -> list[int]:
 
 
 def _just_turned(bench: Bench) -> Flags:
-    """(n,) rows of an imposed stroke that has just begun or turned: there the force changes fast
-    because of friction and flow, and jerks are no news."""
+    """(n,) rows in which an imposed stroke leaves the place where it began or turned: there the
+    force changes fast because of friction and flow, and jerks are no news. Of a leg that rests
+    there first, the last of that alone, and never more than a share of it."""
     out, load = np.zeros(bench.rows.n, dtype=bool), bench.load
     if not bench.imposed:
         return out
     for run in np.unique(bench.rows.run):
         mine = np.flatnonzero(bench.rows.run == run)
-        legs = [0, *turns(load[mine]), len(mine)]
-        near = _TURNED * float(np.ptp(load[mine]))
-        for a, b in pairwise(legs):
-            left = np.abs(load[mine[a:b]] - load[mine[a]]) > near
-            end = a + int(left.argmax()) if left.any() else b
-            out[mine[max(a - _BEFORE, 0) : end + 1]] = True
+        for a, b in pairwise([0, *turns(load[mine]), len(mine)]):
+            gone = np.abs(load[mine[a:b]] - load[mine[a]])
+            end = a + int(np.argmax(gone > _TURNED * gone.max(initial=0.0)))
+            begin = max(end - int(np.ceil(_OF_A_LEG * (b - a))), a - _BEFORE, 0)
+            out[mine[begin : end + 1]] = True
     return out
 
 
-_TURNED, _BEFORE = 0.05, 2  # of the stroke's range; rows
+_TURNED, _OF_A_LEG = 0.05, 0.15  # of a leg's way; of its rows
+_BEFORE = 1  # rows: the furthest of a noisy stroke may come later than its turn
 
 
 def _spread(values: Array) -> Array:

@@ -142,11 +142,6 @@ class Course:
         return not self.returns and not self.repeats
 
     @property
-    def pulled_once(self) -> bool:
-        """A single pull of a rig without an arm, from one side."""
-        return not self.data.arm and self.once and self.one_sided
-
-    @property
     def left_behind(self) -> float:
         """Share of the largest displacement that is left when the force was taken away in the end,
         0 where it was not."""

@@ -74,7 +74,7 @@ class GapData:
     compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
     simulated (n,) m or None: displacement that another simulator predicts for every sample.
     timed: whether `time` was recorded; it counts samples otherwise. on_the_way (n,) or None:
-    samples of ramps that were recorded before holds.
+    samples of ramps under the name of the level they lead to (ramps.py).
     """
 
     arm: bool

@@ -122,7 +122,7 @@ def _levels(bench: Bench, s: int) -> tuple[float, ...]:
     top = float(load[np.argmax(np.abs(load))]) if load.size else 0.0
     if not rows.continuous:
         steps = rows.step[mine]
-        loading = (rows.branch[mine] != UNLOADING) & (steps > 0)
+        loading = (rows.branch[mine] != UNLOADING) & (steps > 0) & ~rows.on_the_way[mine]
         found = sorted({int(k) for k in steps[loading]})
         means = [float(load[loading & (steps == k)].mean()) for k in found]
         rising = [v for v in means if v * top > 0]

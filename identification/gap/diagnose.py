@@ -29,7 +29,7 @@ from identification.gap.leftover import looked_up
 from identification.gap.locate import NOWHERE, Where, locate
 from identification.gap.noise import NOISY, SWINGS
 from identification.gap.posterior import Known, settled
-from identification.gap.ramps import ramps_apart
+from identification.gap.ramps import ramps_told
 from identification.gap.refine import refine
 from identification.gap.search import force, search
 from identification.gap.snaps import Snaps
@@ -125,7 +125,7 @@ def explain_gap(
     out, forced = set(withhold), frozenset(add)
     check_words(out | forced)
     tell("preparing", 0.0)
-    bench = make_bench(without_glitches(without_ends(ramps_apart(data))))
+    bench = make_bench(without_glitches(without_ends(ramps_told(data))))
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])

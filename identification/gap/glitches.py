@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
-from identification.gap.holds import hold_ids, is_continuous, scatter_within
+from identification.gap.holds import hold_ids, is_continuous, rest_ids, scatter_within
 
 _WINDOW = 25  # readings, in which a typical change is
 _NOISE, _STEPS, _RANGE = 6.0, 3.0, 0.02  # a glitch is off by more than each: standard deviations,
@@ -30,7 +30,9 @@ def without_glitches(data: GapData) -> GapData:
     if len(data.force) < _FEWEST:
         return data
     hold = hold_ids(data)
-    off = _while_running(data) if is_continuous(data, hold) else _at_rest(data, hold)
+    off = (
+        _while_running(data) if is_continuous(data, hold) else _at_rest(data, rest_ids(data, hold))
+    )
     if not off.any():
         return data
     count = int(off.sum())

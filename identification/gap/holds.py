@@ -10,13 +10,25 @@ _RUNNING_SHARE = 0.5  # a "hold" through which the force runs by half its range 
 
 
 def hold_ids(data: GapData) -> Ints:
-    """(n,) number of the hold of every sample: same run, branch and step, without a pause, and on
-    one side of no load: steps of the same size to and fro may bear the same number."""
-    keys = np.column_stack([data.run, data.branch, data.step])
+    """(n,) number of the hold of every sample: same run, branch and step, without a pause, at rest
+    or on the way there, and on one side of no load: steps of the same size to and fro may bear the
+    same number."""
+    way = np.zeros(len(data.run), bool) if data.on_the_way is None else data.on_the_way
+    keys = np.column_stack([data.run, data.branch, data.step, way])
     new = np.any(np.diff(keys, axis=0) != 0, axis=1)
     loaded = (data.step > 0) & (np.abs(data.force) > _LOADED * data.instruments.force)
     side = np.where(loaded, side_of(data.force), 0.0)
     new |= side[1:] * side[:-1] < 0
+    return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
+
+
+def rest_ids(data: GapData, hold: Ints) -> Ints:
+    """(n,) the same holds (n,), in which samples on the way stand alone: what they do is no
+    scatter."""
+    if data.on_the_way is None:
+        return hold
+    way = data.on_the_way
+    new = (np.diff(hold) != 0) | way[1:] | way[:-1]
     return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
 
 
@@ -41,8 +53,9 @@ def is_continuous(data: GapData, hold: Ints) -> bool:
     edges = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
     count = np.diff(np.append(edges, len(hold)))
     width = np.maximum.reduceat(data.force, edges) - np.minimum.reduceat(data.force, edges)
-    # of one side of no load, where holds end (`hold_ids`)
-    span = max(float(np.ptp(np.clip(data.force * sign, 0.0, None))) for sign in (1.0, -1.0))
+    whole = float(np.ptp(data.force))
+    side = max(float(np.ptp(np.clip(data.force * sign, 0.0, None))) for sign in (1.0, -1.0))
+    span = np.where(data.step[edges] > 0, side, whole)  # where holds end with their side
     return bool(np.any((count > 2) & (width > _RUNNING_SHARE * span) & (span > 0)))
 
 
@@ -78,16 +91,27 @@ def scatter_within(values: Array, hold: Ints) -> float | None:
 
 
 def swing_within(values: Array, hold: Ints) -> float:
-    """rms of what values (n,) have in common with the next one about the mean of their hold: a
-    vibration that samples follow, not their own noise. 0 where holds are too short."""
+    """rms of what values (n,) have in common with the next one about the line through their hold: a
+    vibration that samples follow, or noise of many colours; not their own noise, nor what settles.
+    0 where holds are too short, or where chance does as much."""
     count = np.bincount(hold)[hold]
-    left = values - np.bincount(hold, weights=values)[hold] / count
+
+    def about_mean(x: Array) -> Array:
+        return np.asarray(x - np.bincount(hold, weights=x)[hold] / count)
+
+    left, at = about_mean(values), about_mean(np.arange(len(values), dtype=float))
+    steep = np.bincount(hold, weights=left * at) / np.maximum(np.bincount(hold, at**2), 1e-300)
+    left = left - steep[hold] * at
     pairs = (hold[1:] == hold[:-1]) & (count[1:] >= _SWINGS)
     common = (left[1:] * left[:-1])[pairs]
-    return float(max(common.mean(), 0.0) ** 0.5) if common.size >= ENOUGH else 0.0
+    if common.size < ENOUGH:
+        return 0.0
+    sure = float(common.mean()) - _BY_CHANCE * float(common.std()) / common.size**0.5
+    return float(max(sure, 0.0) ** 0.5)
 
 
 _SWINGS = 5  # samples of a hold
+_BY_CHANCE = 2.0  # standard deviations of the mean
 
 
 def noise_in_holds(values: Array, hold: Ints, stated: float) -> float:
@@ -104,16 +128,3 @@ def steadied(hold: Ints, values: Array, weight: Array, sd: float) -> tuple[Array
     rows = np.bincount(hold, weights=weight > 0)
     steady = (square <= _STEADY_PER_ROW * rows + _STEADY_ONCE)[hold]
     return np.where(steady, mean[hold], values), steady
-
-
-def much_to_go(displacement: Array, level: Ints, sd: float) -> Flags:
-    """(n,) rows at a level (n,) at which the displacement has much of its step to go, whatever a
-    force says that scatters: the load may not be there yet. sd: of one sample."""
-    ends = np.append(np.flatnonzero(np.diff(level)), len(level) - 1)
-    off = np.abs(displacement - displacement[ends][level])
-    step = np.abs(np.diff(displacement[ends], prepend=0.0))[level]
-    return np.asarray((off > _SEEN * sd) & (off > _TO_GO * step) & (step > 0))
-
-
-_SEEN = 4.0  # standard deviations
-_TO_GO = 0.25  # of a step

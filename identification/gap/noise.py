@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
-from identification.gap.holds import ENOUGH, hold_ids, scatter_within, swing_within
+from identification.gap.history import half_sample
+from identification.gap.holds import ENOUGH, hold_ids, rest_ids, scatter_within, swing_within
 from identification.gap.rows import Rows
 from identification.gap.turns import turns
 
@@ -59,7 +60,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     """Noise of the rows; slope (n,) m/N turns noise of the force into that of the response."""
     meter = data.instruments
     fallback = np.hypot(meter.displacement, slope * meter.force)
-    hold = hold_ids(data)
+    hold = rest_ids(data, hold_ids(data))
     steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
     common = np.where(rows.steady, steep * meter.force / np.sqrt(rows.hold_weight), 0.0)
     if rows.continuous:
@@ -72,6 +73,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     else:
         alone = np.where(rows.steady, meter.displacement, fallback)
         per_sample = _white(data, rows, alone, slope, hold)
+    if not rows.continuous:
+        moving = np.hypot(np.maximum(per_sample, fallback), _apart(rows))
+        per_sample = np.where(rows.on_the_way, moving, per_sample)
     weight = np.ones(rows.n) if rows.continuous else rows.weight
     stated = meter.displacement
     if rows.continuous or imposed:
@@ -96,6 +100,18 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     )  # fmt: skip
 
 
+def _apart(rows: Rows) -> Array:
+    """(n,) m that the arm moves while one channel was read and the other not yet: channels of their
+    own clocks are together to a share of the time between two samples."""
+    time, way = np.diff(rows.time), np.abs(np.diff(rows.displacement))
+    speed = np.divide(way, time, out=np.zeros(len(way)), where=(time > 0) & ~rows.hold_starts[1:])
+    either_side = np.maximum(np.append(speed, 0.0), np.append(0.0, speed))
+    return np.asarray(_TOGETHER * 2 * half_sample(rows) * either_side)
+
+
+_TOGETHER = 0.02
+
+
 _ONE_NUMBER = 0.7  # of successive readings of a hold: they scatter by a quarter of the step
 
 
@@ -115,12 +131,10 @@ _SAME = 1e-9  # of the range: digits that a conversion of units leaves
 
 
 def _swings(data: GapData, rows: Rows, hold: Ints) -> float:
-    """What an arm's displacement swings about its holds, ramps before them left out, over what is
-    stated; 0 where it runs."""
+    """What an arm's displacement swings about its holds, over what is stated; 0 where it runs."""
     if rows.continuous or not data.arm:
         return 0.0
-    rests = slice(None) if data.on_the_way is None else ~data.on_the_way
-    return swing_within(data.displacement[rests], hold[rests]) / data.instruments.displacement
+    return swing_within(data.displacement, hold) / data.instruments.displacement
 
 
 def _encoders(data: GapData, rows: Rows, hold: Ints) -> Array:

@@ -34,7 +34,6 @@ class Rarer(NamedTuple):
 
 
 _HYSTERESIS, _YIELD = frozenset({"joint_hysteresis"}), frozenset({"joint_yield"})
-_PLAY = frozenset({"joint_backlash"})
 _CREEP, _LAG = frozenset({"joint_creep"}), frozenset({"time_lag"})
 _TOUCHES = frozenset({"contact_seating", "joint_backlash"})
 _ANY, _NO_WORD = frozenset(WORDS), frozenset[str]()
@@ -44,7 +43,8 @@ RARER = (
     Rarer(log(0.05), _HYSTERESIS, _NO_WORD, lambda c: c.once),
     # A target that warms up while it is held in place.
     Rarer(log(0.05), frozenset({"thermal_drift"}), _NO_WORD, lambda c: c.imposed),
-    # Loops at one rate are commonly friction; what comes late differs from it in details only.
+    # Loops at one rate are commonly friction; what comes late differs from it in details only, and
+    # two of that kind in more of them.
     Rarer(-30.0, _CREEP, _NO_WORD, lambda c: c.one_rate),
     Rarer(-30.0, _LAG, _NO_WORD, lambda c: c.one_rate),
     # A single pull that ends nearly flat: of 12 such records of others, 11 were of what yields.
@@ -52,8 +52,6 @@ RARER = (
     # The force falls while the stroke goes on, which of what is elastic only what snaps over does:
     # of 13 such records of others (by a fortieth to a fifth) none was.
     Rarer(-20.0, CURVES, _YIELD, lambda c: c.gives_in),
-    # Slack that a single pull takes up is a seat: of play one sees how it comes back.
-    Rarer(-30.0, _PLAY, _NO_WORD, lambda c: c.pulled_once),
     # A way at no force before all of it: what is not there yet has no curve.
     Rarer(-20.0, _ANY, _TOUCHES, lambda c: c.approaches),
     # Loaded from one side and let go again and again: friction that is seen the first time only.

@@ -13,11 +13,12 @@ from identification.gap.data import CYCLE, ZERO, Array, Flags, GapData, Ints
 from identification.gap.holds import (
     hold_ids,
     is_continuous,
-    much_to_go,
     noise_in_holds,
+    rest_ids,
     side_of,
     steadied,
 )
+from identification.gap.ramps import much_to_go
 from identification.gap.turns import rises
 
 _LEVELS = 12  # force classes of a continuous recording, per sense of motion
@@ -130,17 +131,18 @@ def reduce_rows(data: GapData) -> Rows:
     run, setup, branch, step = map(first, (data.run, data.setup, data.branch, data.step))
     force, displacement = mean(data.force), mean(data.displacement)
     holds = _blocks(run) if bins.running else _consecutive(first(hold))
+    ramp = np.zeros(len(run), bool) if data.on_the_way is None else first(data.on_the_way)
     if bins.running:
         level = _continuous_levels(setup, force)
     else:
-        level = _ids(np.column_stack([setup, branch, step, *_approach(run, branch, holds, force)]))
+        came = _approach(run, branch, holds, force)
+        level = _ids(np.column_stack([setup, branch, step, ramp, *came]))
     meter, at_zero = data.instruments, (branch == ZERO) & (step <= 0)
     # of what runs, holds are but stretches; a run that begins unloaded comes from nowhere
     stay = _consecutive(_ids(np.column_stack([run, branch, step]))) if bins.running else holds
     begins = (stay == stay[_changes(run)][_consecutive(run)]) & at_zero
-    ramp = np.zeros(len(run), bool) if data.on_the_way is None else first(data.on_the_way)
     coming = ramp | (much_to_go(displacement, stay, meter.displacement) & ~begins)
-    still = partial(_still, bins, hold, holds, ~coming)
+    still = partial(_still, bins, rest_ids(data, hold), holds, ~coming)
     steadied, steady = still(data.force, meter.force)
     rested, rests = still(data.displacement, meter.displacement)
     return Rows(

@@ -87,7 +87,8 @@ def _as_stated(engine: Engine) -> float:
     above = np.floor(PARTS * np.log(max(hidden / least, 1.0)) / LOG_STEP)
     etas = least * np.exp(np.arange(-PARTS, above + 1) / PARTS * LOG_STEP)
     more = [log_joint_between(engine, (), float(eta)) for eta in etas]
-    less = _SURE_SHARE if hidden <= _STEP * engine.bench.noise.stated else _UNSURE_SHARE
+    less = float(np.interp(hidden / engine.bench.noise.stated, [_STEP, 1.0],
+                           [_SURE_SHARE, _UNSURE_SHARE]))  # fmt: skip
     return log_mean(
         [engine.levels[0].log_base, *more], [1 - less, *(less / len(more) for _ in more)]
     )
@@ -95,14 +96,14 @@ def _as_stated(engine: Engine) -> float:
 
 # What readings have in common with the next ones of their hold, they have with all of it, and more:
 # noise of many colours (1/f) is as large from hold to hold.
-_IN_HOLDS = 3.0
+_IN_HOLDS = 4.0
 
 
 def _hidden(engine: Engine) -> float:
     """Imperfection (m) that passes for noise."""
     noise = engine.bench.noise
-    known = min(max(_STEP, _IN_HOLDS * noise.swings), 1.0) if noise.sure else UNSURE
-    return known * noise.stated
+    share = min(max(_STEP, _IN_HOLDS * noise.swings), 1.0) if noise.sure else UNSURE
+    return share * noise.stated
 
 
 def force(

@@ -3,6 +3,7 @@ plateaus of a driven displacement."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from identification.gap.evidence import Engine
 from identification.gap.holds import hold_ids, swing_within
 from identification.gap.products import White
 from identification.gap.rows import reduce_rows
+from identification.gap.search import _hidden
 from identification.gap.variants import Variant
 from rig.dataset import load
 from rig.gap_data import gap_data
@@ -202,9 +204,23 @@ def test_creep_that_grows_with_the_square_is_among_the_shapes_of_an_arm() -> Non
 
 
 def test_what_swings_at_rest_is_what_neighbours_within_a_hold_have_in_common() -> None:
-    """Holds of six: 1, 1, 1, -1, -1, -1 about their means; of shorter ones nothing is said."""
-    hold = np.repeat(np.arange(20), 6)
-    values = np.tile([1.0, 1, 1, -1, -1, -1], 20) + 50.0 * hold
-    assert swing_within(values, hold) == pytest.approx(0.6**0.5)
-    assert swing_within(np.tile([1.0, -1.0], 60), hold) == 0.0
-    assert swing_within(values, np.repeat(np.arange(40), 3)) == 0.0
+    """A vibration of six samples; not what settles, nor noise of single samples; of short holds
+    nothing is said."""
+    hold, within = np.repeat(np.arange(20), 12), np.tile(np.arange(12.0), 20)
+    swings = np.sin(2 * np.pi * within / 6)
+    # products of neighbours: half of the cosine of a sixth of a turn
+    assert swing_within(swings + 50.0 * hold, hold) == pytest.approx(0.5, rel=0.2)
+    assert swing_within(3.0 * within + 50.0 * hold, hold) < 1e-6
+    rng = np.random.default_rng(1)
+    assert swing_within(rng.normal(0, 1, 240), hold) == 0.0
+    assert swing_within(np.tile([1.0, -1.0], 120), hold) == 0.0
+    assert swing_within(swings, np.repeat(np.arange(80), 3)) == 0.0
+
+
+def test_noise_alike_within_holds_may_be_as_large_from_hold_to_hold() -> None:
+    """Up to all of what is stated of a sample passes for noise then."""
+    bench, hidden = small_bench(), []
+    for swings in (0.0, 0.1, 0.2, 0.9):
+        noise = replace(bench.noise, sure=True, swings=swings)
+        hidden.append(_hidden(small_engine(replace(bench, noise=noise))) / noise.stated)
+    assert hidden == pytest.approx([0.6, 0.6, 0.8, 1.0])

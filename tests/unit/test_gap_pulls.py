@@ -114,18 +114,6 @@ def test_a_toe_before_a_knee_is_two_things_and_the_knee_is_the_larger() -> None:
     assert {e.name for e in found.effects} == {"contact_seating", "joint_yield"}
 
 
-@pytest.mark.parametrize("back", [False, True])
-def test_slack_that_a_single_pull_takes_up_is_a_seat(back: bool) -> None:
-    u = np.linspace(0.0, STROKE, 200)
-    force = SPRING * np.maximum(u - 1e-4, 0.0)
-    if back:
-        u, force = np.append(u, u[::-1]), np.append(force, force[::-1])
-    play = frozenset(["joint_backlash"])
-    bench = make_bench(running(force, u, imposed="displacement"))
-    assert (prior_of(play, bench) < prior_of(play) - 20) is not back
-    assert back or diagnose_gap(bench.data).verdict == "contact_seating"
-
-
 @pytest.mark.parametrize("slacks", [(1.2e-4,), (3e-5, 1.4e-4)])
 def test_a_toe_alone_is_a_seat(slacks: tuple[float, ...]) -> None:
     """Slack that is taken up bit by bit, at once or in two, then the line that was simulated."""

@@ -11,8 +11,8 @@ import pytest
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.holds import hold_ids, scatter_within, steadied
-from identification.gap.ramps import ramps_apart
+from identification.gap.holds import steadied
+from identification.gap.ramps import ramps_told
 from identification.gap.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
@@ -112,7 +112,7 @@ def test_a_load_on_its_way_to_none_is_no_zero(late: bool) -> None:
     """But a force that is read late, or drifts, is one that nobody loads."""
     force, u, step = ramped(late, drift=0.02)
     branch = np.where(step > 0, 2, 0)
-    rows = reduce_rows(ramps_apart(bench_data(force, u, step=step, branch=branch)))
+    rows = reduce_rows(ramps_told(bench_data(force, u, step=step, branch=branch)))
     at_zero = rows.branch == 0
     loaded = at_zero & (rows.displacement > 1e-6)
     assert loaded.any()
@@ -138,29 +138,7 @@ def test_a_run_that_begins_unloaded_comes_from_nowhere() -> None:
     """While it warms up, and its force drifts with that: all of it is read at no load."""
     warm = 1 - np.exp(-np.arange(30) / 10.0)
     data = bench_data(3 * warm, 3e-5 * warm, step=np.zeros(30, dtype=int), branch=np.zeros(30, int))
-    assert reduce_rows(ramps_apart(data)).zero.all()
-
-
-def test_a_ramp_before_a_level_is_a_step_of_its_own() -> None:
-    """Levels that the load takes 7 s to come to, and rests at for 9, recorded all the time."""
-    level = np.repeat(10.0 * np.arange(1, 9), 16)
-    true = level - 10.0 * np.maximum(0.0, 1 - np.arange(len(level)) % 16 / 7)
-    force = true + np.random.default_rng(2).normal(0, 0.05, len(true))
-    data = bench_data(force, SPRING * true, step=(level / 10).astype(int))
-    data = replace(data, instruments=replace(data.instruments, force=0.05))
-    rows = reduce_rows(ramps_apart(data))
-    # what is at rest is at its level, whatever bins begin before it is
-    assert np.sum(rows.steady & ~rows.on_the_way) > 20
-    off = rows.force - level[np.searchsorted(data.time, rows.time)]
-    assert np.abs(off[~rows.on_the_way]).max() < 0.1
-    assert np.abs(off[rows.on_the_way]).max() > 5
-    apart = ramps_apart(data)
-    assert scatter_within(data.force, hold_ids(data)) > 0.1
-    assert scatter_within(apart.force, hold_ids(apart)) == pytest.approx(0.05, rel=0.2)
-    assert make_bench(replace(apart, arm=True)).noise.swings < 0.5  # a ramp is no vibration
-    # what drifts, creeps or lags while the load stands is on no way
-    creeps = replace(data, force=level, displacement=SPRING * true)
-    assert ramps_apart(creeps) is creeps
+    assert reduce_rows(ramps_told(data)).zero.all()
 
 
 def test_steps_of_one_number_to_and_fro_are_two_levels() -> None:

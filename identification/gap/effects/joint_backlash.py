@@ -42,6 +42,7 @@ SMOOTH = ("soft", "slow", "arctan", "sprung")
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 _PRELOADS = 8  # over the range of the net torque
+_NO_LOAD, _HARDLY = 0.02, 1.3  # of the largest load; times the first that was read
 _PRELOAD_PRIOR = 0.25
 _SELDOM = (0.05, exp(-20.0))  # of levels; of what runs on, whose evidence is tempered
 CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
@@ -128,16 +129,18 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
     step, out = (high - low) / _PRELOADS, list[Variant]()
     if not step > 0:
         return []
-    # what is slack before a one-sided load has grown is a seat
-    first = _PRELOADS // 4 if _pressed(bench) else 0
-    for preload in -(start + way * (np.arange(first, _PRELOADS) + 0.5) * step):
+    preloads = -(start + way * (np.arange(_PRELOADS) + 0.5) * step)
+    if _pressed(bench):  # what is slack before the first load that was read is a seat
+        loaded = np.abs(plain)[np.abs(plain) > _NO_LOAD * np.abs(plain).max()]
+        preloads = preloads[np.abs(preloads) > _HARDLY * loaded.min(initial=np.inf)]
+    for preload in preloads:
         if abs(preload) < by_tool:
             continue
         for zone in zones:
             info = {"joint": j, "zone_Nm": zone * span, "crossing": "weight", "tool_kg": TOOL_KG,
                     "preload_Nm": float(preload), "step_Nm": step}  # fmt: skip
             label = f"joint {j + 1} preload {way * preload / (high - low):.2g}"
-            share = _by_preload(bench) / (_PRELOADS - first)
+            share = _by_preload(bench) / len(preloads)
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
     return out
 
@@ -169,7 +172,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     kind = found.info["kind"]
     if kind in PLACED:
         return []
-    beside = _REFINED if bench.data.arm else () if _pressed(bench) else _BENCH_REFINED
+    beside: tuple[str, ...] = _REFINED if bench.data.arm else _BENCH_REFINED
+    beside = () if _pressed(bench) else beside
     if found.info["preload_Nm"]:  # straight and soft anywhere else, it is a curve
         beside = tuple(k for k in beside if k != "sprung")
     kinds = tuple(dict.fromkeys([kind, *(beside if close >= CLOSE[0] else ())]))

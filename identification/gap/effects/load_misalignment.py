@@ -74,7 +74,7 @@ def _each_pose(bench: Bench) -> list[Variant]:
     show what it does: to the target alone anything does the same that differs between poses."""
     setups, rows = bench.data.setups, bench.rows
     shown = rows.tangential is not None or bench.has_q
-    if not shown or len({s.pose for s in setups}) < 2:
+    if not shown or len({s.direction for s in setups}) == len(setups):  # no direction comes again
         return []
     tops = [float(np.abs(bench.load[rows.setup == k]).max(initial=0.0)) or 1.0
             for k in range(len(setups))]  # fmt: skip

@@ -104,7 +104,7 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
     if channel != _driven(bench):
         line = _smooth(bench, bench.line)
         return bench.stacked(_behind(bench, line[:, None], kind, lag)[:, 0] - line)
-    if bench.rows.continuous or bench.rows.on_the_way.any():
+    if bench.rows.continuous or np.mean(bench.rows.on_the_way) > _SHOWN:
         ahead = _ahead(bench, _smooth(bench, bench.load), kind, lag)
     else:
         ahead = _true_force(bench, kind, lag) - bench.load
@@ -112,6 +112,9 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
         return bench.stacked(bench.line_slope * ahead)
     # unloaded, a force that lags still shows what is over
     return bench.force_column(ahead) + bench.stacked(zero_force=-ahead)
+
+
+_SHOWN = 0.1  # of the rows: then the way between levels was recorded, and need not be guessed
 
 
 def _driven(bench: Bench) -> str:

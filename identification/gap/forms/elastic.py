@@ -177,8 +177,12 @@ def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
     shares reached at a load, in proportion to it or to a power of it; shares that drag; what a rig
     without an arm gives way under these; shares of single runs (numbers from 0) beyond these."""
     names = v.info["directions"]
-    setups = [next(s for s in bench.data.setups if s.direction == d) for d in names]
-    poses = [{"pose": p} if p else {} for p in v.info.get("poses", [""] * len(names))]
+    of_pose = v.info.get("poses", [""] * len(names))
+    setups = [
+        next(s for s in bench.data.setups if s.direction == d and p in ("", s.pose))
+        for d, p in zip(names, of_pose, strict=True)
+    ]
+    poses = [{"pose": p} if p else {} for p in of_pose]
     terms, given = [], []
     for s, pose, shapes in zip(setups, poses, v.info["shapes"], strict=True):
         terms += [
