@@ -129,10 +129,8 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
     step, out = (high - low) / _PRELOADS, list[Variant]()
     if not step > 0:
         return []
-    preloads = -(start + way * (np.arange(_PRELOADS) + 0.5) * step)
-    if _pressed(bench):  # what is slack before the first load that was read is a seat
-        loaded = np.abs(plain)[np.abs(plain) > _NO_LOAD * np.abs(plain).max()]
-        preloads = preloads[np.abs(preloads) > _HARDLY * loaded.min(initial=np.inf)]
+    even = -(start + way * (np.arange(_PRELOADS) + 0.5) * step)
+    preloads = _within_load(bench, plain, np.asarray(even, dtype=float))
     for preload in preloads:
         if abs(preload) < by_tool:
             continue
@@ -143,6 +141,16 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
             share = _by_preload(bench) / len(preloads)
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
     return out
+
+
+def _within_load(bench: Bench, plain: Array, preloads: Array) -> Array:
+    """Those of the preloads (k,) that a one-sided load (n,) of a rig without an arm meets after the
+    first that was read: what is slack before is a seat."""
+    if not _pressed(bench):
+        return preloads
+    size = np.abs(plain)
+    first = float(size[size > _NO_LOAD * size.max()].min(initial=np.inf))
+    return preloads[np.abs(preloads) > _HARDLY * first]
 
 
 def net(bench: Bench, j: int, crossing: str, kg: float, preload: float = 0.0) -> Array:
@@ -201,6 +209,7 @@ def _finer(
     weighty = bool(by_kg or preload)
     kg = float(info["tool_kg"]) + close * (_TOOL_STEPS_KG if by_kg else np.zeros(1))
     Nm = preload + close * (_PRELOAD_STEPS * info["step_Nm"] if preload else np.zeros(1))
+    Nm = _within_load(bench, net(bench, j, "weight", TOOL_KG), Nm) if preload else Nm
     if zones is None:
         ratios = np.array([1 / 1.5, 1.0, 1.5]) if weighty else np.geomspace(1 / 1.5, 1.5, 7)
         zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
