@@ -52,10 +52,9 @@ def _moving(data: GapData, hold: Ints) -> Flags:
         far.append(np.abs(off) / _spans(data, values))
     alike = away[0] * away[1] * _senses(data) > 0
     alike &= (np.minimum(*np.abs(away)) > 1) & (np.maximum(*far) < _ABOUT * np.minimum(*far))
-    there = np.where(
-        alike & (np.hypot(*away) > _SEEN), n, within
-    )  # place in its hold of the first sample that is there
-    arrives = np.minimum.reduceat(there, starts)
+    coming = alike & (np.hypot(*away) > _SEEN)
+    # of every hold: the place in it of the first sample that is there
+    arrives = np.minimum.reduceat(np.where(coming, n, within), starts)
     arrives[np.maximum(*far)[starts] < _AWAY] = 0
     first = np.diff(data.run[starts], prepend=-1) != 0
     arrives[first & (data.branch[starts] == ZERO) & (data.step[starts] <= 0)] = 0
@@ -64,17 +63,21 @@ def _moving(data: GapData, hold: Ints) -> Flags:
 
 def _spans(data: GapData, values: Array) -> Array:
     """(n,) range of values (n,) in the setup of every sample."""
-    spans = [np.ptp(values[data.setup == s]) for s in range(len(data.setups))]
-    return np.array([span or 1.0 for span in spans])[data.setup]
+    out = np.ones(len(values))
+    for s in np.unique(data.setup):
+        mine = data.setup == s
+        out[mine] = np.ptp(values[mine]) or 1.0
+    return out
 
 
 def _senses(data: GapData) -> Array:
     """(n,) 1 where force and displacement of a setup rise together, -1 where they do not."""
-    signs = []
-    for s in range(len(data.setups)):
-        force, u = (v[data.setup == s] for v in (data.force, data.displacement))
-        signs.append(float(np.sign((force - force.mean()) @ (u - u.mean()))))
-    return np.array(signs)[data.setup]
+    out = np.zeros(len(data.force))
+    for s in np.unique(data.setup):
+        mine = data.setup == s
+        force, u = data.force[mine], data.displacement[mine]
+        out[mine] = np.sign((force - force.mean()) @ (u - u.mean()))
+    return out
 
 
 def much_to_go(displacement: Array, level: Ints, sd: float) -> Flags:
