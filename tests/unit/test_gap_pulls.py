@@ -114,6 +114,17 @@ def test_a_toe_before_a_knee_is_two_things_and_the_knee_is_the_larger() -> None:
     assert {e.name for e in found.effects} == {"contact_seating", "joint_yield"}
 
 
+def test_a_knee_that_is_recorded_from_its_middle_on_has_no_seat() -> None:
+    """A seat of several scales stiffens and never gives way again, as the foot of a knee does."""
+    u = np.linspace(0.2 * STROKE, STROKE, 400)
+    force = voce(u, knee=50.0)
+    bench = make_bench(running(force, u, imposed="displacement", instruments=METER))
+    seats = [v for v in library(bench, ["contact_seating"]) if v.label == "mixture"]
+    assert seats
+    assert all(all(v.each) for v in seats)
+    assert pulled(force, u).verdict == "joint_yield"
+
+
 @pytest.mark.parametrize("slacks", [(1.2e-4,), (3e-5, 1.4e-4)])
 def test_a_toe_alone_is_a_seat(slacks: tuple[float, ...]) -> None:
     """Slack that is taken up bit by bit, at once or in two, then the line that was simulated."""

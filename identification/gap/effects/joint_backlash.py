@@ -42,7 +42,6 @@ SMOOTH = ("soft", "slow", "arctan", "sprung")
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 _PRELOADS = 8  # over the range of the net torque
-_NO_LOAD, _HARDLY = 0.02, 1.3  # of the largest load; times the first that was read
 _PRELOAD_PRIOR = 0.25
 _SELDOM = (0.05, exp(-20.0))  # of levels; of what runs on, whose evidence is tempered
 CLOSE = (0.2, 0.1, 0.04, 0.02)  # shares of the steps between masses, one look after the other
@@ -62,10 +61,10 @@ _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
 def variants(bench: Bench) -> list[Variant]:
     """Per joint: zone, with and without friction, crossing where weight and load balance, or a
-    preload; of a rig without an arm that is loaded from one side nowhere else: what is slack at the
-    ends of its load is a seat."""
+    preload; in a recording that runs on from one side nowhere else: what is slack at its ends is a
+    seat."""
     running = not bench.data.arm and bench.rows.continuous
-    inside = _pressed(bench) and (running or not bench.imposed)
+    inside = running and _pressed(bench)
     # a bench is pushed along one direction after another, each on a part of its own
     kinds, out = tuple(k for k in KINDS if bench.data.arm or k not in KEPT), []
     if _pressed(bench):
@@ -129,28 +128,16 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
     step, out = (high - low) / _PRELOADS, list[Variant]()
     if not step > 0:
         return []
-    even = -(start + way * (np.arange(_PRELOADS) + 0.5) * step)
-    preloads = _within_load(bench, plain, np.asarray(even, dtype=float))
-    for preload in preloads:
+    for preload in -(start + way * (np.arange(_PRELOADS) + 0.5) * step):
         if abs(preload) < by_tool:
             continue
         for zone in zones:
             info = {"joint": j, "zone_Nm": zone * span, "crossing": "weight", "tool_kg": TOOL_KG,
                     "preload_Nm": float(preload), "step_Nm": step}  # fmt: skip
             label = f"joint {j + 1} preload {way * preload / (high - low):.2g}"
-            share = _by_preload(bench) / len(preloads)
+            share = _by_preload(bench) / _PRELOADS
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
     return out
-
-
-def _within_load(bench: Bench, plain: Array, preloads: Array) -> Array:
-    """Those of the preloads (k,) that a one-sided load (n,) of a rig without an arm meets after the
-    first that was read: what is slack before is a seat."""
-    if not _pressed(bench):
-        return preloads
-    size = np.abs(plain)
-    first = float(size[size > _NO_LOAD * size.max()].min(initial=np.inf))
-    return preloads[np.abs(preloads) > _HARDLY * first]
 
 
 def net(bench: Bench, j: int, crossing: str, kg: float, preload: float = 0.0) -> Array:
@@ -209,7 +196,6 @@ def _finer(
     weighty = bool(by_kg or preload)
     kg = float(info["tool_kg"]) + close * (_TOOL_STEPS_KG if by_kg else np.zeros(1))
     Nm = preload + close * (_PRELOAD_STEPS * info["step_Nm"] if preload else np.zeros(1))
-    Nm = _within_load(bench, net(bench, j, "weight", TOOL_KG), Nm) if preload else Nm
     if zones is None:
         ratios = np.array([1 / 1.5, 1.0, 1.5]) if weighty else np.geomspace(1 / 1.5, 1.5, 7)
         zones = float(info["zone_Nm"]) * ratios**close**_CLOSER
