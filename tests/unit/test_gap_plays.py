@@ -149,10 +149,8 @@ def test_no_tool_hangs_on_a_rig_without_an_arm() -> None:
     bench = make_bench(running(force, force / SPRING, imposed="force"))
     plays = [v for v in library(bench, ["joint_backlash"]) if not v.info["preload_Nm"]]
     closer = [v for p in plays for v in joint_backlash.refined(bench, p)]
-    assert not any("weight" in v.label or "tool" in v.label for v in (*plays, *closer))
+    assert not any("tool" in v.label for v in (*plays, *closer))
     assert {v.info["kind"] for v in closer} >= {"soft", "slow", "sprung"}
-    shapes = {v.label for v in plays}
-    assert len(shapes) == len(plays)  # each once
 
 
 def test_a_preload_puts_a_play_into_a_recording_from_one_side() -> None:

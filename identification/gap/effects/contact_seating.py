@@ -81,8 +81,8 @@ def variants(bench: Bench) -> list[Variant]:
             columns,
             scales,
             prior=2.0,
-            # of a specimen that yields, a seat that stiffens and gives way again is the knee's foot
-            each=not bench.data.arm,
+            # in a running pull, a seat that stiffens and gives way again is the foot of a knee
+            each=bench.rows.continuous and not bench.data.arm,
             force_N=0.1 * top,
             laws=tuple(("exponential", s * top) for s in forces),
         )

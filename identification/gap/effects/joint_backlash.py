@@ -100,10 +100,7 @@ def _by_preload(bench: Bench) -> float:
 
 
 def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Array, float]]:
-    """What may cross zero: name, mass of the tool, torque (n,), prior. Nothing hangs on a rig
-    without an arm."""
-    if not bench.data.arm:
-        return [("load", TOOL_KG, bench.true_torque[:, j], 2.0)]
+    """What may cross zero: name, mass of the tool, torque (n,), prior."""
     torque, plain, per_kg = bench.true_torque[:, j], bench.weight(j, 0.0), bench.weight_per_kg(j)
     masses = TOOLS_KG if np.abs(per_kg).max() * max(TOOLS_KG) > ZONES[0] * span else (TOOL_KG,)
     net = [(kg, torque + plain + kg * per_kg) for kg in masses]
