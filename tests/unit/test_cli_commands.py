@@ -116,23 +116,21 @@ def test_a_path_that_is_not_there(rig: Rig, files: Path) -> None:
     )
 
 
-def test_what_cannot_become_a_model_is_said_before_the_work(rig: Rig, files: Path) -> None:
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("--write-model", "A model file holds an arm; write the diagnosis with --json."),
+        ("--next", "A protocol file is for an arm; leave --next out, and the diagnosis itself "
+                   "says what to measure next."),
+    ],
+)  # fmt: skip
+def test_what_cannot_become_a_file_is_said_before_the_work(
+    rig: Rig, files: Path, option: str, said: str
+) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
-    status, out, err = rig("diagnose", "d.h5", "--write-model", "found.yaml")
+    status, out, err = rig("diagnose", "d.h5", option, "made.yaml")
     assert (status, out) == (2, "")  # no result: nothing was diagnosed
-    assert err == (
-        "d.h5: robot: none. A model file holds an arm; write the diagnosis with --json.\n"
-    )
-
-
-def test_what_cannot_become_a_protocol_is_said_before_the_work(rig: Rig, files: Path) -> None:
-    rig("import", "t.csv", "m.yaml", "-o", "d.h5")
-    status, out, err = rig("diagnose", "d.h5", "--next", "next.yaml")
-    assert (status, out) == (2, "")  # no result: nothing was diagnosed
-    assert err == (
-        "d.h5: robot: none. A protocol file is for an arm; leave --next out, and the diagnosis "
-        "itself says what to measure next.\n"
-    )
+    assert err == f"d.h5: robot: none. {said}\n"
 
 
 def test_diagnose_takes_the_stiffnesses_of_a_model_of_the_same_robot(rig: Rig, files: Path) -> None:
