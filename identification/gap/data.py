@@ -104,6 +104,11 @@ class GapData:
     notes: tuple[str, ...] = field(default=())
 
     @property
+    def ways(self) -> Flags:
+        """(n,) samples on the way, none where no ramp was told."""
+        return np.zeros(len(self.run), bool) if self.on_the_way is None else self.on_the_way
+
+    @property
     def joints(self) -> int:
         """Number of elastic elements."""
         return len(self.compliance)

@@ -13,8 +13,7 @@ def hold_ids(data: GapData) -> Ints:
     """(n,) number of the hold of every sample: same run, branch and step, without a pause, at rest
     or on the way there, and on one side of no load: steps of the same size to and fro may bear the
     same number."""
-    way = np.zeros(len(data.run), bool) if data.on_the_way is None else data.on_the_way
-    keys = np.column_stack([data.run, data.branch, data.step, way])
+    keys = np.column_stack([data.run, data.branch, data.step, data.ways])
     new = np.any(np.diff(keys, axis=0) != 0, axis=1)
     loaded = (data.step > 0) & (np.abs(data.force) > _LOADED * data.instruments.force)
     side = np.where(loaded, side_of(data.force), 0.0)
@@ -25,9 +24,7 @@ def hold_ids(data: GapData) -> Ints:
 def rest_ids(data: GapData, hold: Ints) -> Ints:
     """(n,) the same holds (n,), in which samples on the way stand alone: what they do is no
     scatter."""
-    if data.on_the_way is None:
-        return hold
-    way = data.on_the_way
+    way = data.ways
     new = (np.diff(hold) != 0) | way[1:] | way[:-1]
     return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
 

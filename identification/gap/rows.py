@@ -131,7 +131,7 @@ def reduce_rows(data: GapData) -> Rows:
     run, setup, branch, step = map(first, (data.run, data.setup, data.branch, data.step))
     force, displacement = mean(data.force), mean(data.displacement)
     holds = _blocks(run) if bins.running else _consecutive(first(hold))
-    ramp = np.zeros(len(run), bool) if data.on_the_way is None else first(data.on_the_way)
+    ramp = first(data.ways)
     if bins.running:
         level = _continuous_levels(setup, force)
     else:
