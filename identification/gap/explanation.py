@@ -19,6 +19,7 @@ from identification.gap.parts import (
     energies,
     log_joints,
     mended,
+    needed,
     part_sizes,
     signs_kept,
 )
@@ -132,7 +133,7 @@ def explain(
     levels = engine.levels
     bases = log_joints(engine, parts)
     sizes = part_sizes(engine, parts, int(bases.argmax()))
-    each, energy = _counted(engine, parts, sizes), sizes.energy
+    each, energy = _counted(engine, parts, sizes, int(bases.argmax())), sizes.energy
     together = _together(parts, each)
     logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
@@ -162,12 +163,14 @@ def explain(
     )
 
 
-def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
+def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) -> Array:
     """Sizes of the parts. Without an arm friction brings its own mean stiffness, and what was
     simulated may be its first slope: a spring that is off beside it counts by what the friction
     leaves of the gap, and for less than the friction where it would move more than was measured
     and the friction takes it back. A toe and a knee count as they move: what a spring would hide of
-    either, the other shows; but a ball on a plate is no toe, and goes on like a spring."""
+    either, the other shows; but a ball on a plate is no toe, and goes on like a spring. Of an
+    imposed stroke creep, too, brings a mean stiffness, and what a spring leaves of either says
+    little: the larger is the one that the other can do less without."""
     if engine.bench.data.arm:
         return sizes.gap
     goes_on = any(p.variant.info.get("goes_on") for p in parts)
@@ -176,6 +179,10 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
     rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
     if not rubs.any():
         return sizes.gap
+    creeps = np.array([p.word == "joint_creep" for p in parts], dtype=bool)
+    if engine.bench.imposed and len(parts) == _PAIR and creeps.any():
+        larger = sizes.gap.argmax() == needed(engine, parts, level).argmax()
+        return sizes.gap if larger else sizes.gap[::-1]
     linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
     mine = float(sizes.gap[rubs].max())
     rest = max(engine.structural**2 - mine**2, 0.0) ** 0.5
@@ -184,6 +191,7 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
 
 
 _LESS = 0.99
+_PAIR = 2
 
 
 def conditioned(

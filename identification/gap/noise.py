@@ -35,7 +35,8 @@ class Noise:
     one sample. raised: how many times what is stated readings scatter, of a running recording or
     within holds, at least 1.
     sure: of an arm's instruments, or measured; what else is stated is known to a factor UNSURE.
-    swings: how many times what is stated an arm goes to and fro while nothing changes. seen: of one
+    swings: how many times what is stated an arm goes to and fro while nothing changes. slow: how
+    many times what is stated it may differ from hold to hold. seen: of one
     sample, m, as far as a rig without an arm showed it: 0 where it read every level but once."""
 
     response: Array
@@ -47,6 +48,7 @@ class Noise:
     raised: float = 1.0
     sure: bool = True
     swings: float = 0.0
+    slow: float = 0.0
     seen: float = 0.0
 
     @property
@@ -95,6 +97,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         stated=stated,
         raised=raised,
         swings=_swings(data, rows, hold),
+        slow=_slow(data, rows, float(np.median(slope)), hold),
         sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),
     )  # fmt: skip
@@ -135,6 +138,18 @@ def _swings(data: GapData, rows: Rows, hold: Ints) -> float:
     if rows.continuous or not data.arm:
         return 0.0
     return swing_within(data.displacement, hold) / data.instruments.displacement
+
+
+def _slow(data: GapData, rows: Rows, slope: float, hold: Ints) -> float:
+    """How many times what is stated an arm's readings may differ from hold to hold: by what is
+    stated of both channels and their holds don't show. 0 where these can't tell."""
+    meter, slow = data.instruments, []
+    for values, stated in ((data.displacement, meter.displacement), (data.force, meter.force)):
+        white = scatter_within(values, hold)
+        if rows.continuous or not data.arm or white is None:
+            return 0.0
+        slow.append(max(stated**2 - white**2, 0.0) ** 0.5)
+    return float(np.hypot(slow[0], slope * slow[1])) / meter.displacement
 
 
 def _encoders(data: GapData, rows: Rows, hold: Ints) -> Array:

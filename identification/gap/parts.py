@@ -87,6 +87,22 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     )
 
 
+def needed(engine: Engine, parts: tuple[Part, ...], level: int) -> Array:
+    """(p,) nats by which the others alone, fitted anew, explain less than all parts, at one
+    level."""
+    alone = [_gained(engine, parts[:i] + parts[i + 1 :], level) for i in range(len(parts))]
+    return np.asarray(_gained(engine, parts, level) - np.array(alone))
+
+
+def _gained(engine: Engine, parts: tuple[Part, ...], level: int) -> float:
+    """Nats by which the most probable coefficients of all parts fit better than none."""
+    columns = [c for p in parts for c in p.variant.columns]
+    root = block([p.root for p in parts])
+    inner = np.eye(root.shape[1]) + root.T @ engine.square(tuple(columns))[level] @ root
+    moment = root.T @ engine.levels[level].moment[columns]
+    return float(0.5 * moment @ np.linalg.solve(inner, moment))
+
+
 def _beyond_springs(engine: Engine, moved: Array) -> float:
     """rms (m) of a linear effect beyond what the springs give within three standard deviations;
     beside an effect that hardly shows, some of what it moves counts whatever they give."""

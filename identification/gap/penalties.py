@@ -8,7 +8,7 @@ import numpy as np
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, Sizes
-from identification.gap.words import CURVES, FRICTION, LINEAR, MECHANISMS
+from identification.gap.words import CURVES, DAMAGE, FRICTION, LINEAR, MECHANISMS, SOFTENING
 
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
@@ -180,7 +180,8 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
         return True
     if bench.course.never_held and "time_lag" in words and words & MECHANISMS:
         return True  # of a single pull: what comes late and what bends are one curve
-    if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & MECHANISMS)):
+    bends = MECHANISMS | {DAMAGE, SOFTENING}
+    if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & bends)):
         return True
     springs = "joint_stiffness_error" in words and words & MECHANISMS
     if not (springs or words <= FRICTION):

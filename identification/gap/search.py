@@ -97,13 +97,15 @@ def _as_stated(engine: Engine) -> float:
 # What readings have in common with the next ones of their hold, they have with all of it, and more:
 # noise of many colours (1/f) is as large from hold to hold.
 _IN_HOLDS = 4.0
+# What differs from hold to hold may wander over many of them, and does not average out.
+_FROM_HOLD = 1.5
 
 
 def _hidden(engine: Engine) -> float:
     """Imperfection (m) that passes for noise."""
     noise = engine.bench.noise
-    share = min(max(_STEP, _IN_HOLDS * noise.swings), 1.0) if noise.sure else UNSURE
-    return share * noise.stated
+    swings = min(max(_STEP, _IN_HOLDS * noise.swings), 1.0)
+    return (max(swings, _FROM_HOLD * noise.slow) if noise.sure else UNSURE) * noise.stated
 
 
 def force(

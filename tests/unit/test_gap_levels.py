@@ -224,3 +224,25 @@ def test_noise_alike_within_holds_may_be_as_large_from_hold_to_hold() -> None:
         noise = replace(bench.noise, sure=True, swings=swings)
         hidden.append(_hidden(small_engine(replace(bench, noise=noise))) / noise.stated)
     assert hidden == pytest.approx([0.6, 0.6, 0.8, 1.0])
+
+
+def test_what_is_stated_and_holds_do_not_show_may_differ_from_hold_to_hold() -> None:
+    """Of both channels; and wander over many holds."""
+    rng = np.random.default_rng(6)
+    step = np.repeat(np.arange(1, 9), 12)
+    load = 10.0 * step
+    data = bench_data(load + rng.normal(0, 0.1, 96), 1e-5 * load + rng.normal(0, 1e-6, 96),
+                      step=step, arm=True)  # fmt: skip
+    slow = []
+    for stated in (1e-6, 2e-6, 4e-6):
+        meter = replace(data.instruments, force=2 * stated / 1e-5, displacement=stated)
+        slow.append(make_bench(replace(data, instruments=meter)).noise.slow)
+    # sqrt(1 - 1) and (2 uN: a tenth seen, of 0.2, 0.4 and 0.8 N) ...
+    unseen = [np.hypot(max(s**2 - 1, 0.0) ** 0.5, (4 * s**2 - 1) ** 0.5) / s for s in (1, 2, 4)]
+    assert slow == pytest.approx(unseen, abs=0.1)
+    assert make_bench(replace(data, arm=False)).noise.slow == 0.0
+    bench, hidden = small_bench(), []
+    for far in (0.3, 0.5, 1.0):
+        noise = replace(bench.noise, sure=True, slow=far)
+        hidden.append(_hidden(small_engine(replace(bench, noise=noise))) / noise.stated)
+    assert hidden == pytest.approx([0.6, 0.75, 1.5])

@@ -10,6 +10,7 @@ import pytest
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.designs import _levels
+from identification.gap.glitches import picked
 from identification.gap.holds import hold_ids, is_continuous, rest_ids, scatter_within
 from identification.gap.ramps import ramps_told
 from identification.gap.rows import reduce_rows
@@ -104,3 +105,23 @@ def test_of_what_runs_only_the_way_to_no_load_is_told() -> None:
     assert told.on_the_way is not None
     assert np.all(told.branch[told.on_the_way] == 0)
     assert 30 <= told.on_the_way.sum() <= 41
+
+
+def test_levels_are_levels_though_a_lag_hides_the_way_there() -> None:
+    """The force comes within three readings, far across zero; the displacement follows slowly. A
+    stroke whose force stands soon, because it rubs, runs on."""
+    level = np.repeat([0.0, 30, 90, 50, -40, -100, -20, 60, 0, 80, -70, 0], 14)
+    coming = np.minimum(1.0, (np.arange(len(level)) % 14 + 1) / 3)
+    before = np.concatenate([np.zeros(14), level[:-14]])
+    force = before + (level - before) * coming
+    late = SPRING * force
+    for _ in range(2):
+        late = np.convolve(late, 0.5 ** np.arange(1, 40))[: len(level)]
+    step = np.repeat(np.arange(12), 14)
+    held = bench_data(force, late, step=step)
+    assert not is_continuous(held, hold_ids(held))
+    way, within = np.where(step % 2 == 0, 1.0, -1.0), np.arange(168) % 14
+    slid = bench_data(100 * way * np.clip(within - 1.0, -1, 1), 1e-4 * np.cumsum(way), step=step)
+    assert is_continuous(slid, hold_ids(slid))
+    few = picked(held, (step > 7) & (step < 10))  # nobody knows what lags there, and what runs
+    assert is_continuous(few, hold_ids(few))

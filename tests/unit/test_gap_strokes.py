@@ -71,6 +71,21 @@ def test_lag_of_a_recording_without_lag_is_not_made_of_its_noise() -> None:
         assert abs(np.corrcoef(column, left)[0, 1]) < 0.3, v.label
 
 
+def test_a_channel_may_lag_as_behind_two_filters() -> None:
+    """A step's answer begins without a jump: `1 - (1 + t/T) exp(-t/T)`, 2 T late."""
+    force = np.repeat([0.0, 50.0, -50.0, 20.0], 60)
+    levels = bench_data(force, force / SPRING, step=np.repeat(np.arange(4), 60))
+    bench = make_bench(levels)
+    behind = late(bench, "displacement", "two filters", 4.0)[: bench.rows.n]
+    first = bench.rows.hold == 1
+    t = bench.rows.time[first] - 60
+    left = -50 / SPRING * (1 + t / 2) * np.exp(-t / 2)
+    # the load comes within a second or so
+    assert np.abs(behind[first] - left)[t > 4].max() < 0.1 * 50 / SPRING
+    assert behind[first][0] == pytest.approx(-50 / SPRING, rel=0.1)
+    assert any(v.info["kind"] == "two filters" for v in library(bench, ["time_lag"]))
+
+
 def test_steps_of_what_is_driven_are_no_noise_and_stay_sharp_in_a_lag() -> None:
     force = np.repeat([0.0, 50.0, 0.0, -50.0, 0.0], 40)
     bench = make_bench(running(force, force / SPRING, imposed="force"))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap import explanation
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.choice import chosen_of, foresees
@@ -21,8 +22,8 @@ from identification.gap.explanation import (
     up_to_likeliest,
 )
 from identification.gap.leftover import looked_up
-from identification.gap.parts import Part, Sizes, log_joints
-from identification.gap.penalties import _apart, _on_its_own
+from identification.gap.parts import Part, Sizes, log_joints, needed
+from identification.gap.penalties import _apart, _on_its_own, _same_element
 from identification.gap.search import (
     SPRINGS,
     _elsewhere,
@@ -44,7 +45,7 @@ from identification.gap.verdict import (
     _tells_of_three,
     weighed,
 )
-from identification.gap.words import JERKS
+from identification.gap.words import DAMAGE, JERKS, SOFTENING
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_weights import UP, hanging
 
@@ -75,19 +76,19 @@ def test_without_an_arm_a_wrong_spring_counts_by_what_friction_leaves_of_the_gap
     rubs, spring = part("joint_hysteresis", [0]), part("joint_stiffness_error", [1])
     gap = engine.structural * np.array([0.8, 9.0])
     sizes = Sizes(gap, np.full(2, 0.9) * engine.most**0.5, 0.0)
-    assert _counted(engine, (rubs, spring), sizes) == pytest.approx(
+    assert _counted(engine, (rubs, spring), sizes, 0) == pytest.approx(
         engine.structural * np.array([0.8, 0.6])
     )
     far = Sizes(gap, np.array([0.0, 2.0]) * engine.most**0.5, 0.0)  # than was measured
-    assert _counted(engine, (rubs, spring), far)[1] < gap[0]
+    assert _counted(engine, (rubs, spring), far, 0)[1] < gap[0]
     slight = Sizes(np.array([0.2, 9.0]) * engine.structural, far.moved, 0.0)
-    assert _counted(engine, (rubs, spring), slight)[1] < slight.gap[0]
+    assert _counted(engine, (rubs, spring), slight, 0)[1] < slight.gap[0]
     bent = part("joint_nonlinear_stiffness", [0])
-    assert _counted(engine, (bent, spring), sizes) is gap  # a curve has its line from the spring
+    assert _counted(engine, (bent, spring), sizes, 0) is gap  # a curve has its line from the spring
     toe, knee = part("contact_seating", [0]), part("joint_yield", [1])
-    assert _counted(engine, (toe, knee), sizes) is sizes.moved
+    assert _counted(engine, (toe, knee), sizes, 0) is sizes.moved
     arm = replace_bench(engine, replace(engine.bench, data=replace(engine.bench.data, arm=True)))
-    assert _counted(arm, (rubs, spring), sizes) is gap
+    assert _counted(arm, (rubs, spring), sizes, 0) is gap
 
 
 def test_the_main_cause_of_two_is_the_larger_one_as_far_as_their_sizes_are_known() -> None:
@@ -137,6 +138,41 @@ def test_springs_far_off_stand_on_their_own_beside_a_mechanism() -> None:
     assert not _on_its_own((part("joint_yield", [0]), rubs), far, 0, 1)
     curves = [part("joint_nonlinear_stiffness", [1], kinds=k) for k in (("line", 0.5), ("even",))]
     assert [_on_its_own((springs, curve), far, 0, 1) for curve in curves] == [False, True]
+
+
+def test_springs_are_part_of_what_is_damaged_on_a_bench() -> None:
+    """As of every other law there: but jerks have no line."""
+    engine = small_engine_of(small_bench())
+    spring = part("joint_stiffness_error", [0])
+    arm = replace_bench(engine, replace(engine.bench, data=replace(engine.bench.data, arm=True)))
+    for word, same in ((DAMAGE, True), (SOFTENING, True), (JERKS, False)):
+        assert _same_element(engine, spring, part(word, [1])) is same
+        assert not _same_element(arm, spring, part(word, [1]))
+
+
+def test_what_a_part_is_needed_for_is_what_the_others_can_not_do() -> None:
+    """Coefficients with a standard normal prior, fitted anew without each."""
+    engine = small_engine(small_bench())
+    parts = part("joint_creep", [0]), part("joint_yield", [1])
+    gram, moment = engine.square((0, 1))[1], engine.levels[1].moment[[0, 1]]
+    both = 0.5 * moment @ np.linalg.solve(np.eye(2) + gram, moment)
+    alone = 0.5 * moment**2 / (1 + np.diag(gram))
+    assert needed(engine, parts, 1) == pytest.approx(both - alone[::-1])
+
+
+@pytest.mark.parametrize(("imposed", "larger"), [(True, 1), (False, 0)])
+def test_of_creep_and_friction_in_an_imposed_stroke_the_needed_one_is_larger(
+    monkeypatch: pytest.MonkeyPatch, imposed: bool, larger: int
+) -> None:
+    """Each brings a mean stiffness, which the spring takes over."""
+    engine = small_engine_of(small_bench())
+    engine = replace_bench(engine, replace(engine.bench, imposed=imposed))
+    monkeypatch.setattr(explanation, "needed", lambda *_: np.array([36.0, 250.0]))
+    parts = part("joint_creep", [0]), part("joint_yield", [1])
+    sizes = Sizes(np.array([5e-7, 1e-7]), np.array([8e-6, 5e-4]), 0.0)
+    found = _counted(engine, parts, sizes, 0)
+    assert found.argmax() == larger
+    assert sorted(found) == sorted(sizes.gap)
 
 
 def test_a_mean_of_evidence_leaves_out_what_weighs_nothing() -> None:
@@ -272,18 +308,21 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
 
 
 def test_what_no_word_names_is_unknown_unless_a_word_explains_it_as_well() -> None:
-    """A word that is the larger one beside it keeps its weight; one that leaves no more than the
-    noise keeps all."""
+    """A word that is the larger one beside it keeps its weight, unless it is a drift that takes any
+    path; one that leaves no more than the noise keeps all."""
     bench = small_bench()
     variants = library(bench, ["joint_creep"])
     found = search(small_engine_of(bench), variants)
     creep, jerks, noise = part("joint_creep", [0]), part(JERKS, [1]), bench.noise.stated
+    winds, warms = (part("thermal_drift", [0], path=path) for path in ("free", "steady"))
     for parts, eta, main in (((jerks,), 3 * noise, "unknown"),
                              ((jerks, creep), 3 * noise, "unknown"),
                              ((creep, jerks), 3 * noise, "joint_creep"),
+                             ((winds, jerks), 3 * noise, "unknown"),
+                             ((warms, jerks), 3 * noise, "thermal_drift"),
                              ((jerks,), noise, "joint_creep")):  # fmt: skip
         word = said((creep,), (1e-5,), -20.0, eta)
-        odd = said(parts, (1e-5, 0.5e-5)[: len(parts)], 20.0, 0.0)
+        odd = said(parts, (1e-5, 0.6e-5)[: len(parts)], 20.0, 0.0)
         whole = replace(found, explanations=(word,), nameless=(odd,), unknown=-90.0, alone={})
         given = weighed(whole, {}).probabilities
         assert max(given, key=lambda w: given[w]) == main

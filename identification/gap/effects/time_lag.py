@@ -1,7 +1,8 @@
 """One channel lags the other: shows where the load changes, at the first samples of a hold.
 
 Pure delay of the laser, `u(t) = u_0(t - d)`, or of the force; a first-order filter of either, or
-one that is delayed as well; or a mean over the last readings, late by half of its window.
+one that is delayed as well, or two alike (a critically damped one of second order); or a mean over
+the last readings, late by half of its window.
 Lags of filters, averaging and transmission: 0.05 to 10 s.
 
 Size: 0.05 to 10 s; 0.6 to 12 times the sampling interval here.
@@ -47,7 +48,7 @@ def variants(bench: Bench) -> list[Variant]:
     return out
 
 
-KINDS = ("delay", "filter", "average", "delayed filter")
+KINDS = ("delay", "filter", "average", "delayed filter", "two filters")
 _STEP = 1.13
 _STEPS = np.array([-3, -2, -1, 0, 1, 2, 3])
 
@@ -153,7 +154,9 @@ def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
         return retarded(
             delayed(values, lag / 2, bench.rows), np.array([lag / 2]), bench.rows, bench.rest
         )
-    return retarded(values, np.array([lag]), bench.rows, bench.rest)
+    for each in (lag / 2, lag / 2) if kind == "two filters" else (lag,):
+        values = retarded(values, np.array([each]), bench.rows, bench.rest)
+    return values
 
 
 def _ahead(bench: Bench, load: Array, kind: str, lag: float) -> Array:
