@@ -10,7 +10,6 @@ import pytest
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.designs import _levels
-from identification.gap.glitches import picked
 from identification.gap.holds import hold_ids, is_continuous, rest_ids, scatter_within
 from identification.gap.ramps import ramps_told
 from identification.gap.rows import reduce_rows
@@ -123,5 +122,7 @@ def test_levels_are_levels_though_a_lag_hides_the_way_there() -> None:
     way, within = np.where(step % 2 == 0, 1.0, -1.0), np.arange(168) % 14
     slid = bench_data(100 * way * np.clip(within - 1.0, -1, 1), 1e-4 * np.cumsum(way), step=step)
     assert is_continuous(slid, hold_ids(slid))
-    few = picked(held, (step > 7) & (step < 10))  # nobody knows what lags there, and what runs
-    assert is_continuous(few, hold_ids(few))
+    once = 100 * np.minimum(1.0, np.arange(40) / 10)  # two ramps with their holds are one recording
+    twice = np.concatenate([once, 100 - once])
+    ramp = bench_data(twice, SPRING * twice, step=np.repeat([1, 2], 40))
+    assert is_continuous(ramp, hold_ids(ramp))
