@@ -103,7 +103,7 @@ def _continuous_edges(data: GapData) -> Ints:
     alike and no bin straddles much of either; every run starts a bin."""
     n = len(data.force)
     wanted = int(np.clip(_ROWS_PER_PASS * passes(data.force), CONTINUOUS_ROWS, _MOST_ROWS))
-    if n <= wanted:
+    if n <= (_MOST_ROWS if data.arm else wanted):  # an arm's few levels are left in a sample or two
         return np.arange(n, dtype=np.int64)
     path = np.arange(n) / n
     width = max(1, n // (4 * wanted))
