@@ -153,6 +153,46 @@ def test_shapes_of_a_bench_that_is_pulled_are_their_laws(imposed: str) -> None:
     assert any("hardened" in v.label for v in library(bench, ["joint_yield"]))
 
 
+# Alike but for their place in the file: of a window, half is a delay and half a filter.
+_ALIKE = ("time_lag",)
+
+
+@pytest.mark.parametrize("word", [w for w in WORDS if w not in _ALIKE])
+def test_terms_in_another_order_have_the_same_columns(bench: Bench, word: str) -> None:
+    """A file is edited by hand, and its coefficients stand beside their terms."""
+    there, turned = replace(bench, columns=Pool()), 0
+    laws = {}
+    for v in library(there, [word]):
+        law, _ = law_of(there, v)
+        laws[(tuple(law.constants), tuple(tuple(t.shape) for t in law.terms))] = law
+    for law in laws.values():
+        back = replace(law, terms=law.terms[::-1])
+        np.testing.assert_array_equal(
+            rows_of(there, word, back), rows_of(there, word, law)[:, ::-1], err_msg=str(law)
+        )
+        turned += len(law.terms) > 1
+    assert turned > 0
+
+
+@pytest.mark.parametrize(
+    ("word", "constants", "key"),
+    [
+        ("joint_yield", {"memory": KEPT, "flow_time": 0.0}, "threshold"),
+        ("joint_hysteresis", {"memory": KEPT, "law": "Iwan"}, "strength"),
+        ("joint_hysteresis", {"memory": KEPT, "law": "Dahl"}, "reach"),
+    ],
+)
+def test_a_spring_of_its_own_may_stand_first(
+    bench: Bench, word: str, constants: dict[str, object], key: str
+) -> None:
+    terms = (Term("compliance"), Term("compliance", {key: 5.0}), Term("compliance", {key: 30.0}))
+    law = Law({"joint": 0, **constants}, terms)
+    made = rows_of(bench, word, law)
+    for i, term in enumerate(terms):
+        alone = rows_of(bench, word, replace(law, terms=(term,)))
+        np.testing.assert_array_equal(made[:, i], alone[:, 0])
+
+
 def one(word: str, law: Law, *values: float) -> Form:
     return Form(word, law, np.array(values), np.zeros((len(values),) * 2))
 

@@ -46,9 +46,9 @@ def describe_hysteresis(bench: Bench, v: Variant) -> tuple[Law, Array]:
 
 
 def hysteresis(bench: Bench, law: Law) -> list[Array]:
-    """What the friction holds back: `S_r(tau)` (stop operator), or reach, or load, times bristle
-    state; what slips beside it (Prandtl's law): `P_r(tau)`; of a term without a strength the line
-    of its own spring."""
+    """Column of every term, in their order: what the friction holds back, `S_r(tau)` (stop
+    operator), or reach, or load, times bristle state; what slips beside it (Prandtl's law):
+    `P_r(tau)`; of a term without a strength the line of its own spring."""
     c = law.constants
     joint, iwan = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
@@ -70,9 +70,13 @@ def hysteresis(bench: Bench, law: Law) -> list[Array]:
         way = joint_hysteresis.by_ratio(load, span) if by_load else load
         z = bristles(way, size, fresh, c["law"].startswith("Bouc-Wen"), weight)
         held = (z * (np.abs(load)[:, None] if by_load else size))[kept]
-        held = held * np.column_stack([_grown(bench, law, t) for t in law.terms if t.shape])
-    lines = [bench.joint_column(joint, torque) for t in law.terms if not t.shape]
-    return [*(bench.joint_column(joint, -bench.sense * h) for h in held.T), *lines]
+        grown = np.array([_grown(bench, law, t) for t in law.terms if t.shape])
+        held = held * grown.reshape(len(size), bench.rows.n).T
+    each = iter(held.T)
+    return [
+        bench.joint_column(joint, -bench.sense * next(each) if t.shape else torque)
+        for t in law.terms
+    ]
 
 
 def _grown(bench: Bench, law: Law, term: Term) -> Array:

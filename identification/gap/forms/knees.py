@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array
+from identification.gap.data import Array, Flags
 from identification.gap.effects import base_slip, flow_back, joint_yield
 from identification.gap.effects.flows import Flow, states
 from identification.gap.forms.law import (
@@ -61,43 +61,56 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
 
 
 def columns(bench: Bench, law: Law) -> list[Array]:
-    """Column of every play: state of radius `threshold` on the torque (or moment), lagging; of a
-    term without one the line of its own spring."""
+    """Column of every term, in their order: state of radius `threshold` on the torque (or moment),
+    lagging; of a term without one the line of its own spring."""
     c = law.constants
     if "joint" in c:
         load = bench.true_torque[:, c["joint"]]
     else:
         lever = base_slip.lever_of(bench, c["axis"], c["depth"])
         load = lever * bench.true_load
-    out = []
-    for state in _states(bench, law, load):
-        if "joint" in c:
-            out.append(bench.joint_column(c["joint"], bench.sense * state))
+    states, out = _states(bench, law, load), []
+    for i in range(len(law.terms)):
+        if i not in states:
+            out.append(bench.joint_column(c["joint"], load))
+        elif "joint" in c:
+            out.append(bench.joint_column(c["joint"], bench.sense * states[i]))
         else:
-            out.append(bench.outside_column(lever * state))
-    return out + [bench.joint_column(c["joint"], load) for t in law.terms if not t.shape]
+            out.append(bench.outside_column(lever * states[i]))
+    return out
 
 
-def _states(bench: Bench, law: Law, load: Array) -> list[Array]:
+def _states(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
+    """Number of the term -> its state (n,); those of a kind are made in one go. None of a spring of
+    its own."""
     fresh = fresh_after(bench, law.constants["memory"])
-    radius = np.array([t.shape["threshold"] for t in law.terms if "threshold" in t.shape])
     weight = None
     hung = law.constants["memory"] in (HUNG, HUNG_LOST)
     if hung and "joint" in law.constants:  # its twin may sit elsewhere
         weight = bench.weight(law.constants["joint"])
     flow, square = law.constants["flow_time"], law.constants.get("flow_exponent") == _SQUARE
-    out = list(states(bench, Flow(load, radius, flow, fresh, weight, square)).T)
-    beyond = np.array([t.shape["grows_beyond"] for t in law.terms if "grows_beyond" in t.shape])
-    out += list(joint_yield.grown(load, beyond, fresh).T)
-    for term in law.terms:
-        if "after" not in term.shape:
-            continue
-        peak = flow_back.peaks(load, term.shape["after"], fresh)
-        if "ratchets_beyond" in term.shape:
-            path = flow_back.ratchet(load, term.shape["ratchets_beyond"], fresh)
-            state = flow_back.RATCHETS * path
-        else:
-            state = bench.plays(load, np.array([term.shape["returns_beyond"]]), fresh)[:, 0]
-            state = state - state[peak]
-        out.append(np.where(peak >= 0, state, 0.0))
+    plays, radius = _with(law, "threshold")
+    made = states(bench, Flow(load, radius, flow, fresh, weight, square))
+    out = dict(zip(plays, made.T, strict=True))
+    growing, beyond = _with(law, "grows_beyond")
+    out |= zip(growing, joint_yield.grown(load, beyond, fresh).T, strict=True)
+    for i in _with(law, "after")[0]:
+        out[i] = _back(bench, law.terms[i], load, fresh)
     return out
+
+
+def _with(law: Law, shape: str) -> tuple[list[int], Array]:
+    """Numbers of the terms with that key, and its values (k,)."""
+    mine = [i for i, t in enumerate(law.terms) if shape in t.shape]
+    return mine, np.array([law.terms[i].shape[shape] for i in mine])
+
+
+def _back(bench: Bench, term: Term, load: Array, fresh: Flags) -> Array:
+    """(n,) state of what flows back, or ratchets, once `after` was passed."""
+    peak = flow_back.peaks(load, term.shape["after"], fresh)
+    if "ratchets_beyond" in term.shape:
+        state = flow_back.RATCHETS * flow_back.ratchet(load, term.shape["ratchets_beyond"], fresh)
+    else:
+        state = bench.plays(load, np.array([term.shape["returns_beyond"]]), fresh)[:, 0]
+        state = state - state[peak]
+    return np.where(peak >= 0, state, 0.0)
