@@ -19,7 +19,8 @@ from rig.protocol import MeasurementProtocol, Run
 
 # Act on what the instruments see of everything else: realised last.
 _LAST = ("displacement_scale", "time_lag")
-_LEAST_GAIN = 0.05
+_LEAST_GAIN = 0.05  # true over shown
+_HALVINGS = 60  # to the last digit
 # Samples of instruments that nothing here depends on: a prediction has no noise.
 _ANY = Instruments(0.1, 2e-6, 0.005, 0.003)
 
@@ -52,14 +53,28 @@ def predict(
     for f in forms:
         if f.word not in _LAST:
             moved += realise(bench, f)[: bench.rows.n]
-    # A gain is fitted as a share w of what the laser shows: shown = true + w shown.
-    share = sum(float(f.values.sum()) for f in forms if f.word == "displacement_scale")
-    moved = moved / max(1 - share, _LEAST_GAIN)
+    gains = [f for f in forms if f.word == "displacement_scale"]
+    if gains:
+        moved = _shown(bench, gains, moved)
     seen = replace(bench, response=moved)
     for f in forms:
         if f.word == "time_lag":
             moved = moved + realise(seen, f)[: bench.rows.n]
     return _by_hold(bench, moved), _beyond(bench, forms)
+
+
+def _shown(bench: Bench, gains: Sequence[Form], true: Array) -> Array:
+    """(n,) m: what the laser shows of a motion `true` (n,) m. A gain is fitted as what of the
+    reading is too much, in proportion to it, to its square, or to what lies above a range:
+    shown = true + excess(shown), row by row; found by bisection, since excess may grow anyhow."""
+    low, high = np.zeros(len(true)), true / _LEAST_GAIN
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        seen = replace(bench, moves=middle)
+        excess = sum(realise(seen, f)[: bench.rows.n] for f in gains)
+        beyond = np.sign(true) * (middle - excess) > np.abs(true)
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return (low + high) / 2
 
 
 def _by_hold(bench: Bench, moved: Array) -> PlannedPath:

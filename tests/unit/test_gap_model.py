@@ -277,6 +277,26 @@ def test_a_gain_acts_on_everything_else(tmp_path: Path) -> None:
         np.testing.assert_allclose(with_gain, 1.25 * without, rtol=1e-9)
 
 
+def test_a_gain_that_bends_follows_the_reading(tmp_path: Path) -> None:
+    """Above a range it grows from there on; with the reading, from the first micrometre."""
+    range_mm, excess = 0.5, 0.1
+    above = {"above_mm": range_mm, "excess_share_of_reading": excess}
+    bends = {"at_mm": 2.0, "excess_share_of_reading": excess}
+    laser = {"name": "displacement_scale"}
+    nothing = {"excess_share_of_reading": 0.0}
+    found = simulate(
+        model(tmp_path, {**laser, "terms": [nothing, above]}), procedure(tmp_path)
+    )  # fmt: skip
+    _, moved, springs = levels(found, "loading", 1)
+    true, knee = springs, range_mm * 1e-3
+    assert true[0] < knee < true[-1]
+    beyond = knee + (true - knee) / (1 - excess)
+    np.testing.assert_allclose(moved, np.where(true > knee, beyond, true), rtol=1e-9)
+    found = simulate(model(tmp_path, {**laser, "terms": [nothing, bends]}), procedure(tmp_path))
+    _, moved, springs = levels(found, "loading", 1)
+    np.testing.assert_allclose(moved - excess * moved**2 / 2e-3, springs, rtol=1e-9)
+
+
 def test_what_cannot_be_foretold_is_left_out_and_said(tmp_path: Path) -> None:
     shift = {"name": "zero_shift", "terms": [{"run": 2, "lasts": True, "shift_mm": 0.03}]}
     warm = {"name": "thermal_drift", "path": "exponential", "quantity": "displacement",
