@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil
 
 import numpy as np
 
@@ -141,7 +140,7 @@ class _Walk:
     def _repetition(self, index: int, run: Run, repetition: int) -> None:
         procedure = self._procedure
         sampling = procedure.sampling
-        count = max(sampling.samples_per_step, ceil(procedure.hold_s * sampling.rate_Hz))
+        count = procedure.samples_of_step
         self._now += AMPLIFIER_S + TARE_S
         self._start = self._now
         place = (float(index), float(repetition))

@@ -212,16 +212,11 @@ def _floats(values: Array) -> tuple[float, ...]:
     return tuple(float(v) for v in values)
 
 
-def _per_step(protocol: MeasurementProtocol) -> int:
-    sampling = protocol.sampling
-    return max(sampling.samples_per_step, ceil(protocol.hold_s * sampling.rate_Hz))
-
-
 def _samples(protocol: MeasurementProtocol, run: Run) -> int:
     """Of one repetition: plateaus and settled steps; those taken while settling come on top."""
     zero_s = protocol.zero.before_s + protocol.zero.after_s
     plateaus = round(zero_s * protocol.sampling.rate_Hz)
-    return plateaus + len(protocol.steps(run)) * _per_step(protocol)
+    return plateaus + len(protocol.steps(run)) * protocol.samples_of_step
 
 
 def _repetition_s(protocol: MeasurementProtocol, run: Run, station: Station | None) -> float:
@@ -257,7 +252,7 @@ def _assumptions(
     settle = protocol.settle
     yield (
         f"{SCREW_S:g} s of turning and {settle.window_s:g} s of settling (no longer than its "
-        f"window) a step, {_per_step(protocol)} samples"
+        f"window) a step, {protocol.samples_of_step} samples"
     )
     yield f"{UNLOAD_S:g} s to unload, {TARE_S:g} s to tare, Reset and Operate once a repetition"
     if np.max(arm.joint_stiffness_relative_sd) > 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot
+from math import ceil, hypot
 from pathlib import Path
 from typing import Literal
 
@@ -40,6 +40,8 @@ __all__ = [
     "load_protocol",
     "parse_protocol",
 ]
+
+_ROUNDING = 1e-9  # samples: 12.5 s at 4.4 Hz are 55 of them
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,12 @@ class MeasurementProtocol:
             return tuple(up)
         down = [Step(number, "unloading", force) for number, force in reversed(levels[:-1])]
         return (*up, *down)
+
+    @property
+    def samples_of_step(self) -> int:
+        """As many as asked for, and at least as long as the hold."""
+        held = ceil(self.hold_s * self.sampling.rate_Hz - _ROUNDING)
+        return max(self.sampling.samples_per_step, held)
 
     def sequence(self) -> tuple[tuple[int, Run, int], ...]:
         """(index of the run, run, repetition from 1) in the order of measurement."""

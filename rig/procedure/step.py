@@ -59,7 +59,7 @@ class StepProcedure:
         half_width = self._protocol.force_band.half_width_N(step.target_N)
         show(step=step.number, steps=steps, target_N=step.target_N, band_N=half_width)
         show(branch=step.branch)
-        show(samples=0, samples_wanted=self._wanted())
+        show(samples=0, samples_wanted=self._protocol.samples_of_step)
         deadline = self._supervision.now() + self._protocol.step_deadline_s
         while True:
             first_row = self._recorder.rows
@@ -140,7 +140,7 @@ class StepProcedure:
 
     def _sample(self, where: Where, step: Step) -> None:
         taken = 0
-        while taken < self._wanted():
+        while taken < self._protocol.samples_of_step:
             self._supervision.show(phase="sampling", settle_remaining_s=0.0, samples=taken)
             _, slot = self._supervision.tick()
             if slot is not None and self.record(slot, where, step, settled=True):
@@ -189,11 +189,6 @@ class StepProcedure:
         place = {"pose": where.run.pose, "direction": where.run.direction}
         repetition = {"run": where.index, "repetition": where.repetition}
         self._recorder.event(kind, text, **repetition, **place, **data)
-
-    def _wanted(self) -> int:
-        """Samples per step: as many as asked for, and at least as long as the hold."""
-        sampling = self._protocol.sampling
-        return max(sampling.samples_per_step, round(self._protocol.hold_s * sampling.rate_Hz))
 
     def _stiffness(self) -> float:
         """Over the last two steps, N/mm: tells how far to turn; nan before there are two."""

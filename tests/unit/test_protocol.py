@@ -174,3 +174,15 @@ def test_three_mistakes_are_one_message_with_their_places() -> None:
         'P:23:27: runs[1].direction: "Y" is unknown. Known: x, y.',
         'P:24:1: repetitons: unknown key. Did you mean "repetitions"?',
     ]
+
+
+@pytest.mark.parametrize(
+    ("hold_s", "rate_Hz", "samples"), [(0, 1, 5), (5.2, 1, 6), (6.5, 1, 7), (12.5, 4.4, 55)]
+)
+def test_a_step_has_samples_for_at_least_its_hold(
+    hold_s: float, rate_Hz: float, samples: int
+) -> None:
+    paper = load_protocol(PROTOCOLS / "paper_xy.yaml")
+    sampling = dataclasses.replace(paper.sampling, rate_Hz=rate_Hz)
+    protocol = dataclasses.replace(paper, hold_s=hold_s, sampling=sampling)
+    assert protocol.samples_of_step == samples

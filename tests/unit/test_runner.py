@@ -234,11 +234,14 @@ def test_a_force_that_relaxes_out_of_its_band_is_approached_again(bench: Bench) 
     assert forces == pytest.approx([40.0] * len(forces), abs=0.5)
 
 
-def test_a_hold_is_sampled_for_as_long_as_it_lasts(bench: Bench) -> None:
-    bench.protocol = parse_protocol(PROTOCOL.replace("hold_s: 0", "hold_s: 7"), bench.path)
+@pytest.mark.parametrize(("hold_s", "samples"), [(7, 7), (4.4, 5)])
+def test_a_hold_is_sampled_for_at_least_as_long_as_it_lasts(
+    bench: Bench, hold_s: float, samples: int
+) -> None:
+    bench.protocol = parse_protocol(PROTOCOL.replace("hold_s: 0", f"hold_s: {hold_s}"), bench.path)
     bench.run()
     settled = [r for r in bench.good() if r["step"] == 1 and r["values"]["settled"]]
-    assert len(settled) == 2 * 7
+    assert len(settled) == 2 * samples
 
 
 def test_loading_ends_at_the_displacement_of_the_run(bench: Bench) -> None:
