@@ -343,5 +343,7 @@ def reverse(setup: Setup) -> Setup:
         lever=-setup.lever,
         offset_lever=-setup.offset_lever,
         turned_lever=-setup.turned_lever,
+        bent_lever=-setup.bent_lever,
+        turned_offset=-setup.turned_offset,
         moment=-setup.moment,
     )

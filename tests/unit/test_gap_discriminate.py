@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ import pytest
 from identification.gap import discriminate
 from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
-from identification.gap.designs import Design, candidates, present_design
+from identification.gap.designs import Design, candidates, present_design, reverse
 from identification.gap.discriminate import (
     ENOUGH,
     _discrimination,
@@ -23,8 +23,22 @@ from identification.gap.evidence import Engine
 from identification.gap.forms import Form, law_of
 from identification.gap.pool import Pool
 from identification.gap.search import search
+from rig.gap_data import arm_setup
+from rig.model import load_robot
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
+
+
+def test_a_place_loaded_the_other_way_is_the_setup_of_that_direction() -> None:
+    """All that is linear in the direction changes its sign; lengths, weights and squares stay."""
+    q, tcp = np.array([0.3, -1.2, 1.5, -0.4, 1.0, 0.2]), np.array([0.02, 0.0, 0.1])
+    n = np.array([0.6, 0.0, 0.8])
+    arm = load_robot("ur10e")
+    there = asdict(reverse(arm_setup(arm, "P1", q, tcp, "x", n)))
+    wanted = asdict(arm_setup(arm, "P1", q, tcp, "-x", -n))
+    assert (there["pose"], there["direction"]) == ("P1", "-x")
+    for name in wanted.keys() - {"pose", "direction", "tangents", "tangent_lever"}:
+        np.testing.assert_allclose(there[name], wanted[name], atol=1e-12, err_msg=name)
 
 
 def test_a_truth_in_the_pool_is_a_measurement_of_it() -> None:
