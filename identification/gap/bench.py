@@ -78,6 +78,8 @@ class Bench:
     columns: Pool = field(default_factory=Pool)
     flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
     moves: Array | None = None
+    # (channel, kind) -> lags (k,) s and what each does (k, n): of this bench alone, no copy's
+    lags: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict, init=False)
 
     @property
     def has_q(self) -> bool:

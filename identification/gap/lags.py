@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from identification.gap.bench import Bench
@@ -30,8 +28,11 @@ def closest_lag(bench: Bench, channel: str, kind: str, does: Array) -> tuple[flo
     return best[1], float(np.sqrt(best[0] / max(float(y @ y), 1e-300)))
 
 
-@lru_cache(maxsize=4)
 def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
-    """Lags (k,) s and what each does to the responses (k, n)."""
-    lags = _LAGS * sampling_time(bench.rows)
-    return lags, np.array([late(bench, channel, kind, float(t))[: bench.rows.n] for t in lags])
+    """Lags (k,) s and what each does to the responses (k, n). Kept with the bench: a cache of the
+    module would keep the benches of many diagnoses alive."""
+    if (channel, kind) not in bench.lags:
+        lags = _LAGS * sampling_time(bench.rows)
+        does = [late(bench, channel, kind, float(t))[: bench.rows.n] for t in lags]
+        bench.lags[channel, kind] = lags, np.array(does)
+    return bench.lags[channel, kind]

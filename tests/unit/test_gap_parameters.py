@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -20,6 +22,7 @@ from identification.gap.evidence import (
 from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
 from identification.gap.interval import NOMINAL, Parameter, Softer
+from identification.gap.lags import closest_lag
 from identification.gap.parameters import parameters, run_seconds
 from identification.gap.parts import Part
 from identification.gap.posterior import (
@@ -174,6 +177,19 @@ def test_a_lag_is_read_by_what_it_does(true: float) -> None:
     assert found.low < true < found.high
     # the load moves for 3 s, begun within the last half second: that much of what is seen is open
     assert sd(found) > 0.9 * 0.5 * 0.5 / 3 * (true - 0.5)
+
+
+def test_a_bench_whose_lag_was_read_is_let_go() -> None:
+    bench = up_and_down()
+    closest_lag(bench, "displacement", "delay", np.full(bench.rows.n, 1e-6))
+    other = replace(bench, moves=2 * bench.line)
+    does = late(other, "displacement", "delay", 0.9)[: other.rows.n]
+    lag, _ = closest_lag(other, "displacement", "delay", does)
+    assert lag == pytest.approx(0.9, rel=0.1)  # of the copy's own path
+    kept = weakref.ref(bench)
+    del bench, other
+    gc.collect()
+    assert kept() is None
 
 
 def test_a_lag_in_proportion_to_what_it_does() -> None:
