@@ -60,6 +60,21 @@ def test_what_bends_gives_way_under_load_in_every_part(
     assert charged(v, bad) < -25.0
 
 
+def test_axes_are_turned_where_both_that_lie_are_seen() -> None:
+    """Pushed all but along y, far out: about y next to nothing turns the stand."""
+    data = arm_data(directions="y")
+    n = np.array([0.0012, 1.0, 0.0]) / np.hypot(0.0012, 1.0)
+    setups = tuple(replace(s, unit_vector=n, moment=np.array([-0.7, 0.0008, 0.3]))
+                   for s in data.setups)  # fmt: skip
+    bench = make_bench(replace(data, setups=setups))
+    m = moments(bench, 0.0)[0]
+    assert abs(m[1]) < 1e-3 < abs(2 * m[0] * m[1])
+    _, variants = of(bench, "base_compliance")
+    assert variants["axes 0 m below"].info["axes"] == [0, 2]
+    assert "turned axes 0 m below" not in variants
+    assert all(set(v.info["axes"]) >= {0, 1} for v in variants.values() if v.info["turned"])
+
+
 def test_a_stand_that_tilts_about_an_oblique_edge_has_turned_axes(bench: Bench) -> None:
     fresh, variants = of(bench, "base_compliance")
     edge = np.array([np.cos(0.6), np.sin(0.6), 0.0])

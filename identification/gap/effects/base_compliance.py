@@ -65,7 +65,7 @@ def variants(bench: Bench) -> list[Variant]:
             variant(WORD, f"axes {depth:g} m below", [columns[a] for a in seen], SCALES, each=True,
                     axes=seen, **info)
         )  # fmt: skip
-        if np.abs(both).max() > 1e-3:
+        if {0, 1} <= set(seen) and np.abs(both).max() > 1e-3:
             coupling = bench.add(bench.outside_column(both * bench.load))
             stand = _turned(depth, [*(columns[a] for a in seen), coupling], seen)
             out.append(stand)
@@ -82,7 +82,8 @@ def variants(bench: Bench) -> list[Variant]:
 
 def _turned(depth: float, columns: list[int], axes: list[int]) -> Variant:
     """Of a stand whose soft axes lie between x and y, the moment about one turns it about the other
-    too. An axis half between them, either way, has a positive compliance as well."""
+    too. An axis half between them, either way, has a positive compliance as well. axes: x and y
+    first."""
     root = np.diag([*np.ones(len(axes)), COUPLED])
     total = np.append(np.ones(len(axes)), 0.0)
     between = np.zeros((2, len(columns)))
