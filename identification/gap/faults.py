@@ -157,8 +157,8 @@ _SATURATED = 2  # steps
 
 
 def saturates(data: GapData) -> float | None:
-    """Force (N), the largest of its run, that holds of ascending steps share while the displacement
-    goes on; None where there is none. Of an arm: its steps are steps of the force."""
+    """Force (N), the largest of its run either way, that holds of ascending steps share while the
+    displacement goes on; None where there is none. Of an arm: its steps are steps of the force."""
     hold = hold_ids(data)
     if not data.arm or is_continuous(data, hold):
         return None
@@ -167,16 +167,19 @@ def saturates(data: GapData) -> float | None:
     same, seen = _SAME_FORCE * data.instruments.force, 0
     for run in np.unique(data.run):
         at = np.flatnonzero((data.run[first] == run) & (data.branch[first] == LOADING))
-        ways, steps = np.diff(u[at]), np.diff(data.step[first][at])
+        if not at.size:
+            continue
+        top = float(force[at][np.abs(force[at]).argmax()])  # below zero where it is pulled
+        ways, steps = np.sign(top) * np.diff(u[at]), np.diff(data.step[first][at])
         goes_on = ways > max(
             _CLEARLY * data.instruments.displacement,
             _GOES_ON * float(np.median(np.abs(ways))) if ways.size else 0.0,
         )
         stays = (np.abs(np.diff(force[at])) < same) & (steps > 0) & goes_on
-        stays &= np.abs(force[at][1:] - force[at].max(initial=0.0)) < same
+        stays &= np.abs(force[at][1:] - top) < same
         seen += int(stays.sum())
         if seen >= _SATURATED and stays.any():
-            return float(force[at].max())
+            return top
     return None
 
 

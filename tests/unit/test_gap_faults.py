@@ -222,6 +222,8 @@ def test_a_force_that_stays_from_step_to_step_while_all_goes_on_is_an_amplifier_
     assert saturates(full) == pytest.approx(85.0)
     (note,) = faults(full)
     assert "stays at 85 N" in note
+    pulled = replace(full, force=-full.force, displacement=-full.displacement)
+    assert saturates(pulled) == pytest.approx(-85.0)
     still = np.where(full.step > 3, full.displacement[full.step == 3].mean(), full.displacement)
     assert saturates(replace(full, displacement=still)) is None  # nothing was turned on
     top = replace(data, force=np.where(data.step == 4, 121.0, data.force))
