@@ -253,6 +253,8 @@ class Course:
         if not (self.once and self.always_moves) or not np.ptp(self.response) > 0:
             return 0.0
         size = np.abs(self.response - self.response[0])
+        if len(size) < 3:
+            return 0.0
         fall = way_back(np.median([size[:-2], size[1:-1], size[2:]], axis=0))
         return float(fall / np.ptp(self.response))
 

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from identification.gap.bench import displacement_imposed
+from identification.gap.diagnose import diagnose_gap
 from rig.dataset import Origin, load
 from rig.diagnose import diagnose
 from rig.gap_data import gap_data
 from rig.tables import import_table
+from tests.conformance.gap_designs import DESIGNS, imported, meta, noisy
 from tests.unit.cli_bench import META, TABLE
 from tests.unit.test_gap_operators import bench_data
 
@@ -37,6 +39,17 @@ def test_a_force_that_never_changes_was_not_answered_to_a_stroke() -> None:
     data = bench_data(np.zeros(n), moved, step=step, branch=np.where(step > 0, 1, 0))
     assert not displacement_imposed(data)
     assert displacement_imposed(replace(data, imposed="displacement", force=1e5 * moved))
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize("rows", [1, 2, 3, 4, 5])
+def test_a_few_readings_are_diagnosed_as_nothing(name: str, rows: int) -> None:
+    """Of a running recording from where it bears: the first of them unloaded is another matter."""
+    design = DESIGNS[name]
+    table = noisy(design)
+    first = 3 if design.continuous else 0
+    data = gap_data(imported(table[first : first + rows], meta(design)))
+    assert diagnose_gap(data).verdict in ("none", "unknown")
 
 
 def test_where_nothing_is_wrong_no_place_is_named(tmp_path: Path) -> None:
