@@ -294,7 +294,7 @@ class _Integrated:
 
 
 def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
-    """0, then sizes of imperfection by factors of about 2.5, from half the stated uncertainty to
+    """0, then sizes of imperfection by factors of 2.5, from half the stated uncertainty to
     the size of what the base leaves."""
     start = 0.5 * bench.noise.stated
     left = structural_rms(bench, base, target)

@@ -19,6 +19,7 @@ LEAST_IMPERFECTION = 0.01
 # Of what a lag does at a reading of a hold: it repeats a path between levels that hands took and
 # nobody saw. Who turns a third of a step in a fifth of the time, in several strokes, is so far off.
 PATH = 0.4
+_STEP = 2.5  # of the grid, where two levels do not tell
 _SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
 
 
@@ -70,7 +71,9 @@ _FLOOR = float(np.log(LEAST_IMPERFECTION / IMPERFECTION))
 
 
 def _edge(etas: Array, i: int) -> float:
-    """log of the edge between level i and the next."""
+    """log of the edge between level i and the next: midway. Below the least size, which follows 0,
+    half a step of the grid, which may be of every other level only."""
     if i < 0 or i >= len(etas) - 1:
         return -np.inf if i < 0 else np.inf
-    return float(0.5 * np.log(max(etas[i], etas[i + 1] / 2.5) * etas[i + 1]))
+    step = etas[2] / etas[1] if len(etas) > 2 else _STEP
+    return float(0.5 * np.log((etas[i] if i else etas[1] / step) * etas[i + 1]))

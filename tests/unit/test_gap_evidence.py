@@ -23,6 +23,7 @@ from identification.gap.evidence import (
 from identification.gap.explanation import conditioned
 from identification.gap.finer import LOG_STEP
 from identification.gap.fit import _holds
+from identification.gap.imperfection import level_prior, log_share
 from identification.gap.parts import Part, log_joint_between, log_joints, mended
 from identification.gap.priors import prior_of
 from identification.gap.search import _as_stated, search
@@ -212,6 +213,17 @@ def test_probabilities_cover_all_words_and_sum_to_one() -> None:
 def test_words_that_need_an_arm_are_never_given_without_one() -> None:
     words = {v.word for v in library(small_bench())}
     assert not words & {"link_flexibility", "base_compliance", "base_slip", "pose_error"}
+
+
+@pytest.mark.parametrize("step", [2.5, 6.25])
+def test_levels_of_imperfection_are_bins_about_them(step: float) -> None:
+    """Of any grid: sizes within half a step of a level have its share of the prior."""
+    etas = np.concatenate([[0.0], 1e-6 * step ** np.arange(6)])
+    half = 0.5 * np.log(step)
+    for i in (1, 2, 3):
+        edges = np.log(etas[i]) + np.array([-half, half])
+        alone = float(log_share(etas, edges, (3e-6 / 0.04) ** 2)[0])
+        assert level_prior(etas, i, (3e-6 / 0.04) ** 2) == pytest.approx(alone, abs=1e-9)
 
 
 def test_fit_and_evidence_take_one_imperfection_of_a_hold() -> None:
