@@ -182,11 +182,15 @@ def _moves(
     beside: list[_Shapes],
     rivals: list[tuple[Parameters, float]],
 ) -> float:
-    """Mean square by which a parameter of an effect moves with what stands beside it."""
+    """Mean square by which a parameter of an effect moves with what stands beside it; shapes beside
+    which there is none say nothing of it."""
     total = 0.0
     for other in beside:
-        values = np.array([r[index][name].value for r in other.read])
-        total += float(other.share @ (values - values[0]) ** 2) / float(other.share.sum())
+        with_it = [i for i, r in enumerate(other.read) if name in r[index]]
+        values = np.array([other.read[i][index][name].value for i in with_it])
+        share = other.share[with_it]
+        if values.size:
+            total += float(share @ (values - values[0]) ** 2) / float(share.sum())
     have = [(r[name].value - value, weight) for r, weight in rivals if name in r]
     whole = 1.0 + sum(weight for _, weight in have)
     return total + sum(weight * off**2 for off, weight in have) / whole

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -184,6 +186,15 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
     both = known_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_x"]
     assert both.value == pytest.approx(alone.value)
     assert both.high - both.low > 1.02 * (alone.high - alone.low)
+
+
+def test_a_shape_beside_which_a_parameter_is_none_says_nothing_of_it() -> None:
+    """A threshold that the data hardly pass has an onset beside one shape, beside another none."""
+    each = [{"onset_y": Parameter(value, value - 1, value + 1, "N")} for value in (80.0, 86.0)]
+    read = [[each[0], {}], [{}, {}], [each[1], {}]]
+    beside = SimpleNamespace(index=1, read=read, share=np.array([1.0, 0.5, 0.5]))
+    moves = posterior._moves("onset_y", 80.0, 0, [cast("posterior._Shapes", beside)], [])
+    assert moves == pytest.approx(0.5 / 1.5 * 6.0**2)
 
 
 def test_intervals_of_effects_that_share_a_gap_are_wider() -> None:
