@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from identification.arm import STANDARD_GRAVITY, Arm, tool_offset
 from identification.elastic import Beam
-from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
+from identification.gap.data import BRANCH_NAMES, Array, Flags, GapData, Instruments, Ints, Setup
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from rig.dataset import Dataset
 from rig.errors import InputError
@@ -34,6 +34,7 @@ def gap_data(dataset: Dataset) -> GapData:
     used &= np.isfinite(dataset.columns["displacement_mm"])
     if not used.any():
         raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
+    used, aside = _without_holes(dataset, used)
     columns = {k: v[used] for k, v in dataset.columns.items()}
     names = [str(d) for d in columns["direction"]]
     poses = [str(p) for p in columns["pose"]]
@@ -71,14 +72,44 @@ def gap_data(dataset: Dataset) -> GapData:
         ),
         tangential=_tangential(columns, setups, setup),
         q=_readings(dataset, columns, poses),
-        temperature=_optional(columns, [f"temperature{j}_C" for j in range(1, 7)], 6),
+        temperature=_optional(columns, _MAY_MISS["joint temperatures"], 6),
         output_encoder=meta.joint_encoder == "output",
         datum=meta.datum,
         tare=meta.tare,
         imposed=meta.imposed,
         timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
-        notes=(*notes, *_unsettled(dataset)),
+        notes=(*notes, *aside, *_unsettled(dataset)),
     )
+
+
+_JOINTS = "joint readings"
+_MAY_MISS = {
+    _JOINTS: [f"q{j}_rad" for j in range(1, 7)],
+    "force components": [f"force_{a}_N" for a in "xyz"],
+    "joint temperatures": [f"temperature{j}_C" for j in range(1, 7)],
+}
+_FEW = 0.05  # of the samples
+
+
+def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...]]:
+    """The samples to use (n,), without a few that lack what all others have, and what to say of it:
+    a channel counts only where it is there throughout."""
+    notes = []
+    for what, names in _MAY_MISS.items():
+        has = all(n in dataset.columns for n in names)
+        if not has or (what == _JOINTS and dataset.meta.robot == "none"):
+            continue
+        values = [dataset.columns[n].astype(float) for n in names]
+        there, count = np.isfinite(values).all(axis=0), int(used.sum())
+        missing = int((used & ~there).sum())
+        if 0 < missing <= _FEW * count:
+            used = used & there
+            notes.append(f"{missing} of {count} samples lack {what}: set aside.")
+        elif 0 < missing < count:
+            notes.append(
+                f"{missing} of {count} samples lack {what}: taken as if none had been recorded."
+            )
+    return used, tuple(notes)
 
 
 def _unsettled(dataset: Dataset) -> tuple[str, ...]:
@@ -150,7 +181,7 @@ def _readings(
 ) -> Array | None:
     if dataset.meta.robot == "none":
         return None
-    q = _optional(columns, [f"q{j}_rad" for j in range(1, 7)], 6)
+    q = _optional(columns, _MAY_MISS[_JOINTS], 6)
     if q is None:
         return None
     commanded = {name: np.array(p.q_rad) for name, p in dataset.meta.poses.items()}

@@ -52,6 +52,29 @@ def test_a_few_readings_are_diagnosed_as_nothing(name: str, rows: int) -> None:
     assert diagnose_gap(data).verdict in ("none", "unknown")
 
 
+@pytest.mark.parametrize(("column", "field", "what"), [
+    ("q3_rad", "q", "joint readings"), ("force_y_N", "tangential", "force components"),
+])  # fmt: skip
+def test_a_hole_in_a_column_costs_its_samples_and_not_the_channel(
+    column: str, field: str, what: str
+) -> None:
+    table, count = noisy(DESIGNS["rich"]), len(noisy(DESIGNS["rich"]))
+    whole = gap_data(imported(table, meta(DESIGNS["rich"])))
+    few, many = table.copy(), table.copy()
+    few.loc[[57, 90], column] = np.nan
+    data = gap_data(imported(few, meta(DESIGNS["rich"])))
+    kept = np.delete(np.arange(count), [57, 90])
+    np.testing.assert_array_equal(getattr(data, field), getattr(whole, field)[kept])
+    np.testing.assert_array_equal(data.force, whole.force[kept])
+    assert f"2 of {count} samples lack {what}: set aside." in data.notes
+    many.loc[: count // 2, column] = np.nan
+    data = gap_data(imported(many, meta(DESIGNS["rich"])))
+    assert getattr(data, field) is None
+    assert len(data.force) == count
+    note = f"{count // 2 + 1} of {count} samples lack {what}: taken as if none had been recorded."
+    assert note in data.notes
+
+
 def test_where_nothing_is_wrong_no_place_is_named(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(TABLE)
     (tmp_path / "m.yaml").write_text(META)
