@@ -39,11 +39,6 @@ def mirror(beta: float) -> Array:
     return S
 
 
-def beta_of_angle(angle: float) -> float:
-    """beta (rad) for two arms whose base x axes enclose `angle` (rad): `(pi - angle) / 2`."""
-    return (np.pi - angle) / 2
-
-
 def mirrored(C: Array, beta: float) -> Array:
     """Compliance (..., 6, 6) of the mirror image at the common node: `S C S`."""
     S = mirror(beta)

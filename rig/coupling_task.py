@@ -75,10 +75,9 @@ class TaskResult:
             )
         verdict = "the task can be done" if best.feasible else "no placement reaches the task"
         lines.append(f"  reached over required: {best.margin:.2f}; {verdict}")
-        if self.as_modelled is not None:
-            lines.append(
-                f"  as modelled (beta = {np.rad2deg(self.spec.beta):g} deg): {self.as_modelled:.2f}"
-            )
+        lines.append(
+            f"  as modelled (beta = {np.rad2deg(self.spec.beta):g} deg): {self.as_modelled:.2f}"
+        )
         return "\n".join([*lines, *(f"Note: {note}" for note in self.notes)])
 
 

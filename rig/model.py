@@ -98,11 +98,6 @@ def load_robot(name_or_path: str | Path) -> Arm:
     return _robot(name_or_path)[0]
 
 
-def robot_reach(name_or_path: str | Path) -> float:
-    """Nominal reach about the shoulder in m, as the maker states it."""
-    return _robot(name_or_path)[1]
-
-
 def told_first(notes: Sequence[str]) -> tuple[list[str], list[str]]:
     """Notes that have to be read before any number (where it comes from), and the others."""
     first = [note for note in notes if note.startswith(("EMULATED:", "INCOMPLETE:"))]

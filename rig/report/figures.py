@@ -212,29 +212,6 @@ def compared_curves(
     return watermark(figure, banners)
 
 
-def gap_sizes(gap: Json, banners: Sequence[str]) -> Figure:
-    """rms of the gap before and after the effects, fitted and withheld, over the noise.
-
-    gap: the object `gap` of rig.diagnosis/1.
-    """
-    held = [h for h in (gap["held_out"], *gap.get("held_out_other", ())) if h]
-    rows = [("fitted", gap), *((f"withheld {h['fold']}", h) for h in held)]
-    figure, axes = _axes(7.5, 1.2 + 0.55 * len(rows), "rms in mm", "")
-    at = -np.arange(len(rows), dtype=float)
-    for shift, key, colour, word in ((0.19, "before", "0.6", "simulation as it was"),
-                                     (-0.19, "after", COLOURS[0], "with the effects")):  # fmt: skip
-        axes.barh(at + shift, [r[f"{key}_rms_mm"] for _, r in rows], 0.36, color=colour,
-                  label=word)  # fmt: skip
-    axes.axvline(gap["noise_rms_mm"], color="black", linestyle="--", linewidth=1,
-                 label="noise of the instruments")  # fmt: skip
-    axes.set_yticks(at, [name for name, _ in rows])
-    axes.set_xscale("log")
-    plain_numbers(axes.xaxis)
-    axes.grid(visible=False, axis="y")
-    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=8)
-    return watermark(figure, banners)
-
-
 def _axes(width: float, height: float, x: str, y: str) -> tuple[Figure, Any]:
     from matplotlib.figure import Figure
 

@@ -7,7 +7,6 @@ it does on another bench. On the bench that it came from, it is the fitted contr
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -157,8 +156,3 @@ def _of_terms(form: Form, keep: list[bool]) -> Form:
     return replace(
         form, law=law, values=form.values[mine], covariance=form.covariance[np.ix_(mine, mine)]
     )
-
-
-def known_words() -> Iterable[str]:
-    """Words that have a form: all of the library."""
-    return _TABLE
