@@ -26,7 +26,7 @@ from rig.errors import InputError, did_you_mean
 from rig.gap_data import gap_data
 from rig.gap_forms import effects_of
 from rig.meta import Simulation
-from rig.model import load_model
+from rig.model import ArmModel, load_model
 from rig.other_setups import elsewhere
 from rig.other_simulator import with_curves
 
@@ -40,13 +40,14 @@ Progress = Callable[[str, float], None]
 class Diagnosis:
     """The result with what it came from; `to_json` is schema rig.diagnosis/1. known_effects: of
     the model that was given, part of the simulation; left_behind: words of that model which belong
-    to the session that it was made from, and are no part of it."""
+    to the session that it was made from, and are no part of it; model: the model itself."""
 
     dataset: str
     result: GapResult
     banners: tuple[str, ...] = ()
     known_effects: tuple[dict[str, Any], ...] = ()
     left_behind: tuple[str, ...] = ()
+    model: ArmModel | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The diagnosis as plain values."""
@@ -92,7 +93,14 @@ class Diagnosis:
                 f"Left out of the model: {', '.join(self.left_behind)}, of the session that it was "
                 "made from."
             )
-        return "\n\n".join([*self.banners, *known, render(self.result)])
+        return "\n\n".join([*self.banners, *self._outside(), *known, render(self.result)])
+
+    def _outside(self) -> list[str]:
+        """What the simulation has beside springs and effects."""
+        if self.model is None or not self.model.written_outside:
+            return []
+        keys = " and ".join(f"`{key}`" for key in self.model.written_outside)
+        return [f"The simulation has the model's {keys}: the gap is what goes beyond them."]
 
 
 def diagnose(
@@ -104,15 +112,17 @@ def diagnose(
     add: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Diagnoses a data set. model: a model file whose springs (and effects) stand for META's;
+    """Diagnoses a data set. model: a model file whose springs (and links, mounting, effects) stand
+    for META's;
     simulation: CSV with another simulator's curves; withhold: words taken out of the library; add:
     words the explanation must contain. InputError for anything wrong."""
     known: tuple[dict[str, Any], ...] = ()
     behind: tuple[str, ...] = ()
-    if model is None:
+    read = None if model is None else load_model(model)
+    if read is None:
         data = gap_data(dataset)
     else:
-        data, known, behind = _believing(dataset, model)
+        data, known, behind = _believing(dataset, read)
     if simulation is not None:
         data = with_curves(data, simulation)
     out, forced = tuple(withhold), tuple(add)
@@ -127,12 +137,12 @@ def diagnose(
             data,
             withhold=out,
             add=forced,
-            others=lambda: elsewhere(dataset),
+            others=lambda: elsewhere(dataset, read),
             progress=progress,
         )
     except NotShown as error:
         raise InputError(f"--add: {error}.") from error
-    return Diagnosis(dataset.uuid, result, dataset.banners(), known, behind)
+    return Diagnosis(dataset.uuid, result, dataset.banners(), known, behind, read)
 
 
 def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
@@ -146,22 +156,21 @@ def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
 
 
 def _believing(
-    dataset: Dataset, model: Path
+    dataset: Dataset, read: ArmModel
 ) -> tuple[GapData, tuple[dict[str, Any], ...], tuple[str, ...]]:
-    """The data with springs and effects of a model file as their simulation, those effects, and
-    words of the model that are left out."""
-    read = load_model(model)
+    """The data with springs, links, mounting and effects of a model as their simulation, those
+    effects, and words of the model that are left out."""
     effects = effects_of(read)
     if read.arm.name != dataset.meta.robot:
         raise InputError(
-            f"{model}: the robot is {read.arm.name}, the measurement's is {dataset.meta.robot}. "
-            "Give the model of the measured robot."
+            f"{read.name}: the robot is {read.arm.name}, the measurement's is "
+            f"{dataset.meta.robot}. Give the model of the measured robot."
         )
     c1, c2, c3, c4, c5, c6 = (float(c) for c in read.arm.joint_stiffness)
     simulation = Simulation(joint_stiffness_Nm_per_rad=(c1, c2, c3, c4, c5, c6))
     believed = dataset.meta.model_copy(update={"simulation": simulation})
     data = replace(
-        gap_data(replace(dataset, meta=believed)),
+        gap_data(replace(dataset, meta=believed), read),
         compliance_relative_sd=read.arm.joint_stiffness_relative_sd,
     )
     lasting, behind = effects.lasting, effects.left_behind
@@ -172,7 +181,7 @@ def _believing(
     try:
         return less_known(data, lasting), known, behind
     except ValueError as error:
-        raise InputError(f"{model}: effects: {error}. Give a model without effects.") from error
+        raise InputError(f"{read.name}: effects: {error}. Give a model without effects.") from error
 
 
 def _looks_like(r: GapResult) -> dict[str, Any] | None:

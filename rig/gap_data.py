@@ -13,7 +13,7 @@ from identification.gap.data import BRANCH_NAMES, Array, Flags, GapData, Instrum
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from rig.dataset import Dataset
 from rig.errors import InputError
-from rig.model import load_robot
+from rig.model import ArmModel, load_robot
 from rig.storage.columns import SAMPLE_NUMBER
 
 MM = 1e-3
@@ -22,8 +22,9 @@ _STANDS = 0.5  # share of the samples of a run at which its clock stands still
 _STEP_RAD = 1e-5  # central differences of levers: error below 1e-9
 
 
-def gap_data(dataset: Dataset) -> GapData:
-    """SI arrays of the samples in use. InputError where META lacks what a diagnosis needs."""
+def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
+    """SI arrays of the samples in use. model: whose links and mounting are simulated beside the
+    springs of META. InputError where META lacks what a diagnosis needs."""
     meta, where = dataset.meta, str(dataset.path or "data set")
     if meta.simulation is None:
         raise InputError(
@@ -42,7 +43,7 @@ def gap_data(dataset: Dataset) -> GapData:
     number = {key: i for i, key in enumerate(keys)}
     setup = np.array([number[k] for k in zip(poses, names, strict=True)], dtype=np.int64)
     arm = None if meta.robot == "none" else load_robot(meta.robot)
-    setups = tuple(_setup(dataset, arm, pose, name) for pose, name in keys)
+    setups = tuple(_setup(dataset, arm, pose, name, model) for pose, name in keys)
     compliance, relative = _springs(dataset)
     meter = meta.instruments
     run, session = (
@@ -199,19 +200,24 @@ def _tangential(
     )
 
 
-def _setup(dataset: Dataset, arm: Arm | None, pose: str, direction: str) -> Setup:
+def _setup(
+    dataset: Dataset, arm: Arm | None, pose: str, direction: str, model: ArmModel | None
+) -> Setup:
     n = np.array(dataset.meta.directions[direction], dtype=float)
     if arm is None:
         return _bench_setup(dataset, direction, n, _tangents(n))
     where = dataset.meta.poses[pose]
     return arm_setup(
-        arm, pose, np.array(where.q_rad), np.array(where.tcp_xyz_mm) * MM, direction, n
+        arm, pose, np.array(where.q_rad), np.array(where.tcp_xyz_mm) * MM, direction, n, model
     )
 
 
-def arm_setup(arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Array) -> Setup:
+def arm_setup(
+    arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Array,
+    model: ArmModel | None = None,
+) -> Setup:  # fmt: skip
     """The setup of an arm: q (6,) rad, point of load tcp (3,) m in the flange frame, direction n
-    (3,) of length 1."""
+    (3,) of length 1; model: whose links and mounting are simulated, by default none."""
     tool, tangents = tool_offset(tcp), _tangents(n)
     J = arm.jacobian(q, tool)[:3]
     flange = arm.fk(q, tool)
@@ -238,6 +244,7 @@ def arm_setup(arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Arra
         tool_gravity=J.T @ np.array(STANDARD_GRAVITY),
         bent_lever=_bent(arm, q, tool, n),
         turned_offset=_turned_offset(axes, n) @ R,
+        outside=0.0 if model is None else model.outside(q, tool, n),
     )  # fmt: skip
 
 

@@ -61,6 +61,7 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
         "[0, 0, 0, 1]]}",
         f"{SPRINGS}: {_flow([float(f'{k:.7g}') for k in stiffness])}",
         f"joint_stiffness_sd: {_flow([float(f'{s:.4g}') for s in sd])}",
+        *_outside(diagnosis),
         *_effects(diagnosis, dataset),
         "# Not measured, an assumption for rig couple: edit it to the second arm's place.",
         f"coupling: {{base_distance_mm: {_ASSUMED_DISTANCE_MM:g}, beta_deg: 0, load_axes: base, "
@@ -111,6 +112,12 @@ def forms(result: GapResult) -> list[Form]:
     return [
         describe(result.bench, part, *result.fit.of(i)) for i, part in enumerate(result.fit.parts)
     ]
+
+
+def _outside(diagnosis: Diagnosis) -> list[str]:
+    """Links and mounting of the model that was given: part of the simulation that is corrected."""
+    written = {} if diagnosis.model is None else diagnosis.model.written_outside
+    return [f"{key}: {_flow(value)}" for key, value in written.items()]
 
 
 def _effects(diagnosis: Diagnosis, dataset: Dataset) -> list[str]:

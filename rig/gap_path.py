@@ -105,7 +105,7 @@ def planned_data(model: ArmModel, procedure: MeasurementProtocol) -> GapData:
         arm_setup(
             model.arm, run.pose, np.array(poses[run.pose].q_rad),
             np.array(poses[run.pose].tcp_xyz_mm) / 1e3, run.direction,
-            np.array(procedure.directions[run.direction]),
+            np.array(procedure.directions[run.direction]), model,
         )
         for run in procedure.runs
     )  # fmt: skip

@@ -110,7 +110,6 @@ def points(r: GapResult) -> Points:
 
     left = r.engine.target[: rows.n] - r.fit.response
     response = mean(bench.response)
-    stated = np.sum(bench.lever**2 * bench.data.compliance, axis=1)
     precision = np.bincount(number, weights=1 / r.engine.sigma[: rows.n] ** 2)
     noise = np.sqrt(1 / precision + bench.noise.hold[first] ** 2)
     return Points(
@@ -119,7 +118,7 @@ def points(r: GapResult) -> Points:
         session=mean(rows.session), force=mean(rows.measured_force),
         displacement=mean(rows.displacement) * MM, measured=response * MM,
         before=mean(stated_prediction(r.engine)) * MM, after=(response - mean(left)) * MM,
-        stated=mean(stated) * MM, noise=noise * MM,
+        stated=mean(bench.stated_slope) * MM, noise=noise * MM,
     )  # fmt: skip
 
 

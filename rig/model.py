@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -63,7 +63,8 @@ class Requirement:
 @dataclass(frozen=True, eq=False)
 class ArmModel:
     """A model file, read and checked. q (6,) rad, tool (4, 4), mounting: compliance (6, 6) of the
-    base or None; `effects` verbatim; `links` in use (empty: rigid links)."""
+    base or None; `effects` verbatim; `links` in use (empty: rigid links); written_outside: links
+    and mounting as the file has them, of the keys that it has."""
 
     name: str
     arm: Arm
@@ -76,10 +77,19 @@ class ArmModel:
     required: tuple[Requirement, ...]
     reach: float | None
     note: str = ""
+    written_outside: Mapping[str, Any] = field(default_factory=dict)
 
     def compliance(self) -> Array:
         """Compliance (6, 6) at the tool of the single arm, effects left out."""
         return self.arm.compliance(self.q, self.tool, links=self.links, base=self.mounting)
+
+    def outside(self, q: Array, tool: Array, n: Array) -> float:
+        """m/N along n (3,) at the tool (4, 4) in pose q (6,): what links and mounting give way."""
+        if self.mounting is None and not self.links:
+            return 0.0
+        springs = self.arm.compliance(q, tool)
+        C = self.arm.compliance(q, tool, links=self.links, base=self.mounting) - springs
+        return float(n @ C[:3, :3] @ n)
 
 
 # --- reading -------------------------------------------------------------------------------------
@@ -123,6 +133,7 @@ def load_model(path: str | Path) -> ArmModel:
         required=tuple(_requirement(document, i) for i in range(len(written.required))),
         reach=reach,
         note=written.note,
+        written_outside=_written_outside(written),
     )
 
 
@@ -321,6 +332,23 @@ def _section(
         raise AssertionError
     wall = None if written.wall_mm is None else written.wall_mm / 1e3
     return _checked(document, place, lambda: tube(material, written.diameter_mm / 1e3, wall))
+
+
+def _written_outside(written: ModelFile) -> dict[str, Any]:
+    """Plain values of `link_segments` and `mounting`, left out where there are none."""
+    out: dict[str, Any] = {}
+    if isinstance(written.link_segments, list):
+        out["link_segments"] = [_given(s) for s in written.link_segments]
+    elif written.link_segments != "none":
+        out["link_segments"] = written.link_segments
+    if written.mounting is not None:
+        out["mounting"] = _given(written.mounting)
+    return out
+
+
+def _given(written: Any) -> dict[str, Any]:
+    """A part of a file, without the keys that it leaves out."""
+    return asdict(written, dict_factory=lambda pairs: {k: v for k, v in pairs if v is not None})
 
 
 def _mounting(written: MountingFile | None) -> Array | None:

@@ -11,15 +11,16 @@ from identification.inverse import solutions
 from rig.dataset import Dataset
 from rig.gap_data import arm_setup
 from rig.meta import Meta
-from rig.model import load_robot
+from rig.model import ArmModel, load_robot
 
 _NEARER_M = 0.2  # of the point of load towards the base's axis: levers about a quarter shorter
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-def elsewhere(dataset: Dataset) -> list[Elsewhere]:
+def elsewhere(dataset: Dataset, model: ArmModel | None = None) -> list[Elsewhere]:
     """Other poses with the directions of the first one, and base axes not loaded yet; empty for a
-    rig without an arm. Poses that the arm does not reach are left out."""
+    rig without an arm. Poses that the arm does not reach are left out. model: whose links and
+    mounting are simulated."""
     meta = dataset.meta
     if meta.robot == "none":
         return []
@@ -29,14 +30,14 @@ def elsewhere(dataset: Dataset) -> list[Elsewhere]:
     out = []
     for name, (text, q) in other_poses(arm, meta, first).items():
         setups = tuple(
-            arm_setup(arm, name, q, tcp, d, np.array(n)) for d, n in meta.directions.items()
+            arm_setup(arm, name, q, tcp, d, np.array(n), model) for d, n in meta.directions.items()
         )
         out.append(Elsewhere(name.rsplit("_", maxsplit=1)[-1], text, setups))
     vectors = np.array(list(meta.directions.values()))
     for axis, vector in AXES.items():
         if np.abs(vectors @ np.array(vector)).max() < 0.9 and axis not in meta.directions:
             q = np.array(meta.poses[first].q_rad)
-            one = arm_setup(arm, first, q, tcp, axis, np.array(vector))
+            one = arm_setup(arm, first, q, tcp, axis, np.array(vector), model)
             text = f"Load along {axis} of the base frame as well: other joints carry there."
             out.append(Elsewhere(f"axis {axis}", text, (one,)))
     return out

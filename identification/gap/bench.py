@@ -49,8 +49,9 @@ class Bench:
 
     load (n,) N: what drives the rig, as a force. torque (n, m): torque of each joint under it.
     lever (n, m). elastic (n, m) rad: deflection of each simulated joint. slope (n,) m/N: simulated
-    compliance along the direction. sense: +1 where the force is imposed and the effect adds
-    displacement; -1 where the displacement is imposed and the same effect takes force away.
+    compliance along the direction, of springs and what is simulated beside them. sense: +1 where
+    the force is imposed and the effect adds displacement; -1 where the displacement is imposed and
+    the same effect takes force away.
     reach m: largest simulated or measured response, the natural unit of what has no other.
     scatter (n,) m^2: mean square of the samples about their row; trend (n,) m s: mean product of
     time and response about it.
@@ -241,7 +242,11 @@ class Bench:
     @cached_property
     def stated_slope(self) -> Array:
         """(n,) m/N: compliance along the direction as simulated, by which a response is a force."""
-        return np.asarray(self.lever**2 @ self.data.compliance)
+        return self.slope_of(self.data.compliance)
+
+    def slope_of(self, compliance: Array) -> Array:
+        """(n,) m/N: compliance along the direction with springs of that compliance (m,)."""
+        return np.asarray(self.lever**2 @ compliance + _outside(self.data, self.rows))
 
     def _follow(self, response: Array) -> Array:
         """Deflections (n, m) of the joints under the force behind a response (n,) m."""
@@ -325,8 +330,8 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     rows = rows or reduce_rows(data)
     c = data.compliance if compliance is None else compliance
     lever = np.stack([s.lever for s in data.setups])[rows.setup]
-    slope = lever**2 @ c
-    stated = lever**2 @ data.compliance
+    outside = _outside(data, rows)
+    slope, stated = (lever**2 @ springs + outside for springs in (c, data.compliance))
     imposed = displacement_imposed(data)
     load = driven(data, rows, imposed)
     if imposed:
@@ -352,6 +357,11 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, scatter=scatter,
         trend=trend, observed=observed,
     )  # fmt: skip
+
+
+def _outside(data: GapData, rows: Rows) -> Array:
+    """(n,) m/N: of the setup of every row."""
+    return np.array([s.outside for s in data.setups])[rows.setup]
 
 
 def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:

@@ -33,7 +33,9 @@ class Setup:
     base origin of a newton along the direction. links (2, l, 4) m/N: compliance along the
     direction of each nominal link by bending at its start, in its middle, at its end, and by twist,
     placed as the model has it, and from joint to joint. gravity (m,) Nm: torques of the arm's own
-    weight; tool_gravity (m,) Nm/kg: of a mass at the point of load.
+    weight; tool_gravity (m,) Nm/kg: of a mass at the point of load. outside m/N: compliance along
+    the direction of what the simulation has beside the springs (segments, mounting), which no joint
+    reading sees.
     Second order, 0 where there is none: bent_lever (m, m, m), change of turned_lever per radian;
     turned_offset (m, m, 3), change of offset_lever i per radian of joint j.
     """
@@ -52,6 +54,7 @@ class Setup:
     tool_gravity: Array | float = 0.0
     bent_lever: Array | float = 0.0
     turned_offset: Array | float = 0.0
+    outside: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -161,12 +161,13 @@ def planned(design: Design, bench: Bench) -> GapData:
     whole, n, data = np.int64, len(rows), bench.data
     setup, repetition = setup.astype(whole), repetition.astype(whole)
     lever = np.stack([s.lever for s in design.setups])[setup]
+    outside = np.array([s.outside for s in design.setups])[setup]
     new = np.append(True, (np.diff(setup) != 0) | (np.diff(repetition) != 0))
     return replace(
         data, setups=design.setups, time=time, session=session,
         run=np.cumsum(new).astype(whole) - 1, setup=setup, repetition=repetition,
         branch=branch.astype(whole), step=step.astype(whole), force=load,
-        displacement=np.sum(lever**2 * data.compliance, axis=1) * load,
+        displacement=(lever**2 @ data.compliance + outside) * load,
         instruments=design.instruments,
         tangential=np.zeros((n, 2)) if design.components else None,
         q=np.zeros((n, data.joints)) if design.readings else None,

@@ -127,7 +127,7 @@ def _counted_from(bench: Bench, compliance: Array) -> Bench:
     """The bench with these springs (m,)."""
     return replace(
         bench, compliance=compliance, elastic=bench.torque * compliance,
-        slope=np.asarray(bench.lever**2 @ compliance),
+        slope=bench.slope_of(compliance),
     )  # fmt: skip
 
 
