@@ -28,9 +28,10 @@ class Base:
 
 
 def prediction(bench: Bench) -> Array:
-    """Stacked: what springs of `bench.compliance` predict."""
+    """Stacked: what springs of `bench.compliance` predict, or another simulator; of that nobody
+    knows how the joints turn, so that these are taken to do as the springs do."""
     if bench.rows.simulated is not None:
-        return bench.stacked(bench.rows.simulated)
+        return bench.stacked(bench.rows.simulated, bench.elastic)
     return bench.stacked(bench.slope * bench.load, bench.elastic) + HALF * _geometry(bench)
 
 

@@ -18,8 +18,10 @@ from rig.gap_data import gap_data
 from rig.gap_model import write_model
 from rig.model import load_model
 from rig.other_setups import elsewhere
+from rig.simulate import simulate, write_csv
 from tests.conformance.gap_designs import DESIGNS, STATED, TCP_MM, Array, Q, imported, meta, noisy
 
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
 MODEL = f"""robot: ur10e
 pose: {{q_rad: {Q["P1"]}}}
 tool: {{length_mm: 100}}
@@ -80,6 +82,17 @@ def test_what_the_model_has_is_no_gap(folder: Path, found: Diagnosis) -> None:
     assert without.result.verdict != "none"
     assert without.result.before > 3 * found.result.before
     assert "`mounting`" not in without.to_text()
+
+
+def test_a_model_and_its_curves_are_one_simulation(folder: Path, found: Diagnosis) -> None:
+    text = (PROTOCOLS / "paper_xy.yaml").read_text("utf-8")
+    pose = text[text.index("poses:") : text.index("joint_encoder:")]
+    here = f"poses:\n  P1: {{q_rad: {Q['P1']}, tcp_xyz_mm: {TCP_MM}}}\n"
+    (folder / "p.yaml").write_text(text.replace(pose, here))
+    write_csv(simulate(model(folder), folder / "p.yaml"), folder / "curves.csv")
+    curves = diagnose(measured(folder), simulation=folder / "curves.csv")
+    assert curves.result.verdict == "none"
+    assert curves.result.before == pytest.approx(found.result.before, rel=1e-3)
 
 
 def test_a_corrected_model_keeps_them(folder: Path, found: Diagnosis) -> None:
