@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData
+from identification.gap.faults import Fault, found_in
 from identification.gap.imposed import approaches
 from identification.gap.loops import lost
 from identification.gap.rows import Rows
@@ -270,6 +271,11 @@ class Course:
     def let_go(self) -> Snaps | None:
         """Forces that let go of a rig without an arm, None where they don't."""
         return None if self.data.arm else let_go(self.data)
+
+    @cached_property
+    def faults(self) -> tuple[Fault, ...]:
+        """Of the instruments that recorded it."""
+        return found_in(self.data)
 
     @cached_property
     def wanders(self) -> str | None:

@@ -20,7 +20,7 @@ from identification.gap.effects import library
 from identification.gap.ends import without_ends
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Explanation, Found, Likeness
-from identification.gap.faults import faults, goes_against
+from identification.gap.faults import SIGNS
 from identification.gap.fit import Fit, fit
 from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
@@ -223,7 +223,8 @@ def _left(engine: Engine, fitted: Fit) -> float:
 
 def _likeness(found: Found, verdict: str) -> Likeness | None:
     """Of an unknown gap; none of one whose channels count in opposite senses."""
-    if verdict != "unknown" or goes_against(found.engine.bench.data):
+    course = found.engine.bench.course
+    if verdict != "unknown" or any(f.kind == SIGNS for f in course.faults):
         return None
     return found.looks_like
 
@@ -369,7 +370,7 @@ def _notes(bench: Bench) -> tuple[str, ...]:
         out.append("No session clock: drifts are seen only within runs and from run to run.")
     if bench.course.timeless:
         out.append("No time was recorded: lags, creep and how fast it flowed are left out.")
-    out += faults(data)
+    out += [f.text for f in bench.course.faults]
     if bench.course.let_go:
         out.append(_let_go(bench.course.let_go, float(np.ptp(data.force))))
     if bench.noise.raised > NOISY:

@@ -6,6 +6,8 @@ a dial is misread by a whole turn; an amplifier is full; a specimen has long bee
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -15,59 +17,118 @@ from identification.gap.ends import after_break
 from identification.gap.holds import hold_ids, is_continuous
 
 
-def faults(data: GapData) -> tuple[str, ...]:
-    """A note for every fault that is found, with what to see to."""
-    out = []
-    against = goes_against(data)
-    if against:
-        out.append(
-            f"The displacement falls while the force grows, in {', '.join(against)}: one of the "
-            "two has the wrong sign. See which way force and laser count, turn one of them in the "
-            "table, and diagnose again."
-        )
-    if bursts(data):
-        out.append(
-            "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "
-            "glitches, which no effect explains. See to the laser's mounting and to the cables."
-        )
-    since = frozen_since(data)
-    if since is not None:
-        at = f"After {since:.4g} s" if data.timed else f"After {since:.0f} readings of a run"
-        out.append(
-            f"{at} the displacement is the same number, less than was read before, while the force "
-            "goes on growing: the sensor has lost its target, or stands still. See to it."
-        )
-    back = goes_back(data)
-    if back is not None and not against:
-        out.append(
-            f"At {data.force[back]:.4g} N the displacement goes back, from "
-            f"{1e3 * data.displacement[back - 1]:.4g} to {1e3 * data.displacement[back]:.4g} mm, "
-            "though the force grows: misread, mistyped, a sensor that slipped, or something else "
-            "that moves the target. See to these readings."
-        )
-    stuck = jumps_to(data)
-    if stuck is not None:
-        share = float(np.mean(data.displacement == stuck))
-        out.append(
-            f"The displacement jumps to one and the same number, {1e3 * stuck:.6g} mm, and back "
-            f"again and again ({share:.0%} of the readings) while the force stands: what a sensor, "
-            "or its converter, says when it has nothing to say. See to it."
-        )
-    full = saturates(data)
-    if full is not None:
-        out.append(
-            f"From step to step the force stays at {full:.4g} N, while the displacement goes on as "
-            "before: an amplifier that is full, or a range that is too small. See to it."
-        )
-    broken = after_break(data)
-    if broken.any():
-        out.append(
-            f"The force falls at once while the stroke goes on (at {data.time[broken][0]:.4g} s), "
-            f"and {broken.mean():.0%} of the readings come after that: a break. End the recording "
-            "there to learn of what was before."
-        )
-    return tuple(out)
+@dataclass(frozen=True)
+class Fault:
+    """kind: one of the names below; text: what is wrong, where, and what to see to."""
 
+    kind: str
+    text: str
+
+
+SIGNS, BURSTS, FROZEN, GOES_BACK, JUMPS, FULL, BROKEN = (
+    "signs", "bursts", "frozen", "goes back", "jumps", "full", "broken",
+)  # fmt: skip
+
+
+def found_in(data: GapData) -> tuple[Fault, ...]:
+    """Every fault that is found."""
+    told = {kind: text for kind, detector in _DETECTORS.items() if (text := detector(data))}
+    if SIGNS in told:  # what counts the wrong way goes back all the time
+        told.pop(GOES_BACK, None)
+    return tuple(Fault(kind, text) for kind, text in told.items())
+
+
+def faults(data: GapData) -> tuple[str, ...]:
+    """What is said of every fault."""
+    return tuple(f.text for f in found_in(data))
+
+
+# --- what is said of each ------------------------------------------------------------------------
+
+
+def _signs(data: GapData) -> str:
+    against = goes_against(data)
+    if not against:
+        return ""
+    return (
+        f"The displacement falls while the force grows, in {', '.join(against)}: one of the "
+        "two has the wrong sign. See which way force and laser count, turn one of them in the "
+        "table, and diagnose again."
+    )
+
+
+def _bursts(data: GapData) -> str:
+    if not bursts(data):
+        return ""
+    return (
+        "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "
+        "glitches, which no effect explains. See to the laser's mounting and to the cables."
+    )
+
+
+def _lost(data: GapData) -> str:
+    since = frozen_since(data)
+    if since is None:
+        return ""
+    at = f"After {since:.4g} s" if data.timed else f"After {since:.0f} readings of a run"
+    return (
+        f"{at} the displacement is the same number, less than was read before, while the force "
+        "goes on growing: the sensor has lost its target, or stands still. See to it."
+    )
+
+
+def _goes_back(data: GapData) -> str:
+    back = goes_back(data)
+    if back is None:
+        return ""
+    return (
+        f"At {data.force[back]:.4g} N the displacement goes back, from "
+        f"{1e3 * data.displacement[back - 1]:.4g} to {1e3 * data.displacement[back]:.4g} mm, "
+        "though the force grows: misread, mistyped, a sensor that slipped, or something else "
+        "that moves the target. See to these readings."
+    )
+
+
+def _jumps(data: GapData) -> str:
+    stuck = jumps_to(data)
+    if stuck is None:
+        return ""
+    share = float(np.mean(data.displacement == stuck))
+    return (
+        f"The displacement jumps to one and the same number, {1e3 * stuck:.6g} mm, and back "
+        f"again and again ({share:.0%} of the readings) while the force stands: what a sensor, "
+        "or its converter, says when it has nothing to say. See to it."
+    )
+
+
+def _full(data: GapData) -> str:
+    full = saturates(data)
+    if full is None:
+        return ""
+    return (
+        f"From step to step the force stays at {full:.4g} N, while the displacement goes on as "
+        "before: an amplifier that is full, or a range that is too small. See to it."
+    )
+
+
+def _broken(data: GapData) -> str:
+    broken = after_break(data)
+    if not broken.any():
+        return ""
+    return (
+        f"The force falls at once while the stroke goes on (at {data.time[broken][0]:.4g} s), "
+        f"and {broken.mean():.0%} of the readings come after that: a break. End the recording "
+        "there to learn of what was before."
+    )
+
+
+_DETECTORS: dict[str, Callable[[GapData], str]] = {
+    SIGNS: _signs, BURSTS: _bursts, FROZEN: _lost, GOES_BACK: _goes_back, JUMPS: _jumps,
+    FULL: _full, BROKEN: _broken,
+}  # fmt: skip
+
+
+# --- how each is found ---------------------------------------------------------------------------
 
 _AGAINST = -0.8  # correlation of force and displacement
 _BEGINS = 0.5  # of the largest force: a record that starts above that may be one of giving way

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.faults import (
+    SIGNS,
     bursts,
     faults,
     frozen_since,
@@ -238,9 +240,13 @@ def test_channels_that_count_in_opposite_senses_are_told_where_they_do() -> None
     assert goes_against(everywhere) == ("P1/x", "P1/y", "P2/x", "P2/y")
     one = replace(data, displacement=np.where(data.setup == 1, -1, 1) * data.displacement)
     assert goes_against(one) == ("P1/y",)
-    told = [n for n in faults(everywhere) if "wrong sign" in n or "goes back" in n]
-    assert len(told) == 1
-    assert "P2/y" in told[0]
+    course = make_bench(everywhere).course
+    (told,) = course.faults
+    assert told.kind == SIGNS  # and not that it goes back, as it does all the time
+    assert goes_back(everywhere) is not None
+    assert "P2/y" in told.text
+    assert faults(everywhere) == (told.text,)
+    assert course.faults is course.faults  # looked for once
     found = diagnose_gap(everywhere)
     assert (found.verdict, found.looks_like) == ("unknown", None)
 
