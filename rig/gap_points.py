@@ -27,11 +27,12 @@ class Points:
     """n points in the order of measurement: means of holds; of a running recording, its rows.
 
     setup, run, repetition (n,): numbers. branch (n,): as `data.BRANCH_NAMES`. sense (n,): 0 at zero
-    load, RISING or FALLING; of cycles, which way the load runs. session s, force N, displacement
-    mm, as measured. before, after (n,) mm: what the simulation predicts of the answering quantity,
-    as stated and with the effects (and springs, gains, datum as fitted); measured (n,) mm: that
-    quantity. Where the displacement is imposed the answer is the force over the simulated
-    stiffness `stated` (n,) mm/N. noise (n,) mm: standard deviation of a point by the instruments.
+    load, RISING or FALLING; of a running recording, which way the load goes; RISING of cycles that
+    are held at levels. session s, force N, displacement mm, as measured. before, after (n,) mm:
+    what the simulation predicts of the answering quantity, as stated and with the effects (and
+    springs, gains, datum as fitted); measured (n,) mm: that quantity. Where the displacement is
+    imposed the answer is the force over the simulated stiffness `stated` (n,) mm/N. noise (n,) mm:
+    standard deviation of a point by the instruments.
     """
 
     setup: Ints

@@ -27,7 +27,7 @@ _LATER = 3  # rows of a hold from here on count as one
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """effects: coefficients (k,) and covariance (k, k) of the parts' columns, one after the other.
+    """coefficients (k,), covariance (k, k): of the parts' columns, one after the other.
 
     base (b,): of the base's columns; joint_covariance (b + k, b + k): of base and effects together.
     pulls (b + k,): all of them in the coordinates in which their prior is standard normal.

@@ -18,7 +18,7 @@ _SHOWS = 0.15  # an effect shows where it reaches this share of its largest part
 
 @dataclass(frozen=True, eq=False)
 class Where:
-    """As CONTRACT: names, force ranges N per direction, joints from 1, share of the gap."""
+    """Names, force ranges (N) of directions, joints from 1, share of the gap: `where` in JSON."""
 
     directions: tuple[str, ...]
     poses: tuple[str, ...]

@@ -1,8 +1,8 @@
 """How likely explanations are before the data are looked at.
 
-Prior odds: a rig whose simulation misses nothing is as likely as one effect; a second effect has
-odds 1:20, a third again 1:20. Within a count all words (or sets of words) are equally likely, but
-for what some data make rarer.
+0.5 for a rig whose simulation misses nothing, 0.37 for one effect, 0.05 for what no word names;
+every further effect has odds 1:20. Within a count all words (or sets of words) are equally likely,
+but for what some data make rarer.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ _SPARSE = 0.2  # share of numbers that are not zero, below which zeros are left 
 @dataclass(frozen=True, eq=False)
 class Weights:
     """What an imperfection leaves of the precision: of hold means (holds,), of joint readings
-    (6 holds,), and of contrasts (rows,)."""
+    (m holds,), and of contrasts (rows,)."""
 
     hold: Array
     q: Array

@@ -15,10 +15,9 @@ from identification.gap.words import LINEAR, NAMELESS, WORDS
 # Neighbouring points of one smooth run are no independent witnesses of its law.
 TEMPER = 0.12
 
-# Of 132 verdicts of the blind check whose posterior was above 0.97, 128 named an effect that was
-# there, of 71 on other people's rigs that nobody had seen before 55 were right, `none` and
-# `unknown` no oftener than the others: the families are not all that nature has, and the posterior
-# does not know that.
+# Verdicts whose posterior is above 0.97 are right less often than that, on other people's rigs that
+# nobody had seen before much less, `none` and `unknown` no oftener than the others (counts in
+# docs/gap.md): the families are not all that nature has, and the posterior does not know that.
 DOUBT, BENCH_DOUBT = 0.05, 0.2
 
 

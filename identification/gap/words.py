@@ -1,4 +1,4 @@
-"""The words of the diagnosis, and what holds of each; the order is that of CONTRACT (4)."""
+"""The words of the diagnosis, and what holds of each; the order is that of results."""
 
 from __future__ import annotations
 

@@ -18,7 +18,8 @@ GENERATORS = ("hidden", "benches", "mujoco", "mujoco-small-turns")
 
 
 class Case(Protocol):
-    """What a generator draws: columns and meta as CONTRACT section 3, and the answers."""
+    """What a generator draws: columns and meta as `rig import` takes them, and the
+    answers."""
 
     @property
     def name(self) -> str:

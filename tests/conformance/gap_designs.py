@@ -116,7 +116,7 @@ def levers(rows: pd.DataFrame) -> Array:
 def noisy(
     design: Design, law: Law | None = None, seed: int = 0, noise: float = 1.0
 ) -> pd.DataFrame:
-    """The table as measured: columns of CONTRACT, laser zeroed at the first sample of a setup."""
+    """The table as measured, for `rig import`: laser zeroed at the first sample of a setup."""
     rng, rows = np.random.default_rng(seed), table(design)
     n, force = len(rows), rows["force_N"].to_numpy(float).copy()
     lever = levers(rows) if design.arm else np.zeros((n, 6))

@@ -3,9 +3,7 @@ do not see. The same knees as `joint_yield`, on the moment about yaw or tilt axe
 an edge, along an axis of the base or between two of them; or it slides, which is to turn about an
 axis far below.
 
-The slope beyond the threshold is a compliance of 1e-6 to 1e-3 rad/Nm.
-
-Size: slope beyond the threshold 1e-6 to 1e-3 rad/Nm.
+Size: slope beyond the threshold, a compliance, on a lever of 0.75 m 5e-7 to 4e-4 rad/Nm.
 Prior: as joint_yield, per axis and depth.
 Source: Coulomb friction in the bolted joint of the mounting, effective radius about 0.25 m.
 """
