@@ -337,13 +337,21 @@ def _sense(branch: str, force: Array) -> str:
     return "loading" if force[-1] >= force[0] else "unloading"
 
 
+def _lacking(repetitions: list[int], runs: int) -> str:
+    """Which of so many runs have no zero line."""
+    if len(repetitions) == runs:
+        return "No run has a zero-load plateau"
+    *first, last = map(str, repetitions)
+    if not first:
+        return f"Repetition {last} has no zero-load plateau"
+    return f"Repetitions {', '.join(first)} and {last} have no zero-load plateau"
+
+
 def _notes(runs: list[_Run], zeros: list[list[_Plateau]], datum: str) -> list[str]:
     """What the zero lines were made of, in sentences."""
     without = [r.repetition for r, z in zip(runs, zeros, strict=True) if not z]
     if without:
-        which = "no run" if len(without) == len(runs) else f"repetitions {without}"
-        text = "has a zero-load plateau" if which == "no run" else "have no zero-load plateau"
-        return [f"{which[0].upper()}{which[1:]} {text}: force and displacement as they are."]
+        return [f"{_lacking(without, len(runs))}: force and displacement are taken as measured."]
     single = sum(1 for z in zeros if len(z) == 1)
     notes = []
     if single:

@@ -47,7 +47,21 @@ def test_without_plateaus_nothing_is_taken_off_and_the_origin_is_unknown() -> No
     curve = only(table(rows))
     assert [p.force for p in loading(curve)] == pytest.approx([f + 3.0 for f in LEVELS])
     assert not curve.origin
-    assert curve.notes == ("No run has a zero-load plateau: force and displacement as they are.",)
+    said = "No run has a zero-load plateau: force and displacement are taken as measured."
+    assert curve.notes == (said,)
+
+
+@pytest.mark.parametrize(("without", "said"), [
+    ({2}, "Repetition 2 has no zero-load plateau: force and displacement are taken as measured."),
+    ({1, 3}, "Repetitions 1 and 3 have no zero-load plateau: "),
+    ({1, 2, 4}, "Repetitions 1, 2 and 4 have no zero-load plateau: "),
+])  # fmt: skip
+def test_repetitions_without_a_plateau_are_listed_in_words(without: set[int], said: str) -> None:
+    rows = []
+    for n in (1, 2, 3, 4):
+        zeros = (0, 0) if n in without else (4, 4)
+        rows += run(lambda f: f / 100, LEVELS, repetition=n, zeros=zeros)
+    assert only(table(rows)).notes[0].startswith(said)
 
 
 def test_the_zero_lines_uncertainty_is_part_of_a_levels() -> None:
