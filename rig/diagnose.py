@@ -193,7 +193,7 @@ def _looks_like(r: GapResult) -> dict[str, Any] | None:
         return None
     period = {"swings": "period_s", "waves": "period_mm"}.get(like.kind)
     size = {} if period is None else {period: (like.period or 0.0) * (MM if "mm" in period else 1)}
-    return {"kind": like.kind, **size, "text": looks_like(like)}
+    return {"kind": like.kind, **size, "text": looks_like(like, arm=r.bench.data.arm)}
 
 
 def _effect(e: Effect, data: GapData) -> dict[str, Any]:

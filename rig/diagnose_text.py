@@ -82,16 +82,24 @@ LOOKS_LIKE = {
     "softening": "below the largest load so far it is softer than it was on the way there, as "
     "rubber is (Mullins); to be sure, load it to one top three times, then further",
 }
+# Of a rig without an arm, whose displacement may be read by anything.
+_BY_ANY_SENSOR = {
+    "waves": "a wave over the stroke, {} long: a screw's thread, or the scale that the sensor "
+    "reads; to be sure, begin the stroke elsewhere, and measure again",
+    "jumps": "the displacement jumps between holds, elsewhere in every run: see to what sticks and "
+    "lets go, and to the sensor's mounting; to be sure, hold one load for long",
+}
 _SURE = 3  # periods
 
 
-def looks_like(like: Likeness) -> str:
+def looks_like(like: Likeness, *, arm: bool = True) -> str:
     """In words, with the period in its unit."""
     period = like.period or 0.0
     told = [f"{brief(t, 3)} s" for t in (period, _SURE * period)]
     if like.kind == "waves":
         told = [f"{brief(period * MM, 3)} mm"]
-    return LOOKS_LIKE["wanders" if like.wanders else like.kind].format(*told)
+    words = LOOKS_LIKE if arm else LOOKS_LIKE | _BY_ANY_SENSOR
+    return words["wanders" if like.wanders else like.kind].format(*told)
 
 
 def render(r: GapResult) -> str:
@@ -110,7 +118,9 @@ def _answer(r: GapResult) -> str:
             "explain all that was measured. There is no gap to close."
         )
     if r.verdict == "unknown":
-        like = "" if r.looks_like is None else f" It looks like this: {looks_like(r.looks_like)}."
+        arm = r.bench.data.arm
+        told = None if r.looks_like is None else looks_like(r.looks_like, arm=arm)
+        like = "" if told is None else f" It looks like this: {told}."
         return (
             f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
             f"the uncertainty: {brief(r.after * MM, 3)} of {brief(r.before * MM, 3)} mm rms remain;"

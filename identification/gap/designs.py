@@ -202,7 +202,7 @@ def _walk(design: Design) -> Iterator[tuple[float, ...]]:
 def candidates(design: Design, arm: bool, elsewhere: Sequence[Elsewhere]) -> list[Candidate]:
     """Designs derived from the present one, each with one thing changed."""
     out = [*_channels(design, arm), *_paths(design), *_amplitudes(design, arm)]
-    out += _calibrated(design)
+    out += _calibrated(design, arm)
     for other in elsewhere:
         added = _with_setups(design, other.setups)
         out.append(Candidate(other.kind, other.text, added))
@@ -284,13 +284,16 @@ def _amplitudes(design: Design, arm: bool) -> Iterator[Candidate]:
     yield Candidate("cycles", text, grown)
 
 
-def _calibrated(design: Design) -> Iterator[Candidate]:
+def _calibrated(design: Design, arm: bool) -> Iterator[Candidate]:
     meter = design.instruments
+    force, displacement, rig = (
+        ("dynamometer", "laser", "arm") if arm else ("force sensor", "displacement sensor", "rig")
+    )
     if meter.force_gain > _WEIGHT_GAIN or meter.displacement_gain > _GAUGE_GAIN:
         yield Candidate(
             "calibrate",
-            "Check the gains before measuring again: a known weight on the dynamometer (1 %), a "
-            "gauge block under the laser (0.2 %); what then remains is the arm's.",
+            f"Check the gains before measuring again: a known weight on the {force} (1 %), a "
+            f"gauge block under the {displacement} (0.2 %); what then remains is the {rig}'s.",
             replace(
                 design,
                 instruments=replace(

@@ -338,9 +338,10 @@ def _disbelieved(found: Found, verdict: str) -> tuple[str, ...]:
     asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
     if not asks:
         return ()
-    words = " and ".join(p.word for p in best.parts) or "nothing"
+    words = " and ".join(p.word for p in best.parts)
+    what = f"What explains the gap best ({words})" if words else "Without any effect, the best fit"
     return (
-        f"What explains the gap best ({words}) asks for {asks}: it was not believed. "
+        f"{what} asks for {asks}: it was not believed. "
         "See whether META states too small an uncertainty.",
     )
 

@@ -52,17 +52,18 @@ def _signs(data: GapData) -> str:
         return ""
     return (
         f"The displacement falls while the force grows, in {', '.join(against)}: one of the "
-        "two has the wrong sign. See which way force and laser count, turn one of them in the "
-        "table, and diagnose again."
+        "two has the wrong sign. See which way force and displacement count, turn one of them in "
+        "the table, and diagnose again."
     )
 
 
 def _bursts(data: GapData) -> str:
     if not bursts(data):
         return ""
+    sensor = "laser" if data.arm else "displacement sensor"
     return (
         "Readings at rest scatter in spells, far beyond what they scatter mostly: vibration or "
-        "glitches, which no effect explains. See to the laser's mounting and to the cables."
+        f"glitches, which no effect explains. See to the {sensor}'s mounting and to the cables."
     )
 
 

@@ -137,6 +137,12 @@ def without_gap() -> Diagnosis:
     return Diagnosis("id", _gap("none", 0.987))
 
 
+def without_arm(found: Diagnosis) -> Diagnosis:
+    """The same of a rig without an arm."""
+    bench: Any = SimpleNamespace(data=SimpleNamespace(arm=False))
+    return replace(found, result=replace(found.result, bench=bench))
+
+
 def unexplained() -> Diagnosis:
     """A gap that no word explains."""
     where = Where(("x", "y"), (), {"x": (-20.0, 40.0), "y": (0.0, 1234.5)}, ("loading",), (2,),

@@ -32,7 +32,10 @@ def test_creep_of_a_hold_is_no_burst_and_bursts_are() -> None:
     assert not bursts(bench_data(given.pop("force"), given.pop("displacement"), **given))
     shaken = u + np.where(np.arange(len(u)) % 11 == 5, 4e-5, 0.0)
     given = one_hold(t, shaken)
-    assert bursts(bench_data(given.pop("force"), given.pop("displacement"), **given))
+    rung = bench_data(given.pop("force"), given.pop("displacement"), **given)
+    assert bursts(rung)
+    assert "See to the displacement sensor's mounting" in " ".join(faults(rung))
+    assert "See to the laser's mounting" in " ".join(faults(replace(rung, arm=True)))
 
 
 def test_a_lag_that_takes_half_a_hold_is_no_burst() -> None:

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
-from identification.gap.bench import displacement_imposed
+from identification.gap import diagnose as module
+from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.diagnose import diagnose_gap
+from identification.gap.explanation import Explanation, Found
 from rig.dataset import Origin, load
 from rig.diagnose import diagnose
 from rig.gap_data import gap_data
 from rig.tables import import_table
-from tests.conformance.gap_designs import DESIGNS, imported, meta, noisy
+from tests.conformance.effect_benches import quick_engine
+from tests.conformance.gap_designs import DESIGNS, imported, linear, meta, noisy
 from tests.unit.cli_bench import META, TABLE
 from tests.unit.test_gap_operators import bench_data
 
@@ -73,6 +78,18 @@ def test_a_hole_in_a_column_costs_its_samples_and_not_the_channel(
     assert len(data.force) == count
     note = f"{count // 2 + 1} of {count} samples lack {what}: taken as if none had been recorded."
     assert note in data.notes
+
+
+def test_what_asks_for_too_much_without_any_effect_is_told_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    engine = quick_engine(make_bench(linear("rich")))
+    asks = "the stiffness of a joint 7 standard deviations off what META states"
+    monkeypatch.setattr(module, "what_is_strained", lambda *_: asks)
+    nothing = Explanation((), 0.0, 0.0, (), 0.0)
+    found = cast("Found", SimpleNamespace(engine=engine, explanations=(nothing,)))
+    (note,) = module._disbelieved(found, "unknown")
+    assert note.startswith(f"Without any effect, the best fit asks for {asks}: it was not")
 
 
 def test_where_nothing_is_wrong_no_place_is_named(tmp_path: Path) -> None:

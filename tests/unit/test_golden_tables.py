@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from identification.gap.explanation import Likeness
 from identification.gap.interval import Parameter
 from rig import cli, diagnose_text
 from rig.blind import text
@@ -84,6 +85,15 @@ def test_what_was_added_is_compared_with_the_explanation_without_it() -> None:
     assert "no explanation" not in lines[4]
     worse = diagnose_text._gap(replace(found, after=5e-6)).splitlines()
     assert worse[4] == "  What was added is no explanation: more is left with it than without."
+
+
+@pytest.mark.parametrize("kind", ["waves", "jumps"])
+def test_a_rig_without_an_arm_is_told_of_no_laser(kind: str) -> None:
+    found = shown.unexplained()
+    found = replace(found, result=replace(found.result, looks_like=Likeness(kind, 1e-3, -80.0)))
+    assert "laser" in diagnose_text.render(found.result)
+    assert "laser" not in diagnose_text.render(shown.without_arm(found).result)
+    assert "sensor" in diagnose_text.render(shown.without_arm(found).result)
 
 
 def test_what_each_of_many_runs_has_to_itself_is_one_line_with_its_range() -> None:
