@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rig.diagnose_text import EACH, families
+from rig.diagnose_text import EACH, NO_GAP, families
 from rig.report.document import (
     Block,
     Bullets,
@@ -44,10 +44,11 @@ def _answer(found: Node) -> Rich:
     verdict, sizes = found["verdict"].text(), found["gap"]
     p = found["probabilities"][verdict].percent()
     start: Rich = (Word(verdict, "strong"), " (", *p, "): ")
-    if verdict == "none":
-        return (*start, "noise, gains and stiffnesses within their stated uncertainty explain all "
-                "that was measured. There is no gap to close.")  # fmt: skip
     before, after, noise = (sizes[f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise"))
+    if verdict == "none":
+        return (*start, f"{NO_GAP} Of the ", *before, " mm rms that the simulation misses as it "
+                "stands, ", *after, " mm remain when these are fitted within that; the instruments "
+                "alone leave ", *noise, " mm.")  # fmt: skip
     if verdict == "unknown":
         return (*start, "there is a gap, and no effect of the library explains it down to the "
                 "uncertainty: ", *after, " of ", *before, " mm rms remain; the instruments alone "

@@ -99,6 +99,7 @@ def test_where_nothing_is_wrong_no_place_is_named(tmp_path: Path) -> None:
     found = diagnose(load(tmp_path / "d.h5"))
     assert found.result.verdict == "none"
     assert "Where" not in found.to_text()
+    assert "joint" not in found.to_text().splitlines()[0]  # it has none
     where = found.to_json()["where"]
     assert where["directions"] == where["poses"] == []
     assert where["share_of_gap"] == 0.0
