@@ -117,29 +117,26 @@ def render(r: GapResult) -> str:
 
 
 def _answer(r: GapResult) -> str:
-    p = r.probabilities[r.verdict]
+    head, arm = f"{r.verdict} ({likely(r.probabilities[r.verdict])}):", r.bench.data.arm
+    before, after, noise = (brief(v * MM, 3) for v in (r.before, r.after, r.noise))
+    alone = f"the instruments alone leave {noise} mm."
     if r.verdict == "none":
         return (
-            f"none ({p:.0%}): {NO_GAP} Of the {brief(r.before * MM, 3)} mm rms that the simulation "
-            f"misses as it stands, {brief(r.after * MM, 3)} mm remain when these are fitted within "
-            f"that; the instruments alone leave {brief(r.noise * MM, 3)} mm."
+            f"{head} {NO_GAP} Of the {before} mm rms that the simulation misses as it stands, "
+            f"{after} mm remain when these are fitted within that; {alone}"
         )
     if r.verdict == "unknown":
-        arm = r.bench.data.arm
         told = None if r.looks_like is None else looks_like(r.looks_like, arm=arm)
         like = "" if told is None else f" It looks like this: {told}."
         return (
-            f"unknown ({p:.0%}): there is a gap, and no effect of the library explains it down to "
-            f"the uncertainty: {brief(r.after * MM, 3)} of {brief(r.before * MM, 3)} mm rms remain;"
-            f" the instruments alone leave {brief(r.noise * MM, 3)} mm.{like}"
+            f"{head} there is a gap, and no effect of the library explains it down to the "
+            f"uncertainty: {after} of {before} mm rms remain; {alone}{like}"
         )
     more = [name for name in r.names if name != r.verdict]
     also = f" Beside it: {', '.join(more)}." if more else ""
-    meaning = meanings(arm=r.bench.data.arm)[r.verdict]
     return (
-        f"{r.verdict} ({p:.0%}): {meaning}.{also} With it the gap shrinks from "
-        f"{brief(r.before * MM, 3)} to {brief(r.after * MM, 3)} mm rms; the instruments "
-        f"alone leave {brief(r.noise * MM, 3)} mm."
+        f"{head} {meanings(arm=arm)[r.verdict]}.{also} With it the gap shrinks from {before} to "
+        f"{after} mm rms; {alone}"
     )
 
 
@@ -148,7 +145,7 @@ def _where(r: GapResult) -> str:
     if not w.directions:
         return ""
     forces = ", ".join(f"{d}: {brief(a)} to {brief(b)} N" for d, (a, b) in w.force.items())
-    lines = [f"Where ({w.share:.0%} of the gap that springs leave)", f"  directions  {forces}"]
+    lines = [f"Where ({_share(w.share)} of the gap that springs leave)", f"  directions  {forces}"]
     if w.poses:
         lines.append(f"  poses       {', '.join(w.poses)}")
     lines.append(f"  branches    {', '.join(w.branches)}")
@@ -177,9 +174,12 @@ def _title(e: Effect, names: list[str]) -> str:
 
 
 def _one_effect(e: Effect, title: str) -> list[str]:
-    lines = [f"  {title}: present with {e.probability:.0%}, {_share(e.share_of_gap)} of the gap"]
+    lines = [
+        f"  {title}: present with a probability of {likely(e.probability)}; does "
+        f"{_share(e.share_of_gap)} of the gap"
+    ]
     if len(e.places) > 1:
-        each = ", ".join(f"{place} ({p:.0%})" for place, p in e.places.items())
+        each = ", ".join(f"{place} ({likely(p)})" for place, p in e.places.items())
         lines.append(f"    these data leave open where it sits: {each}")
     lines += _parameters(e.parameters)
     if e.indistinguishable_from:
@@ -192,10 +192,16 @@ _OF_RUN = re.compile(r"(.+)_run\d+$")
 EACH = 2  # runs that are listed one by one
 
 
+def likely(p: float) -> str:
+    """A probability as percent; nothing is certain, nor excluded."""
+    whole = round(100 * p)
+    return "> 99 %" if whole == 100 else "< 1 %" if whole == 0 else f"{whole} %"
+
+
 def _share(value: float) -> str:
     """What is there is more than nothing of the gap."""
-    text = f"{value:.0%}"
-    return "less than 1%" if text == "0%" else text
+    whole = round(100 * value)
+    return "less than 1 %" if whole == 0 else f"{whole} %"
 
 
 def families(found: Mapping[str, T]) -> dict[str, dict[str, T]]:

@@ -15,7 +15,7 @@ from identification.gap.diagnose import Effect, GapResult
 from identification.gap.forms import Form, describe, lasting
 from rig.dataset import Dataset
 from rig.diagnose import Diagnosis
-from rig.diagnose_text import meanings
+from rig.diagnose_text import likely, meanings
 from rig.errors import InputError
 from rig.gap_forms import to_entry
 from rig.gap_keys import CONTAINED, SPRINGS
@@ -53,7 +53,7 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
     )
     lines = [
         f"# The simulation with what rig diagnose found missing in it: {result.verdict} "
-        f"({result.probabilities[result.verdict]:.0%}).",
+        f"({likely(result.probabilities[result.verdict])}).",
         f"note: {json.dumps(note)}",
         f"robot: {meta.robot}",
         f"pose: {{q_rad: {_flow(list(pose.q_rad))}}}",
@@ -155,7 +155,7 @@ def _about(effect: Effect, dataset: Dataset) -> dict[str, Any]:
 
 
 def _comment(effect: Effect, meaning: str) -> str:
-    text = f"{meaning}; {effect.share_of_gap:.0%} of the gap"
+    text = f"{meaning}; {100 * effect.share_of_gap:.0f} % of the gap"
     if len(effect.places) > 1:
         text += f"; it may sit at {', '.join(effect.places)}"
     if effect.indistinguishable_from:

@@ -97,8 +97,8 @@ def _jumps(data: GapData) -> str:
     share = float(np.mean(data.displacement == stuck))
     return (
         f"The displacement jumps to one and the same number, {1e3 * stuck:.6g} mm, and back "
-        f"again and again ({share:.0%} of the readings) while the force stands: what a sensor, "
-        "or its converter, says when it has nothing to say. See to it."
+        f"again and again ({100 * share:.0f} % of the readings) while the force stands: what a "
+        "sensor, or its converter, says when it has nothing to say. See to it."
     )
 
 
@@ -118,8 +118,8 @@ def _broken(data: GapData) -> str:
         return ""
     return (
         f"The force falls at once while the stroke goes on (at {data.time[broken][0]:.4g} s), "
-        f"and {broken.mean():.0%} of the readings come after that: a break. End the recording "
-        "there to learn of what was before."
+        f"and {100 * broken.mean():.0f} % of the readings come after that: a break. End the "
+        "recording there to learn of what was before."
     )
 
 

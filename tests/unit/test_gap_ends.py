@@ -58,7 +58,7 @@ def test_a_recording_that_goes_on_long_after_a_break_is_unknown() -> None:
     assert without_ends(data) is data
     found = diagnose_gap(data)
     assert found.verdict == "unknown"
-    assert any("31% of the readings come after that: a break" in n for n in found.notes)
+    assert any("31 % of the readings come after that: a break" in n for n in found.notes)
 
 
 @pytest.mark.parametrize("what", ["knee", "slips", "cycle", "stiff", "noise", "levels", "bridged"])

@@ -298,11 +298,11 @@ def test_what_only_came_back_to_zero_was_not_read_while_unloading(
 @pytest.mark.parametrize(
     ("share", "text"),
     [
-        (0.0, "less than 1%"),
-        (0.004, "less than 1%"),
-        (0.005, "less than 1%"),
-        (0.006, "1%"),
-        (0.61, "61%"),
+        (0.0, "less than 1 %"),
+        (0.004, "less than 1 %"),
+        (0.005, "less than 1 %"),
+        (0.006, "1 %"),
+        (0.61, "61 %"),
     ],
 )
 def test_what_is_there_is_more_than_nothing_of_the_gap(share: float, text: str) -> None:

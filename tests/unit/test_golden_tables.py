@@ -87,6 +87,13 @@ def test_what_was_added_is_compared_with_the_explanation_without_it() -> None:
     assert worse[4] == "  What was added is no explanation: more is left with it than without."
 
 
+@pytest.mark.parametrize(("p", "said"), [
+    (1.0, "> 99 %"), (0.9951, "> 99 %"), (0.994, "99 %"), (0.5, "50 %"), (0.004, "< 1 %"),
+])  # fmt: skip
+def test_a_probability_is_never_said_to_be_one_or_none(p: float, said: str) -> None:
+    assert diagnose_text.likely(p) == said
+
+
 @pytest.mark.parametrize("kind", ["waves", "jumps"])
 def test_a_rig_without_an_arm_is_told_of_no_laser(kind: str) -> None:
     found = shown.unexplained()
