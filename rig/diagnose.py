@@ -78,6 +78,7 @@ class Diagnosis:
             "looks_like": _looks_like(r),
             "runners_up": {w: {"held_out_after_rms_mm": v * MM} for w, v in r.runners_up.items()},
             "notes": list(r.notes),
+            "note_kinds": [n.kind for n in r.said],
             "known_effects": [e["name"] for e in self.known_effects],
             "banners": list(self.banners),
         }

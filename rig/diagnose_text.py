@@ -98,6 +98,15 @@ _BY_ANY_SENSOR = {
 _SURE = 3  # periods
 
 
+# Kinds of notes, and under which heading they stand.
+NOTED = {
+    "fault": "See to this first",
+    "set aside": "Set aside",
+    "undecided": "Not decidable from these data",
+    "remark": "To be known",
+}
+
+
 def looks_like(like: Likeness, *, arm: bool = True) -> str:
     """In words, with the period in its unit."""
     period = like.period or 0.0
@@ -111,8 +120,9 @@ def looks_like(like: Likeness, *, arm: bool = True) -> str:
 def render(r: GapResult) -> str:
     """All lines, in the order of importance."""
     parts = [_answer(r), _where(r), _effects(r), _gap(r), _next(r)]
-    if r.notes:
-        parts.append("Not decidable from these data:\n" + "\n".join(f"  {n}" for n in r.notes))
+    for kind, heading in NOTED.items():
+        told = [f"  {n.text}" for n in r.said if n.kind == kind]
+        parts += ["\n".join([f"{heading}:", *told])] if told else []
     return "\n\n".join(p for p in parts if p)
 
 

@@ -35,7 +35,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     used &= np.isfinite(dataset.columns["displacement_mm"])
     if not used.any():
         raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
-    used, aside = _without_holes(dataset, used)
+    used, aside, without = _without_holes(dataset, used)
     columns = {k: v[used] for k, v in dataset.columns.items()}
     names = [str(d) for d in columns["direction"]]
     poses = [str(p) for p in columns["pose"]]
@@ -79,7 +79,8 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         tare=meta.tare,
         imposed=meta.imposed,
         timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
-        notes=(*notes, *aside, *_unsettled(dataset)),
+        aside=aside,
+        notes=(*notes, *without, *_unsettled(dataset)),
     )
 
 
@@ -92,10 +93,10 @@ _MAY_MISS = {
 _FEW = 0.05  # of the samples
 
 
-def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...]]:
-    """The samples to use (n,), without a few that lack what all others have, and what to say of it:
-    a channel counts only where it is there throughout."""
-    notes = []
+def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...], tuple[str, ...]]:
+    """The samples to use (n,), without a few that lack what all others have: a channel counts only
+    where it is there throughout. And what to say of those, and of channels that do not count."""
+    aside, without = [], []
     for what, names in _MAY_MISS.items():
         has = all(n in dataset.columns for n in names)
         if not has or (what == _JOINTS and dataset.meta.robot == "none"):
@@ -105,12 +106,12 @@ def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...
         missing = int((used & ~there).sum())
         if 0 < missing <= _FEW * count:
             used = used & there
-            notes.append(f"{missing} of {count} samples lack {what}: set aside.")
+            aside.append(f"{missing} of {count} samples lack {what}: set aside.")
         elif 0 < missing < count:
-            notes.append(
+            without.append(
                 f"{missing} of {count} samples lack {what}: taken as if none had been recorded."
             )
-    return used, tuple(notes)
+    return used, tuple(aside), tuple(without)
 
 
 def _unsettled(dataset: Dataset) -> tuple[str, ...]:

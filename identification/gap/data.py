@@ -8,7 +8,7 @@ own spring, 0 for the others.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -77,7 +77,8 @@ class GapData:
     compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
     simulated (n,) m or None: displacement that another simulator predicts for every sample.
     timed: whether `time` was recorded; it counts samples otherwise. on_the_way (n,) or None:
-    samples of ramps under the name of the level they lead to (ramps.py).
+    samples of ramps under the name of the level they lead to (ramps.py). aside, notes: what is to
+    be said of samples that were set aside, and of others.
     """
 
     arm: bool
@@ -104,7 +105,8 @@ class GapData:
     simulated: Array | None = None
     timed: bool = True
     on_the_way: Flags | None = None
-    notes: tuple[str, ...] = field(default=())
+    aside: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def ways(self) -> Flags:

@@ -27,12 +27,12 @@ from identification.gap.heldout import HeldOut, folds, held_out, stated_predicti
 from identification.gap.interval import Parameter
 from identification.gap.leftover import looked_up
 from identification.gap.locate import NOWHERE, Where, locate
-from identification.gap.noise import NOISY, SWINGS
+from identification.gap.noise import SWINGS
+from identification.gap.notes import FAULT, REMARK, Note, notes_of, ordered
 from identification.gap.posterior import Known, settled
 from identification.gap.ramps import ramps_told
 from identification.gap.refine import refine
 from identification.gap.search import force, search
-from identification.gap.snaps import Snaps
 from identification.gap.strain import what_is_strained
 from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
@@ -68,7 +68,7 @@ class GapResult:
     remainder: imperfection that the laws are taken to have, of no law for `unknown`; what is left
     on average stands in `after`. looks_like: of an unknown gap, where that is plain. without_added:
     `after` without the words that were to be added; None where there were none, or the
-    explanation had them.
+    explanation had them. said: what is to be known beside, by kind.
     """
 
     verdict: str
@@ -83,7 +83,7 @@ class GapResult:
     next_measurement: NextMeasurement | None
     remainder: float
     looks_like: Likeness | None
-    notes: tuple[str, ...]
+    said: tuple[Note, ...]
     bench: Bench
     engine: Engine
     fit: Fit
@@ -94,6 +94,11 @@ class GapResult:
     def names(self) -> tuple[str, ...]:
         """Of the effects, each once: one mechanism may sit in several joints."""
         return tuple(dict.fromkeys(e.name for e in self.effects))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is said, without its kind."""
+        return tuple(n.text for n in self.said)
 
 
 def diagnose_gap(
@@ -207,7 +212,7 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         next_measurement=None,
         remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
         looks_like=_likeness(found, verdict),
-        notes=(*_notes(bench), *_disbelieved(found, verdict)),
+        said=ordered([*notes_of(bench), *_disbelieved(found, verdict)]),
         bench=bench,
         engine=engine,
         fit=fitted,
@@ -324,64 +329,25 @@ def _next(
     return None
 
 
-def _disbelieved(found: Found, verdict: str) -> tuple[str, ...]:
+def _disbelieved(found: Found, verdict: str) -> tuple[Note, ...]:
     """Why an arm's best explanation was not believed, where that is what it asks for: META may
     state too little, and only its author can tell."""
     best, swings = found.explanations[0], found.engine.bench.noise.swings
     if verdict != "unknown" or not found.engine.bench.data.arm:
         return ()
     if not best.parts and swings > SWINGS:
-        return (
+        text = (
             f"While nothing changes the displacement swings by {swings:.1f} times what is stated "
-            "of one sample: a vibration, or a pick-up of the mains. Find it before you go on.",
+            "of one sample: a vibration, or a pick-up of the mains. Find it before you go on."
         )
+        return (Note(FAULT, text),)
     asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
     if not asks:
         return ()
     words = " and ".join(p.word for p in best.parts)
     what = f"What explains the gap best ({words})" if words else "Without any effect, the best fit"
-    return (
+    text = (
         f"{what} asks for {asks}: it was not believed. "
-        "See whether META states too small an uncertainty.",
+        "See whether META states too small an uncertainty."
     )
-
-
-def _let_go(snaps: Snaps, span: float) -> str:
-    times = "once" if snaps.count == 1 else f"{snaps.count} times"
-    return (
-        f"The force falls at once while the stroke goes on, {times}, by up to "
-        f"{snaps.largest * span:.3g} N (first at {snaps.first:.4g} s): it sticks and slips, snaps, "
-        "cracks or is torn off, as no effect of the library does."
-    )
-
-
-def _notes(bench: Bench) -> tuple[str, ...]:
-    """What these data can't decide, whatever the verdict."""
-    data, rows, out = bench.data, bench.rows, list(bench.data.notes)
-    if not np.ptp(bench.load) > 0:
-        out.append("The load does not change: nothing can be said of stiffness or of joints.")
-    if not bench.course.unloads:
-        out.append("Nothing was unloaded: lasting and elastic deflection look alike.")
-    if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
-        out.append("One repetition: what repeats and what does not can't be told apart.")
-    if data.arm and not bench.has_q:
-        reason = "not recorded" if data.q is None else "taken before the gear"
-        out.append(f"Joint readings are {reason}: joints, links and base look alike.")
-    if data.session is None and data.arm:
-        out.append("No session clock: drifts are seen only within runs and from run to run.")
-    if bench.course.timeless:
-        out.append("No time was recorded: lags, creep and how fast it flowed are left out.")
-    out += [f.text for f in bench.course.faults]
-    if bench.course.let_go:
-        out.append(_let_go(bench.course.let_go, float(np.ptp(data.force))))
-    if bench.noise.raised > NOISY:
-        out.append(
-            f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "
-            "uncertainty that was judged too small. They were taken as uncertain as they are."
-        )
-    if bench.imposed:
-        out.append("The displacement is imposed: force is predicted from it.")
-    elif bench.data.imposed == "displacement":
-        out.append("The displacement is imposed; at rest the joints bear the force that was read: "
-                   "displacement is predicted from it.")  # fmt: skip
-    return tuple(out)
+    return (Note(REMARK, text),)

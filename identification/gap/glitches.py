@@ -115,13 +115,13 @@ def _minor(data: GapData, off: Flags) -> bool:
 
 
 def picked(data: GapData, kept: Flags, *notes: str) -> GapData:
-    """Some of the rows, kept (n,), with further notes."""
+    """Some of the rows, kept (n,); notes: what is said of the others."""
     n, out = len(kept), dict[str, Any]()
     for f in fields(data):
         value = getattr(data, f.name)
         if isinstance(value, np.ndarray) and len(value) == n and f.name not in _NOT_ROWS:
             out[f.name] = value[kept]
-    return replace(data, **out, notes=(*data.notes, *notes))
+    return replace(data, **out, aside=(*data.aside, *notes))
 
 
 _NOT_ROWS = frozenset({"compliance", "compliance_relative_sd"})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rig.diagnose_text import EACH, NO_GAP, families
+from rig.diagnose_text import EACH, NO_GAP, NOTED, families
 from rig.report.document import (
     Block,
     Bullets,
@@ -176,8 +176,10 @@ def _rest(found: Node) -> list[Block]:
         pair = " from ".join(following.get("separates").value or ())
         words = (f"To tell {pair}: {following['text'].text()}",)
         blocks.append(Section("gap-next", "What to measure next", (Paragraph(words),)))
-    notes = tuple(n.text() for n in found["notes"])
-    if notes:
-        title = "Not decidable from these data"
-        blocks.append(Section("gap-notes", title, (Bullets(notes),)))
+    notes = [(n.text(), k.text()) for n, k in zip(found["notes"], found["note_kinds"], strict=True)]
+    for kind, heading in NOTED.items():
+        told = tuple(text for text, of in notes if of == kind)
+        if told:
+            name = f"gap-{kind.replace(' ', '-')}"
+            blocks.append(Section(name, heading, (Bullets(told),)))
     return blocks

@@ -16,6 +16,7 @@ from identification.gap.explanation import Likeness
 from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
 from identification.gap.locate import Where
+from identification.gap.notes import ASIDE, UNDECIDED, Note
 from identification.joints import JointFit, Observation, Prior
 from identification.maps import Need, Placement, Stance, Task
 from identification.next_poses import Proposal
@@ -87,7 +88,7 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
         "next_measurement": None,
         "remainder": 0.0,
         "looks_like": None,
-        "notes": (),
+        "said": (),
         **more,
     }
     probabilities = {verdict: p, "base_slip": 0.9961 - p, "zero_shift": 0.0039}
@@ -127,7 +128,8 @@ def explained() -> Diagnosis:
         next_measurement=NextMeasurement("Measure y in pose P2, loading and unloading.",
                                          ("joint_yield", "base_slip"), "poses", 12.4, 31.0,
                                          options),
-        notes=("Gains: the force's own of 0.5 % can't be told from springs off by one factor.",),
+        said=(Note(ASIDE, "3 of 240 readings jump off and come back at once: set aside."),
+              Note(UNDECIDED, "Nothing was unloaded: lasting and elastic deflection look alike.")),
     )  # fmt: skip
     return Diagnosis("id", result, (EMULATED,), ({"name": "contact_seating"},))
 

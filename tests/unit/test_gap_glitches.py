@@ -31,7 +31,7 @@ def test_single_readings_that_jump_off_are_set_aside_and_said() -> None:
     kept = without_glitches(recording(triangle(), force))
     assert len(kept.force) == N - 3
     assert kept.time[60] == pytest.approx(6.2)
-    (note,) = kept.notes
+    (note,) = kept.aside
     assert note.startswith("3 of 300 readings jump off and come back at once: set aside")
     assert "6 s" in note
     assert len(kept.compliance) == len(data.compliance)
@@ -42,7 +42,7 @@ def test_turning_points_and_steps_are_no_glitches(noise: float) -> None:
     draw = np.random.default_rng(4)
     for u in (triangle(), np.repeat([0.0, 1.0, 0.4, 1.2, 0.1], N // 5)):
         force = 100 * u + 5 * u**2 + noise * draw.standard_normal(len(u))
-        assert not without_glitches(recording(u, force)).notes
+        assert not without_glitches(recording(u, force)).aside
 
 
 def test_a_clean_spring_with_jumping_readings_keeps_them() -> None:
@@ -51,13 +51,13 @@ def test_a_clean_spring_with_jumping_readings_keeps_them() -> None:
     force[[60, 120, 200]] += 20.0
     kept = without_glitches(recording(triangle(), force))
     assert len(kept.force) == N
-    assert not kept.notes
+    assert not kept.aside
 
 
 def test_many_of_them_are_how_the_rig_behaves() -> None:
     force = 100 * (triangle() + 0.3 * triangle() ** 2)
     force[10::15] += 20.0
-    assert not without_glitches(recording(triangle(), force)).notes
+    assert not without_glitches(recording(triangle(), force)).aside
 
 
 def test_the_diagnosis_sets_them_aside_and_says_so() -> None:
@@ -81,13 +81,13 @@ def resting(spikes: dict[int, float], n: int = 30) -> GapData:
 def test_a_reading_at_rest_that_jumps_off_is_set_aside() -> None:
     kept = without_glitches(resting({84: 30e-6, 140: -20e-6}))
     assert len(kept.force) == 8 * N // 10 - 2
-    assert kept.notes[0].startswith("2 of 240 readings jump off")
+    assert kept.aside[0].startswith("2 of 240 readings jump off")
     assert diagnose_gap(resting({84: 30e-6})).verdict == "none"  # one that is off is no effect
 
 
 def test_first_readings_of_a_level_and_spells_stay() -> None:
     first = {80: 30e-6, 96: 30e-6}  # what lags
-    assert not without_glitches(resting(first)).notes
-    assert not without_glitches(resting({84: 30e-6, 85: 30e-6})).notes  # it stayed there
-    assert not without_glitches(resting(dict.fromkeys(range(3, 240, 72), 60e-6))).notes  # 1.7%
-    assert not without_glitches(resting({84: 6e-6})).notes  # noise does that
+    assert not without_glitches(resting(first)).aside
+    assert not without_glitches(resting({84: 30e-6, 85: 30e-6})).aside  # it stayed there
+    assert not without_glitches(resting(dict.fromkeys(range(3, 240, 72), 60e-6))).aside  # 1.7%
+    assert not without_glitches(resting({84: 6e-6})).aside  # noise does that

@@ -71,7 +71,7 @@ def test_a_hole_in_a_column_costs_its_samples_and_not_the_channel(
     kept = np.delete(np.arange(count), [57, 90])
     np.testing.assert_array_equal(getattr(data, field), getattr(whole, field)[kept])
     np.testing.assert_array_equal(data.force, whole.force[kept])
-    assert f"2 of {count} samples lack {what}: set aside." in data.notes
+    assert f"2 of {count} samples lack {what}: set aside." in data.aside
     many.loc[: count // 2, column] = np.nan
     data = gap_data(imported(many, meta(DESIGNS["rich"])))
     assert getattr(data, field) is None
@@ -89,7 +89,7 @@ def test_what_asks_for_too_much_without_any_effect_is_told_so(
     nothing = Explanation((), 0.0, 0.0, (), 0.0)
     found = cast("Found", SimpleNamespace(engine=engine, explanations=(nothing,)))
     (note,) = module._disbelieved(found, "unknown")
-    assert note.startswith(f"Without any effect, the best fit asks for {asks}: it was not")
+    assert note.text.startswith(f"Without any effect, the best fit asks for {asks}: it was not")
 
 
 def test_where_nothing_is_wrong_no_place_is_named(tmp_path: Path) -> None:

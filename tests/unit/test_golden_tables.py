@@ -15,6 +15,7 @@ import pytest
 
 from identification.gap.explanation import Likeness
 from identification.gap.interval import Parameter
+from identification.gap.notes import KINDS, Note, ordered
 from rig import cli, diagnose_text
 from rig.blind import text
 from rig.blind.score import report
@@ -85,6 +86,15 @@ def test_what_was_added_is_compared_with_the_explanation_without_it() -> None:
     assert "no explanation" not in lines[4]
     worse = diagnose_text._gap(replace(found, after=5e-6)).splitlines()
     assert worse[4] == "  What was added is no explanation: more is left with it than without."
+
+
+def test_notes_stand_under_what_they_are_what_is_wrong_first() -> None:
+    assert tuple(diagnose_text.NOTED) == KINDS
+    notes = ordered([Note(kind, f"Of {kind}.") for kind in reversed(KINDS)])
+    text = diagnose_text.render(replace(shown.without_gap().result, said=notes))
+    assert text.endswith("See to this first:\n  Of fault.\n\nSet aside:\n  Of set aside.\n\n"
+                         "Not decidable from these data:\n  Of undecided.\n\n"
+                         "To be known:\n  Of remark.")  # fmt: skip
 
 
 @pytest.mark.parametrize(("p", "said"), [
