@@ -258,10 +258,8 @@ def _gap(r: GapResult) -> str:
             lines.append("  What was added is no explanation: more is left with it than without.")
     for h in r.held_out:
         low, high = h.ci95
-        lines.append(
-            _row(f"withheld {h.fold}", h.before, h.after, r.noise)
-            + f" ({brief(low, 3)} to {brief(high, 3)})"
-        )
+        open_to = f" ({brief(low, 3)} to {brief(high, 3)})" if low < high else ""
+        lines.append(_row(f"withheld {h.fold}", h.before, h.after, r.noise) + open_to)
     lines.append(f"  {'noise of the instruments':32s}{brief(r.noise * MM):>9s}")
     for word, after in r.runners_up.items():
         lines.append(f"  withheld, with {word} instead: {brief(after * MM)}")
@@ -269,10 +267,10 @@ def _gap(r: GapResult) -> str:
 
 
 def _row(name: str, before: float, after: float, noise: float) -> str:
-    shrink = before / after if after > 0 else 1.0
+    shrink = brief(before / after, 3) if after > 0 else "-"
     ratio = after / noise if noise > 0 else 1.0
     shown = f"{brief(before * MM):>9s} {brief(after * MM):>9s} {ratio:11.2f}"
-    return f"  {name:22s}{shown}  {brief(shrink, 3):>6s}"
+    return f"  {name:22s}{shown}  {shrink:>6s}"
 
 
 def _next(r: GapResult) -> str:

@@ -311,7 +311,7 @@ def change(before: float, after: float, ci95: tuple[float, float] | None = None)
     grows = after > before
     factor, word = (after / before, "larger") if grows else (before / after, "smaller")
     text = f"{factor:.3g} times {word}"
-    if ci95 is None or not 0 < ci95[0] <= ci95[1] < np.inf:
+    if ci95 is None or not 0 < ci95[0] < ci95[1] < np.inf:
         return text
     low, high = (1 / ci95[1], 1 / ci95[0]) if grows else ci95
     return f"{text} ({low:.3g} to {high:.3g})"

@@ -28,7 +28,8 @@ ALWAYS_IN = -1  # number of the fold of rows that are never withheld
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """fold: what was withheld in turn; rms m before and after; shrink factor with ci95."""
+    """fold: what was withheld in turn; rms m before and after; shrink factor with ci95, whose ends
+    are one number where too few blocks tell how far it may be off."""
 
     fold: str
     before: float

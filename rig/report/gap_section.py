@@ -154,7 +154,8 @@ def _how_far(found: Node) -> Table:
     rows = [row("fitted", *_sizes(sizes), no, no)]
     for h in folds:
         if h:
-            low, high = h["ci95"][0].number(3), h["ci95"][1].number(3)
+            told = h["ci95"][0].value < h["ci95"][1].value
+            low, high = (h["ci95"][i].number(3) if told else no for i in (0, 1))
             rows.append(row(f"withheld: {h['fold'].text()}", *_sizes(h), low, high))
     rows.append(row("noise of the instruments", no, noise, no, no, no))
     for word, r in found.get("runners_up").items():

@@ -313,6 +313,7 @@ def test_change_of_the_gap_in_words() -> None:
     assert change(1.8, 0.0679, (18.04, 38.86)) == "26.5 times smaller (18 to 38.9)"
     assert change(1.0, 1.25, (0.5, 0.8)) == "1.25 times larger (1.25 to 2)"
     assert change(2.0, 1.0) == "2 times smaller"
+    assert change(2.0, 1.0, (2.0, 2.0)) == "2 times smaller"  # nothing told how far it is off
     assert change(2.0, 1.0, (0.0, 3.0)) == "2 times smaller"
     assert change(0.0, 0.0) == "unchanged"
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from identification.gap.explanation import Likeness
+from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
 from identification.gap.notes import KINDS, Note, ordered
 from rig import cli, diagnose_text
@@ -86,6 +87,14 @@ def test_what_was_added_is_compared_with_the_explanation_without_it() -> None:
     assert "no explanation" not in lines[4]
     worse = diagnose_text._gap(replace(found, after=5e-6)).splitlines()
     assert worse[4] == "  What was added is no explanation: more is left with it than without."
+
+
+def test_an_interval_that_nothing_tells_is_not_shown() -> None:
+    once = HeldOut("block", 1.72e-5, 1e-6, (17.2, 17.2))
+    found = replace(shown.without_gap().result, held_out=(once,), after=0.0)
+    lines = diagnose_text._gap(found).splitlines()
+    assert lines[2].split()[-1] == "-"  # nothing is left
+    assert lines[3].endswith("17.2")
 
 
 def test_notes_stand_under_what_they_are_what_is_wrong_first() -> None:
