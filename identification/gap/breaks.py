@@ -33,6 +33,7 @@ LOSSES = (0.03, 0.1, 0.3)  # of the stiffness
 KNOTS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)  # of the largest load
 BELOW = (0.05, 0.15, 0.5)  # of the largest load: so far below what it bore it is as soft as it gets
 _FEWEST_ROWS = 30
+_STAYS = 0.3  # of the way, when the load is gone: what only softens comes back
 _CURVE, _LOOP, _SLOW = 7, 4, 5  # degrees of a smooth response that jumps are looked for beside
 _NOTHING_NEW = 1e-6  # of its square is left of a jump beside what is known
 
@@ -42,7 +43,9 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     moves = bench.rows.continuous and not (bench.data.arm or bench.course.rests)
     if not moves or bench.rows.n < _FEWEST_ROWS:
         return []
-    lasting = [*_damage(bench), *_softening(bench)] if bench.course.returns else []
+    lasting = _damage(bench) if bench.course.returns else []
+    if bench.course.returns and bench.course.left_behind < _STAYS:
+        lasting += _softening(bench)
     return [*lasting, *_jerks(bench, base, target)]
 
 

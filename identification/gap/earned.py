@@ -68,7 +68,7 @@ def _foretold(found: Found, name: str, fold: Ints) -> dict[frozenset[str], Expla
     for both in (e for e in pairs if len(e.words) == _TWO):
         drifts = both.parts[0].word in FREE
         best = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
-        for one in (e for e in found.explanations if e.parts and e.words < both.words):
+        for one in (e for e in found.explanations if e.words < both.words and e.words - FREE):
             after = held_out(found.engine, one, name, fold).after
             if after < best:
                 best, out[both.words] = after, one

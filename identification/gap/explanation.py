@@ -32,7 +32,7 @@ from identification.gap.penalties import (
     within_stated,
 )
 from identification.gap.priors import prior_of
-from identification.gap.words import FRICTION, LINEAR
+from identification.gap.words import CURVES, FRICTION, LINEAR
 
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
@@ -170,19 +170,23 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) 
     and the friction takes it back. A toe and a knee count as they move: what a spring would hide of
     either, the other shows; but a ball on a plate is no toe, and goes on like a spring. Of an
     imposed stroke creep, too, brings a mean stiffness, and what a spring leaves of either says
-    little: the larger is the one that the other can do less without."""
+    little: the larger is the one that the other can do less without. Where most of the way is left
+    when the load is gone, what gives way is larger than any curve."""
     if engine.bench.data.arm:
         return sizes.gap
+    rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
+    curves = np.array([p.word in CURVES for p in parts], dtype=bool)
+    creeps = np.array([p.word == "joint_creep" for p in parts], dtype=bool)
+    if len(parts) == _PAIR and rubs.any():
+        if curves.any() and engine.bench.course.left_behind > _STAYS:
+            return _led(sizes.gap, int(rubs.argmax()))
+        if creeps.any() and engine.bench.imposed:
+            return _led(sizes.gap, int(needed(engine, parts, level).argmax()))
     goes_on = any(p.variant.info.get("goes_on") for p in parts)
     if frozenset(p.word for p in parts) == TOE_AND_KNEE and not goes_on:
         return sizes.moved
-    rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
     if not rubs.any():
         return sizes.gap
-    creeps = np.array([p.word == "joint_creep" for p in parts], dtype=bool)
-    if engine.bench.imposed and len(parts) == _PAIR and creeps.any():
-        larger = sizes.gap.argmax() == needed(engine, parts, level).argmax()
-        return sizes.gap if larger else sizes.gap[::-1]
     linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
     mine = float(sizes.gap[rubs].max())
     rest = max(engine.structural**2 - mine**2, 0.0) ** 0.5
@@ -191,7 +195,12 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) 
 
 
 _LESS = 0.99
-_PAIR = 2
+_PAIR, _STAYS = 2, 0.5  # effects; of the way
+
+
+def _led(sizes: Array, first: int) -> Array:
+    """Sizes of two, of which the first one is the larger."""
+    return sizes if sizes.argmax() == first else sizes[::-1]
 
 
 def conditioned(

@@ -180,6 +180,8 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
         return True
     if bench.course.never_held and "time_lag" in words and words & MECHANISMS:
         return True  # of a single pull: what comes late and what bends are one curve
+    if not engine.bench.data.arm and words == LATE and _as_late(one, other):
+        return True
     bends = MECHANISMS | {DAMAGE, SOFTENING}
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & bends)):
         return True
@@ -187,6 +189,16 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     if not (springs or words <= FRICTION):
         return False
     return same or not (engine.bench.has_q or _apart(engine, one, other))
+
+
+LATE = frozenset({"joint_creep", "time_lag"})
+_AS_LATE = 3.0  # times the lag: what comes as soon as that is the lag's own law
+
+
+def _as_late(one: Part, other: Part) -> bool:
+    """Whether what creeps is over about when the lag is: by the mean of its times' logarithms."""
+    info = {**one.variant.info, **other.variant.info}
+    return float(np.exp(np.mean(np.log(info["times_s"])))) < _AS_LATE * float(info["lag_s"])
 
 
 def _only_rubs(engine: Engine, play: Part, curve: Part) -> bool:

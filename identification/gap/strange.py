@@ -21,7 +21,7 @@ import numpy as np
 from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.compare import by_word, log_mean, marginal, score
-from identification.gap.data import Array
+from identification.gap.data import Array, Ints
 from identification.gap.effects.drift import by_direction, free_path, path_root
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Found, Likeness
@@ -73,7 +73,8 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     if bench.course.rests:
         return swings
     waves = _waves(bench, base, target)
-    return [*_slopes(bench), *swings, *waves, *_rough(bench), *_jumps(bench), *_settles(bench)]
+    return [*_slopes(bench), *swings, *waves, *_rough(bench, target), *_jumps(bench),
+            *_settles(bench)]  # fmt: skip
 
 
 def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[Likeness, ...]:
@@ -148,17 +149,41 @@ def _waves(bench: Bench, base: Base, target: Array) -> list[Variant]:
     return _periodic(bench, base, target, "waves", (u - start) / span, count, masks, span)
 
 
-def _rough(bench: Bench) -> list[Variant]:
-    """Every level of the load is off by an amount of its own, the same whenever it is met."""
+def _rough(bench: Bench, target: Array) -> list[Variant]:
+    """Every level of the load is off by an amount of its own, the same whenever it is met; on a
+    bench not where these make a smooth curve, which a spring may have."""
     rows = bench.rows
     step = np.round(bench.load / (_ALIKE * float(np.ptp(bench.load)) or 1.0))
     place = np.unique(np.column_stack([rows.setup, step]), axis=0, return_inverse=True)[1]
     place = place.reshape(-1)
     if not int(place.max()) < _MOST_LEVELS:
         return []
+    if not bench.data.arm and _smooth(bench, place, target[: rows.n]):
+        return []
     columns = [bench.add(bench.outside_column((place == k).astype(float)))
                for k in range(int(place.max()) + 1)]  # fmt: skip
     return [variant("rough", "levels", columns, _scales(bench), positive=False)]
+
+
+def _smooth(bench: Bench, place: Ints, target: Array) -> bool:
+    """Whether the levels (n,) lie near the line through their neighbours, by far nearer than their
+    means of what is to be explained (n,) do to one line."""
+    count = np.bincount(place, bench.rows.weight)
+    load, mean = (np.bincount(place, bench.rows.weight * v) / count for v in (bench.load, target))
+    setup = np.bincount(place, bench.rows.weight * bench.rows.setup) / count
+    off, about = 0.0, 0.0
+    for s in np.unique(setup):
+        order = np.flatnonzero(setup == s)[np.argsort(load[setup == s])]
+        x, y = load[order], mean[order]
+        if len(x) < _FEWEST_LEVELS:
+            return False
+        between = y[:-2] + (y[2:] - y[:-2]) * (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
+        off += float(np.sum((y[1:-1] - between) ** 2))
+        about += float(np.sum((y - np.polyval(np.polyfit(x, y, 1), x)) ** 2))
+    return off < _SMOOTH**2 * about
+
+
+_FEWEST_LEVELS, _SMOOTH = 5, 0.25
 
 
 def _jumps(bench: Bench) -> list[Variant]:

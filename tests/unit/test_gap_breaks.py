@@ -14,7 +14,7 @@ from identification.gap.breaks import _just_turned, jump_rows, strangers
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.priors import LOG_UNKNOWN, prior_of
-from identification.gap.words import JERKS, NAMELESS, WORDS
+from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING, WORDS
 from rig.diagnose_text import LOOKS_LIKE
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
@@ -141,6 +141,20 @@ def test_only_recordings_that_run_on_without_an_arm_are_looked_at() -> None:
     assert of(bench_data(levels, levels / SPRING, step=np.repeat(np.arange(10), 5))) == []
     still = np.random.default_rng(2).normal(0, 0.1, N)
     assert of(running(still, np.zeros(N), imposed="force")) == []
+
+
+@pytest.mark.parametrize("stays", [0.0, 0.6])
+def test_what_stays_when_the_load_is_gone_does_not_only_soften(stays: float) -> None:
+    """Rubber comes back; under a tip most of the way is left."""
+    left = stays * np.maximum.accumulate(STROKE)
+    force = SPRING * np.maximum(STROKE - left, 0.0)
+    bench = make_bench(running(np.append(force[:-20], np.zeros(20)),
+                               np.append(STROKE[:-20], np.full(20, left[-1])),
+                               imposed="displacement"))  # fmt: skip
+    target = bench.observed - prediction(bench)
+    found = {v.word for v in strangers(bench, base_columns(bench), target)}
+    assert (SOFTENING in found) is (stays == 0.0)
+    assert DAMAGE in found
 
 
 def test_half_of_what_is_unknown_has_these_shapes() -> None:

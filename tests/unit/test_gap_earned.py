@@ -248,6 +248,15 @@ def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: b
         assert result.probabilities[word] > 0.7
 
 
+def test_a_drift_alone_speaks_for_nobody() -> None:
+    """It foretells nothing, also where another effect foretells less than nothing."""
+    e = engine(np.array([0.0, 3.0, -3.0]) * BUMP)
+    drift = explained([1, 2], "thermal_drift", -40.0)
+    bump = explained([0], "joint_nonlinear_stiffness", -60.0)
+    both = Explanation(bump.parts + drift.parts, 0.0, 0.0, (BUMP / 3, BUMP / 9), 0.0)
+    assert earned(found(e, both, drift, bump)).foretold[both.words] is bump
+
+
 @pytest.mark.parametrize(("share", "named"), [(0.05, 2), (0.3, 3)])
 def test_a_third_effect_that_hardly_moves_anything_is_not_named(share: float, named: int) -> None:
     e = engine(np.full(REPETITIONS, BUMP))

@@ -3,6 +3,8 @@ and what pulls that never come back leave hidden."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,8 +14,10 @@ from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence import Engine, eta_levels
+from identification.gap.glitches import picked
 from identification.gap.parts import Part
 from identification.gap.penalties import _same_element
+from identification.gap.strange import strangers
 from tests.unit.test_gap_operators import bench_data
 
 
@@ -62,6 +66,29 @@ def test_pulls_that_never_come_back_hide_all_memory(back: bool, hidden: bool) ->
     assert _same_element(engine, *words.values()) is hidden
 
 
+@pytest.mark.parametrize(("off", "rough"), [(0.0, False), (0.05, True)])
+def test_levels_that_make_a_smooth_curve_are_a_spring(off: float, rough: bool) -> None:
+    """A conical one, whatever its law; not one whose every level is off by something of its own, or
+    of which too few were read, or an arm, whose joints bend alike in all poses."""
+    force = np.concatenate([np.arange(0.0, 130, 10), np.arange(110.0, -1, -10)])
+    own = dict(zip(np.unique(force), np.random.default_rng(3).normal(0, off, 13), strict=True))
+    moved = 2e-3 * (np.log1p(force / 100) + np.array([own[f] for f in force]))
+    held = {"force": force, "displacement": moved, "step": np.arange(25),
+            "branch": np.append(0, np.ones(24, dtype=np.int64))}  # fmt: skip
+    each = {k: np.repeat(v, 12) for k, v in held.items()}
+    data = bench_data(each.pop("force"), each.pop("displacement"), **each)
+    few = picked(data, np.isin(data.force, [0.0, 40.0, 80.0, 120.0]))
+
+    def found(data: GapData) -> bool:
+        bench = make_bench(data)
+        target = bench.observed - prediction(bench)
+        return "rough" in {v.word for v in strangers(bench, base_columns(bench), target)}
+
+    assert found(data) is rough
+    assert found(few)
+    assert found(replace(data, arm=True))
+
+
 def nothing_loaded(moved: Array) -> GapData:
     """A recording without load."""
     n = len(moved)
@@ -87,3 +114,32 @@ def test_what_rests_may_swing(periods: float, verdict: str) -> None:
     if verdict == "unknown":
         assert result.looks_like is not None
         assert result.looks_like.period == pytest.approx(399 / periods, rel=0.01)
+
+
+def under_a_weight(moved: Array, every_s: float = 1.0) -> GapData:
+    """What was read beside a weight that hangs all the time, as is stated."""
+    n = len(moved)
+    trembles = 0.1 * np.random.default_rng(5).standard_normal(n)
+    return bench_data(80.0 + trembles, moved, step=np.full(n, -1), time=every_s * np.arange(n),
+                      session=every_s * np.arange(n), imposed="force")  # fmt: skip
+
+
+@pytest.mark.parametrize(("back", "drifts"), [(0.0, False), (0.3, True)])
+def test_what_goes_back_under_a_standing_load_does_not_creep(back: float, drifts: bool) -> None:
+    at = np.linspace(0.0, 1.0, 600)
+    noise = 1e-6 * np.random.default_rng(4).standard_normal(600)
+    moved = 4e-5 * (1 - np.exp(-3 * at)) + back * 4e-5 * np.sin(20 * at) + noise
+    found = {v.word for v in library(make_bench(under_a_weight(moved)), ["thermal_drift"])}
+    assert bool(found) is drifts
+    few = under_a_weight(moved[:12])  # nobody knows
+    assert not library(make_bench(few), ["thermal_drift"])
+
+
+@pytest.mark.parametrize(("every_s", "verdict"), [(10.0, "unknown"), (120.0, "thermal_drift")])
+def test_a_room_may_swing_often_but_slowly(every_s: float, verdict: str) -> None:
+    """Fourteen times in 1.7 h, or in 20 h."""
+    at = np.linspace(0.0, 1.0, 600)
+    noise = 1e-6 * np.random.default_rng(4).standard_normal(600)
+    moved = 1e-4 * at + 3e-5 * np.sin(2 * np.pi * 14 * at) + noise
+    result = diagnose_gap(under_a_weight(moved, every_s))
+    assert result.verdict == verdict

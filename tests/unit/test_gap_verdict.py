@@ -47,6 +47,7 @@ from identification.gap.verdict import (
 )
 from identification.gap.words import DAMAGE, JERKS, SOFTENING
 from tests.unit.test_gap_evidence import small_bench, small_engine
+from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_weights import UP, hanging
 
 
@@ -138,6 +139,31 @@ def test_springs_far_off_stand_on_their_own_beside_a_mechanism() -> None:
     assert not _on_its_own((part("joint_yield", [0]), rubs), far, 0, 1)
     curves = [part("joint_nonlinear_stiffness", [1], kinds=k) for k in (("line", 0.5), ("even",))]
     assert [_on_its_own((springs, curve), far, 0, 1) for curve in curves] == [False, True]
+
+
+@pytest.mark.parametrize("second", ["contact_seating", "joint_nonlinear_stiffness"])
+def test_where_most_of_the_way_is_left_what_gives_way_is_larger_than_a_curve(second: str) -> None:
+    parts = part(second, [0]), part("joint_yield", [1])
+    sizes = Sizes(np.array([5e-7, 1e-7]), np.array([4e-7, 2e-7]), 0.0)
+    for back, larger in ((0.2, 0), (0.8, 1)):
+        load = np.append(np.linspace(0, 80, 9), 0.0)
+        moved = np.append(1e-5 * load[:-1], (1 - back) * 8e-4)
+        bench = make_bench(bench_data(load, moved, step=np.arange(10)))
+        found = _counted(small_engine_of(bench), parts, sizes, 0)
+        assert found.argmax() == 1 - larger
+
+
+@pytest.mark.parametrize(("times_s", "same"), [((0.1, 0.3), True), ((1.0, 3.0), False)])
+def test_what_creeps_as_soon_as_a_channel_lags_is_the_lag(
+    times_s: tuple[float, ...], same: bool
+) -> None:
+    engine = small_engine_of(small_bench())
+    creep = part("joint_creep", [0], times_s=np.array(times_s))
+    lag = part("time_lag", [1], lag_s=0.1)
+    assert _same_element(engine, creep, lag) is same
+    assert _same_element(engine, lag, creep) is same
+    arm = replace_bench(engine, replace(engine.bench, data=replace(engine.bench.data, arm=True)))
+    assert not _same_element(arm, creep, lag)
 
 
 def test_springs_are_part_of_what_is_damaged_on_a_bench() -> None:

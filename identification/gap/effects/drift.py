@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.turns import way_back
 from identification.gap.variants import Variant, variant
 
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
@@ -17,6 +18,7 @@ _SEEN = 3  # rows within the time constant
 # one bears three pieces; where nothing is loaded, nothing tells a quick path from other events.
 PIECES = {"free path": 10, "winding path": 32}
 LONG_PIECES, RESTING_PIECES, LEAST_PIECES = 40, 20, 4
+MOST_PIECES, _ROOM_S = 100, 300.0  # of long rests; s of each, in which a room gets no warmer
 
 
 def warm_ups(bench: Bench) -> dict[str, Array]:
@@ -48,10 +50,32 @@ def by_direction(bench: Bench) -> dict[str, Array]:
 def own_clock(bench: Bench) -> bool:
     """Whether time and load part company: the load comes and goes at least three times, in runs or
     in cycles of one, or there is none at all. Else a path in time is a curve of the load, or the
-    creep under one that stands."""
-    if bench.course.stands and _loaded(bench):
+    creep under one that stands, unless that goes back."""
+    if hangs(bench) and not _goes_back(bench):
         return False
     return bench.course.passes >= 3
+
+
+def hangs(bench: Bench) -> bool:
+    """Whether a load stood all the time, from before anybody looked."""
+    return bench.course.stands and _loaded(bench)
+
+
+def _goes_back(bench: Bench) -> bool:
+    """Whether what is read under a standing load goes to and fro, as nothing does that creeps: by
+    means of even pieces, beyond what these scatter by the neighbours' difference."""
+    count = min(_STRETCHES, bench.rows.n // _OF_EACH)
+    if count < LEAST_PIECES:
+        return False
+    pieces = np.array_split(bench.response, count)
+    mean = np.array([p.mean() for p in pieces])
+    noise = max(float(np.diff(p).std()) / (2 * len(p)) ** 0.5 for p in pieces)
+    back = min(way_back(mean * sign) for sign in (1.0, -1.0))
+    return bool(back > max(_BACK * float(np.ptp(mean)), _CLEARLY * noise))
+
+
+_STRETCHES, _OF_EACH = 100, 4  # pieces at most; rows of each at least
+_BACK, _CLEARLY = 0.1, 5.0  # of all that was seen; standard deviations
 
 
 def paths(bench: Bench) -> dict[str, Array]:
@@ -73,7 +97,7 @@ def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
         return usual[:SMALL]
     if not bench.rows.continuous:
         return usual
-    return (*(s for s in usual if s < 0.3), 0.3, *((1.0, 3.0) if bench.course.rests else ()))
+    return (*(s for s in usual if s < 0.3), 0.3, *((1.0, 3.0, 10.0) if bench.course.rests else ()))
 
 
 _LOADED = 0.3  # of the largest force
@@ -114,7 +138,10 @@ def free_paths(bench: Bench) -> dict[str, FreePath]:
         return {}
     if not bench.rows.continuous:
         return {label: FreePath(pieces) for label, pieces in PIECES.items()}
-    most = RESTING_PIECES if bench.course.rests else LONG_PIECES
+    most = LONG_PIECES
+    if bench.course.rests:
+        slow = int(min(bench.course.session_span / _ROOM_S, bench.rows.n / _OF_EACH))
+        most = min(max(RESTING_PIECES, slow), MOST_PIECES)
     pieces = min(3 * (bench.course.passes - 3), most)
     if pieces < LEAST_PIECES:
         return {}
