@@ -175,7 +175,7 @@ def _smooth(bench: Bench, place: Ints, target: Array) -> bool:
     for s in np.unique(setup):
         order = np.flatnonzero(setup == s)[np.argsort(load[setup == s])]
         x, y = load[order], mean[order]
-        if len(x) < _FEWEST_LEVELS:
+        if len(x) < 3:  # two have no curve
             return False
         between = y[:-2] + (y[2:] - y[:-2]) * (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
         off += float(np.sum((y[1:-1] - between) ** 2))
@@ -183,7 +183,7 @@ def _smooth(bench: Bench, place: Ints, target: Array) -> bool:
     return off < _SMOOTH**2 * about
 
 
-_FEWEST_LEVELS, _SMOOTH = 5, 0.25
+_SMOOTH = 0.25
 
 
 def _jumps(bench: Bench) -> list[Variant]:

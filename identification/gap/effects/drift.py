@@ -97,7 +97,8 @@ def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
         return usual[:SMALL]
     if not bench.rows.continuous:
         return usual
-    return (*(s for s in usual if s < 0.3), 0.3, *((1.0, 3.0, 10.0) if bench.course.rests else ()))
+    steep = (1.0, 3.0, 10.0) if _resting_pieces(bench) > RESTING_PIECES else (1.0, 3.0)
+    return (*(s for s in usual if s < 0.3), 0.3, *(steep if bench.course.rests else ()))
 
 
 _LOADED = 0.3  # of the largest force
@@ -138,14 +139,17 @@ def free_paths(bench: Bench) -> dict[str, FreePath]:
         return {}
     if not bench.rows.continuous:
         return {label: FreePath(pieces) for label, pieces in PIECES.items()}
-    most = LONG_PIECES
-    if bench.course.rests:
-        slow = int(min(bench.course.session_span / _ROOM_S, bench.rows.n / _OF_EACH))
-        most = min(max(RESTING_PIECES, slow), MOST_PIECES)
+    most = _resting_pieces(bench) if bench.course.rests else LONG_PIECES
     pieces = min(3 * (bench.course.passes - 3), most)
     if pieces < LEAST_PIECES:
         return {}
     return {"free path": FreePath(pieces), "steady path": FreePath(pieces, True)}
+
+
+def _resting_pieces(bench: Bench) -> int:
+    """Pieces of a path while nothing is loaded anew: of hours, in which a room swings, more."""
+    slow = int(min(bench.course.session_span / _ROOM_S, bench.rows.n / _OF_EACH))
+    return min(max(RESTING_PIECES, slow), MOST_PIECES)
 
 
 def free_path(bench: Bench, pieces: int) -> Array:
