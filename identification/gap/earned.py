@@ -61,22 +61,26 @@ _PASSES = 2
 
 def _foretold(found: Found, name: str, fold: Ints) -> dict[frozenset[str], Explanation]:
     """Of explanations with two effects that matter, the one effect that foretells withheld data
-    better than both: words that stand for each other foretell the same. What a drift does nothing
-    foretells: where it is the larger one, another has to be plainly better to speak for both."""
+    better than both: words that stand for each other foretell the same; of two that do, alike, the
+    one that explains more. What a drift does nothing foretells: where it is the larger one, another
+    has to be plainly better to speak for both."""
     first, out = found.explanations[0].log_weight, {}
     pairs = [e for e in found.explanations[:_PAIRS] if e.log_weight > first - _NEAR]
     for both in (e for e in pairs if len(e.words) == _TWO):
         drifts = both.parts[0].word in FREE
-        best = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
-        for one in (e for e in found.explanations if e.words < both.words and e.words - FREE):
-            after = held_out(found.engine, one, name, fold).after
-            if after < best:
-                best, out[both.words] = after, one
+        most = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
+        each = [e for e in found.explanations if e.words < both.words and e.words - FREE]
+        after = [held_out(found.engine, e, name, fold).after for e in each]
+        best = min(after, default=most)
+        limit = min(_ALIKE * best, most)
+        speaker = next((e for e, a in zip(each, after, strict=True) if a < limit), None)
+        if speaker is not None:
+            out[both.words] = speaker
     return out
 
 
 _TWO, _PAIRS, _NEAR = 2, 3, 25.0  # so many of the best, and nats below the first, are looked at
-_BETTER, _PLAINLY = 0.98, 0.5
+_BETTER, _PLAINLY, _ALIKE = 0.98, 0.5, 1.1
 
 
 def _weighty(found: Found, kept: dict[frozenset[str], float]) -> list[Explanation]:

@@ -12,12 +12,12 @@ from identification.gap.bench import make_bench
 from identification.gap.choice import WORTH_OF_THIRD, chosen_of
 from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.earned import earned
+from identification.gap.earned import _foretold, earned
 from identification.gap.effects.drift import FreePath, free_path, free_variant
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, Found
 from identification.gap.faults import bursts
-from identification.gap.heldout import ALWAYS_IN, _stacked_keep, folds, held_out
+from identification.gap.heldout import ALWAYS_IN, HeldOut, _stacked_keep, folds, held_out
 from identification.gap.leftover import looked_up
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import cancelling, pettiness, trifle
@@ -255,6 +255,24 @@ def test_a_drift_alone_speaks_for_nobody() -> None:
     bump = explained([0], "joint_nonlinear_stiffness", -60.0)
     both = Explanation(bump.parts + drift.parts, 0.0, 0.0, (BUMP / 3, BUMP / 9), 0.0)
     assert earned(found(e, both, drift, bump)).foretold[both.words] is bump
+
+
+@pytest.mark.parametrize(("bump_after", "speaks"), [(1.05, "bump"), (1.3, "creep"), (2.5, "creep")])
+def test_of_two_that_foretell_alike_the_one_that_explains_more_speaks(
+    monkeypatch: pytest.MonkeyPatch, bump_after: float, speaks: str
+) -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    one = {"bump": explained([0], "joint_nonlinear_stiffness", -40.0),
+           "creep": explained([1], "joint_creep", -60.0)}  # fmt: skip
+    parts = one["creep"].parts + one["bump"].parts
+    both = Explanation(parts, 0.0, 0.0, (BUMP / 3, BUMP / 3), 0.0)
+    after = {both.words: 2.0, one["bump"].words: bump_after, one["creep"].words: 1.0}
+    monkeypatch.setattr(
+        "identification.gap.earned.held_out",
+        lambda _, x, *__: HeldOut("repetition", 3.0, after[x.words], (1.0, 1.0)),
+    )
+    told = _foretold(found(e, both, *one.values()), "repetition", np.zeros(e.bench.rows.n, int))
+    assert told[both.words] is one[speaks]
 
 
 @pytest.mark.parametrize(("share", "named"), [(0.05, 2), (0.3, 3)])
