@@ -170,8 +170,9 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) 
     and the friction takes it back. A toe and a knee count as they move: what a spring would hide of
     either, the other shows; but a ball on a plate is no toe, and goes on like a spring. Of an
     imposed stroke creep, too, brings a mean stiffness, and what a spring leaves of either says
-    little: the larger is the one that the other can do less without. Where most of the way is left
-    when the load is gone, what gives way is larger than any curve."""
+    little: the larger is the one that the other can do less without; at one rate the friction, from
+    which creep differs in details only. Where most of the way is left when the load is gone, what
+    gives way is larger than any curve."""
     if engine.bench.data.arm:
         return sizes.gap
     rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
@@ -179,6 +180,8 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) 
     creeps = np.array([p.word == "joint_creep" for p in parts], dtype=bool)
     if len(parts) == _PAIR and rubs.any():
         if curves.any() and engine.bench.course.left_behind > _STAYS:
+            return _led(sizes.gap, int(rubs.argmax()))
+        if creeps.any() and engine.bench.course.one_rate:
             return _led(sizes.gap, int(rubs.argmax()))
         if creeps.any() and engine.bench.imposed:
             return _led(sizes.gap, int(needed(engine, parts, level).argmax()))

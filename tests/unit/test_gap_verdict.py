@@ -13,6 +13,7 @@ from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.choice import chosen_of, foresees
 from identification.gap.compare import Scored, log_mean
+from identification.gap.course import Course
 from identification.gap.effects import library
 from identification.gap.evidence import Engine
 from identification.gap.explanation import (
@@ -186,11 +187,15 @@ def test_what_a_part_is_needed_for_is_what_the_others_can_not_do() -> None:
     assert needed(engine, parts, 1) == pytest.approx(both - alone[::-1])
 
 
-@pytest.mark.parametrize(("imposed", "larger"), [(True, 1), (False, 0)])
+@pytest.mark.parametrize(
+    ("imposed", "one_rate", "larger"), [(True, False, 1), (False, False, 0), (False, True, 1)]
+)
 def test_of_creep_and_friction_in_an_imposed_stroke_the_needed_one_is_larger(
-    monkeypatch: pytest.MonkeyPatch, imposed: bool, larger: int
+    monkeypatch: pytest.MonkeyPatch, imposed: bool, one_rate: bool, larger: int
 ) -> None:
-    """Each brings a mean stiffness, which the spring takes over."""
+    """Each brings a mean stiffness, which the spring takes over; at one rate the friction is, from
+    which creep differs in details only."""
+    monkeypatch.setattr(Course, "one_rate", one_rate)
     engine = small_engine_of(small_bench())
     engine = replace_bench(engine, replace(engine.bench, imposed=imposed))
     monkeypatch.setattr(explanation, "needed", lambda *_: np.array([36.0, 250.0]))
