@@ -1,4 +1,4 @@
-"""Troubles of recordings that run on, which no word names: jerks, damage, softening.
+"""Troubles of recordings that run on, which no word names: jerks, damage, softening, wandering.
 
 On a rig without an arm a grip slips in jerks or an interferometer loses fringes, fibres break for
 good, rubber is softer wherever it was stretched before (Mullins 1969). Words with any freedom, as
@@ -7,7 +7,8 @@ do, alone and beside them; what they explain best is `unknown`, and what it look
 
 jerks: the response jumps at rows found one after the other, and stays. damage: the stiffness that
 is lost grows with the largest load so far. softening: below the largest load so far it is softer,
-and back where it was at that load (Ogden, Roxburgh 1999).
+and back where it was at that load (Ogden, Roxburgh 1999). wanders: the stiffness goes its own way
+in time, as it does by fatigue, cure, humidity or a pressure that nobody holds.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from numpy.polynomial.chebyshev import chebvander
 from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effects.drift import free_path, path_root
 from identification.gap.explanation import Found, Likeness
 from identification.gap.turns import rises, turns
 from identification.gap.variants import Variant, variant
-from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING
+from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING, WANDERS
 
 SHARES = (0.01, 0.03, 0.1, 0.3, 1.0)  # of the largest response, by one jump
 COUNTS = (1, 2, 4, 8, 12)  # jumps
@@ -33,6 +35,7 @@ LOSSES = (0.03, 0.1, 0.3)  # of the stiffness
 KNOTS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)  # of the largest load
 BELOW = (0.05, 0.15, 0.5)  # of the largest load: so far below what it bore it is as soft as it gets
 _FEWEST_ROWS = 30
+_PASSES, _LEAST_PIECES, _PIECES = 3, 3, 12  # of the load; of a path in time
 _STAYS = 0.3  # of the way, when the load is gone: what only softens comes back
 _CURVE, _LOOP, _SLOW = 7, 4, 5  # degrees of a smooth response that jumps are looked for beside
 _NOTHING_NEW = 1e-6  # of its square is left of a jump beside what is known
@@ -46,7 +49,7 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     lasting = _damage(bench) if bench.course.returns else []
     if bench.course.returns and bench.course.left_behind < _STAYS:
         lasting += _softening(bench)
-    return [*lasting, *_jerks(bench, base, target)]
+    return [*lasting, *_wanders(bench), *_jerks(bench, base, target)]
 
 
 def told(found: Found) -> Found:
@@ -89,6 +92,16 @@ def _softening(bench: Bench) -> list[Variant]:
         columns = [bench.add(bench.outside_column(c)) for c in (soft, soft * largest / top)]
         out.append(variant(SOFTENING, f"below {share:g}", columns, LOSSES, prior=1 / len(BELOW)))
     return out
+
+
+def _wanders(bench: Bench) -> list[Variant]:
+    """Of a load that comes and goes often enough to tell time from load."""
+    pieces = min(bench.course.passes - _PASSES, _PIECES)
+    if not bench.course.returns or pieces < _LEAST_PIECES:
+        return []
+    spring, hats = bench.slope * bench.load, free_path(bench, pieces)
+    columns = [bench.add(bench.outside_column(spring * hat)) for hat in hats.T]
+    return [variant(WANDERS, "in time", columns, LOSSES, path_root(pieces), positive=False)]
 
 
 def _jerks(bench: Bench, base: Base, target: Array) -> list[Variant]:

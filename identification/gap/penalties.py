@@ -8,7 +8,7 @@ import numpy as np
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, Sizes
-from identification.gap.words import CURVES, DAMAGE, FRICTION, LINEAR, MECHANISMS, SOFTENING
+from identification.gap.words import CURVES, DRIFTS, FRICTION, JERKS, LINEAR, MECHANISMS, NAMELESS
 
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
@@ -182,7 +182,9 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
         return True  # of a single pull: what comes late and what bends are one curve
     if not engine.bench.data.arm and words == LATE and _as_late(one, other):
         return True
-    bends = MECHANISMS | {DAMAGE, SOFTENING}
+    if engine.bench.course.rests and words <= DRIFTS:
+        return True  # what is read beside a load that stands is one path in time
+    bends = MECHANISMS | frozenset(NAMELESS) - {JERKS}
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & bends)):
         return True
     springs = "joint_stiffness_error" in words and words & MECHANISMS

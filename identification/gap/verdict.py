@@ -10,7 +10,7 @@ import numpy as np
 from identification.gap.explanation import LAW_REMAINDER, Explanation, Found
 from identification.gap.noise import UNSURE
 from identification.gap.penalties import LEAST_SHARE, joints_of
-from identification.gap.words import LINEAR, NAMELESS, WORDS
+from identification.gap.words import LINEAR, WORDS
 
 # Neighbouring points of one smooth run are no independent witnesses of its law.
 TEMPER = 0.12
@@ -168,23 +168,9 @@ def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
     of the first one's law."""
     if not explanation.parts:
         return {"none": 1.0}
-    if _follows(explanation):
-        return {"unknown": 1.0}
     if not arm:
         return {explanation.parts[0].word: 1.0}
     return _largest(explanation.troubles)
-
-
-def _follows(explanation: Explanation) -> bool:
-    """Whether its main effect takes any path, beside what no word names and is of its size: then
-    that is no law, but follows more of the same."""
-    sizes = explanation.troubles
-    nameless = sum(s for w, s in sizes.items() if w in NAMELESS)
-    free = explanation.parts[0].variant.info.get("path") == "free"
-    return free and nameless > _OF_ITS_SIZE * max(sizes.values())
-
-
-_OF_ITS_SIZE = 0.5
 
 
 def _largest(sizes: Mapping[str, float]) -> dict[str, float]:

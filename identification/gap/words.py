@@ -54,5 +54,5 @@ FRICTION = words_of("friction")
 DRIFTS = words_of("drift")
 
 # Troubles of running recordings that no word names (breaks.py): what they explain is `unknown`.
-JERKS, DAMAGE, SOFTENING = "jerks", "damage", "softening"
-NAMELESS = (JERKS, DAMAGE, SOFTENING)
+JERKS, DAMAGE, SOFTENING, WANDERS = "jerks", "damage", "softening", "wanders"
+NAMELESS = (JERKS, DAMAGE, SOFTENING, WANDERS)

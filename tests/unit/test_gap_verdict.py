@@ -46,7 +46,7 @@ from identification.gap.verdict import (
     _tells_of_three,
     weighed,
 )
-from identification.gap.words import DAMAGE, JERKS, SOFTENING
+from identification.gap.words import DAMAGE, JERKS, SOFTENING, WANDERS
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_weights import UP, hanging
@@ -172,7 +172,7 @@ def test_springs_are_part_of_what_is_damaged_on_a_bench() -> None:
     engine = small_engine_of(small_bench())
     spring = part("joint_stiffness_error", [0])
     arm = replace_bench(engine, replace(engine.bench, data=replace(engine.bench.data, arm=True)))
-    for word, same in ((DAMAGE, True), (SOFTENING, True), (JERKS, False)):
+    for word, same in ((DAMAGE, True), (SOFTENING, True), (WANDERS, True), (JERKS, False)):
         assert _same_element(engine, spring, part(word, [1])) is same
         assert not _same_element(arm, spring, part(word, [1]))
 
@@ -339,21 +339,18 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
 
 
 def test_what_no_word_names_is_unknown_unless_a_word_explains_it_as_well() -> None:
-    """A word that is the larger one beside it keeps its weight, unless it is a drift that takes any
-    path; one that leaves no more than the noise keeps all."""
+    """A word that is the larger one beside it keeps its weight; one that leaves no more than the
+    noise keeps all."""
     bench = small_bench()
     variants = library(bench, ["joint_creep"])
     found = search(small_engine_of(bench), variants)
     creep, jerks, noise = part("joint_creep", [0]), part(JERKS, [1]), bench.noise.stated
-    winds, warms = (part("thermal_drift", [0], path=path) for path in ("free", "steady"))
     for parts, eta, main in (((jerks,), 3 * noise, "unknown"),
                              ((jerks, creep), 3 * noise, "unknown"),
                              ((creep, jerks), 3 * noise, "joint_creep"),
-                             ((winds, jerks), 3 * noise, "unknown"),
-                             ((warms, jerks), 3 * noise, "thermal_drift"),
                              ((jerks,), noise, "joint_creep")):  # fmt: skip
         word = said((creep,), (1e-5,), -20.0, eta)
-        odd = said(parts, (1e-5, 0.6e-5)[: len(parts)], 20.0, 0.0)
+        odd = said(parts, (1e-5, 0.5e-5)[: len(parts)], 20.0, 0.0)
         whole = replace(found, explanations=(word,), nameless=(odd,), unknown=-90.0, alone={})
         given = weighed(whole, {}).probabilities
         assert max(given, key=lambda w: given[w]) == main

@@ -29,6 +29,7 @@ BENCH_SHARES = (0.01, 0.03, 0.1)
 STEPS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45)  # of it, between which several faces seat
 HERTZ_AT = 0.1  # of the largest force: where its scale is put
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8)  # of an imposed stroke
+TOES = tuple(s for s in SLACKS if s < 0.5)  # what bends over more than half of it is a curve
 SEATS = (0.08, 0.16, 0.25, 0.35, 0.5, 0.7)  # of the stroke beyond a slack
 LOST = {"slack": 1.0, "toe": 0.5}  # share of a slack's stroke by which the rest comes late
 FINER = np.linspace(-0.32, 0.32, 9)  # of a slack that was found
@@ -151,12 +152,13 @@ def _slacks(bench: Bench) -> list[Variant]:
     if bench.data.arm or not bench.imposed:
         return []
     stroke = _stroke(bench)
-    single = {law: [_slack(bench, law, s * stroke) for s in SLACKS] for law in LOST}
+    shares = {"slack": SLACKS, "toe": TOES}
+    single = {law: [_slack(bench, law, s * stroke) for s in shares[law]] for law in LOST}
     toes = [v.columns[0] for v in single["toe"]]
-    root = np.diag([LOST["toe"] * _given(bench, s * stroke) for s in SLACKS])
-    laws = tuple(("toe", s * stroke) for s in SLACKS)
+    root = np.diag([LOST["toe"] * _given(bench, s * stroke) for s in TOES])
+    laws = tuple(("toe", s * stroke) for s in TOES)
     several = variant(WORD, "toes", toes, (0.1, 0.3, 1.0), root, each=True, prior=2.0,
-                      force_N=SLACKS[-1] * stroke, laws=laws)  # fmt: skip
+                      force_N=TOES[-1] * stroke, laws=laws)  # fmt: skip
     out = [v for vs in single.values() for v in vs]
     if bench.course.approaches:
         out += [_then_seats(bench, s * stroke, 1 / len(SLACKS)) for s in SLACKS]

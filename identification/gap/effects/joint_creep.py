@@ -80,10 +80,9 @@ def variants(bench: Bench) -> list[Variant]:
             name, likely = f"joint {j + 1}{memory}", _LIKELY[memory]
             pairs = (0.3 if bench.data.arm else 0.5) * likely
             out += _family(name, columns, spectrum, sizes, 0.5 * likely, pairs, info)
-        if bench.data.arm or not bench.rows.continuous:
-            columns = _elements(bench, j, spectrum, None, is_bent=True)
-            info = {"joint": j, "memory": "", "bent": True}
-            out += _family(f"joint {j + 1}{BENT}", columns, spectrum, sizes, 0.2, 0.2, info)
+        columns = _elements(bench, j, spectrum, None, is_bent=True)
+        info = {"joint": j, "memory": "", "bent": True}
+        out += _family(f"joint {j + 1}{BENT}", columns, spectrum, sizes, 0.2, 0.2, info)
     return out
 
 
