@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import BRANCH_NAMES, Array, Flags, Ints
+from identification.gap.data import BRANCH_NAMES, Array, Flags
 from identification.gap.evidence import Engine
 from identification.gap.fit import Fit
 from identification.gap.variants import Variant
@@ -38,15 +38,15 @@ def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Wher
     sizes: of the effects, rms m."""
     bench, n = engine.bench, engine.bench.rows.n
     main = fit.contribution(engine, 0)[:n] if fit.parts else gap
-    per_setup = _size_per(bench.rows.setup, _visible(engine, fit, main), len(bench.data.setups))
+    per_setup = _size_per_setup(engine, _visible(engine, fit, main))
     top = per_setup.max()
     if not top > 0:
         return NOWHERE
     shows = per_setup >= _SHOWS * top
     setups = [s for s, yes in zip(bench.data.setups, shows, strict=True) if yes]
     rows = shows[bench.rows.setup] & (np.abs(main) >= _SHOWS * np.abs(main).max())
-    total = float(np.sum(gap**2))
-    inside = float(np.sum(gap[shows[bench.rows.setup]] ** 2))
+    square = bench.rows.weight * gap**2  # every sample counts, not every row
+    total, inside = float(square.sum()), float(square[shows[bench.rows.setup]].sum())
     word = fit.parts[0].word if fit.parts else ""
     return Where(
         directions=tuple(dict.fromkeys(s.direction for s in setups)),
@@ -75,20 +75,23 @@ def _visible(engine: Engine, fit: Fit, main: Array) -> Array:
     moved = engine.bench.rows.moved(main[:, None])[:, 0]
     if not fit.parts or fit.parts[0].word in LINEAR:
         return moved
-    out = moved.copy()
-    bench = engine.bench
+    out, bench = moved.copy(), engine.bench
+    load = bench.rows.moved(bench.load[:, None])[:, 0]
     for s in range(len(bench.data.setups)):
         mine = bench.rows.setup == s
-        x = bench.load[mine] - bench.load[mine].mean()
-        power = float(x @ x)
+        weight, x = bench.rows.weight[mine], load[mine]
+        power = float(weight @ x**2)
         if power > 0:
-            out[mine] -= x * float(x @ moved[mine]) / power
+            out[mine] -= x * float(weight @ (x * moved[mine])) / power
     return out
 
 
-def _size_per(number: Ints, values: Array, count: int) -> Array:
-    squares = np.bincount(number, weights=values**2, minlength=count)
-    return np.asarray(np.sqrt(squares / np.maximum(np.bincount(number, minlength=count), 1)))
+def _size_per_setup(engine: Engine, values: Array) -> Array:
+    """(s,) rms of values (n,) in every setup, each sample counted."""
+    rows, count = engine.bench.rows, len(engine.bench.data.setups)
+    squares = np.bincount(rows.setup, weights=rows.weight * values**2, minlength=count)
+    samples = np.bincount(rows.setup, weights=rows.weight, minlength=count)
+    return np.asarray(np.sqrt(squares / np.maximum(samples, 1)))
 
 
 def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
@@ -117,7 +120,7 @@ def _joints(engine: Engine, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]
             out.append(int(p.variant.info["joint"]) + 1)
         elif "joints" in p.variant.info and p.word == "joint_stiffness_error":
             w, cov = fit.of(i)
-            part = np.abs(w) * np.linalg.norm(_moved(engine, p.variant), axis=0)
+            part = np.abs(w) * _size_of_each(engine, p.variant)
             shows = (np.abs(w) > 2 * np.sqrt(np.diag(cov))) & (part >= _SHOWS * part.max())
             out += [j + 1 for j, s in zip(p.variant.info["joints"], shows, strict=True) if s]
     return tuple(dict.fromkeys(out))
@@ -126,6 +129,7 @@ def _joints(engine: Engine, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]
 _COUNTS = 0.1  # of the largest effect, a hundredth of its square: there the gap does not lie
 
 
-def _moved(engine: Engine, variant: Variant) -> Array:
-    """(n, k) what unit coefficients do to the response, without the datum of each setup."""
-    return engine.bench.rows.moved(engine.responses(variant.columns))
+def _size_of_each(engine: Engine, variant: Variant) -> Array:
+    """(k,) rms of what unit coefficients do to the response, without the datum of each setup."""
+    rows = engine.bench.rows
+    return np.array([rows.rms(v) for v in rows.moved(engine.responses(variant.columns)).T])

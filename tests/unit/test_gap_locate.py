@@ -1,0 +1,68 @@
+"""Where the gap lies: every sample counts, however many of them a row holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from identification.gap.bench import Bench, make_bench
+from identification.gap.data import Array
+from identification.gap.locate import locate
+from tests.unit.test_gap_forms import arm_data
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return make_bench(arm_data())
+
+
+def located(bench: Bench, gap: Array, word: str = "") -> object:
+    """Where a gap (n,) lies; word: of the effect that made it, none where empty."""
+    part = SimpleNamespace(word=word, variant=SimpleNamespace(info={}))
+    fit = SimpleNamespace(parts=(part,) if word else (), contribution=lambda engine, i: gap)
+    return locate(SimpleNamespace(bench=bench), fit, [1.0], gap)
+
+
+def balanced(bench: Bench, values: Array) -> Array:
+    """Values (n,) without the mean of their setup."""
+    return bench.rows.moved(values[:, None])[:, 0]
+
+
+def test_share_of_the_gap_counts_samples(bench: Bench) -> None:
+    rows = bench.rows
+    long = np.where(rows.setup == 0, 20.0, 1.0) * rows.weight  # holds that took twenty times longer
+    wave = np.where(np.arange(rows.n) % 2, 1e-6, -1e-6)
+    gap = wave * np.where(rows.setup == 0, 1.0, 0.1)
+    longer = replace(bench, rows=replace(rows, weight=long))
+    of_samples = np.repeat(gap**2, long.astype(int))
+    of_setup = np.repeat(rows.setup == 0, long.astype(int))
+    found = located(longer, gap)
+    assert len(found.directions) == 1
+    assert found.share == pytest.approx(of_samples[of_setup].sum() / of_samples.sum())
+
+
+def test_directions_in_which_a_gap_shows_count_samples(bench: Bench) -> None:
+    """What stands in single samples of long holds is small, though in as many rows as others."""
+    rows = bench.rows
+    y = np.array([s.direction == "y" for s in bench.data.setups])[rows.setup]
+    weight = np.where(rows.hold_starts | ~y, 1.0, 400.0)
+    longer = replace(bench, rows=replace(rows, weight=weight))
+    gap = np.where(np.arange(rows.n) % 2, 1e-6, -1e-6)
+    gap[y & ~rows.hold_starts] = 0.0
+    assert located(longer, gap).directions == ("x",)
+    assert located(bench, gap).directions == ("x", "y")
+
+
+def test_what_springs_take_over_is_fitted_to_samples(bench: Bench) -> None:
+    """An effect that is straight over the load in all but a few samples is no more than these."""
+    rows = bench.rows
+    y = np.array([s.direction == "y" for s in bench.data.setups])[rows.setup]
+    weight = np.where(rows.hold_starts | ~y, 1.0, 1e4)
+    longer = replace(bench, rows=replace(rows, weight=weight))
+    bent = np.where(np.arange(rows.n) % 2, 1e-6, -1e-6)
+    straight = 2e-8 * bench.load * np.where(rows.hold_starts, 3.0, 1.0)
+    gap = np.where(y, straight, bent)
+    assert located(longer, balanced(longer, gap), "joint_yield").directions == ("x",)
