@@ -45,7 +45,6 @@ _OF_ONE_SPRING = {
     "joint_nonlinear_stiffness": "the spring is curved, reversibly",
     "joint_hysteresis": "it rubs: loading and unloading differ from the first load on",
     "joint_creep": "it creeps under the held load",
-    "base_slip": "it slips above a threshold load, and stays there",
     "contact_seating": "what is loaded seats itself in its fixture",
     "displacement_scale": "the gain of the displacement sensor is off",
     "joint_stiffness_error": "the stiffness is not the simulated one",

@@ -1,0 +1,126 @@
+"""Every table that is keyed by the words of effects holds all of them, or a subset that is named.
+
+A word that one of the tables lacks is missed here, before data show it.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.gap import forms, parameters, readings, refine
+from identification.gap.parts import Part
+from identification.gap.words import IN_JOINTS, KINDS, NEED_ARM, WORDS
+from rig import diagnose_text, gap_keys, gap_path
+from rig.blind import judge, mujoco_effects
+from rig.worlds.benches import draw as benches
+from rig.worlds.hidden import draw as hidden
+from rig.worlds.hidden import textbook
+from rig.worlds.hidden import words as drawn
+from tests.conformance.effect_benches import OUTSIDE, PAIRS, of
+
+ANSWERS = {"none", "unknown"}
+
+TABLES = {
+    "kinds": KINDS,
+    "parameters": parameters._TABLE,
+    "forms": forms._TABLE,
+    "grammar of model files": gap_keys.GRAMMAR,
+    "meanings": diagnose_text.MEANING,
+    "words that are drawn": drawn.EFFECTS,
+    "laws of hidden worlds": set(hidden.FORMS) - ANSWERS,
+    "textbook": {*textbook.FORMS, "pose_error"},  # of which rivals makes a fit of its own
+    "laws of benches": (set(benches.FORMS) - ANSWERS) | NEED_ARM | {"load_misalignment"},
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_table_holds_every_word(name: str) -> None:
+    assert sorted(TABLES[name]) == sorted(WORDS)
+
+
+# --- subsets: a new word goes to one of the two sides ------------------------------------------
+
+ANY_GRID = {  # linear in all that is unknown, or hardly changed between the points of a grid
+    "joint_creep", "link_flexibility", "base_compliance", "force_scale", "displacement_scale",
+    "thermal_drift", "zero_shift", "joint_stiffness_error",
+}  # fmt: skip
+NO_LENGTH = {  # in newtons, seconds, angles that springs give, or of an instrument
+    "link_flexibility", "base_compliance", "load_misalignment", "force_drift", "force_scale",
+    "displacement_scale", "thermal_drift", "zero_shift", "time_lag", "pose_error",
+    "joint_stiffness_error",
+}  # fmt: skip
+ALIKE_WITHOUT_ARM = {  # said in words that speak of no joint and no laser
+    "load_misalignment", "force_drift", "force_scale", "thermal_drift", "zero_shift", "time_lag",
+}  # fmt: skip
+NO_HINGE = {  # instruments, drifts and seats, which the other engine has no part for
+    "contact_seating", "load_misalignment", "force_drift", "force_scale", "displacement_scale",
+    "thermal_drift", "zero_shift", "time_lag", "pose_error",
+}  # fmt: skip
+
+SIDES: dict[str, tuple[Collection[str], set[str], Collection[str]]] = {
+    "refined": (refine._FINER, ANY_GRID, WORDS),
+    "lengths": (readings._LENGTHS, NO_LENGTH, WORDS),
+    "meanings without an arm": (
+        diagnose_text._OF_ONE_SPRING, ALIKE_WITHOUT_ARM, set(WORDS) - NEED_ARM,
+    ),
+    "drawn for the other engine": (mujoco_effects.EFFECTS, NO_HINGE, WORDS),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SIDES)
+def test_word_is_in_the_table_or_named_as_left_out(name: str) -> None:
+    some, others, words = SIDES[name]
+    assert sorted([*some, *others]) == sorted(words)
+
+
+def test_words_that_grids_meet_badly_are_refined() -> None:
+    assert set(refine._GRIDS) <= set(refine._FINER)
+
+
+def test_laws_that_go_through_springs_name_them_in_model_files() -> None:
+    about = {w for w, grammar in gap_keys.GRAMMAR.items() if "about" in grammar.constants}
+    assert about == forms._THROUGH_SPRINGS
+
+
+def test_what_belongs_to_a_session_is_said_to_be_left_out() -> None:
+    assert set(gap_path._WORDS) == forms.OF_SESSION
+    chance = {c for g in gap_keys.GRAMMAR.values() for c, _ in g.terms} & forms.SESSION
+    of_session = {c for w in forms.OF_SESSION for c, _ in gap_keys.GRAMMAR[w].terms}
+    assert set(gap_path._CHANCE) == chance - of_session
+
+
+def test_both_sides_say_alike_what_joints_show() -> None:
+    assert IN_JOINTS | {"joint_stiffness_error"} == drawn.IN_JOINTS
+    assert set(OUTSIDE) == drawn.OUTSIDE_JOINTS
+
+
+# --- names of parameters ------------------------------------------------------------------------
+
+
+@cache
+def names() -> dict[str, set[str]]:
+    """Word -> parameters that its shapes have on the benches of the designs."""
+    out: dict[str, set[str]] = defaultdict(set)
+    for word, design in PAIRS:
+        bench, variants, _ = of(word, design)
+        kinds = {(len(v.columns), *sorted(v.info)): v for v in variants}
+        for (k, *_), v in kinds.items():
+            part = Part(v, v.scales[0])
+            out[word] |= set(parameters.parameters(bench, part, np.ones(k), np.eye(k)))
+    return out
+
+
+@pytest.mark.parametrize("word", readings._LENGTHS)
+def test_lengths_are_parameters_of_their_word(word: str) -> None:
+    assert set(readings._LENGTHS[word]) <= names()[word]
+
+
+@pytest.mark.parametrize(("word", "key"), judge.SHARED)
+def test_what_is_scored_is_a_parameter_of_its_word(word: str, key: str) -> None:
+    stem = judge.SHARED[word, key].split("{")[0].rstrip("123456")  # of directions, or joints
+    assert any(n.startswith(stem) for n in names()[word])
