@@ -27,6 +27,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING, Array, Flags, Ints
 from identification.gap.factor import factor_of
 from identification.gap.growing import Growing
+from identification.gap.imperfection import LOG_STEP, STEP
 from identification.gap.products import Gathered, Some, Weights, White
 from identification.gap.rows import Rows
 from identification.gap.turns import rises
@@ -294,12 +295,12 @@ class _Integrated:
 
 
 def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
-    """0, then sizes of imperfection by factors of 2.5, from half the stated uncertainty to
-    the size of what the base leaves."""
+    """0, then sizes of imperfection by factors of `STEP`, from half the stated uncertainty to the
+    size of what the base leaves."""
     start = 0.5 * bench.noise.stated
     left = structural_rms(bench, base, target)
-    count = max(3, int(np.ceil(np.log(max(1.5 * left / start, 1.0)) / np.log(2.5))) + 1)
-    return np.concatenate([[0.0], start * 2.5 ** np.arange(count)])
+    count = max(3, int(np.ceil(np.log(max(1.5 * left / start, 1.0)) / LOG_STEP)) + 1)
+    return np.concatenate([[0.0], start * STEP ** np.arange(count)])
 
 
 def structural_rms(bench: Bench, base: Base, target: Array) -> float:

@@ -1,8 +1,8 @@
 """Evidence between the levels of imperfection.
 
-The levels are steps by a factor of 2.5; where thousands of readings are far above the noise, the
-evidence peaks more sharply than that. For explanations that matter it is integrated over the size
-of the imperfection about its peak.
+The levels are coarse steps (`imperfection.STEP`); where thousands of readings are far above the
+noise, the evidence peaks more sharply than that. For explanations that matter it is integrated over
+the size of the imperfection about its peak.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ import numpy as np
 from identification.gap.compare import logsumexp
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
-from identification.gap.imperfection import level_prior, log_share
+from identification.gap.imperfection import LOG_STEP, level_prior, log_share
 from identification.gap.parts import Part, log_joint_between, log_joints
 
 PARTS = 3  # of a step between levels
 _POINTS = 25  # of the integral, per part of a step
-LOG_STEP = np.log(2.5)  # between levels
 
 
 def gained(engine: Engine, parts: tuple[Part, ...], energy: float) -> float:

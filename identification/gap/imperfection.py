@@ -19,7 +19,8 @@ LEAST_IMPERFECTION = 0.01
 # Of what a lag does at a reading of a hold: it repeats a path between levels that hands took and
 # nobody saw. Who turns a third of a step in a fifth of the time, in several strokes, is so far off.
 PATH = 0.4
-_STEP = 2.5  # of the grid, where two levels do not tell
+STEP = 2.5  # of the grid: from one level to the next
+LOG_STEP = float(np.log(STEP))
 _SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
 
 
@@ -75,5 +76,5 @@ def _edge(etas: Array, i: int) -> float:
     half a step of the grid, which may be of every other level only."""
     if i < 0 or i >= len(etas) - 1:
         return -np.inf if i < 0 else np.inf
-    step = etas[2] / etas[1] if len(etas) > 2 else _STEP
+    step = etas[2] / etas[1] if len(etas) > 2 else STEP
     return float(0.5 * np.log((etas[i] if i else etas[1] / step) * etas[i + 1]))

@@ -19,6 +19,7 @@ from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Expla
 from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.hands import open_to_hands
+from identification.gap.imperfection import STEP
 from identification.gap.noise import UNSURE
 from identification.gap.strain import LIMIT, strain
 from identification.gap.verdict import weighed
@@ -33,7 +34,6 @@ _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
 SWINGS = 0.03  # share that is kept by a drift that comes and goes, or hurries,
 _SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
-_STEP = 2.5  # of the grid of imperfections: so much it may be off
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
 
 
@@ -80,7 +80,7 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     if _swings(fitted) or _hurries(engine, fitted):
         share *= SWINGS
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
-    if explanation.eta > _STEP * allowed:
+    if explanation.eta > STEP * allowed:  # so much the grid may be off
         good = min(good, explanation.log_good)
     asked = strain(engine, fitted, explanation.eta)
     return _unstrained(replace(explanation, log_good=good), asked)

@@ -15,7 +15,7 @@ from identification.gap.effects.base_slip import ACROSS, slides
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
-from identification.gap.imperfection import IMPERFECTION, level_priors
+from identification.gap.imperfection import IMPERFECTION, STEP, level_priors
 from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Softer
 from identification.gap.parameters import NOT_NEGATIVE, from_zero, parameters
 from identification.gap.parts import Part, energies, log_joints, part_sizes, signs_kept
@@ -343,7 +343,7 @@ def _size(engine: Engine, i: int, energy: float) -> float:
     etas = engine.etas
     if i > 0:
         return float(etas[i])
-    return float(min(IMPERFECTION * energy**0.5, etas[1] / 2.5**0.5))
+    return float(min(IMPERFECTION * energy**0.5, etas[1] / STEP**0.5))
 
 
 def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:

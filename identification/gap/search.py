@@ -14,7 +14,8 @@ from identification.gap.explanation import (
     explain,
     up_to_likeliest,
 )
-from identification.gap.finer import LOG_STEP, PARTS, gained
+from identification.gap.finer import PARTS, gained
+from identification.gap.imperfection import LOG_STEP
 from identification.gap.noise import UNSURE
 from identification.gap.parts import Part, log_joint_between, part_sizes
 from identification.gap.penalties import joints_of

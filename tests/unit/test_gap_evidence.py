@@ -21,9 +21,8 @@ from identification.gap.evidence import (
     run_columns,
 )
 from identification.gap.explanation import conditioned
-from identification.gap.finer import LOG_STEP
 from identification.gap.fit import _holds
-from identification.gap.imperfection import level_prior, log_share
+from identification.gap.imperfection import LOG_STEP, level_prior, log_share
 from identification.gap.parts import Part, log_joint_between, log_joints, mended
 from identification.gap.priors import prior_of
 from identification.gap.search import _as_stated, search
