@@ -99,19 +99,24 @@ _SELDOM = 3.0  # times: samples evenly spaced keep a bin below 2
 
 
 def _continuous_edges(data: GapData) -> Ints:
-    """Bins of equal path of force and displacement together, so that fast and slow parts count
-    alike and no bin straddles much of either; every run starts a bin."""
+    """Bins of equal path; every run starts one."""
     n = len(data.force)
     wanted = int(np.clip(_ROWS_PER_PASS * passes(data.force), CONTINUOUS_ROWS, _MOST_ROWS))
     if n <= (_MOST_ROWS if data.arm else wanted):  # an arm's few levels are left in a sample or two
         return np.arange(n, dtype=np.int64)
-    path = np.arange(n) / n
-    width = max(1, n // (4 * wanted))
-    for values in (data.force, data.displacement):
-        smooth = np.repeat(values[::width], width)[:n]  # steps of the noise are no path
-        step = np.abs(np.diff(smooth, prepend=smooth[0]))
-        total = step.sum()
-        path = path + (np.cumsum(step) / total if total > 0 else 0.0)
-    number = np.floor(path / path[-1] * wanted * (1 - 1e-12)).astype(np.int64)
+    number = even_path(data.force, data.displacement, wanted)
     new = (np.diff(number, prepend=-1) != 0) | (np.diff(data.run, prepend=-1) != 0)
     return np.flatnonzero(new).astype(np.int64)
+
+
+def even_path(force: Array, displacement: Array, wanted: int) -> Ints:
+    """(n,) number of the bin, of up to `wanted`: bins of equal path in time and both channels (n,)
+    together, so that fast and slow parts count alike, a ramp of a moment as much as the hold after
+    it, and no bin straddles much of either."""
+    n = len(force)
+    path, width = np.arange(n) / n, max(1, n // (4 * wanted))
+    for values in (force, displacement):
+        coarse = np.repeat(values[::width], width)[:n]  # steps of the noise are no path
+        step = np.abs(np.diff(coarse, prepend=coarse[0]))
+        path = path + np.cumsum(step) / (step.sum() or 1.0)
+    return np.asarray(np.floor(path / path[-1] * wanted * (1 - 1e-12)), dtype=np.int64)

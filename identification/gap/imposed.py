@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from identification.gap.bins import even_path
 from identification.gap.data import ZERO, Array, GapData, Ints
 from identification.gap.turns import way_back
 
@@ -193,7 +194,7 @@ def _channels(
     """Both channels in the same bins. The noise is what second differences show (their median, so
     that jumps do not count), and no more than a stated uncertainty that was misjudged: a coarse
     recording shows its bends there."""
-    edges = _even_path(values)
+    edges = _edges(values)
     count = np.diff(np.append(edges, len(time)))
 
     def mean(y: Array) -> Array:
@@ -208,19 +209,12 @@ def _channels(
     return one(values[0], sds[0]), one(values[1], sds[1])
 
 
-def _even_path(values: tuple[Array, Array]) -> Ints:
-    """First samples of bins of equal path in time and both channels: a ramp of a moment counts as
-    much as the hold after it."""
+def _edges(values: tuple[Array, Array]) -> Ints:
+    """First samples of bins of equal path."""
     n = len(values[0])
     if n <= _POINTS:
         return np.arange(n)
-    path, width = np.arange(n) / n, max(1, n // (4 * _POINTS))
-    for y in values:
-        coarse = np.repeat(y[::width], width)[:n]  # steps of the noise are no path
-        step = np.abs(np.diff(coarse, prepend=coarse[0]))
-        path = path + np.cumsum(step) / (step.sum() or 1.0)
-    number = np.floor(path / path[-1] * _POINTS * (1 - 1e-12)).astype(np.int64)
-    return np.flatnonzero(np.diff(number, prepend=-1) != 0)
+    return np.flatnonzero(np.diff(even_path(*values, _POINTS), prepend=-1) != 0)
 
 
 def _cost(channel: _Channel, floor: float) -> float:
