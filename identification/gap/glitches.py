@@ -15,6 +15,7 @@ import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
 from identification.gap.holds import hold_ids, is_continuous, rest_ids, scatter_within
+from identification.gap.white import white_sd
 
 _WINDOW = 25  # readings, in which a typical change is
 _NOISE, _STEPS, _RANGE = 6.0, 3.0, 0.02  # a glitch is off by more than each: standard deviations,
@@ -89,7 +90,7 @@ def _off_in_one(x: Array) -> Flags:
     """Readings, up to _LONGEST in a row, that are all off the line between the ones about them."""
     from scipy.ndimage import median_filter
 
-    noise = float(np.median(np.abs(np.diff(x, 2)))) / 0.6745 / 6**0.5
+    noise = white_sd(np.diff(x, 2))
     step = median_filter(np.abs(np.diff(x, append=x[-1])), _WINDOW, mode="nearest")
     limit = np.maximum(_STEPS * step, max(_NOISE * noise, _RANGE * float(np.ptp(x))))
     off = np.zeros(len(x), dtype=bool)

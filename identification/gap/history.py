@@ -332,7 +332,7 @@ def _ramps(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]
     """Of every run its first row and the one after its last, and corners of its path: times (m,)
     and values (m,) or (m, k)."""
     half = half_sample(rows)
-    for a, b in pairwise(np.append(np.flatnonzero(rows.starts), rows.n).tolist()):
+    for a, b in pairwise(rows.run_edges.tolist()):
         t, v = rows.time[a:b], values[a:b]
         if not rows.continuous:
             new = rows.hold_starts[a:b]

@@ -19,6 +19,7 @@ import numpy as np
 from identification.gap.bins import even_path
 from identification.gap.data import ZERO, Array, GapData, Ints
 from identification.gap.turns import way_back
+from identification.gap.white import white_sd
 
 _POINTS = 1000  # bins of a recording: more do not tell the path better
 _CLOSEST = 3e-7  # of the squared range: a piece that leaves less is as good as exact
@@ -203,8 +204,8 @@ def _channels(
     def one(y: Array, sd: float) -> _Channel:
         points = mean(y)
         span = float(np.ptp(points)) or 1.0
-        shown = 1.4826 * float(np.median(np.abs(np.diff(points, 2)))) / np.sqrt(6)
-        return _Channel(mean(time), points / span, min(shown, _MISJUDGED * sd) / span)
+        shown = min(white_sd(np.diff(points, 2)), _MISJUDGED * sd)
+        return _Channel(mean(time), points / span, shown / span)
 
     return one(values[0], sds[0]), one(values[1], sds[1])
 

@@ -13,6 +13,7 @@ from identification.gap.history import half_sample
 from identification.gap.holds import ENOUGH, hold_ids, rest_ids, scatter_within, swing_within
 from identification.gap.rows import Rows
 from identification.gap.turns import turns
+from identification.gap.white import LEAST_SAMPLES, white_noise, white_sd
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -98,7 +99,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         raised=raised,
         swings=_swings(data, rows, hold),
         slow=_slow(data, rows, float(np.median(slope)), hold),
-        sure=data.arm or (rows.continuous and len(data.force) >= _LEAST_SAMPLES),
+        sure=data.arm or (rows.continuous and len(data.force) >= LEAST_SAMPLES),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),
     )  # fmt: skip
 
@@ -244,10 +245,8 @@ def _reach(rows: Rows, driven: Array, sd: float) -> int:
 
 def _about(rows: Rows, reach: int) -> tuple[Ints, Ints]:
     """(n,) the rows that lie `reach` before and after every row, within its run."""
-    number, run = np.arange(rows.n), np.cumsum(rows.starts) - 1
-    starts = np.flatnonzero(rows.starts)
-    last = np.append(starts[1:], rows.n)[run] - 1
-    return np.maximum(number - reach, starts[run]), np.minimum(number + reach, last)
+    number, run, edges = np.arange(rows.n), np.cumsum(rows.starts) - 1, rows.run_edges
+    return np.maximum(number - reach, edges[run]), np.minimum(number + reach, edges[run + 1] - 1)
 
 
 _LONG = 8  # rows of a stretch in which a channel stands
@@ -297,9 +296,8 @@ def _stands(rows: Rows, driven: Array, stated: float) -> Flags:
 
 def _stretches(rows: Rows, driven: Array, sd: float) -> Iterator[slice]:
     """Rows over which what is driven stands still within its noise."""
-    ends = np.append(np.flatnonzero(rows.starts)[1:], rows.n)
-    for a, b in zip(np.flatnonzero(rows.starts), ends, strict=True):
-        first = int(a)
+    for a, b in pairwise(rows.run_edges.tolist()):
+        first = a
         while first < b:
             last = _stretch(driven[first:b], _BAND * sd) + first
             mine = slice(first, last)
@@ -314,7 +312,7 @@ def _jitter(driven: Array, stated: float) -> float:
     steps = np.abs(np.diff(driven))
     if len(steps) < 2:
         return 0.0
-    scatter = float(np.median(np.abs(np.diff(driven, 2)))) / 0.6745 / 6**0.5
+    scatter = white_sd(np.diff(driven, 2))
     coarse = float(np.mean(steps == 0)) > _REPEATED
     step = float(steps[steps > 0].min(initial=np.inf)) / 12**0.5
     return max(min(scatter, 3 * stated), step if coarse and step <= stated else 0.0)
@@ -329,8 +327,7 @@ def _means(rows: Rows, values: Array, reach: int) -> Array:
     a, b = _about(rows, reach)
     number = np.arange(rows.n)
     side = np.minimum(number - a, b - number)
-    edges = np.append(np.flatnonzero(rows.starts), rows.n)
-    for start, end in pairwise(edges):
+    for start, end in pairwise(rows.run_edges):
         for turn in turns(values[start:end]):
             side = np.minimum(side, np.abs(number - (start + turn)))
     total = np.concatenate([[0.0], np.cumsum(values)])
@@ -348,48 +345,6 @@ def _run(values: Array) -> float:
     """By how much a straight line through the values changes along them."""
     at = np.linspace(-0.5, 0.5, len(values))
     return abs(float(at @ values) / float(at @ at))
-
-
-_WHITE = 1.5  # ratio of second differences' variances over two samples and over one: noise has 1
-_LEAST_SAMPLES = 300
-
-
-def white_noise(values: Array, beside: Array | None = None) -> float:
-    """Standard deviation of the white part of a signal that is sampled densely; 0 where second
-    differences show how it moves rather than its noise. Of turning points alone, up and down by
-    turns, every second one tells. beside (n,): what moves with it, and is read at the same moments:
-    where these come unevenly both are off their course together, which is no noise."""
-    if len(values) < _LEAST_SAMPLES:
-        return 0.0
-
-    one, two = _size(_second(values, 1)), _size(_second(values, 2))
-    if two >= _WHITE**0.5 * one:
-        return 0.0
-    if beside is None:
-        return min(one, two)
-    second = _second(values, 1)
-    return min(one, two, _size(second - _in_common(second, _second(beside, 1))))
-
-
-def _size(second: Array) -> float:
-    """Standard deviation of the noise behind second differences, from their median size."""
-    return float(np.median(np.abs(second))) / 0.6745 / 6**0.5
-
-
-def _second(values: Array, step: int) -> Array:
-    """Second differences over so many samples to either side."""
-    return values[2 * step :] - 2 * values[step:-step] + values[: -2 * step]
-
-
-def _in_common(values: Array, beside: Array) -> Array:
-    """What of values (n,) goes in proportion to others, as most of them do."""
-    sizes = [np.median(np.abs(v)) for v in (values, beside)]
-    usual = (np.abs(values) <= _USUAL * sizes[0]) & (np.abs(beside) <= _USUAL * sizes[1])
-    square = float(beside[usual] @ beside[usual])
-    return beside * (float(beside[usual] @ values[usual]) / square if square > 0 else 0.0)
-
-
-_USUAL = 5.0  # medians of their sizes
 
 
 def tangent(rows: Rows, force_sd: float) -> Array:

@@ -84,6 +84,11 @@ class Rows:
         return np.flatnonzero(self.hold_starts)
 
     @cached_property
+    def run_edges(self) -> Ints:
+        """(runs + 1,) first row of every run, and the one after the last."""
+        return np.append(np.flatnonzero(self.starts), self.n)
+
+    @cached_property
     def _share_of_setup(self) -> Array:
         """(n, s) what each row weighs in the mean of its setup."""
         weight = (

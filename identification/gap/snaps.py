@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData
-from identification.gap.noise import white_noise
+from identification.gap.white import white_noise
 
 
 @dataclass(frozen=True)
