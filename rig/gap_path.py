@@ -11,9 +11,10 @@ from identification.gap.bench import Bench, make_bench
 from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
 from identification.gap.forms import OF_SESSION, SESSION, Form, realise
 from identification.gap.forms.law import along, in_pose
+from identification.times import MOUNT_S, SCREW_S, UNLOAD_S
 from rig.gap_data import arm_setup
 from rig.model import ArmModel
-from rig.plan import AMPLIFIER_S, MOUNT_S, SCREW_S, TARE_S, UNLOAD_S
+from rig.plan import AMPLIFIER_S, TARE_S
 from rig.protocol import MeasurementProtocol, Run
 
 # Act on what the instruments see of everything else: realised last.

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import Arm, along, tool_offset
+from identification.times import MOUNT_S, SCREW_S, UNLOAD_S
 from rig.digits import counted
 from rig.model import load_robot
 from rig.plan_margins import (
@@ -35,10 +36,7 @@ from rig.yamlnodes import Key, Problem, refuse
 
 Array = NDArray[np.float64]
 
-# What hands and devices take, in s; the text of the plan names every one.
-MOUNT_S = 300.0
-SCREW_S = 10.0
-UNLOAD_S = 15.0
+# What devices take, in s; the text of the plan names every one, as what hands take.
 TARE_S = 2.0
 AMPLIFIER_S = 4.0  # Reset and Operate, where no station says it
 

@@ -11,6 +11,7 @@ from math import degrees, isnan, nan, radians
 from drivers.errors import NotDischarged, NotWanted
 from drivers.interfaces import Loader, Prompt
 from rig.errors import MeasurementStopped
+from rig.plan import TARE_S
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.limits import Watch
 from rig.procedure.progress import Progress
@@ -19,7 +20,6 @@ from rig.procedure.step import StepProcedure, TopReached, Where
 from rig.procedure.supervision import Supervision, Wish
 from rig.protocol import MeasurementProtocol, Run, Step
 
-TARE_S = 2.0
 # Within this the arm counts as standing in its reference pose: RTDE shows commanded poses to
 # 0.001 deg, and by hand on the pendant a joint is brought there to about a tenth of a degree.
 POSE_TOLERANCE_DEG = 0.5

@@ -15,9 +15,9 @@ from identification.gap.bench import Bench
 from identification.gap.data import LOADING, UNLOADING, ZERO, GapData, Instruments, Setup
 from identification.gap.history import half_sample
 from identification.gap.rows import REST_S
+from identification.times import MOUNT_S, SCREW_S, SETTLE_S, UNLOAD_S
 
-# What hands take, s: to turn the screw and let the arm settle, to unload, to set up a direction.
-APPROACH_S, UNLOAD_S, MOUNT_S = 14.0, 15.0, 300.0
+APPROACH_S = SCREW_S + SETTLE_S  # of a level
 _MOST_LEVELS = 10
 _WEIGHT_GAIN, _GAUGE_GAIN = 0.01, 0.002  # a known weight, a gauge block: standard uncertainties
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from drivers.kistler.settings import PerAxis
+from identification.times import MOUNT_S
 from rig.errors import InputError
 from rig.model import load_robot
-from rig.plan import MOUNT_S, Plan, plan
+from rig.plan import Plan, plan
 from rig.protocol import MeasurementProtocol, Pose, Run, load_protocol, parse_protocol
 from rig.station import Station, load_station
 
