@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,13 +18,11 @@ from rig.diagnose_text import likely, meanings
 from rig.errors import InputError
 from rig.gap_forms import to_entry
 from rig.gap_keys import CONTAINED, SPRINGS
+from rig.model_write import arm_lines, coupling_lines, flow
 from rig.storage.files import in_place_of
 
-_PLAIN = re.compile(r"(?!true|false|null)[a-z]{4,}(_[a-z]+)*")  # read as text by every YAML
 OF_THIS_SESSION = "of the measured session: rig simulate and rig diagnose --model leave it out"
 _LEAST = 0.02  # of a joint's compliance that a fit may leave of it
-# Of the published pair; what stands in a model file until somebody edits it.
-_ASSUMED_DISTANCE_MM = 1500.0
 
 
 def write_model(diagnosis: Diagnosis, dataset: Dataset, path: Path) -> None:
@@ -44,10 +41,7 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
     """
     meta, result = dataset.meta, diagnosis.result
     check_writable(dataset, others=result.bench.rows.simulated is not None)
-    stiffness, sd = springs(result)
-    setup = result.bench.data.setups[0]
-    pose = meta.poses[setup.pose]
-    x, y, z = (v / 1e3 for v in pose.tcp_xyz_mm)
+    pose = meta.poses[result.bench.data.setups[0].pose]
     note = " ".join(
         [*diagnosis.banners, f"Springs and effects of the diagnosis of {dataset.uuid}."]
     )
@@ -55,17 +49,10 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
         f"# The simulation with what rig diagnose found missing in it: {result.verdict} "
         f"({likely(result.probabilities[result.verdict])}).",
         f"note: {json.dumps(note)}",
-        f"robot: {meta.robot}",
-        f"pose: {{q_rad: {_flow(list(pose.q_rad))}}}",
-        f"tool: {{flange_T_tcp: [[1, 0, 0, {x:g}], [0, 1, 0, {y:g}], [0, 0, 1, {z:g}], "
-        "[0, 0, 0, 1]]}",
-        f"{SPRINGS}: {_flow([float(f'{k:.7g}') for k in stiffness])}",
-        f"joint_stiffness_sd: {_flow([float(f'{s:.4g}') for s in sd])}",
+        *arm_lines(meta.robot, pose.q_rad, pose.tcp_xyz_mm, *springs(result)),
         *_outside(diagnosis),
         *_effects(diagnosis, dataset),
-        "# Not measured, an assumption for rig couple: edit it to the second arm's place.",
-        f"coupling: {{base_distance_mm: {_ASSUMED_DISTANCE_MM:g}, beta_deg: 0, load_axes: base, "
-        "kind: rigid}",
+        *coupling_lines(),
     ]
     return "\n".join(lines) + "\n"
 
@@ -117,7 +104,7 @@ def forms(result: GapResult) -> list[Form]:
 def _outside(diagnosis: Diagnosis) -> list[str]:
     """Links and mounting of the model that was given: part of the simulation that is corrected."""
     written = {} if diagnosis.model is None else diagnosis.model.written_outside
-    return [f"{key}: {_flow(value)}" for key, value in written.items()]
+    return [f"{key}: {flow(value)}" for key, value in written.items()]
 
 
 def _effects(diagnosis: Diagnosis, dataset: Dataset) -> list[str]:
@@ -169,25 +156,10 @@ def _entry_lines(entry: Mapping[str, Any]) -> list[str]:
         mark = "  - " if not lines else "    "
         if key in ("terms", "covariance") and isinstance(value, list):
             lines.append(f"{mark}{key}:")
-            lines += [f"      - {_flow(one)}" for one in value]
+            lines += [f"      - {flow(one)}" for one in value]
         elif key == "parameters" and isinstance(value, Mapping) and value:
             lines.append(f"{mark}{key}:")
-            lines += [f"      {name}: {_flow(one)}" for name, one in value.items()]
+            lines += [f"      {name}: {flow(one)}" for name, one in value.items()]
         else:
-            lines.append(f"{mark}{key}: {_flow(value)}")
+            lines.append(f"{mark}{key}: {flow(value)}")
     return lines
-
-
-def _flow(value: Any) -> str:
-    """A value in YAML's flow style; numbers with nine digits and always read as numbers."""
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{k}: {_flow(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_flow(v) for v in value) + "]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return value if _PLAIN.fullmatch(value) else json.dumps(value)
-    text = f"{value:.9g}"
-    mantissa, _, exponent = text.partition("e")
-    return f"{mantissa}.0e{exponent}" if exponent and "." not in mantissa else text

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.errors import InputError
+from rig.model_write import arm_lines, coupling_lines
 from rig.storage.files import in_place_of
 
 if TYPE_CHECKING:
     from rig.identify import IdentifyResult
-
-# Of the published pair; what stands in a model file until somebody edits it.
-_ASSUMED_DISTANCE_MM = 1500.0
 
 
 def text(result: IdentifyResult) -> str:
@@ -53,29 +51,18 @@ def text(result: IdentifyResult) -> str:
 
 def model_text(result: IdentifyResult) -> str:
     """A model file that holds the identified stiffnesses, in the first measured pose."""
-    note = " ".join(result.banners)
-    return (
-        f"# Identified from {', '.join(Path(d).name for d in result.datasets)}\n"
-        + (f"note: {json.dumps(note)}\n" if note else "")
-        + _model_keys(result)
-    )
-
-
-def _model_keys(result: IdentifyResult) -> str:
-    fit, q = result.fit, result.observations[0].q
-    x, y, z = (v / 1e3 for v in result.tool_xyz)
-    return (
-        f"robot: {result.arm.name}\n"
-        f"pose: {{q_rad: [{_list(q, 9)}]}}\n"
-        f"tool: {{flange_T_tcp: [[1, 0, 0, {x:g}], [0, 1, 0, {y:g}], [0, 0, 1, {z:g}], "
-        "[0, 0, 0, 1]]}\n"
-        f"joint_stiffness_Nm_per_rad: [{_list(fit.stiffness, 7)}]\n"
-        f"joint_stiffness_sd: [{_list(fit.stiffness * fit.relative_sd, 4)}]\n"
-        "effects: []\n"
-        "# Not measured, an assumption for rig couple: edit it to the second arm's place.\n"
-        f"coupling: {{base_distance_mm: {_ASSUMED_DISTANCE_MM:g}, beta_deg: 0, load_axes: base, "
-        "kind: rigid}\n"
-    )
+    fit, note = result.fit, " ".join(result.banners)
+    lines = [
+        f"# Identified from {', '.join(Path(d).name for d in result.datasets)}",
+        *([f"note: {json.dumps(note)}"] if note else []),
+        *arm_lines(
+            result.arm.name, result.observations[0].q.tolist(), result.tool_xyz, fit.stiffness,
+            fit.stiffness * fit.relative_sd,
+        ),
+        "effects: []",
+        *coupling_lines(),
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
 
 
 def protocol_text(result: IdentifyResult, station: str | None = None, levels: int = 10) -> str:
