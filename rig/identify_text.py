@@ -10,6 +10,7 @@ import numpy as np
 
 from rig.errors import InputError
 from rig.model_write import arm_lines, coupling_lines
+from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
 from rig.storage.files import in_place_of
 
 if TYPE_CHECKING:
@@ -37,13 +38,14 @@ def text(result: IdentifyResult) -> str:
             f"  {verdict}"
         )
     prior_sd = dict.fromkeys(f"{100 * sd:.4g}" for sd in fit.prior.relative_sd)
-    known = _list(100 * fit.prior.relative_sd) if len(prior_sd) > 1 else next(iter(prior_sd))
+    known = numbers(100 * fit.prior.relative_sd, 4) if len(prior_sd) > 1 else next(iter(prior_sd))
     lines.append(f"Prior: {fit.prior.source}, relative sd {known} %. u: standard uncertainty.")
     if result.proposals:
         lines.append("Next poses that would tell most, in this order:")
         for p in result.proposals:
             lines.append(
-                f"  q = ({_list(np.rad2deg(p.q))}) deg, along {p.axis}, to {p.force:.0f} N: {p.why}"
+                f"  q = ({numbers(np.rad2deg(p.q), 4)}) deg, along {p.axis}, "
+                f"to {p.force:.0f} N: {p.why}"
             )
     lines += [f"Note: {note}" for note in result.notes]
     return "\n".join(lines)
@@ -73,14 +75,11 @@ def protocol_text(result: IdentifyResult, station: str | None = None, levels: in
         raise InputError("rig identify: no next poses were looked for; there is no protocol.")
     poses, runs = [], []
     for i, p in enumerate(result.proposals, 1):
-        poses.append(
-            f"  N{i}: {{q_rad: [{_list(p.q, 9)}], "
-            f"tcp_xyz_mm: [{_list(np.array(result.tool_xyz))}], program: null}}"
-        )
+        poses.append(pose_line(f"N{i}", p.q, result.tool_xyz))
         step = p.force / levels
         runs.append(
             f"  - {{pose: N{i}, direction: {p.axis}, "
-            f"steps_N: [{_list(step * np.arange(1, levels + 1), 5)}]}}"
+            f"steps_N: [{numbers(step * np.arange(1, levels + 1), 5)}]}}"
         )
     greatest = max(p.force for p in result.proposals)
     softest = max(
@@ -97,15 +96,11 @@ def protocol_text(result: IdentifyResult, station: str | None = None, levels: in
         "runs:\n" + "\n".join(runs) + "\nrepetitions: 3\nbranches: loading\norder: by_run\n\n"
         "sampling: {rate_Hz: 1, samples_per_step: 5}\nhold_s: 0\n"
         "force_band: {absolute_N: 0.5, relative: 0.01}\n"
-        "settle:\n  window_s: 4\n  force_slope_N_per_s: 0.05\n  force_spread_N: 0.3\n"
-        "  displacement_slope_mm_per_s: 0.002\n  displacement_spread_mm: 0.01\n"
-        "  deadline_s: 60\n  at_deadline: record\n"
-        "step_deadline_s: 300\nzero: {before_s: 6, after_s: 6}\nrest_s: 10\n"
-        "rated_load_N: null\n\nlimits:\n"
-        f"  force_N: {{max: {1.15 * greatest + 5:.0f}, at: stop}}\n"
-        f"  displacement_mm: {{max: {min(9.5, 2e3 * softest + 1):.1f}, at: stop}}\n"
-        "  joint_deviation_deg: {max: 5, at: stop}\n"
-        "  joint_temperature_C: {max: 60, at: stop}\n"
+        + "\n".join(settle_lines())
+        + "\nstep_deadline_s: 300\nzero: {before_s: 6, after_s: 6}\nrest_s: 10\n"
+        "rated_load_N: null\n\n"
+        + "\n".join(limit_lines(greatest, f"{min(9.5, 2e3 * softest + 1):.1f}"))
+        + "\n"
     )
 
 
@@ -135,7 +130,3 @@ def _not_identified(share: float) -> str:
     if share < 10:
         return "repeats the prior"
     return "known, not to 5 %" if share >= 90 else "partly seen"
-
-
-def _list(values: object, digits: int = 4) -> str:
-    return ", ".join(f"{v:.{digits}g}" for v in np.asarray(values, dtype=float))

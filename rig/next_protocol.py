@@ -21,15 +21,11 @@ from rig.model import load_robot
 from rig.other_setups import other_poses
 from rig.plan import plan
 from rig.protocol import MeasurementProtocol, parse_protocol
-from rig.protocolfile import Settle
+from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
 from rig.station import load_station
 from rig.storage.files import in_place_of
 
 _LASER_MM = 9.0  # of a range of 10 mm
-_SETTLE = Settle(
-    window_s=4, force_slope_N_per_s=0.05, force_spread_N=0.3, displacement_slope_mm_per_s=0.002,
-    displacement_spread_mm=0.01, deadline_s=60, at_deadline="record",
-)  # fmt: skip
 _GENTLER = 0.7  # loads times this, where arm, laser or dynamometer could not take them
 _TRIES = 4
 
@@ -128,25 +124,21 @@ def _lines(
     vectors = {s.direction: s.unit_vector for s in design.setups}
     for name, vector in vectors.items():
         sign = _sense(design, name)
-        yield f"  {json.dumps(name)}: [{_list(sign * vector, 9)}]"
+        yield f"  {json.dumps(name)}: [{numbers(sign * vector, 9)}]"
     stop = _displacement_mm(old)
     yield "\nruns:"
     for setup, levels in zip(design.setups, design.levels, strict=True):
         yield (
             f"  - {{pose: {setup.pose}, direction: {json.dumps(setup.direction)}, "
-            f"steps_N: [{_list(np.abs(levels), 3)}], stop_at_displacement_mm: {0.8 * stop:.3g}}}"
+            f"steps_N: [{numbers(np.abs(levels), 3)}], stop_at_displacement_mm: {0.8 * stop:.3g}}}"
         )
     yield f"repetitions: {design.repetitions}"
     yield f"branches: {'loading-unloading' if design.unload else 'loading'}"
     yield "order: by_run"
     yield from _timing(design, old)
     top = max(abs(f) for one in design.levels for f in one)
-    yield "\nlimits:"
-    yield f"  force_N: {{max: {1.15 * top + 5:.0f}, at: stop}}"
-    yield f"  displacement_mm: {{max: {stop:g}, at: stop}}"
-    yield "  displacement_rate_mm_per_s: {max: 3, at: warn}"
-    yield "  joint_deviation_deg: {max: 5, at: stop}"
-    yield "  joint_temperature_C: {max: 60, at: stop}"
+    yield ""
+    yield from limit_lines(top, f"{stop:g}", "  displacement_rate_mm_per_s: {max: 3, at: warn}")
 
 
 def _sense(design: Design, direction: str) -> float:
@@ -165,15 +157,11 @@ def _poses(design: Design, meta: Meta) -> Iterator[str]:
         known.setdefault(name, q)
         tcp.setdefault(name, tcp[first])
     for name in dict.fromkeys(s.pose for s in design.setups):
-        yield (
-            f"  {name}: {{q_rad: [{_list(known[name], 9)}], "
-            f"tcp_xyz_mm: [{_list(np.array(tcp[name]), 6)}], program: null}}"
-        )
+        yield pose_line(name, known[name], tcp[name])
 
 
 def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
     rate = float(np.clip(1 / design.sample_s, 0.1, 10))
-    settle = old.settle if old else _SETTLE
     gap = min(float(np.diff([0.0, *np.sort(np.abs(levels))]).min()) for levels in design.levels)
     top = max(abs(f) for levels in design.levels for f in levels)
     samples = max(1, min(5, round(design.hold_s * rate)))
@@ -185,12 +173,7 @@ def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
         f"force_band: {{absolute_N: {min(0.5, gap / 4):.3g}, "
         f"relative: {min(0.01, gap / (4 * top)):.3g}}}"
     )
-    yield "settle:"
-    for key in (
-        "window_s", "force_slope_N_per_s", "force_spread_N", "displacement_slope_mm_per_s",
-        "displacement_spread_mm", "deadline_s", "at_deadline",
-    ):  # fmt: skip
-        yield f"  {key}: {getattr(settle, key)}"
+    yield from settle_lines(old.settle) if old else settle_lines()
     yield f"step_deadline_s: {old.step_deadline_s if old else 300:g}"
     yield f"zero: {{before_s: {zero:.5g}, after_s: {zero:.5g}}}"
     yield f"rest_s: {min(design.rest_s, 3600):.5g}"
@@ -200,7 +183,3 @@ def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
 def _displacement_mm(old: MeasurementProtocol | None) -> float:
     limit = None if old is None else old.limits.displacement_mm
     return min(limit.max, _LASER_MM) if limit is not None else _LASER_MM
-
-
-def _list(values: object, digits: int) -> str:
-    return ", ".join(f"{v:.{digits}g}" for v in np.asarray(values, dtype=float))
