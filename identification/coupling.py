@@ -30,6 +30,12 @@ def mirror_axes(beta: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def load_axes(beta: float, kind: str) -> Array:
+    """Columns (3, 3), base frame: the axes that coupled loads act along; kind `mirror`: those of
+    the mirror, else of the base."""
+    return mirror_axes(beta) if kind == "mirror" else np.eye(3)
+
+
 def mirror(beta: float) -> Array:
     """`S = diag(M, -M)` (6, 6) for twists and wrenches at a node in the mirror plane."""
     n = mirror_axes(beta)[:, 0]

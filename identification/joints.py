@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import JOINTS, Arm, unit_vector
+from identification.uncertainty import TWO_SIDED
 
 Array = NDArray[np.float64]
 
@@ -106,7 +107,7 @@ class JointFit:
     @property
     def ci95(self) -> Array:
         """95 % intervals (6, 2) Nm/rad, from those of ln c."""
-        half = 1.959964 * self.relative_sd
+        half = TWO_SIDED * self.relative_sd
         return self.stiffness[:, None] * np.exp(np.stack([-half, half], axis=-1))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.arm import Arm, along, unit_vector
-from identification.coupling import Kind, coupled, mirror_axes
+from identification.coupling import Kind, coupled, load_axes
 from identification.elastic import Beam
 from identification.inverse import BRANCHES, solve, tool_pose
 
@@ -249,7 +249,7 @@ def _margins(
         here = np.isfinite(found[:, j, :, 0])
         C = _compliance(arm, found[:, j][here], task.stance)
         pair = coupled(C, float(beta), task.kind, task.half)
-        axes = mirror_axes(float(beta)) if task.load_axes == "mirror" else np.eye(3)
+        axes = load_axes(float(beta), task.load_axes)
         for m, need in enumerate(task.needs):
             k[:, j, :, m][here] = along(pair, axes @ unit_vector(need.direction))
     share = (k / [need.stiffness for need in task.needs]).min(axis=-1)

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+# Standard deviations on either side of a normal 95 % interval, and of a 90 % one.
+TWO_SIDED, TWO_SIDED_90 = 1.959963984540054, 1.6448536269514722
+
 
 @dataclass(frozen=True)
 class Contribution:
@@ -48,7 +51,7 @@ def combined(value: float, budget: Sequence[Contribution]) -> Quantity:
 def coverage_factor(dof: float) -> float:
     """Student's t for a two-sided 95 % interval; `dof` may be any number above 0, or inf."""
     if math.isinf(dof):
-        return 1.959963984540054
+        return TWO_SIDED
     from scipy.special import stdtrit
 
     return float(stdtrit(dof, 0.975))

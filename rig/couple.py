@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from identification import workspace
 from identification.arm import along, invert_compliance
-from identification.coupling import Kind, State, coupled, decide, mirror_axes
+from identification.coupling import Kind, State, coupled, decide, load_axes
 from identification.coupling import base_distance as distance_of
 from identification.when import Schedule
 from identification.workspace import Workspace
@@ -160,17 +160,12 @@ def _kinds(spec: CouplingSpec) -> list[tuple[str, Kind, Array | None]]:
     return kinds
 
 
-def load_axes(spec: CouplingSpec) -> Array:
-    """Columns (3, 3): the axes that coupled loads act along, base frame."""
-    return mirror_axes(spec.beta) if spec.load_axes == "mirror" else np.eye(3)
-
-
 def _stiffness(C: Array, axes: Array) -> Array:
     return np.array([along(C, axes[:, i]) for i in range(3)])
 
 
 def _pair(C: Array, spec: CouplingSpec, kind: Kind, half: Array | None) -> Array:
-    return _stiffness(coupled(C, spec.beta, kind, half), load_axes(spec))
+    return _stiffness(coupled(C, spec.beta, kind, half), load_axes(spec.beta, spec.load_axes))
 
 
 def _uncertainty(
@@ -200,10 +195,10 @@ def _decisions(model: ArmModel, C: Array, spec: CouplingSpec) -> tuple[Decision,
     the pair, as its table does."""
     kind = next(k for k in _kinds(spec) if k[0] == spec.kind)
     pair_compliance = coupled(C, spec.beta, kind[1], kind[2])
-    out = []
+    axes, out = load_axes(spec.beta, spec.load_axes), []
     for need in model.required:
         single = float(along(C, need.direction))
-        pair = float(along(pair_compliance, load_axes(spec) @ np.array(need.direction)))
+        pair = float(along(pair_compliance, axes @ np.array(need.direction)))
         state = decide(need.stiffness, single, pair)
         out.append(Decision(need.name, need.stiffness, single, pair, state))
     return tuple(out)

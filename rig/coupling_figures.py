@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.coupling import mirror_axes
+from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
 from rig.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
 from rig.plotting import COLOURS, write_figures
@@ -90,7 +90,7 @@ def maps(result: CouplingResult) -> Figure:
     mirror = mirror_axes(spec.beta)
     node = model.arm.fk(model.q, model.tool)
     axis = next((i for r in model.required for i in range(3) if abs(r.direction[i]) > 0.99), 0)
-    load = (mirror if spec.load_axes == "mirror" else np.eye(3))[:, axis]
+    load = load_axes(spec.beta, spec.load_axes)[:, axis]
     sideways, height = np.linspace(-1.4, 1.4, _MAP_CELLS), np.linspace(-0.4, 1.6, _MAP_CELLS)
     T, Z = np.meshgrid(sideways, height)
     plane = (node[:3, 3] @ mirror[:, 0]) * mirror[:, 0]

@@ -134,10 +134,10 @@ def between_arms_deg(beta: float) -> float:
 def _as_modelled(model: ArmModel, spec: CouplingSpec) -> float:
     """Margin of the model's own pose and angle."""
     from identification.arm import along
-    from identification.coupling import coupled, mirror_axes
+    from identification.coupling import coupled, load_axes
 
     pair = coupled(model.compliance(), spec.beta, spec.kind, spec.half)
-    axes = mirror_axes(spec.beta) if spec.load_axes == "mirror" else np.eye(3)
+    axes = load_axes(spec.beta, spec.load_axes)
     return min(float(along(pair, axes @ r.direction)) / r.stiffness for r in model.required)
 
 

@@ -11,10 +11,9 @@ from identification.inverse import solutions
 from rig.dataset import Dataset
 from rig.gap_data import arm_setup
 from rig.meta import Meta
-from rig.model import ArmModel, load_robot
+from rig.model import AXES, ArmModel, load_robot
 
 _NEARER_M = 0.2  # of the point of load towards the base's axis: levers about a quarter shorter
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def elsewhere(dataset: Dataset, model: ArmModel | None = None) -> list[Elsewhere]:

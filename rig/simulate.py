@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from identification.arm import along, tool_offset
 from identification.gap.forms import Form
+from identification.uncertainty import TWO_SIDED
 from rig.errors import InputError
 from rig.gap_forms import effects_of
 from rig.gap_path import left_out, predict
@@ -244,7 +245,7 @@ def _curve_json(c: PredictedCurve) -> dict[str, Any]:
         "stiffness_N_per_mm": {
             "value": k if known else None,
             "standard_uncertainty": u if known else None,
-            "ci95": [k - 1.959964 * u, k + 1.959964 * u] if known else [None, None],
+            "ci95": [k - TWO_SIDED * u, k + TWO_SIDED * u] if known else [None, None],
         },
         "force_N": [float(f) for f in c.force],
         "displacement_mm": [float(1e3 * u) for u in c.displacement],

@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.gap.data import Array
-
-# Standard deviations of a normal 95 % interval, and of a 90 % one.
-TWO_SIDED, TWO_SIDED_90 = 1.959964, 1.644854
+from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 
 
 @dataclass(frozen=True)

@@ -30,10 +30,11 @@ from identification.gap.effects.joint_hysteresis import BY_LOAD
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from identification.gap.effects.time_lag import KINDS
 from identification.gap.history import half_sample, settling_share, standing_on
-from identification.gap.interval import NOMINAL, TWO_SIDED, Found, Parameter, Softer, normal
+from identification.gap.interval import NOMINAL, Found, Parameter, Softer, normal
 from identification.gap.lags import closest_lag
 from identification.gap.parts import Part
 from identification.gap.thresholds import of_knee, torque_unit
+from identification.uncertainty import TWO_SIDED
 
 
 def parameters(

@@ -16,7 +16,7 @@ from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
 from identification.gap.imperfection import IMPERFECTION, STEP, level_priors
-from identification.gap.interval import TWO_SIDED, TWO_SIDED_90, Parameter, Softer
+from identification.gap.interval import Parameter, Softer
 from identification.gap.parameters import NOT_NEGATIVE, from_zero, parameters
 from identification.gap.parts import Part, energies, log_joints, part_sizes, signs_kept
 from identification.gap.penalties import SAME_JOINT, pettiness
@@ -25,6 +25,7 @@ from identification.gap.several import family_of
 from identification.gap.shares import sized
 from identification.gap.variants import Variant, place_of
 from identification.gap.words import LINEAR
+from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 
 Parameters = dict[str, Parameter]
 

@@ -14,8 +14,9 @@ import numpy as np
 from identification.gap.bench import TOOL_SD_KG, Bench
 from identification.gap.data import Array
 from identification.gap.effects.base_slip import BETWEEN_M, SLIDES_M, slides
-from identification.gap.interval import TWO_SIDED, Found, Parameter, normal
+from identification.gap.interval import Found, Parameter, normal
 from identification.gap.parts import Part
+from identification.uncertainty import TWO_SIDED
 
 _GRID_STEP = 0.03  # between finely spaced thresholds, as their share
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Z95 = 1.959963984540054
+from identification.uncertainty import TWO_SIDED
+
 BINS = 10
 
 
@@ -16,9 +17,9 @@ def wilson(hits: int, n: int) -> tuple[float, float]:
     """95 % interval of a rate (Wilson 1927); (0, 1) where there is nothing to judge by."""
     if n == 0:
         return 0.0, 1.0
-    p, z2 = hits / n, Z95**2
+    p, z2 = hits / n, TWO_SIDED**2
     centre = (p + z2 / (2 * n)) / (1 + z2 / n)
-    half = Z95 / (1 + z2 / n) * np.sqrt(p * (1 - p) / n + z2 / (4 * n * n))
+    half = TWO_SIDED / (1 + z2 / n) * np.sqrt(p * (1 - p) / n + z2 / (4 * n * n))
     return max(0.0, float(centre - half)), min(1.0, float(centre + half))
 
 

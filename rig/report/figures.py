@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from identification.uncertainty import TWO_SIDED
 from rig.analyze import MM, N_PER_MM, Analysis
 from rig.dataset import Dataset
 from rig.plotting import COLOURS, MARKERS
@@ -39,7 +40,7 @@ def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
     x = np.arange(1, 7)
     prior = sets[0][1]["prior"]
     middle = K * np.array(prior["joint_stiffness_Nm_per_rad"])
-    spread = np.exp(1.96 * np.array(prior["relative_sd"]))
+    spread = np.exp(TWO_SIDED * np.array(prior["relative_sd"]))
     axes.bar(x, middle * (spread - 1 / spread), 0.8, bottom=middle / spread, color="0.88",
              label="prior, 95 %", zorder=1)  # fmt: skip
     step = 0.5 / max(1, len(sets))
