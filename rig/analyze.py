@@ -13,10 +13,9 @@ from identification.estimate import WEIGHTINGS, Weighting
 from identification.uncertainty import Contribution, Quantity
 from rig.errors import InputError, close_to
 from rig.reduce import Measurements, curves
+from rig.units import MM_PER_M, N_PER_MM
 
 SCHEMA = "rig.analysis/1"
-N_PER_MM = 1e-3  # one N/m in N/mm
-MM = 1e3  # one m in mm
 AUTO: Literal["auto"] = "auto"
 
 
@@ -183,13 +182,13 @@ def _direction(d: Direction) -> dict[str, Any]:
         "stiffness_N_per_mm": quantity(r.k, N_PER_MM),
         "weighting": r.choice.label,
         "weighting_reason": r.choice_reason,
-        "intercept_mm": _number(r.intercept * MM),
+        "intercept_mm": _number(r.intercept * MM_PER_M),
         "by_repetition_N_per_mm": [_number(k * N_PER_MM) for k in r.by_repetition],
         "curve": [
             {
                 "force_N": _number(p.force),
-                "displacement_mm": _number(p.displacement * MM),
-                "sd_mm": _number(p.sd * MM),
+                "displacement_mm": _number(p.displacement * MM_PER_M),
+                "sd_mm": _number(p.sd * MM_PER_M),
                 "n": p.n,
                 "branch": p.branch,
                 "step": p.step,
@@ -229,7 +228,7 @@ def _knee(knee: st.Knee | None) -> dict[str, Any] | None:
         return None
     return {
         "force_N": quantity(knee.force),
-        "displacement_mm": quantity(knee.displacement, MM),
+        "displacement_mm": quantity(knee.displacement, MM_PER_M),
         "slope_before_N_per_mm": _number(knee.k_before * N_PER_MM),
         "slope_after_N_per_mm": _number(knee.k_after * N_PER_MM),
         "evidence_bic": _number(knee.evidence),
@@ -241,10 +240,10 @@ def _hysteresis(r: st.Stiffness) -> dict[str, Any] | None:
     if loop is None:
         return None
     return {
-        "area_N_mm": _number(loop.area * MM),
-        "sd_N_mm": _number(loop.sd * MM),
+        "area_N_mm": _number(loop.area * MM_PER_M),
+        "sd_N_mm": _number(loop.sd * MM_PER_M),
         "share_of_work": _number(loop.relative),
-        "remaining_mm": _number(loop.remaining * MM),
+        "remaining_mm": _number(loop.remaining * MM_PER_M),
         "n": loop.n,
     }
 

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 
 from identification.stiffness import Exclusion, Stiffness
 from identification.uncertainty import Quantity
-from rig.analyze import MM, N_PER_MM, Analysis, Direction
+from rig.analyze import Analysis, Direction
 from rig.digits import number
+from rig.units import MM_PER_M, N_PER_MM
 
 
 def text(analysis: Analysis) -> str:
@@ -59,17 +60,18 @@ def _direction(key: str, direction: Direction) -> Iterator[str]:
     if r.k is not None:
         yield from _stiffness(r, r.k)
     if r.knee is not None:
+        before, after = (number(k * N_PER_MM) for k in (r.knee.k_before, r.knee.k_after))
         yield (
-            f"Knee at {_with_interval(r.knee.force)} N, {_with_interval(r.knee.displacement, MM)} "
-            f"mm: the slope falls from {number(r.knee.k_before * N_PER_MM)} to "
-            f"{number(r.knee.k_after * N_PER_MM)} N/mm."
+            f"Knee at {_with_interval(r.knee.force)} N, "
+            f"{_with_interval(r.knee.displacement, MM_PER_M)} mm: the slope falls from {before} "
+            f"to {after} N/mm."
         )
     yield from _excluded(r.excluded)
     if r.hysteresis is not None:
         loop = r.hysteresis
         share = "" if math.isnan(loop.relative) else f", {loop.relative:.1%} of the work of loading"
         yield (
-            f"Loop between loading and unloading: {number(loop.area * MM)} N mm{share}; "
+            f"Loop between loading and unloading: {number(loop.area * MM_PER_M)} N mm{share}; "
             "k is that of loading."
         )
     yield from r.notes
@@ -85,7 +87,7 @@ def _stiffness(r: Stiffness, k: Quantity) -> Iterator[str]:
     )
     yield f"Line: {r.choice.label}; {r.choice_reason}."
     if r.choice.intercept:
-        yield f"Intercept: {number(r.intercept * MM)} mm"
+        yield f"Intercept: {number(r.intercept * MM_PER_M)} mm"
     if len(r.by_repetition) > 1:
         shown = ", ".join(number(v * N_PER_MM) for v in r.by_repetition[:8])
         more = ", ..." if len(r.by_repetition) > 8 else ""
@@ -103,8 +105,8 @@ def _excluded(excluded: Sequence[Exclusion]) -> Iterator[str]:
 
 def _tables(r: Stiffness) -> Iterator[str]:
     levels = [
-        (p.branch, str(p.step), number(p.force), number(p.displacement * MM),
-         number(p.sd * MM, 2), str(p.n))
+        (p.branch, str(p.step), number(p.force), number(p.displacement * MM_PER_M),
+         number(p.sd * MM_PER_M, 2), str(p.n))
         for p in r.levels
     ]  # fmt: skip
     yield from _table(

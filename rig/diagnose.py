@@ -29,8 +29,8 @@ from rig.meta import Simulation
 from rig.model import ArmModel, load_model
 from rig.other_setups import elsewhere
 from rig.other_simulator import with_curves
+from rig.units import MM_PER_M
 
-MM = 1e3  # mm per m
 # As shapes are labelled, whatever their springs are called: joint 1, joints 1 and 2, joints but 3.
 _JOINT = re.compile(r"\bjoint(s?(?: but)?)(?: (\d+))?(?: and (\d+))?")
 Progress = Callable[[str, float], None]
@@ -73,10 +73,12 @@ class Diagnosis:
                 "minutes": r.next_measurement.minutes,
                 "alternatives": [asdict(o) for o in r.next_measurement.alternatives],
             },
-            "remainder_mm": r.remainder * MM,
+            "remainder_mm": r.remainder * MM_PER_M,
             "remainder": _remainder(r),
             "looks_like": _looks_like(r),
-            "runners_up": {w: {"held_out_after_rms_mm": v * MM} for w, v in r.runners_up.items()},
+            "runners_up": {
+                w: {"held_out_after_rms_mm": v * MM_PER_M} for w, v in r.runners_up.items()
+            },
             "notes": list(r.notes),
             "note_kinds": [n.kind for n in r.said],
             "known_effects": [e["name"] for e in self.known_effects],
@@ -193,7 +195,8 @@ def _looks_like(r: GapResult) -> dict[str, Any] | None:
     if like is None:
         return None
     period = {"swings": "period_s", "waves": "period_mm"}.get(like.kind)
-    size = {} if period is None else {period: (like.period or 0.0) * (MM if "mm" in period else 1)}
+    factor = MM_PER_M if like.kind == "waves" else 1.0
+    size = {} if period is None else {period: (like.period or 0.0) * factor}
     return {"kind": like.kind, **size, "text": looks_like(like, arm=r.bench.data.arm)}
 
 
@@ -209,7 +212,7 @@ def _effect(e: Effect, data: GapData) -> dict[str, Any]:
         "places": dict(e.places),
         "indistinguishable_from": list(e.indistinguishable_from),
         "share_of_gap": e.share_of_gap,
-        "rms_mm": e.size * MM,
+        "rms_mm": e.size * MM_PER_M,
         "form": e.label if data.arm else _JOINT.sub(direction, e.label),
     }
 
@@ -235,11 +238,11 @@ def _where(r: GapResult) -> dict[str, Any]:
 def _gap(r: GapResult) -> dict[str, Any]:
     held = [_held(h) for h in r.held_out]
     return {
-        "noise_rms_mm": r.noise * MM,
-        "before_rms_mm": r.before * MM,
-        "after_rms_mm": r.after * MM,
+        "noise_rms_mm": r.noise * MM_PER_M,
+        "before_rms_mm": r.before * MM_PER_M,
+        "after_rms_mm": r.after * MM_PER_M,
         "shrink_factor": r.before / r.after if r.after > 0 else 1.0,
-        **({} if r.without_added is None else {"without_added_rms_mm": r.without_added * MM}),
+        **({} if r.without_added is None else {"without_added_rms_mm": r.without_added * MM_PER_M}),
         "held_out": held[0] if held else None,
         "held_out_other": held[1:],
     }
@@ -254,11 +257,12 @@ def _remainder(r: GapResult) -> dict[str, Any]:
     if rest.largest is not None:
         at = rest.largest
         largest = {"pose": at.pose, "direction": at.direction, "branch": BRANCH_NAMES[at.branch],
-                   "force_N": at.force, "mean_mm": at.mean * MM, "sd_mm": at.sd * MM}  # fmt: skip
+                   "force_N": at.force, "mean_mm": at.mean * MM_PER_M,
+                   "sd_mm": at.sd * MM_PER_M}  # fmt: skip
     return {
-        "rms_mm": rest.rms * MM,
-        "ci95": [v * MM for v in rest.ci95],
-        "unrepeated_rms_mm": rest.unrepeated_rms * MM,
+        "rms_mm": rest.rms * MM_PER_M,
+        "ci95": [v * MM_PER_M for v in rest.ci95],
+        "unrepeated_rms_mm": rest.unrepeated_rms * MM_PER_M,
         "largest": largest,
     }
 
@@ -266,8 +270,8 @@ def _remainder(r: GapResult) -> dict[str, Any]:
 def _held(h: HeldOut) -> dict[str, Any]:
     return {
         "fold": h.fold,
-        "before_rms_mm": h.before * MM,
-        "after_rms_mm": h.after * MM,
+        "before_rms_mm": h.before * MM_PER_M,
+        "after_rms_mm": h.after * MM_PER_M,
         "shrink_factor": h.shrink,
         "ci95": list(h.ci95),
     }

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 from rig.digits import brief
+from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
     from identification.gap.diagnose import Effect, GapResult
     from identification.gap.explanation import Likeness
     from identification.gap.interval import Parameter
 
-MM = 1e3
 _MORE = 1.01  # times the rest that is not left by rounding
 
 # One line a word: what happens there.
@@ -111,7 +111,7 @@ def looks_like(like: Likeness, *, arm: bool = True) -> str:
     period = like.period or 0.0
     told = [f"{brief(t, 3)} s" for t in (period, _SURE * period)]
     if like.kind == "waves":
-        told = [f"{brief(period * MM, 3)} mm"]
+        told = [f"{brief(period * MM_PER_M, 3)} mm"]
     words = LOOKS_LIKE if arm else LOOKS_LIKE | _BY_ANY_SENSOR
     return words["wanders" if like.wanders else like.kind].format(*told)
 
@@ -127,7 +127,7 @@ def render(r: GapResult) -> str:
 
 def _answer(r: GapResult) -> str:
     head, arm = f"{r.verdict} ({likely(r.probabilities[r.verdict])}):", r.bench.data.arm
-    before, after, noise = (brief(v * MM, 3) for v in (r.before, r.after, r.noise))
+    before, after, noise = (brief(v * MM_PER_M, 3) for v in (r.before, r.after, r.noise))
     alone = f"the instruments alone leave {noise} mm."
     if r.verdict == "none":
         return (
@@ -259,16 +259,16 @@ def _gap(r: GapResult) -> str:
         low, high = h.ci95
         open_to = f" ({brief(low, 3)} to {brief(high, 3)})" if low < high else ""
         lines.append(_row(f"withheld {h.fold}", h.before, h.after, r.noise) + open_to)
-    lines.append(f"  {'noise of the instruments':32s}{brief(r.noise * MM):>9s}")
+    lines.append(f"  {'noise of the instruments':32s}{brief(r.noise * MM_PER_M):>9s}")
     for word, after in r.runners_up.items():
-        lines.append(f"  withheld, with {word} instead: {brief(after * MM)}")
+        lines.append(f"  withheld, with {word} instead: {brief(after * MM_PER_M)}")
     return "\n".join(lines)
 
 
 def _row(name: str, before: float, after: float, noise: float) -> str:
     shrink = brief(before / after, 3) if after > 0 else "-"
     ratio = after / noise if noise > 0 else 1.0
-    shown = f"{brief(before * MM):>9s} {brief(after * MM):>9s} {ratio:11.2f}"
+    shown = f"{brief(before * MM_PER_M):>9s} {brief(after * MM_PER_M):>9s} {ratio:11.2f}"
     return f"  {name:22s}{shown}  {shrink:>6s}"
 
 

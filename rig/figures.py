@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analyze import MM, N_PER_MM, Analysis, Direction
+from rig.analyze import Analysis, Direction
 from rig.digits import number
 from rig.plotting import COLOURS, MARKERS, write_figures
+from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,8 +88,8 @@ def _curve(axes: Any, direction: Direction, key: str, colour: str, marker: str) 
             continue
         axes.errorbar(
             [p.force for p in levels],
-            [p.displacement * MM for p in levels],
-            np.nan_to_num([p.sd * MM for p in levels]),
+            [p.displacement * MM_PER_M for p in levels],
+            np.nan_to_num([p.sd * MM_PER_M for p in levels]),
             color=colour,
             marker=marker,
             markerfacecolor=fill,
@@ -100,12 +101,12 @@ def _curve(axes: Any, direction: Direction, key: str, colour: str, marker: str) 
         )
     crossed = [p for p in r.levels if p.branch == "loading" and p.step in left_out]
     if crossed:
-        axes.plot([p.force for p in crossed], [p.displacement * MM for p in crossed], "x",
+        axes.plot([p.force for p in crossed], [p.displacement * MM_PER_M for p in crossed], "x",
                   color="black", markersize=9, label=f"{key}: not counted towards k")  # fmt: skip
     if r.k is not None:
         counted = [p.force for p in r.levels if p.step not in left_out]
         ends = np.array([min([0.0, *counted]), max([0.0, *counted])])
-        u = (r.intercept + ends / r.k.value) * MM
+        u = (r.intercept + ends / r.k.value) * MM_PER_M
         axes.plot(ends, u, color=colour, linestyle="--", linewidth=1,
                   label=f"{key}: k = {number(r.k.value * N_PER_MM)} N/mm")  # fmt: skip
 

@@ -15,8 +15,8 @@ from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.model import ArmModel, load_robot
 from rig.storage.columns import SAMPLE_NUMBER
+from rig.units import M_PER_MM
 
-MM = 1e-3
 _WIDE_STEP_RAD = 1e-3  # of second derivatives
 _STANDS = 0.5  # share of the samples of a run at which its clock stands still
 _STEP_RAD = 1e-5  # central differences of levers: error below 1e-9
@@ -62,12 +62,12 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         branch=np.array([BRANCH_NAMES.index(str(b)) for b in columns["branch"]], dtype=np.int64),
         step=columns["step"].astype(np.int64),
         force=columns["force_N"].astype(float),
-        displacement=columns["displacement_mm"].astype(float) * MM,
+        displacement=columns["displacement_mm"].astype(float) * M_PER_MM,
         compliance=compliance,
         compliance_relative_sd=relative,
         instruments=Instruments(
             meter.force.standard_uncertainty_N,
-            meter.displacement.standard_uncertainty_mm * MM,
+            meter.displacement.standard_uncertainty_mm * M_PER_MM,
             meter.force.gain_relative_sd,
             meter.displacement.gain_relative_sd,
         ),
@@ -162,7 +162,7 @@ def _springs(dataset: Dataset) -> tuple[Array, Array]:
         k = np.array(simulation.joint_stiffness_Nm_per_rad, dtype=float)
         return 1 / k, np.full(6, simulation.joint_stiffness_relative_sd)
     assert simulation.stiffness_N_per_mm is not None
-    per_m = [simulation.stiffness_N_per_mm[d] / MM for d in dataset.meta.directions]
+    per_m = [simulation.stiffness_N_per_mm[d] / M_PER_MM for d in dataset.meta.directions]
     return 1 / np.array(per_m), np.full(len(per_m), simulation.stiffness_relative_sd)
 
 
@@ -209,7 +209,7 @@ def _setup(
         return _bench_setup(dataset, direction, n, _tangents(n))
     where = dataset.meta.poses[pose]
     return arm_setup(
-        arm, pose, np.array(where.q_rad), np.array(where.tcp_xyz_mm) * MM, direction, n, model
+        arm, pose, np.array(where.q_rad), np.array(where.tcp_xyz_mm) * M_PER_MM, direction, n, model
     )
 
 

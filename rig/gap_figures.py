@@ -25,7 +25,6 @@ from rig.gap_layout import (
 from rig.gap_map import gap_map
 from rig.gap_points import (
     FALLING,
-    MM,
     RISING,
     Points,
     Shown,
@@ -39,6 +38,7 @@ from rig.gap_points import (
     write_table,
 )
 from rig.plotting import COLOURS, write_figures
+from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -221,8 +221,8 @@ def residual(r: Shown, p: Points) -> Figure:
     left.set_ylabel(_gap_label(r, "Left"))
     set_title(
         figure,
-        f"Left {_after(r)}: {r.after * MM:.3g} mm rms of single samples; the instruments alone "
-        f"leave {r.noise * MM:.3g} mm",
+        f"Left {_after(r)}: {r.after * MM_PER_M:.3g} mm rms of single samples; the instruments "
+        f"alone leave {r.noise * MM_PER_M:.3g} mm",
     )
     shared_legend(figure, [left])
     return figure
@@ -284,7 +284,7 @@ def withheld(r: Shown) -> Figure:
     figure = blank(8.5, 1.9 + 0.5 * len(entries))
     axes = figure.add_subplot()
     for i, (_, before, after, _, colour) in enumerate(entries):
-        b, a = before * MM, after * MM
+        b, a = before * MM_PER_M, after * MM_PER_M
         axes.plot([a, b], [i, i], "-", color="0.7", linewidth=2, zorder=1)
         axes.plot(b, i, "o", color="black", markerfacecolor="white", markersize=8,
                   label="_" if i else "before")  # fmt: skip
@@ -292,12 +292,12 @@ def withheld(r: Shown) -> Figure:
     axes.plot([], [], "o", color=GREEN, label=f"after, {_after(r)}")
     if r.runners_up:
         axes.plot([], [], "o", color=COLOURS[3], label="after, with another effect instead")
-    axes.axvline(r.noise * MM, color=BLUE, linestyle="--", label="noise of the instruments")
+    axes.axvline(r.noise * MM_PER_M, color=BLUE, linestyle="--", label="noise of the instruments")
     axes.set_yticks(range(len(entries)), [e[0] for e in entries])
     axes.set_ylim(len(entries) - 0.5, -0.7)
     log_axis(axes)
     for i, (_, before, after, text, _) in enumerate(entries):
-        _above(axes, float(np.sqrt(max(before * after * MM**2, 1e-300))), i, text)
+        _above(axes, float(np.sqrt(max(before * after * MM_PER_M**2, 1e-300))), i, text)
     axes.set_xlabel(_gap_label(r, "Gap", "rms in mm"))
     axes.set_title(f"How far the gap shrinks {_after(r)}", fontsize=11)
     shared_legend(figure, [axes])
@@ -338,9 +338,9 @@ def remaining(r: Shown, p: Points, m: Remainder) -> Figure:
             here = here[np.argsort(m.load[here], kind="stable")]
             if not here.size:
                 continue
-            x = m.displacement[here] * MM if r.imposed else m.load[here]
-            mean, sd = m.mean[here] * MM, m.sd[here] * MM
-            axes.plot(x, m.residual[here] * MM, marker, color=edge, markerfacecolor=fill,
+            x = m.displacement[here] * MM_PER_M if r.imposed else m.load[here]
+            mean, sd = m.mean[here] * MM_PER_M, m.sd[here] * MM_PER_M
+            axes.plot(x, m.residual[here] * MM_PER_M, marker, color=edge, markerfacecolor=fill,
                       markersize=4, label=f"{label}: mean")  # fmt: skip
             axes.fill_between(x, mean - 2 * sd, mean + 2 * sd, color=edge, alpha=0.2, linewidth=0)
             axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
@@ -371,17 +371,17 @@ def _of_sense(m: Remainder, sense: int) -> Any:
 
 
 def _remainder_title(r: Shown, m: Remainder) -> str:
-    low, high = (edge * MM for edge in m.ci95)
+    low, high = (edge * MM_PER_M for edge in m.ci95)
     differs = _unrepeated(m)
     if m.largest is None:
         seen = f"nothing that repeats for sure (95 %: below {high:.2g} mm rms)"
         return f"Left {_after(r)}: {seen}; {differs}"
     e = m.largest
     where = ", ".join(w for w in (e.pose, e.direction, BRANCH_NAMES[e.branch]) if w)
-    at = f"{e.displacement * MM:.3g} mm" if r.imposed else f"{e.force:.4g} N"
+    at = f"{e.displacement * MM_PER_M:.3g} mm" if r.imposed else f"{e.force:.4g} N"
     return (
-        f"Left {_after(r)}: {m.rms * MM:.2g} mm rms repeat (95 %: {low:.2g} to {high:.2g}), "
-        f"most at {where}, {at}: {e.mean * MM:.2g} mm; {differs}"
+        f"Left {_after(r)}: {m.rms * MM_PER_M:.2g} mm rms repeat (95 %: {low:.2g} to {high:.2g}), "
+        f"most at {where}, {at}: {e.mean * MM_PER_M:.2g} mm; {differs}"
     )
 
 
@@ -390,7 +390,7 @@ def _unrepeated(m: Remainder) -> str:
         return "each load was met once, so that what repeats can't be told"
     if m.unrepeated_rms == 0:
         return "beside it, noise"
-    return f"another {m.unrepeated_rms * MM:.2g} mm rms is finer or does not repeat"
+    return f"another {m.unrepeated_rms * MM_PER_M:.2g} mm rms is finer or does not repeat"
 
 
 def _ranked(r: Shown, least: float) -> dict[str, float]:

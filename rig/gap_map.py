@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.gap.data import Array, Flags
-from rig.gap_points import FALLING, MM, RISING, Points, Shown, session_clock
+from rig.gap_points import FALLING, RISING, Points, Shown, session_clock
+from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +32,10 @@ def gap_map(r: Shown, p: Points) -> Figure:
     figure = Figure(figsize=(12.0, height + 4.6), layout="constrained")
     panels = figure.subplots(2, 2, sharex="row", sharey="row", height_ratios=[height, 2.9])
     norm = _norm(p)
-    titles = (f"before: {r.before * MM:.3g} mm rms", f"after: {r.after * MM:.3g} mm rms")
+    titles = (
+        f"before: {r.before * MM_PER_M:.3g} mm rms",
+        f"after: {r.after * MM_PER_M:.3g} mm rms",
+    )
     for j, (gap, title) in enumerate(zip((p.gap_before, p.gap_after), titles, strict=True)):
         image = _strips(r, p, panels[0, j], lines, gap, norm)
         _over_time(r, p, panels[1, j], gap, norm)

@@ -16,8 +16,8 @@ from identification.gap.data import BRANCH_NAMES, ZERO, Array, Ints
 from identification.gap.diagnose import Effect, GapResult
 from identification.gap.heldout import HeldOut, stated_prediction
 from identification.gap.remainder import Remainder, branches
+from rig.units import MM_PER_M
 
-MM = 1e3  # mm per m
 RISING, FALLING = 1, 2
 Table = Mapping[str, Sequence[Any] | NDArray[Any]]
 
@@ -117,9 +117,10 @@ def points(r: GapResult) -> Points:
         setup=rows.setup[first], run=rows.run[first], repetition=rows.repetition[first],
         branch=rows.branch[first], sense=_sense(bench)[first], step=rows.step[first],
         session=mean(rows.session), force=mean(rows.measured_force),
-        displacement=mean(rows.displacement) * MM, measured=response * MM,
-        before=mean(stated_prediction(r.engine)) * MM, after=(response - mean(left)) * MM,
-        stated=mean(bench.stated_slope) * MM, noise=noise * MM,
+        displacement=mean(rows.displacement) * MM_PER_M, measured=response * MM_PER_M,
+        before=mean(stated_prediction(r.engine)) * MM_PER_M,
+        after=(response - mean(left)) * MM_PER_M,
+        stated=mean(bench.stated_slope) * MM_PER_M, noise=noise * MM_PER_M,
     )  # fmt: skip
 
 
@@ -170,10 +171,10 @@ def remainder_table(r: Shown, m: Remainder) -> Table:
         "branch": [BRANCH_NAMES[b] for b in m.branch],
         "load_N": m.load,
         "samples": m.samples,
-        "residual_mm": m.residual * MM,
-        "residual_sd_mm": m.noise * MM,
-        "remainder_mm": m.mean * MM,
-        "remainder_sd_mm": m.sd * MM,
+        "residual_mm": m.residual * MM_PER_M,
+        "residual_sd_mm": m.noise * MM_PER_M,
+        "remainder_mm": m.mean * MM_PER_M,
+        "remainder_sd_mm": m.sd * MM_PER_M,
     }
 
 
@@ -193,8 +194,8 @@ def held_table(r: Shown) -> Table:
              "shrink_ci95_low", "shrink_ci95_high")  # fmt: skip
     table = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
     for key in ("before_rms_mm", "after_rms_mm"):
-        table[key] = [v * MM for v in table[key]]
-    return {**table, "noise_rms_mm": [r.noise * MM] * len(rows)}
+        table[key] = [v * MM_PER_M for v in table[key]]
+    return {**table, "noise_rms_mm": [r.noise * MM_PER_M] * len(rows)}
 
 
 def write_table(table: Table, comments: Sequence[str], path: Path) -> None:

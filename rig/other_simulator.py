@@ -13,10 +13,10 @@ from rig.errors import InputError
 from rig.storage.columns import Values
 from rig.storage.csvblocks import Block, CsvFile
 from rig.storage.csvcells import Reading, parse, shown
+from rig.units import MM_PER_M
 
 Array = NDArray[np.float64]
 
-MM = 1e3  # mm per m
 NUMBERS = ("force_N", "displacement_mm")
 WANTED = "pose, direction, force_N, displacement_mm"
 # Forces that lie closer, as a part of the curve's range, are one level with the rounding of whoever
@@ -86,7 +86,7 @@ def _curve(csv: Path, table: dict[str, Values], setup: Setup) -> tuple[Array, Ar
             mine &= table[key] == value
     order = np.argsort(table["force_N"][mine], kind="stable")
     force = table["force_N"][mine][order]
-    displacement = table["displacement_mm"][mine][order] / MM
+    displacement = table["displacement_mm"][mine][order] / MM_PER_M
     new = np.ones(len(force), dtype=bool)
     new[1:] = np.diff(force) > SAME_FORCE * np.ptp(force) if len(force) else True
     level = np.cumsum(new) - 1

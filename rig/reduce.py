@@ -34,8 +34,8 @@ from numpy.typing import NDArray
 
 from identification.curve import Array, Curve, Point
 from rig.passes import binned, is_held, turning_points
+from rig.units import M_PER_MM
 
-MM = 1e-3  # m
 MOST_REPETITIONS = 50  # into which the cycles of a recording are gathered
 
 
@@ -117,7 +117,7 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
     """(pose, direction) -> curve, in the order of measurement; pose "" without an arm."""
     stated = _Stated(
         dataset.meta.instruments.force.standard_uncertainty_N,
-        dataset.meta.instruments.displacement.standard_uncertainty_mm * MM,
+        dataset.meta.instruments.displacement.standard_uncertainty_mm * M_PER_MM,
     )
     result: dict[tuple[str, str], Curve] = {}
     for (pose, direction), runs in _setups(dataset.columns):
@@ -183,7 +183,7 @@ def _run(columns: dict[str, NDArray[Any]], repetition: int, rows: NDArray[np.int
         columns["branch"][rows],
         np.asarray(columns["step"][rows], dtype=np.int64),
         np.asarray(columns["force_N"][rows], dtype=np.float64),
-        np.asarray(columns["displacement_mm"][rows], dtype=np.float64) * MM,
+        np.asarray(columns["displacement_mm"][rows], dtype=np.float64) * M_PER_MM,
         settled,
     )
 
@@ -361,7 +361,7 @@ def _notes(runs: list[_Run], zeros: list[list[_Plateau]], datum: str) -> list[st
         )
     if datum == "setup" and len(zeros) > 1:
         firsts = [z[0].displacement for z in zeros]
-        apart = (max(firsts) - min(firsts)) / MM
+        apart = (max(firsts) - min(firsts)) / M_PER_MM
         notes.append(
             f"The unloaded positions before the repetitions lie {apart:.2g} mm apart; "
             "each repetition counts from its own."

@@ -18,8 +18,9 @@ from typing import Any
 
 from identification.stiffness import Stiffness
 from identification.uncertainty import Contribution, Quantity, combined
-from rig.analyze import N_PER_MM, Analysis, Direction, quantity
+from rig.analyze import Analysis, Direction, quantity
 from rig.dataset import Dataset
+from rig.units import N_PER_MM
 
 LEVEL = 0.05
 _IDENTITY = (

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.uncertainty import TWO_SIDED
-from rig.analyze import MM, N_PER_MM, Analysis
+from rig.analyze import Analysis
 from rig.dataset import Dataset
 from rig.plotting import COLOURS, MARKERS
 from rig.report.compare import aligned
 from rig.report.quality import RunZeros
+from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -202,8 +203,8 @@ def compared_curves(
             levels = [] if direction is None else direction.result.levels
             mine = [p for p in levels if p.branch == branch]
             if mine:
-                axes.errorbar([p.force for p in mine], [p.displacement * MM for p in mine],
-                              np.nan_to_num([p.sd * MM for p in mine]), linestyle=line,
+                axes.errorbar([p.force for p in mine], [p.displacement * MM_PER_M for p in mine],
+                              np.nan_to_num([p.sd * MM_PER_M for p in mine]), linestyle=line,
                               marker=MARKERS[i % len(MARKERS)], capsize=3,
                               markersize=4 + 3 * min(2, len(sets) - 1 - i), markerfacecolor="none",
                               color=COLOURS[i % len(COLOURS)], linewidth=1,

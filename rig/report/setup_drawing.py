@@ -14,12 +14,12 @@ from identification.arm import tool_offset
 from rig.meta import Meta, MetaPose
 from rig.model import load_robot
 from rig.plotting import COLOURS
+from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-MM = 1e3
 _ARM, _LASER = "0.35", "#CC3311"
 _VIEWS = (("From above", 0, 1), ("From the side", 0, 2))
 
@@ -35,9 +35,9 @@ class Load:
 def arm_points(meta: Meta, pose: MetaPose) -> Array:
     """Origins of the frames from base to flange, then the point of load: (8, 3) mm."""
     arm = load_robot(meta.robot)
-    q, tool = np.array(pose.q_rad), tool_offset(np.array(pose.tcp_xyz_mm) / MM)
+    q, tool = np.array(pose.q_rad), tool_offset(np.array(pose.tcp_xyz_mm) / MM_PER_M)
     frames, tcp = arm.frames(q), arm.fk(q, tool)
-    return np.vstack([frames[:, :3, 3], tcp[:3, 3]]) * MM
+    return np.vstack([frames[:, :3, 3], tcp[:3, 3]]) * MM_PER_M
 
 
 def arm_setup(meta: Meta, name: str, loads: Sequence[Load]) -> Figure:
