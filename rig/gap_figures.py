@@ -206,15 +206,15 @@ def residual(r: Shown, p: Points) -> Figure:
     """What the chosen explanation leaves, over force and over the session's time."""
     figure = blank(11.0, 4.6)
     left, right = figure.subplots(1, 2, sharey=True)
-    minutes, unit = session_clock(p)
-    for axes, x in ((left, p.displacement if r.imposed else p.force), (right, minutes)):
+    elapsed, unit = session_clock(p)
+    for axes, x in ((left, p.displacement if r.imposed else p.force), (right, elapsed)):
         axes.axhline(0, color="0.4", linewidth=0.8, zorder=1)
         _residual_points(r, p, axes, x)
     for s in range(len(r.setups)):
         mine = p.setup == s
         if mine.any():
             _noise_band(left, (p.displacement if r.imposed else p.force)[mine], p.noise[mine])
-    _noise_band(right, minutes, p.noise)
+    _noise_band(right, elapsed, p.noise)
     left.set_xlabel("Displacement in mm" if r.imposed else "Force in N")
     assumed = not r.clock and len(np.unique(p.run)) > 1
     right.set_xlabel(f"Time in the session in {unit}" + ", rests assumed" * assumed)

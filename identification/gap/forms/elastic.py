@@ -21,7 +21,7 @@ from identification.gap.effects.load_misalignment import (
     gives,
     pulled,
 )
-from identification.gap.forms.law import ANEW, Law, Term, along, in_pose, scaled
+from identification.gap.forms.law import ANEW, Law, Term, along, in_pose
 from identification.gap.history import retarded
 from identification.gap.variants import Variant
 
@@ -47,7 +47,7 @@ def describe_curve(bench: Bench, v: Variant) -> tuple[Law, Array]:
     constants = {"joint": joint, "measured_to": top}
     if "tool_kg" in v.info:
         constants["tool"] = float(v.info["tool_kg"])
-    return Law(constants, tuple(terms)), scaled(unit)
+    return Law(constants, tuple(terms)), np.array(unit, dtype=float)
 
 
 def curve(bench: Bench, law: Law) -> list[Array]:
@@ -198,7 +198,7 @@ def describe_misalignment(bench: Bench, v: Variant) -> tuple[Law, Array]:
         s = bench.data.setups[bench.rows.setup[int(np.argmax(bench.rows.run == run))]]
         terms += [Term("tangent", _sideways(s, k) | {"run": int(run)}) for k in range(2)]
     units = [1.0] * len(terms) + [unit for _, unit in given]
-    return Law({}, (*terms, *(term for term, _ in given))), scaled(units)
+    return Law({}, (*terms, *(term for term, _ in given))), np.array(units, dtype=float)
 
 
 def _goes(how: Shape) -> dict[str, Any]:

@@ -62,8 +62,3 @@ def in_pose(bench: Bench, pose: str | None) -> Flags:
     """(n,) rows of that pose; all of them where it is None."""
     of_it = np.array([pose in (None, s.pose) for s in bench.data.setups])
     return np.asarray(of_it[bench.rows.setup])
-
-
-def scaled(values: list[float]) -> Array:
-    """As an array of floats."""
-    return np.array(values, dtype=float)
