@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -179,21 +180,23 @@ def planned(design: Design, bench: Bench) -> GapData:
 def _walk(design: Design) -> Iterator[tuple[float, ...]]:
     """Setup, repetition, branch, step, load, time and session of every sample."""
     now = 0.0
+    for s, repetition in product(range(len(design.setups)), range(1, design.repetitions + 1)):
+        now += MOUNT_S if s and repetition == 1 else 0.0
+        start = now
+        for branch, step, load, count in _holds(design, s):
+            now += design.approach_s if branch != ZERO else UNLOAD_S
+            for _ in range(count):
+                now += design.sample_s
+                yield s, repetition, branch, step, load, now - start, now
+        now += UNLOAD_S + design.rest_s
+
+
+def _holds(design: Design, s: int) -> list[tuple[int, int, float, int]]:
+    """Branch, step, load and samples of every hold of one run of a setup."""
     samples = max(1, round(design.hold_s / design.sample_s))
     zeros = round(design.zero_s / design.sample_s)
-    for s in range(len(design.setups)):
-        now += MOUNT_S if s else 0.0
-        for repetition in range(1, design.repetitions + 1):
-            start = now
-            holds: list[tuple[int, int, float, int]] = [(ZERO, 0, 0.0, zeros)] if zeros else []
-            holds += [(b, k, load, samples) for b, k, load in _pass(design, s)]
-            holds += [(ZERO, 0, 0.0, zeros)] if zeros else []
-            for branch, step, load, count in holds:
-                now += design.approach_s if branch != ZERO else UNLOAD_S
-                for _ in range(count):
-                    now += design.sample_s
-                    yield s, repetition, branch, step, load, now - start, now
-            now += UNLOAD_S + design.rest_s
+    at_rest = [(ZERO, 0, 0.0, zeros)] if zeros else []
+    return [*at_rest, *((*at, samples) for at in _pass(design, s)), *at_rest]
 
 
 # --- what could be done next ---------------------------------------------------------------------

@@ -225,11 +225,19 @@ def _compass(
         for _ in range(_ROUNDS):
             before = value
             for way in ways:
-                for trial in (best + way, best - way):
-                    found = left(trial)
-                    if found < value:
-                        best, value = trial, found
+                best, value = _either_side(left, best, value, way)
             if value == before:
                 break
         ways = ways / 2
+    return best, value
+
+
+def _either_side(
+    left: Callable[[Array], float], best: Array, value: float, way: Array
+) -> tuple[Array, float]:
+    """The deepest of a point and its neighbours to either side along a way."""
+    for trial in (best + way, best - way):
+        found = left(trial)
+        if found < value:
+            best, value = trial, found
     return best, value
