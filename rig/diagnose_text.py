@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 from rig.digits import brief
@@ -51,10 +51,12 @@ _OF_ONE_SPRING = {
 }
 
 
-NO_GAP = (
-    "noise, gains and stiffnesses within their stated uncertainty explain all that was measured. "
-    "There is no gap to close."
-)
+# What is said in place of a word's meaning.
+OTHERWISE = {
+    "none": "noise, gains and stiffnesses within their stated uncertainty explain all",
+    "unknown": "a gap that no effect of the library explains",
+}
+LEAST_PROBABILITY = 0.005  # of a word that is listed
 
 
 def meanings(*, arm: bool) -> dict[str, str]:
@@ -126,26 +128,34 @@ def render(r: GapResult) -> str:
 
 
 def _answer(r: GapResult) -> str:
-    head, arm = f"{r.verdict} ({likely(r.probabilities[r.verdict])}):", r.bench.data.arm
     before, after, noise = (brief(v * MM_PER_M, 3) for v in (r.before, r.after, r.noise))
-    alone = f"the instruments alone leave {noise} mm."
-    if r.verdict == "none":
+    like = None if r.looks_like is None else looks_like(r.looks_like, arm=r.bench.data.arm)
+    meaning = meanings(arm=r.bench.data.arm).get(r.verdict, "")
+    told = answer(r.verdict, meaning, r.names, like)
+    shown = told.format(before=before, after=after, noise=noise)
+    return f"{r.verdict} ({likely(r.probabilities[r.verdict])}): {shown}"
+
+
+def answer(verdict: str, meaning: str, names: Iterable[str], like: str | None) -> str:
+    """What a verdict says, with {before}, {after} and {noise} where rms in mm are to stand. names:
+    of the effects; like: what an unknown gap looks like."""
+    alone = "the instruments alone leave {noise} mm."
+    if verdict == "none":
         return (
-            f"{head} {NO_GAP} Of the {before} mm rms that the simulation misses as it stands, "
-            f"{after} mm remain when these are fitted within that; {alone}"
+            f"{OTHERWISE[verdict]} that was measured. There is no gap to close. Of the {{before}} "
+            "mm rms that the simulation misses as it stands, {after} mm remain when these are "
+            f"fitted within that; {alone}"
         )
-    if r.verdict == "unknown":
-        told = None if r.looks_like is None else looks_like(r.looks_like, arm=arm)
-        like = "" if told is None else f" It looks like this: {told}."
+    if verdict == "unknown":
+        alike = "" if like is None else f" It looks like this: {like}."
         return (
-            f"{head} there is a gap, and no effect of the library explains it down to the "
-            f"uncertainty: {after} of {before} mm rms remain; {alone}{like}"
+            "there is a gap, and no effect of the library explains it down to the uncertainty: "
+            f"{{after}} of {{before}} mm rms remain; {alone}{alike}"
         )
-    more = [name for name in r.names if name != r.verdict]
-    also = f" Beside it: {', '.join(more)}." if more else ""
+    more = [name for name in dict.fromkeys(names) if name != verdict]
+    beside = f" Beside it: {', '.join(more)}." if more else ""
     return (
-        f"{head} {meanings(arm=arm)[r.verdict]}.{also} With it the gap shrinks from {before} to "
-        f"{after} mm rms; {alone}"
+        f"{meaning}.{beside} With it the gap shrinks from {{before}} to {{after}} mm rms; {alone}"
     )
 
 
@@ -171,7 +181,7 @@ def _effects(r: GapResult) -> str:
     for e in r.effects:
         lines += _one_effect(e, _title(e, [other.name for other in r.effects]))
     ranked = sorted(r.probabilities.items(), key=lambda i: -i[1])
-    shown = ", ".join(f"{w} {p:.2f}" for w, p in ranked if p >= 0.005)
+    shown = ", ".join(f"{w} {p:.2f}" for w, p in ranked if p >= LEAST_PROBABILITY)
     lines.append(f"Probability of being the main cause: {shown}")
     return "\n".join(lines)
 

@@ -11,6 +11,7 @@ import numpy as np
 from identification.gap.data import BRANCH_NAMES
 from identification.gap.remainder import Remainder, remainder
 from rig.diagnose import Diagnosis
+from rig.diagnose_text import LEAST_PROBABILITY
 from rig.errors import InputError
 from rig.gap_layout import (
     blank,
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
 
 BLUE, ORANGE, GREEN = COLOURS[0], COLOURS[1], COLOURS[2]
 GREY = "0.45"
-LEAST_PROBABILITY = 0.005
 _SENSES = ((RISING, "loading", BLUE, BLUE, "o"), (FALLING, "unloading", ORANGE, "white", "s"))
 _NOISE = "noise, ±2 standard deviations"
 _MANY = 400  # points of a panel beyond which markers hide each other

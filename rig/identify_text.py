@@ -32,7 +32,7 @@ def text(result: IdentifyResult) -> str:
         low, high = fit.ci95[j] / 1e3
         bound = f"{fit.lower_bound[j] / 1e3:.2f}" if fit.lower_bound[j] > 1 else "-"
         share = max(0.0, 100 * fit.data_share[j])
-        verdict = "identified" if fit.identified[j] else _not_identified(share)
+        verdict = data_say(bool(fit.identified[j]), share)
         lines.append(
             f"  {j + 1}    {c:9.2f} {u:5.2g}  {low:7.2f} to {high:6.2f}  {share:6.1f} %  {bound:>8}"
             f"  {verdict}"
@@ -126,7 +126,10 @@ def _levers(result: IdentifyResult, q: object, direction: object) -> np.ndarray:
     return np.asarray(np.asarray(direction) @ J[:3])
 
 
-def _not_identified(share: float) -> str:
-    if share < 10:
+def data_say(identified: bool, percent: float) -> str:
+    """Of a joint's stiffness; percent of it that comes from the data."""
+    if identified:
+        return "identified"
+    if percent < 10:
         return "repeats the prior"
-    return "known, not to 5 %" if share >= 90 else "partly seen"
+    return "known, not to 5 %" if percent >= 90 else "partly seen"

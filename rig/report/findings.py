@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from rig.identify_text import data_say
 from rig.report.document import (
     Block,
     Bullets,
@@ -13,6 +14,7 @@ from rig.report.document import (
     Paragraph,
     Rich,
     Section,
+    Style,
     Table,
     Word,
     row,
@@ -173,12 +175,8 @@ def _bound(node: Node) -> Rich:
 
 def _verdict(identified: bool, share: float) -> Word:
     """As `rig identify` has it."""
-    if identified:
-        return Word("identified", "good")
-    if share < 0.1:
-        return Word("repeats the prior", "bad")
-    words = "known, not to 5 %" if share >= 0.9 else "partly seen"
-    return Word(words, "open")
+    style: Style = "good" if identified else "bad" if share < 0.1 else "open"
+    return Word(data_say(identified, 100 * share), style)
 
 
 def _next_poses(found: Node) -> list[Block]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
-from rig.diagnose_text import EACH, NO_GAP, NOTED, families
+from rig.diagnose_text import EACH, LEAST_PROBABILITY, NOTED, OTHERWISE, answer, families
 from rig.report.document import (
     Block,
     Bullets,
@@ -19,12 +20,6 @@ from rig.report.document import (
 )
 from rig.report.gather import Session
 from rig.report.results import NOTHING, Node
-
-_LEAST_PROBABILITY = 0.005
-_OTHERWISE = {
-    "none": "noise, gains and stiffnesses within their stated uncertainty explain all",
-    "unknown": "a gap that no effect of the library explains",
-}
 
 
 def gap(session: Session, data: Node) -> Section:
@@ -41,31 +36,19 @@ def gap(session: Session, data: Node) -> Section:
 
 
 def _answer(found: Node) -> Rich:
-    verdict, sizes = found["verdict"].text(), found["gap"]
+    """As `rig diagnose` has it, with the numbers of the JSON."""
+    verdict, like = found["verdict"].text(), found["looks_like"]
+    told = answer(
+        verdict,
+        "" if verdict in OTHERWISE else found["meanings"][verdict].text(),
+        [e["name"].text() for e in found["effects"]],
+        None if like.value is None else like["text"].text(),
+    )
+    sizes = {k: found["gap"][f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise")}
+    parts = re.split(r"\{(before|after|noise)\}", told)
+    shown = [p for i, part in enumerate(parts) for p in (sizes[part] if i % 2 else (part,))]
     p = found["probabilities"][verdict].percent()
-    start: Rich = (Word(verdict, "strong"), " (", *p, "): ")
-    before, after, noise = (sizes[f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise"))
-    if verdict == "none":
-        return (*start, f"{NO_GAP} Of the ", *before, " mm rms that the simulation misses as it "
-                "stands, ", *after, " mm remain when these are fitted within that; the instruments "
-                "alone leave ", *noise, " mm.")  # fmt: skip
-    if verdict == "unknown":
-        return (*start, "there is a gap, and no effect of the library explains it down to the "
-                "uncertainty: ", *after, " of ", *before, " mm rms remain; the instruments alone "
-                "leave ", *noise, " mm.", *_alike(found))  # fmt: skip
-    named = dict.fromkeys(e["name"].text() for e in found["effects"])
-    others = [name for name in named if name != verdict]
-    beside = f" Beside it: {', '.join(others)}." if others else ""
-    meaning = found["meanings"][verdict].text()
-    return (*start, f"{meaning}.{beside} With it the gap shrinks from ", *before, " to ",
-            *after, " mm rms; the instruments alone leave ", *noise, " mm.")  # fmt: skip
-
-
-def _alike(found: Node) -> Rich:
-    """What an unknown gap looks like, with its period as the diagnosis has it."""
-    if found["looks_like"].value is None:
-        return ()
-    return (f" It looks like this: {found['looks_like']['text'].text()}.",)
+    return (Word(verdict, "strong"), " (", *p, "): ", *shown)
 
 
 def _where(found: Node) -> list[Block]:
@@ -139,9 +122,9 @@ def _places(name: str, places: Node) -> Rich:
 def _probabilities(found: Node) -> Table:
     ranked = sorted(found["probabilities"].items(), key=lambda i: -i[1].value)
     rows = tuple(
-        (word, _OTHERWISE.get(word) or found["meanings"][word].text(), p.percent(2))
+        (word, OTHERWISE.get(word) or found["meanings"][word].text(), p.percent(2))
         for word, p in ranked
-        if p.value >= _LEAST_PROBABILITY
+        if p.value >= LEAST_PROBABILITY
     )
     header = ("word", "what happens", "probability")
     return Table("Probability of being the main cause", header, rows, 2)
