@@ -1,4 +1,4 @@
-"""Recordings that were not held at levels: are they, where do they turn, and their bins."""
+"""Recordings that were not held at levels: are they, and their bins."""
 
 from __future__ import annotations
 
@@ -36,34 +36,6 @@ def _runs_through(branch: NDArray[np.str_], step: NDArray[np.int64], force: Arra
     span = float(np.ptp(np.append(force, 0.0)))
     count = np.diff(np.append(edges, force.size))
     return bool(np.any((count > 2) & (width > HELD * span)))
-
-
-def turning_points(force: Array, span: float) -> list[int]:
-    """Rows at which the force turns: extremes from which it comes back by `TURN * span`.
-
-    Smaller reversals, noise among them, stay within a pass.
-    """
-    back = TURN * span
-    turns: list[int] = []
-    if force.size == 0 or not back > 0:
-        return turns
-    values = force.tolist()
-    high = low = 0
-    rising: bool | None = None  # until the force has left its beginning, whose noise is no turn
-    for i, value in enumerate(values):
-        if value > values[high]:
-            high = i
-        if value < values[low]:
-            low = i
-        if rising is not False and values[high] - value > back:
-            if rising:
-                turns.append(high)
-            rising, low = False, i
-        elif rising is not True and value - values[low] > back:
-            if rising is False:
-                turns.append(low)
-            rising, high = True, i
-    return turns
 
 
 def binned(

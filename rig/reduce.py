@@ -33,7 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.curve import Array, Curve, Point
-from rig.passes import binned, is_held, turning_points
+from identification.turns import turning_points
+from rig.passes import TURN, binned, is_held
 from rig.units import M_PER_MM
 
 MOST_REPETITIONS = 50  # into which the cycles of a recording are gathered
@@ -327,7 +328,7 @@ def _passes(branch: NDArray[np.str_], force: Array, span: float) -> Iterator[sli
         if branch[a] != "cycle":
             yield slice(a, b)
             continue
-        turns = [a, *(a + t for t in turning_points(force[a:b], span)), b]
+        turns = [a, *(a + t for t in turning_points(force[a:b], TURN * span)), b]
         yield from (slice(i, j) for i, j in pairwise(turns) if j > i)
 
 

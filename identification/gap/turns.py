@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.data import Array, Flags
+from identification.turns import turning_points
 
 
 def passes(force: Array) -> int:
@@ -15,25 +16,8 @@ def passes(force: Array) -> int:
 def turns(force: Array, share: float = 0.25) -> list[int]:
     """Where it turns from one such pass to the next. share: of its range that a pass takes."""
     stride = max(1, len(force) // 20_000)
-    coarse = force[::stride].tolist()
     back = share * float(np.ptp(force))
-    out: list[int] = []
-    low, high, rising = coarse[0], coarse[0], None
-    at_low = at_high = 0
-    for i, x in enumerate(coarse):
-        if x < low:
-            low, at_low = x, i
-        if x > high:
-            high, at_high = x, i
-        if rising is not False and high - x > back:
-            if rising:
-                out.append(at_high * stride)
-            rising, low, at_low = False, x, i
-        elif rising is not True and x - low > back:
-            if rising is False:
-                out.append(at_low * stride)
-            rising, high, at_high = True, x, i
-    return out
+    return [at * stride for at in turning_points(force[::stride], back)]
 
 
 def way_back(path: Array) -> float:

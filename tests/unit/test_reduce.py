@@ -7,7 +7,8 @@ import pytest
 
 from identification.curve import Curve, Point
 from identification.stiffness import analyze_curve
-from rig.passes import binned, is_held, turning_points
+from identification.turns import turning_points
+from rig.passes import TURN, binned, is_held
 from rig.reduce import curves
 from tests.unit.stiffness_tables import Table, meta, run, table
 
@@ -197,15 +198,15 @@ def test_held_cycles_are_sorted_by_whether_the_load_grows() -> None:
 def test_turning_points_ignore_noise() -> None:
     t = np.arange(1000)
     force = np.sin(t / 50.0) + 0.05 * np.sin(37.0 * t)
-    turns = turning_points(force, float(np.ptp(force)))
+    turns = turning_points(force, TURN * float(np.ptp(force)))
     expected = [50 * math.pi * (i + 0.5) for i in range(6)]
     assert len(turns) == 6
     assert np.abs(np.array(turns) - expected).max() < 20
 
 
 def test_a_recording_that_begins_at_a_turn_has_no_empty_pass() -> None:
-    assert turning_points(np.array([0.0, 5.0, 10.0, 5.0, 0.0]), 10.0) == [2]
-    assert turning_points(np.array([10.0, 5.0, 0.0, 5.0, 10.0]), 10.0) == [2]
+    assert turning_points(np.array([0.0, 5.0, 10.0, 5.0, 0.0]), TURN * 10.0) == [2]
+    assert turning_points(np.array([10.0, 5.0, 0.0, 5.0, 10.0]), TURN * 10.0) == [2]
     assert turning_points(np.zeros(5), 0.0) == []
 
 
