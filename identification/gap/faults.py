@@ -38,11 +38,6 @@ def found_in(data: GapData) -> tuple[Fault, ...]:
     return tuple(Fault(kind, text) for kind, text in told.items())
 
 
-def faults(data: GapData) -> tuple[str, ...]:
-    """What is said of every fault."""
-    return tuple(f.text for f in found_in(data))
-
-
 # --- what is said of each ------------------------------------------------------------------------
 
 

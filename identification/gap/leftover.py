@@ -16,7 +16,6 @@ import numpy as np
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.explanation import LAW_REMAINDER, REMAINDER, SOFT, Explanation, Found
-from identification.gap.faults import faults
 from identification.gap.fit import Fit, fit
 from identification.gap.hands import open_to_hands
 from identification.gap.imperfection import STEP
@@ -41,7 +40,7 @@ def looked_up(found: Found) -> Found:
     """The posterior with what the best explanations really leave; of levels that rest, after a look
     for readings that nothing on a rig makes."""
     engine = found.engine
-    if faults(engine.bench.data):
+    if engine.bench.course.faults:
         doubted = [replace(e, log_good=e.log_good + log(FAULTY)) for e in found.explanations]
         return weighed(replace(found, explanations=tuple(doubted)), found.kept)
     judge = _still_good if engine.bench.data.arm else _judged

@@ -10,7 +10,7 @@ from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.ends import after_break, without_ends
-from identification.gap.faults import faults
+from identification.gap.faults import BROKEN, found_in
 from identification.gap.parts import Part, Sizes
 from identification.gap.penalties import straight
 from identification.gap.priors import prior_of
@@ -86,7 +86,7 @@ def test_what_goes_on_or_back_has_not_broken(what: str) -> None:
         step = np.arange(40) // 2
         data = bench_data(np.where(step < 18, 5.0 * step, 5.0), 1e-5 * step, step=step)
     assert not after_break(data).any()
-    assert not any("break" in note for note in faults(data))
+    assert not any(fault.kind == BROKEN for fault in found_in(data))
 
 
 def test_a_reading_from_before_the_force_was_zeroed_is_set_aside_and_said() -> None:

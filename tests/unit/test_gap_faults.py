@@ -13,7 +13,7 @@ from identification.gap.diagnose import diagnose_gap
 from identification.gap.faults import (
     SIGNS,
     bursts,
-    faults,
+    found_in,
     frozen_since,
     goes_against,
     goes_back,
@@ -26,6 +26,11 @@ from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
 
 
+def told(data: GapData) -> tuple[str, ...]:
+    """What is said of every fault."""
+    return tuple(f.text for f in found_in(data))
+
+
 def test_creep_of_a_hold_is_no_burst_and_bursts_are() -> None:
     t, u = creeping()
     given = one_hold(t, u)
@@ -34,8 +39,8 @@ def test_creep_of_a_hold_is_no_burst_and_bursts_are() -> None:
     given = one_hold(t, shaken)
     rung = bench_data(given.pop("force"), given.pop("displacement"), **given)
     assert bursts(rung)
-    assert "See to the displacement sensor's mounting" in " ".join(faults(rung))
-    assert "See to the laser's mounting" in " ".join(faults(replace(rung, arm=True)))
+    assert "See to the displacement sensor's mounting" in " ".join(told(rung))
+    assert "See to the laser's mounting" in " ".join(told(replace(rung, arm=True)))
 
 
 def test_a_lag_that_takes_half_a_hold_is_no_burst() -> None:
@@ -110,7 +115,7 @@ def test_what_stands_still_for_a_reason_is_none(what: str) -> None:
         force, u = lost_target(at=12, n=40)
         u[21:] = force[21:] / SPRING
     assert frozen_since(running(force, u)) is None
-    assert faults(running(force, u)) == ()
+    assert found_in(running(force, u)) == ()
 
 
 PRECISE = Instruments(0.1, 1e-7, 0.005, 0.003)
@@ -225,7 +230,7 @@ def test_a_force_that_stays_from_step_to_step_while_all_goes_on_is_an_amplifier_
     assert saturates(data) is None
     full = replace(data, force=np.minimum(data.force, 85.0))  # of steps of 40 N: 80, 85, 85
     assert saturates(full) == pytest.approx(85.0)
-    (note,) = faults(full)
+    (note,) = told(full)
     assert "stays at 85 N" in note
     pulled = replace(full, force=-full.force, displacement=-full.displacement)
     assert saturates(pulled) == pytest.approx(-85.0)
@@ -244,11 +249,11 @@ def test_channels_that_count_in_opposite_senses_are_told_where_they_do() -> None
     one = replace(data, displacement=np.where(data.setup == 1, -1, 1) * data.displacement)
     assert goes_against(one) == ("P1/y",)
     course = make_bench(everywhere).course
-    (told,) = course.faults
-    assert told.kind == SIGNS  # and not that it goes back, as it does all the time
+    (fault,) = course.faults
+    assert fault.kind == SIGNS  # and not that it goes back, as it does all the time
     assert goes_back(everywhere) is not None
-    assert "P2/y" in told.text
-    assert faults(everywhere) == (told.text,)
+    assert "P2/y" in fault.text
+    assert found_in(everywhere) == (fault,)
     assert course.faults is course.faults  # looked for once
     found = diagnose_gap(everywhere)
     assert (found.verdict, found.looks_like) == ("unknown", None)
