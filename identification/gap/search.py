@@ -137,8 +137,8 @@ def force(
 
 
 def _seeds(pool: dict[frozenset[str], Explanation], most: int) -> list[Explanation]:
-    """Where to look for a second effect: around all good ones; where the best explains the data
-    down to the noise, around those within reach of it."""
+    """Around which explanations another effect is looked for: the `most` best; where the best of
+    all leaves no more than the noise, those of them within half a window of it."""
     ranked = sorted((e for e in pool.values() if e.parts), key=lambda e: -e.log_weight)
     best = max(e.log_weight for e in pool.values())
     clean = [e for e in pool.values() if e.log_weight == best and e.eta == 0]

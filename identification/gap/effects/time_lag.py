@@ -2,11 +2,12 @@
 
 Pure delay of the laser, `u(t) = u_0(t - d)`, or of the force; a first-order filter of either, or
 one that is delayed as well, or two alike (a critically damped one of second order); or a mean over
-the last readings, late by half of its window.
+the last readings, late by half of its window; or something between delay and filter.
 Lags of filters, averaging and transmission: 0.05 to 10 s.
 
-Size: 0.05 to 10 s; 0.6 to 12 times the sampling interval here.
-Prior: coefficient above LEAST, 1 is the lag itself; lags, channels and kinds equally likely.
+Size: 0.05 to 10 s; 0.3 to 12 times the sampling interval here, on a finer grid about what is found.
+Prior: coefficient above LEAST, 1 is the lag itself; channels and kinds equally likely, what lies
+between two kinds half as much; lags up to 2.5 samples equally likely, longer ones the less.
 Source: averaging and filter settings of amplifiers and laser sensors.
 """
 
