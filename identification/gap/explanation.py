@@ -93,8 +93,8 @@ def _together(parts: tuple[Part, ...], sizes: Iterable[float]) -> dict[str, floa
 @dataclass(frozen=True)
 class Likeness:
     """What an unknown gap looks like. kind: slopes, swings, waves, rough or jumps; of a recording
-    that runs on jerks, damage or softening; period: s of a swing, m of a wave, None of others;
-    log_evidence: of the kind, nats; wanders: slopes that change within runs too."""
+    that runs on jerks, damage, softening or wanders; period: s of a swing, m of a wave, None of
+    others; log_evidence: of the kind, nats; wanders: slopes that change within runs too."""
 
     kind: str
     period: float | None

@@ -14,8 +14,8 @@ from identification.gap.breaks import _just_turned, jump_rows, strangers
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.priors import LOG_UNKNOWN, prior_of
-from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING, WORDS
-from rig.diagnose_text import LOOKS_LIKE
+from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING, WANDERS, WORDS
+from rig.diagnose_text import LOOKS_LIKE, looks_like
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running, triangle
@@ -141,6 +141,25 @@ def test_only_recordings_that_run_on_without_an_arm_are_looked_at() -> None:
     assert of(bench_data(levels, levels / SPRING, step=np.repeat(np.arange(10), 5))) == []
     still = np.random.default_rng(2).normal(0, 0.1, N)
     assert of(running(still, np.zeros(N), imposed="force")) == []
+
+
+@pytest.mark.parametrize(("strokes", "told"), [(9, True), (2, False)])
+def test_a_stiffness_that_goes_its_own_way_in_time_is_nobody_s_word(
+    strokes: int, told: bool
+) -> None:
+    """A pressure that nobody holds; of few strokes nobody knows whether it is load or time."""
+    stroke = 1e-3 * triangle(N, strokes)
+    force = SPRING * stroke * (1 + 0.2 * np.sin(np.linspace(0, 7, N)))
+    noise = np.random.default_rng(8).normal(0, NOISE_N, N)
+    data = running(force + noise, stroke, imposed="displacement")
+    bench = make_bench(data)
+    target = bench.observed - prediction(bench)
+    assert (WANDERS in {v.word for v in strangers(bench, base_columns(bench), target)}) is told
+    if told:
+        found = diagnose_gap(data)
+        assert found.verdict == "unknown"
+        assert found.looks_like is not None
+        assert "wanders" in looks_like(found.looks_like, arm=False)
 
 
 @pytest.mark.parametrize("stays", [0.0, 0.6])

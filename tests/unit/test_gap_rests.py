@@ -18,6 +18,7 @@ from identification.gap.glitches import picked
 from identification.gap.parts import Part
 from identification.gap.penalties import _same_element
 from identification.gap.strange import strangers
+from identification.gap.variants import variant
 from tests.unit.test_gap_operators import bench_data
 
 
@@ -143,3 +144,14 @@ def test_a_room_may_swing_often_but_slowly(every_s: float, verdict: str) -> None
     moved = 1e-4 * at + 3e-5 * np.sin(2 * np.pi * 14 * at) + noise
     result = diagnose_gap(under_a_weight(moved, every_s))
     assert result.verdict == verdict
+
+
+def test_two_drifts_beside_a_load_that_stands_are_one_path() -> None:
+    at = np.linspace(0.0, 1.0, 60)
+    engines = []
+    for load in (np.zeros(60), 80 * np.abs(np.sin(9 * at))):
+        bench = make_bench(bench_data(load, 1e-5 * at + 1e-5 * load, step=np.full(60, -1)))
+        base, target = base_columns(bench), bench.observed - prediction(bench)
+        engines.append(Engine(bench, base, target, eta_levels(bench, base, target)))
+    heat, charge = (Part(variant(w, w, [0], (1.0,)), 1.0) for w in ("thermal_drift", "force_drift"))
+    assert [_same_element(e, heat, charge) for e in engines] == [True, False]

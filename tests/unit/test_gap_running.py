@@ -312,6 +312,8 @@ def test_passes_that_go_about_as_fast_go_at_one_rate(slower: float, one: bool) -
                       session=seconds, time=seconds, imposed="force")  # fmt: skip
     bench = make_bench(data)
     assert bench.course.one_rate is one
+    # there, creep in proportion to anything would be a loop of any shape
+    assert any(v.info["bent"] for v in library(bench, ["joint_creep"])) is not one
     slow = prior_of(frozenset(["joint_creep"]), bench)
     assert (slow < prior_of(frozenset(["joint_creep"])) - 20) is one
     both = frozenset(["joint_creep", "time_lag"])

@@ -80,9 +80,10 @@ def variants(bench: Bench) -> list[Variant]:
             name, likely = f"joint {j + 1}{memory}", _LIKELY[memory]
             pairs = (0.3 if bench.data.arm else 0.5) * likely
             out += _family(name, columns, spectrum, sizes, 0.5 * likely, pairs, info)
-        columns = _elements(bench, j, spectrum, None, is_bent=True)
-        info = {"joint": j, "memory": "", "bent": True}
-        out += _family(f"joint {j + 1}{BENT}", columns, spectrum, sizes, 0.2, 0.2, info)
+        if bench.data.arm or not bench.course.one_rate:  # else it would be a loop of any shape
+            columns = _elements(bench, j, spectrum, None, is_bent=True)
+            info = {"joint": j, "memory": "", "bent": True}
+            out += _family(f"joint {j + 1}{BENT}", columns, spectrum, sizes, 0.2, 0.2, info)
     return out
 
 
