@@ -125,6 +125,16 @@ def test_a_knee_that_is_recorded_from_its_middle_on_has_no_seat() -> None:
     assert pulled(force, u).verdict == "joint_yield"
 
 
+def test_what_bends_over_all_of_the_stroke_is_a_curve_and_no_toe() -> None:
+    """In proportion to its square."""
+    u = np.linspace(0.0, STROKE, 200)
+    found = pulled(SPRING * u**2 / STROKE, u)
+    assert found.verdict == "joint_nonlinear_stiffness"
+    laws = [law for v in library(found.bench, ["contact_seating"]) for law in v.info["laws"]]
+    wide = [force for kind, force in laws if kind == "toe"]
+    assert 0 < max(wide) < 0.5 * np.abs(found.bench.load).max()
+
+
 @pytest.mark.parametrize("slacks", [(1.2e-4,), (3e-5, 1.4e-4)])
 def test_a_toe_alone_is_a_seat(slacks: tuple[float, ...]) -> None:
     """Slack that is taken up bit by bit, at once or in two, then the line that was simulated."""
