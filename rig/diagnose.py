@@ -100,7 +100,8 @@ class Diagnosis:
 
     def _outside(self) -> list[str]:
         """What the simulation has beside springs and effects."""
-        if self.model is None or not self.model.written_outside:
+        curves = self.result.bench.data.simulated is not None  # the simulation is what they are
+        if self.model is None or not self.model.written_outside or curves:
             return []
         keys = " and ".join(f"`{key}`" for key in self.model.written_outside)
         return [f"The simulation has the model's {keys}: the gap is what goes beyond them."]

@@ -91,6 +91,9 @@ LOOKS_LIKE = {
 }
 # Of a rig without an arm, whose displacement may be read by anything.
 _BY_ANY_SENSOR = {
+    "wanders": "the stiffness goes its own way in time: fatigue, cure, humidity, a pressure that "
+    "nobody holds, an amplifier that changes its range; to be sure, go through the same strokes "
+    "again now",
     "waves": "a wave over the stroke, {} long: a screw's thread, or the scale that the sensor "
     "reads; to be sure, begin the stroke elsewhere, and measure again",
     "jumps": "the displacement jumps between holds, elsewhere in every run: see to what sticks and "

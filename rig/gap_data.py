@@ -73,7 +73,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         ),
         tangential=_tangential(columns, setups, setup),
         q=_readings(dataset, columns, poses),
-        temperature=_optional(columns, _MAY_MISS["joint temperatures"], 6),
+        temperature=_optional(columns, _MAY_MISS[_TEMPERATURES], 6),
         output_encoder=meta.joint_encoder == "output",
         datum=meta.datum,
         tare=meta.tare,
@@ -84,27 +84,30 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     )
 
 
-_JOINTS = "joint readings"
+_JOINTS, _TEMPERATURES = "joint readings", "joint temperatures"
+_OF_JOINTS = (_JOINTS, _TEMPERATURES)
 _MAY_MISS = {
     _JOINTS: [f"q{j}_rad" for j in range(1, 7)],
     "force components": [f"force_{a}_N" for a in "xyz"],
-    "joint temperatures": [f"temperature{j}_C" for j in range(1, 7)],
+    _TEMPERATURES: [f"temperature{j}_C" for j in range(1, 7)],
 }
 _FEW = 0.05  # of the samples
 
 
 def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...], tuple[str, ...]]:
     """The samples to use (n,), without a few that lack what all others have: a channel counts only
-    where it is there throughout. And what to say of those, and of channels that do not count."""
+    where it is there throughout. And what to say of those, and of channels that do not count: such
+    as are there in no sample of a level, and temperatures, which are worth no sample."""
     aside, without = [], []
     for what, names in _MAY_MISS.items():
         has = all(n in dataset.columns for n in names)
-        if not has or (what == _JOINTS and dataset.meta.robot == "none"):
+        if not has or (what in _OF_JOINTS and dataset.meta.robot == "none"):
             continue
         values = [dataset.columns[n].astype(float) for n in names]
         there, count = np.isfinite(values).all(axis=0), int(used.sum())
         missing = int((used & ~there).sum())
-        if 0 < missing <= _FEW * count:
+        few = what != _TEMPERATURES and missing <= _FEW * count
+        if missing and few and _levels(dataset, used & there) == _levels(dataset, used):
             used = used & there
             aside.append(f"{missing} of {count} samples lack {what}: set aside.")
         elif 0 < missing < count:
@@ -112,6 +115,12 @@ def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...
                 f"{missing} of {count} samples lack {what}: taken as if none had been recorded."
             )
     return used, tuple(aside), tuple(without)
+
+
+def _levels(dataset: Dataset, used: Flags) -> set[tuple[object, ...]]:
+    """Levels of all runs that the samples to use (n,) belong to."""
+    keys = (dataset.columns[k][used] for k in ("pose", "direction", "repetition", "branch", "step"))
+    return set(zip(*(k.tolist() for k in keys), strict=True))
 
 
 def _unsettled(dataset: Dataset) -> tuple[str, ...]:

@@ -47,7 +47,7 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     if not moves or bench.rows.n < _FEWEST_ROWS:
         return []
     lasting = _damage(bench) if bench.course.returns else []
-    if bench.course.returns and bench.course.left_behind < _STAYS:
+    if bench.course.returns and bench.course.stays < _STAYS:
         lasting += _softening(bench)
     return [*lasting, *_wanders(bench), *_jerks(bench, base, target)]
 

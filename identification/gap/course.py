@@ -21,6 +21,7 @@ from identification.gap.turns import passes, turns, way_back
 from identification.gap.wandering import wanders
 
 _MANY = 1000
+_GONE = 0.03  # of the largest force: so little is none
 _ASIDE = 0.1  # of the largest load: less of the other sign is none
 _TREMBLES, _WAVERS = 2.0, 10.0  # stated standard deviations
 _CLEARLY, _A_LITTLE = 5.0, 0.005  # standard deviations, and share of the range, of a way back
@@ -146,10 +147,20 @@ class Course:
     def left_behind(self) -> float:
         """Share of the largest displacement that is left when the force was taken away in the end,
         0 where it was not."""
+        return self._left(_ASIDE)
+
+    @property
+    def stays(self) -> float:
+        """The same where next to nothing of the force is left: a curve that stiffens has hardly any
+        of it over a third of its way."""
+        return self._left(_GONE)
+
+    def _left(self, gone_below: float) -> float:
+        """gone_below: share of the largest force."""
         force = np.abs(self.rows.measured_force if self.imposed else self.load)
         path = self.load if self.imposed else self.response
         moved = np.abs(path - path[0])
-        gone = force[-1] < _ASIDE * force.max()
+        gone = force[-1] < gone_below * force.max()
         return float(moved[-1] / moved.max()) if gone and moved.max() > 0 else 0.0
 
     @cached_property

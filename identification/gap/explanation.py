@@ -179,7 +179,7 @@ def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) 
     curves = np.array([p.word in CURVES for p in parts], dtype=bool)
     creeps = np.array([p.word == "joint_creep" for p in parts], dtype=bool)
     if len(parts) == _PAIR and rubs.any():
-        if curves.any() and engine.bench.course.left_behind > _STAYS:
+        if curves.any() and engine.bench.course.stays > _STAYS:
             return _led(sizes.gap, int(rubs.argmax()))
         if creeps.any() and engine.bench.course.one_rate:
             return _led(sizes.gap, int(rubs.argmax()))

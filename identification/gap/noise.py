@@ -36,8 +36,8 @@ class Noise:
     one sample. raised: how many times what is stated readings scatter, of a running recording or
     within holds, at least 1.
     sure: of an arm's instruments, or measured; what else is stated is known to a factor UNSURE.
-    swings: how many times what is stated an arm goes to and fro while nothing changes. slow: how
-    many times what is stated it may differ from hold to hold. seen: of one
+    swings: how many times what is stated an arm goes to and fro while nothing changes. slow: by
+    which share of what is stated it may differ from hold to hold. seen: of one
     sample, m, as far as a rig without an arm showed it: 0 where it read every level but once."""
 
     response: Array
@@ -142,7 +142,7 @@ def _swings(data: GapData, rows: Rows, hold: Ints) -> float:
 
 
 def _slow(data: GapData, rows: Rows, slope: float, hold: Ints) -> float:
-    """How many times what is stated an arm's readings may differ from hold to hold: by what is
+    """Share of what is stated by which an arm's readings may differ from hold to hold: by what is
     stated of both channels and their holds don't show. 0 where these can't tell."""
     meter, slow = data.instruments, []
     for values, stated in ((data.displacement, meter.displacement), (data.force, meter.force)):
@@ -150,7 +150,7 @@ def _slow(data: GapData, rows: Rows, slope: float, hold: Ints) -> float:
         if rows.continuous or not data.arm or white is None:
             return 0.0
         slow.append(max(stated**2 - white**2, 0.0) ** 0.5)
-    return float(np.hypot(slow[0], slope * slow[1])) / meter.displacement
+    return min(float(np.hypot(slow[0], slope * slow[1])) / meter.displacement, 1.0)
 
 
 def _encoders(data: GapData, rows: Rows, hold: Ints) -> Array:

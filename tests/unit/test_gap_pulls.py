@@ -12,7 +12,7 @@ from identification.gap.base import base_columns
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.effects import library
+from identification.gap.effects import contact_seating, library
 from identification.gap.effects.contact_seating import refined
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, energies
@@ -131,8 +131,14 @@ def test_what_bends_over_all_of_the_stroke_is_a_curve_and_no_toe() -> None:
     found = pulled(SPRING * u**2 / STROKE, u)
     assert found.verdict == "joint_nonlinear_stiffness"
     laws = [law for v in library(found.bench, ["contact_seating"]) for law in v.info["laws"]]
-    wide = [force for kind, force in laws if kind == "toe"]
-    assert 0 < max(wide) < 0.5 * np.abs(found.bench.load).max()
+    top = np.abs(found.bench.load).max()
+    assert 0 < max(force for kind, force in laws if kind == "toe") < 0.5 * top
+    toe, slack = (
+        next(v for v in library(found.bench, ["contact_seating"]) if v.label == f"{law} 0.4")
+        for law in ("toe", "slack")
+    )
+    assert max(v.info["force_N"] for v in contact_seating.refined(found.bench, toe)) < 0.5 * top
+    assert max(v.info["force_N"] for v in contact_seating.refined(found.bench, slack)) > 0.5 * top
 
 
 @pytest.mark.parametrize("slacks", [(1.2e-4,), (3e-5, 1.4e-4)])

@@ -155,3 +155,14 @@ def test_two_drifts_beside_a_load_that_stands_are_one_path() -> None:
         engines.append(Engine(bench, base, target, eta_levels(bench, base, target)))
     heat, charge = (Part(variant(w, w, [0], (1.0,)), 1.0) for w in ("thermal_drift", "force_drift"))
     assert [_same_element(e, heat, charge) for e in engines] == [True, False]
+
+
+def test_creep_in_coloured_noise_or_a_little_swing_is_creep() -> None:
+    at, rng = np.linspace(0.0, 1.0, 2000), np.random.default_rng(3)
+    creep = 1e-5 * (1 - np.exp(-4 * at))
+    wander = np.zeros(2000)
+    for i, step in enumerate(rng.normal(0, (1 - 0.8**2) ** 0.5 * 1e-6, 1999), 1):
+        wander[i] = 0.8 * wander[i - 1] + step
+    for beside in (wander, 1e-6 * np.sin(60 * at)):
+        white = 3e-7 * rng.standard_normal(2000)
+        assert diagnose_gap(under_a_weight(creep + beside + white)).verdict == "joint_creep"

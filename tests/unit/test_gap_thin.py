@@ -80,6 +80,25 @@ def test_a_hole_in_a_column_costs_its_samples_and_not_the_channel(
     assert note in data.notes
 
 
+@pytest.mark.parametrize("column", ["q3_rad", "temperature2_C"])
+def test_no_level_goes_for_a_hole_nor_any_sample_for_a_temperature(column: str) -> None:
+    design = DESIGNS["rich"]
+    table = noisy(design)
+    first = (table.step == table.step[0]) & (table.branch == table.branch[0])
+    plateau = table.index[first & (table.repetition == 1)][:4]
+    if column in table and column.startswith("q"):  # all of the first level, and no more
+        keys = ["pose", "direction", "repetition", "branch", "step"]
+        plateau = table.index[(table[keys] == table.loc[0, keys]).all(axis=1)]
+    else:
+        for k in range(1, 7):
+            table[f"temperature{k}_C"] = 20.0
+    table.loc[plateau, column] = np.nan
+    data = gap_data(imported(table, meta(design)))
+    assert len(data.force) == len(table)
+    assert (data.q if column.startswith("q") else data.temperature) is None
+    assert any("taken as if none had been recorded" in n for n in data.notes)
+
+
 def test_what_asks_for_too_much_without_any_effect_is_told_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

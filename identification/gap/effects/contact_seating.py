@@ -29,7 +29,8 @@ BENCH_SHARES = (0.01, 0.03, 0.1)
 STEPS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45)  # of it, between which several faces seat
 HERTZ_AT = 0.1  # of the largest force: where its scale is put
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8)  # of an imposed stroke
-TOES = tuple(s for s in SLACKS if s < 0.5)  # what bends over more than half of it is a curve
+_WIDEST = 0.5  # of the stroke: what bends over more than that is a curve, no toe
+TOES = tuple(s for s in SLACKS if s < _WIDEST)
 SEATS = (0.08, 0.16, 0.25, 0.35, 0.5, 0.7)  # of the stroke beyond a slack
 LOST = {"slack": 1.0, "toe": 0.5}  # share of a slack's stroke by which the rest comes late
 FINER = np.linspace(-0.32, 0.32, 9)  # of a slack that was found
@@ -230,7 +231,8 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     wide = force * (1 + close * FINER)
     if bench.data.arm:
         return [_seated(bench, law, f, found.scales, 1 / len(FINER)) for f in wide.tolist()]
-    wide = wide[wide < _stroke(bench)].tolist()
+    most = _WIDEST if law == "toe" else 1.0
+    wide = wide[wide < most * _stroke(bench)].tolist()
     if len(found.columns) > 1:
         return [_then_seats(bench, w, 1 / len(SLACKS) / len(FINER)) for w in wide]
     return [_slack(bench, law, w, 1 / len(FINER)) for w in wide]

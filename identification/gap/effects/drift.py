@@ -10,6 +10,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.turns import way_back
 from identification.gap.variants import Variant, variant
+from identification.gap.white import white_sd
 
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
 _SEEN = 3  # rows within the time constant
@@ -62,20 +63,20 @@ def hangs(bench: Bench) -> bool:
 
 
 def _goes_back(bench: Bench) -> bool:
-    """Whether what is read under a standing load goes to and fro, as nothing does that creeps: by
-    means of even pieces, beyond what these scatter by the neighbours' difference."""
+    """Whether what is read under a standing load goes to and fro, as nothing does that creeps, by a
+    good part of its way: by means of even pieces, beyond what these scatter."""
     count = min(_STRETCHES, bench.rows.n // _OF_EACH)
     if count < LEAST_PIECES:
         return False
     pieces = np.array_split(bench.response, count)
     mean = np.array([p.mean() for p in pieces])
-    noise = max(float(np.diff(p).std()) / (2 * len(p)) ** 0.5 for p in pieces)
+    noise = white_sd(np.diff(mean, 2))
     back = min(way_back(mean * sign) for sign in (1.0, -1.0))
     return bool(back > max(_BACK * float(np.ptp(mean)), _CLEARLY * noise))
 
 
 _STRETCHES, _OF_EACH = 100, 4  # pieces at most; rows of each at least
-_BACK, _CLEARLY = 0.1, 5.0  # of all that was seen; standard deviations
+_BACK, _CLEARLY = 0.33, 5.0  # of all that was seen; standard deviations
 
 
 def paths(bench: Bench) -> dict[str, Array]:

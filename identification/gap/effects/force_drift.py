@@ -37,7 +37,7 @@ SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
 def variants(bench: Bench) -> list[Variant]:
     """Warm-up paths, several rates at once, and a free smooth path: alike in all directions, of
     every amplifier's own, or of all amplifiers alike. A weight that hangs all the time weighs the
-    same: none where it reads so."""
+    same: none where its reading hardly moves."""
     top = float(np.abs(bench.rows.measured_force).max())
     scales = tuple(s * top for s in shares(bench, SHARES))
     if not top > 0 or (hangs(bench) and not bench.imposed):

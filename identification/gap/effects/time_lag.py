@@ -22,6 +22,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.history import averaged, delayed, retarded, sampling_time
 from identification.gap.variants import Variant, variant
+from identification.gap.white import white_sd
 
 WORD = "time_lag"
 # of the time between two samples
@@ -72,7 +73,7 @@ def _likely(multiple: float) -> float:
 def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
     """A lag as a delay, a filter, a mean, and as something between delay and filter."""
     out, pair = [], []
-    known = channel != _driven(bench) or not bench.rows.continuous
+    known = channel != _driven(bench) or not _way_shown(bench)  # else all but a filter are alike
     for kind in KINDS if known else KINDS[:2]:
         change = late(bench, channel, kind, lag)
         if not np.any(change):
@@ -106,7 +107,7 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
     if channel != _driven(bench):
         line = _smooth(bench, bench.line)
         return bench.stacked(_behind(bench, line[:, None], kind, lag)[:, 0] - line)
-    if bench.rows.continuous or np.mean(bench.rows.on_the_way) > _SHOWN:
+    if _way_shown(bench):
         ahead = _ahead(bench, _smooth(bench, bench.load), kind, lag)
     else:
         ahead = _true_force(bench, kind, lag) - bench.load
@@ -114,6 +115,11 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
         return bench.stacked(bench.line_slope * ahead)
     # unloaded, a force that lags still shows what is over
     return bench.force_column(ahead) + bench.stacked(zero_force=-ahead)
+
+
+def _way_shown(bench: Bench) -> bool:
+    """Whether the way of the driven channel was recorded, and need not be guessed."""
+    return bench.rows.continuous or bool(np.mean(bench.rows.on_the_way) > _SHOWN)
 
 
 _SHOWN = 0.1  # of the rows: then the way between levels was recorded, and need not be guessed
@@ -139,7 +145,7 @@ def _smooth(bench: Bench, values: Array) -> Array:
         if b - a > 4 * _SIDE:
             inner = np.convolve(values[a:b], kernel / kernel.sum(), mode="valid")
             read = values[a + _SIDE : b - _SIDE]
-            noise = float(np.median(np.abs(np.diff(values[a:b], 2)))) / 0.6745 / 6**0.5
+            noise = white_sd(np.diff(values[a:b], 2))
             near = np.abs(inner - read) <= _NOISE * noise
             out[a + _SIDE : b - _SIDE] = np.where(near, inner, read)
     return out
