@@ -22,7 +22,7 @@ from identification.gap.fit import Fit, fit
 from identification.gap.hands import open_to_hands
 from identification.gap.heldout import folds, held_out
 from identification.gap.verdict import weighed
-from identification.gap.words import DRIFTS, LINEAR
+from identification.gap.words import DRIFTS, FRICTION, LATE, LINEAR
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
 CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
@@ -62,14 +62,17 @@ _PASSES = 2
 def _foretold(found: Found, name: str, fold: Ints) -> dict[frozenset[str], Explanation]:
     """Of explanations with two effects that matter, the one effect that foretells withheld data
     better than both: words that stand for each other foretell the same; of two that do, alike, the
-    one that explains more. What a drift does nothing foretells: where it is the larger one, another
-    has to be plainly better to speak for both."""
+    one that explains more. What comes late speaks for no friction at one rate, at which they do the
+    same. What a drift does nothing foretells: where it is the larger one, another has to be plainly
+    better to speak for both."""
     first, out = found.explanations[0].log_weight, {}
     pairs = [e for e in found.explanations[:_PAIRS] if e.log_weight > first - _NEAR]
     for both in (e for e in pairs if len(e.words) == _TWO):
         drifts = both.parts[0].word in FREE
         most = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
-        each = [e for e in found.explanations if e.words < both.words and e.words - FREE]
+        rubs = found.engine.bench.course.one_rate and both.words & FRICTION
+        mute = FREE | LATE if rubs else FREE
+        each = [e for e in found.explanations if e.words < both.words and e.words - mute]
         after = [held_out(found.engine, e, name, fold).after for e in each]
         best = min(after, default=most)
         limit = min(_ALIKE * best, most)

@@ -8,7 +8,16 @@ import numpy as np
 from identification.gap.data import Array
 from identification.gap.evidence import Engine
 from identification.gap.parts import Part, Sizes
-from identification.gap.words import CURVES, DRIFTS, FRICTION, JERKS, LINEAR, MECHANISMS, NAMELESS
+from identification.gap.words import (
+    CURVES,
+    DRIFTS,
+    FRICTION,
+    JERKS,
+    LATE,
+    LINEAR,
+    MECHANISMS,
+    NAMELESS,
+)
 
 # A second effect smaller than this share of the first can't be told from the first one's law.
 LEAST_SHARE = 0.12
@@ -193,7 +202,6 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     return same or not (engine.bench.has_q or _apart(engine, one, other))
 
 
-LATE = frozenset({"joint_creep", "time_lag"})
 _AS_LATE = 3.0  # times the lag: what comes as soon as that is the lag's own law
 
 

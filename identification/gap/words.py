@@ -52,6 +52,7 @@ STANDING = words_of("standing")
 CURVES = words_of("curve")
 FRICTION = words_of("friction")
 DRIFTS = words_of("drift")
+LATE = frozenset({"joint_creep", "time_lag"})  # what comes after the load
 
 # Troubles of running recordings that no word names (breaks.py): what they explain is `unknown`.
 JERKS, DAMAGE, SOFTENING, WANDERS = "jerks", "damage", "softening", "wanders"
