@@ -93,7 +93,7 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
     }
     probabilities = {verdict: p, "base_slip": 0.9961 - p, "zero_shift": 0.0039}
     unseen = dict.fromkeys(("engine", "fit", "found"), NOWHERE)
-    arm: Any = SimpleNamespace(data=SimpleNamespace(arm=True))
+    arm: Any = SimpleNamespace(data=SimpleNamespace(arm=True, simulated=None))
     return GapResult(verdict=verdict, probabilities=probabilities, bench=arm, **known, **unseen)
 
 
@@ -141,7 +141,7 @@ def without_gap() -> Diagnosis:
 
 def without_arm(found: Diagnosis) -> Diagnosis:
     """The same of a rig without an arm."""
-    bench: Any = SimpleNamespace(data=SimpleNamespace(arm=False))
+    bench: Any = SimpleNamespace(data=SimpleNamespace(arm=False, simulated=None))
     return replace(found, result=replace(found.result, bench=bench))
 
 
