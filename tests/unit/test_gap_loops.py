@@ -138,7 +138,7 @@ def test_what_never_yielded_flows_not_back() -> None:
 
 def metal(strain: Array) -> Array:
     """(n,) MPa of a structural steel: two backstresses, a yield surface that shrinks and grows
-    (Chaboche 1986; constants of S355: de Castro e Sousa, Suzuki, Lignos 2020), in fine steps."""
+    (Chaboche 1986; constants of the size that such steels have), in fine steps."""
     count = len(strain)
     fine = np.interp(np.linspace(0, count - 1, 20 * count), np.arange(count), strain)
     modulus, c, g = 185e3, np.array([26e3, 2445.0]), np.array([173.0, 9.7])
