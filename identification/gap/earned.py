@@ -113,9 +113,9 @@ def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
     engine = found.engine
     loose = DRIFTS if len(explanation.words) <= 2 else frozenset[str]()  # three have to earn it all
     after = held_out(engine, explanation, "repetition", fold, loose).after
-    fitted, weight = fit(engine, explanation), engine.bench.rows.weight
+    fitted = fit(engine, explanation)
     seen = CLOSED * _moved(engine, fitted)
-    unseen = float(np.sqrt(weight @ open_to_hands(engine, fitted) ** 2 / weight.sum()))
+    unseen = engine.bench.rows.rms(open_to_hands(engine, fitted))
     limit = max(FAILS * noise_of(engine.bench), float(np.hypot(seen, unseen)))
     return float(1 / (1 + (after / limit) ** SHARP))
 
@@ -125,9 +125,8 @@ def _moved(engine: Engine, fitted: Fit) -> float:
     n = engine.bench.rows.n
     bent = [i for i, p in enumerate(fitted.parts) if p.word not in LINEAR]
     moved = sum((fitted.contribution(engine, i)[:n] for i in bent), np.zeros(n))
-    square = engine.bench.rows.moved(moved[:, None])[:, 0] ** 2
-    weight = engine.bench.rows.weight
-    return max(engine.structural, float(np.sqrt(weight @ square / weight.sum())))
+    rows = engine.bench.rows
+    return max(engine.structural, rows.rms(rows.moved(moved[:, None])[:, 0]))
 
 
 def noise_of(bench: Bench) -> float:

@@ -132,8 +132,9 @@ def explain(
     have; left out: there are none."""
     levels = engine.levels
     bases = log_joints(engine, parts)
-    sizes = part_sizes(engine, parts, int(bases.argmax()))
-    each, energy = _counted(engine, parts, sizes, int(bases.argmax())), sizes.energy
+    likeliest = int(bases.argmax())
+    sizes = part_sizes(engine, parts, likeliest)
+    each, energy = _counted(engine, parts, sizes, likeliest), sizes.energy
     together = _together(parts, each)
     logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())

@@ -54,7 +54,7 @@ def is_continuous(data: GapData, hold: Ints) -> bool:
     side = max(float(np.ptp(np.clip(data.force * sign, 0.0, None))) for sign in (1.0, -1.0))
     span = np.where(data.step[edges] > 0, side, whole)  # where holds end with their side
     runs = (count > 2) & (width > _RUNNING_SHARE * span) & (span > 0)
-    return bool(np.any(runs & ~_comes_to_rest(data, edges, count)))
+    return bool(runs.any() and np.any(runs & ~_comes_to_rest(data, edges, count)))
 
 
 def _comes_to_rest(data: GapData, edges: Ints, count: Ints) -> Flags:

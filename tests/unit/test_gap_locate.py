@@ -31,6 +31,17 @@ def balanced(bench: Bench, values: Array) -> Array:
     return bench.rows.moved(values[:, None])[:, 0]
 
 
+def in_y(bench: Bench) -> Array:
+    """(n,) whether a row was pushed along y."""
+    return np.array([s.direction == "y" for s in bench.data.setups])[bench.rows.setup]
+
+
+def with_long_holds(bench: Bench, samples: float) -> Bench:
+    """Rows along y but the first of a hold are the mean of so many samples."""
+    weight = np.where(bench.rows.hold_starts | ~in_y(bench), 1.0, samples)
+    return replace(bench, rows=replace(bench.rows, weight=weight))
+
+
 def test_share_of_the_gap_counts_samples(bench: Bench) -> None:
     rows = bench.rows
     long = np.where(rows.setup == 0, 20.0, 1.0) * rows.weight  # holds that took twenty times longer
@@ -46,10 +57,7 @@ def test_share_of_the_gap_counts_samples(bench: Bench) -> None:
 
 def test_directions_in_which_a_gap_shows_count_samples(bench: Bench) -> None:
     """What stands in single samples of long holds is small, though in as many rows as others."""
-    rows = bench.rows
-    y = np.array([s.direction == "y" for s in bench.data.setups])[rows.setup]
-    weight = np.where(rows.hold_starts | ~y, 1.0, 400.0)
-    longer = replace(bench, rows=replace(rows, weight=weight))
+    rows, y, longer = bench.rows, in_y(bench), with_long_holds(bench, 400.0)
     gap = np.where(np.arange(rows.n) % 2, 1e-6, -1e-6)
     gap[y & ~rows.hold_starts] = 0.0
     assert located(longer, gap).directions == ("x",)
@@ -58,10 +66,7 @@ def test_directions_in_which_a_gap_shows_count_samples(bench: Bench) -> None:
 
 def test_what_springs_take_over_is_fitted_to_samples(bench: Bench) -> None:
     """An effect that is straight over the load in all but a few samples is no more than these."""
-    rows = bench.rows
-    y = np.array([s.direction == "y" for s in bench.data.setups])[rows.setup]
-    weight = np.where(rows.hold_starts | ~y, 1.0, 1e4)
-    longer = replace(bench, rows=replace(rows, weight=weight))
+    rows, y, longer = bench.rows, in_y(bench), with_long_holds(bench, 1e4)
     bent = np.where(np.arange(rows.n) % 2, 1e-6, -1e-6)
     straight = 2e-8 * bench.load * np.where(rows.hold_starts, 3.0, 1.0)
     gap = np.where(y, straight, bent)

@@ -139,9 +139,9 @@ def _smooth(bench: Bench, values: Array) -> Array:
     from what was read, as about a step, it was no noise, and stays."""
     if not bench.rows.continuous:
         return values
-    out, edges = values.copy(), np.append(np.flatnonzero(bench.rows.starts), bench.rows.n)
+    out = values.copy()
     kernel = np.ones(2 * _SIDE + 1)
-    for a, b in pairwise(edges):
+    for a, b in pairwise(bench.rows.run_edges):
         if b - a > 4 * _SIDE:
             inner = np.convolve(values[a:b], kernel / kernel.sum(), mode="valid")
             read = values[a + _SIDE : b - _SIDE]
@@ -172,8 +172,8 @@ def _ahead(bench: Bench, load: Array, kind: str, lag: float) -> Array:
     to be ahead of."""
     if kind != "filter":
         return delayed(load, -lag, bench.rows) - load
-    out, edges = np.zeros_like(load), np.append(np.flatnonzero(bench.rows.starts), bench.rows.n)
-    for a, b in pairwise(edges):
+    out = np.zeros_like(load)
+    for a, b in pairwise(bench.rows.run_edges):
         time = bench.rows.time[a:b]
         if b - a > 1 and np.all(np.diff(time) > 0):
             out[a:b] = lag * np.gradient(load[a:b], time)
