@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
-from rig.digits import brief
+from rig.digits import brief, likely
 from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
@@ -212,12 +212,6 @@ def _one_effect(e: Effect, title: str) -> list[str]:
 T = TypeVar("T")
 _OF_RUN = re.compile(r"(.+)_run\d+$")
 EACH = 2  # runs that are listed one by one
-
-
-def likely(p: float) -> str:
-    """A probability as percent; nothing is certain, nor excluded."""
-    whole = round(100 * p)
-    return "> 99 %" if whole == 100 else "< 1 %" if whole == 0 else f"{whole} %"
 
 
 def _share(value: float) -> str:

@@ -31,3 +31,9 @@ def brief(value: float, digits: int = 4) -> str:
     """As few digits as say it, `digits` at most; thousands in full."""
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e7 else text
+
+
+def likely(p: float) -> str:
+    """A probability as percent; nothing is certain, nor excluded."""
+    whole = round(100 * p)
+    return "> 99 %" if whole == 100 else "< 1 %" if whole == 0 else f"{whole} %"

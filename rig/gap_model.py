@@ -14,7 +14,8 @@ from identification.gap.diagnose import Effect, GapResult
 from identification.gap.forms import Form, describe, lasting
 from rig.dataset import Dataset
 from rig.diagnose import Diagnosis
-from rig.diagnose_text import likely, meanings
+from rig.diagnose_text import meanings
+from rig.digits import likely
 from rig.errors import InputError
 from rig.gap_forms import to_entry
 from rig.gap_keys import CONTAINED, SPRINGS

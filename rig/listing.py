@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.catalogue import recall, remember, stiffness_of
-from rig.digits import number
+from rig.digits import likely, number
 from rig.errors import InputError
 from rig.journal import journal_path
 from rig.storage.files import ENDINGS
@@ -222,7 +222,7 @@ def _cells(e: Entry) -> tuple[str, ...]:
         s.robot,
         " ".join(s.directions),
         e.stiffness_text,
-        "-" if e.verdict is None else f"{e.verdict['word']} {e.verdict['probability']:.0%}",
+        "-" if e.verdict is None else f"{e.verdict['word']} {likely(e.verdict['probability'])}",
         str(s.rows),
         e.state,
     )

@@ -8,34 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.curve import Array
+from identification.running import first_rows, runs_through
 
 BINS = 20  # over the range of force
 TURN = 0.25  # share of the range by which the force must come back to count as a turn
-HELD = 0.5  # share of the range that the force of a held level stays within
 
 
-def is_held(runs: Iterable[tuple[NDArray[np.str_], NDArray[np.int64], Array]]) -> bool:
-    """Whether every run (branch, step, force; (n,) each) rests at levels.
+Levels = tuple[NDArray[np.str_], NDArray[np.int64], Array, Array]
 
-    Not, if samples carry no step (negative), or the force runs through more than half of the run's
-    range within one level. Two samples of a level can't say either, and count as held.
-    """
-    for branch, step, force in runs:
-        loaded = (branch != "zero") & np.isfinite(force)
+
+def is_held(runs: Iterable[Levels]) -> bool:
+    """Whether every run (branch, step, force, displacement; (n,) each) rests at levels: all its
+    samples carry a step (none is negative), and none of them is run through."""
+    for branch, step, force, displacement in runs:
+        loaded = (branch != "zero") & np.isfinite(force) & np.isfinite(displacement)
         if np.any(step[loaded] < 0):
             return False
-        if loaded.any() and _runs_through(branch[loaded], step[loaded], force[loaded]):
+        if not loaded.any():
+            continue
+        load, first = force[loaded], first_rows(branch[loaded], step[loaded])
+        if runs_through(load, displacement[loaded], first, float(np.ptp(np.append(load, 0.0)))):
             return False
     return True
-
-
-def _runs_through(branch: NDArray[np.str_], step: NDArray[np.int64], force: Array) -> bool:
-    change = np.flatnonzero((branch[1:] != branch[:-1]) | (step[1:] != step[:-1])) + 1
-    edges = np.concatenate([[0], change])
-    width = np.maximum.reduceat(force, edges) - np.minimum.reduceat(force, edges)
-    span = float(np.ptp(np.append(force, 0.0)))
-    count = np.diff(np.append(edges, force.size))
-    return bool(np.any((count > 2) & (width > HELD * span)))
 
 
 def binned(

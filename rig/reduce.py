@@ -124,7 +124,7 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
     for (pose, direction), runs in _setups(dataset.columns):
         points: list[Point] = []
         notes: list[str] = []
-        held = is_held([(r.branch, r.step, r.force) for r in runs])
+        held = is_held([(r.branch, r.step, r.force, r.displacement) for r in runs])
         zeros = [_plateaus(run, stated) for run in runs]
         if held:
             for run, plateaus in zip(runs, zeros, strict=True):

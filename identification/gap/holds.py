@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
-
-_RUNNING_SHARE = 0.5  # a "hold" through which the force runs by half its range is none
+from identification.running import first_rows, runs_through
 
 
 def hold_ids(data: GapData) -> Ints:
@@ -47,32 +46,11 @@ def is_continuous(data: GapData, hold: Ints) -> bool:
         return True
     if not data.arm and _numbered(data, hold):
         return True
-    edges = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
-    count = np.diff(np.append(edges, len(hold)))
-    width = np.maximum.reduceat(data.force, edges) - np.minimum.reduceat(data.force, edges)
+    first = first_rows(hold)
     whole = float(np.ptp(data.force))
     side = max(float(np.ptp(np.clip(data.force * sign, 0.0, None))) for sign in (1.0, -1.0))
-    span = np.where(data.step[edges] > 0, side, whole)  # where holds end with their side
-    runs = (count > 2) & (width > _RUNNING_SHARE * span) & (span > 0)
-    return bool(runs.any() and np.any(runs & ~_comes_to_rest(data, edges, count)))
-
-
-def _comes_to_rest(data: GapData, edges: Ints, count: Ints) -> Flags:
-    """(h,) holds, first rows (h,) and samples (h,), at whose beginning the load comes from another
-    level, whatever lags: after that neither force nor displacement goes on."""
-    if len(edges) < _SEVERAL:
-        return np.zeros(len(edges), dtype=bool)
-    late = edges + (_COMING * count).astype(np.int64)
-    out = count >= _FEWEST
-    for values in (data.force, data.displacement):
-        least = _AT_REST * float(np.ptp(values))
-        goes = [np.ptp(values[a:b]) for a, b in zip(late, edges + count, strict=True)]
-        out &= np.array(goes) <= least
-    return np.asarray(out)
-
-
-_SEVERAL, _FEWEST = 4, 5  # levels; samples of one
-_COMING, _AT_REST = 0.4, 0.1  # of its samples; of all that a channel went
+    span = np.where(data.step[first] > 0, side, whole)  # where holds end with their side
+    return runs_through(data.force, data.displacement, first, span)
 
 
 _SIDE = 0.05  # of the largest force: less is no load, nor

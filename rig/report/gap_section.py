@@ -47,7 +47,7 @@ def _answer(found: Node) -> Rich:
     sizes = {k: found["gap"][f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise")}
     parts = re.split(r"\{(before|after|noise)\}", told)
     shown = [p for i, part in enumerate(parts) for p in (sizes[part] if i % 2 else (part,))]
-    p = found["probabilities"][verdict].percent()
+    p = found["probabilities"][verdict].probability()
     return (Word(verdict, "strong"), " (", *p, "): ", *shown)
 
 
@@ -78,7 +78,7 @@ def _effects(found: Node) -> list[Block]:
         name, empty = e["name"].text(), (NOTHING,)
         if words.count(name) > 1:  # one mechanism in several joints
             name = ", ".join([name, *list(e["places"].value)[:1]])
-        head: tuple[Cell, ...] = (Word(name, "strong"), e["probability"].percent(),
+        head: tuple[Cell, ...] = (Word(name, "strong"), e["probability"].probability(),
                                   e["share_of_gap"].percent())  # fmt: skip
         parameters = [
             (key, p["unit"].text(), p["value"].number(), p["ci95"][0].number(),
@@ -114,7 +114,7 @@ def _told(parameters: Node) -> Iterator[tuple[str, Node]]:
 
 def _places(name: str, places: Node) -> Rich:
     """Where an effect may sit, where the data leave that open."""
-    each: list[Rich] = [(f"{place} (", *p.percent(), ")") for place, p in places.items()]
+    each: list[Rich] = [(f"{place} (", *p.probability(), ")") for place, p in places.items()]
     listed = [part for one in each for part in (*one, ", ")]
     return (f"Where {name} sits, these data leave open: ", *listed[:-1], ".")
 
@@ -122,7 +122,7 @@ def _places(name: str, places: Node) -> Rich:
 def _probabilities(found: Node) -> Table:
     ranked = sorted(found["probabilities"].items(), key=lambda i: -i[1].value)
     rows = tuple(
-        (word, OTHERWISE.get(word) or found["meanings"][word].text(), p.percent(2))
+        (word, OTHERWISE.get(word) or found["meanings"][word].text(), p.probability())
         for word, p in ranked
         if p.value >= LEAST_PROBABILITY
     )

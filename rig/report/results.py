@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from rig.digits import number
+from rig.digits import likely, number
 from rig.report.document import Inline, Number, Rich
 
 NOTHING = "-"
@@ -73,6 +73,13 @@ class Node:
         nearly = abs(shown - round(shown)) < 0.05 and round(shown) in (0, 100)
         text = f"{abs(round(shown))}" if nearly else number(shown, digits)
         return (Number(text, self.value, self.pointer, 100.0), " %")
+
+    def probability(self) -> Rich:
+        """A probability as percent, as the terminal tells it: nothing is certain, nor excluded."""
+        if self.value is None:
+            return (NOTHING,)
+        shown = likely(self.value).removesuffix(" %")
+        return (Number(shown, self.value, self.pointer, 100.0), " %")
 
     def interval(self, digits: int = 4, scale: float = 1.0) -> Rich:
         """`low to high` of a pair."""

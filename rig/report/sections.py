@@ -67,7 +67,7 @@ def _gap(data: Node) -> Cell:
     if not found:
         return data["missing"]["diagnose"].text()
     verdict = found["verdict"].text()
-    p = found["probabilities"][verdict].percent()
+    p = found["probabilities"][verdict].probability()
     words: Rich = (Word(verdict, "strong"), " (probability ", *p, ")")
     held = found["gap"]["held_out"]
     if verdict in ("none", "unknown") or not held:

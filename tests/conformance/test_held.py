@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from identification.gap.holds import hold_ids, is_continuous
+from rig.dataset import Dataset
 from rig.gap_data import gap_data
 from rig.passes import is_held
 from tests.conformance.gap_designs import DESIGNS, imported, meta, noisy
 
 
+def agreed(dataset: Dataset) -> bool:
+    """Whether both say that it rests at levels."""
+    columns, data = dataset.columns, gap_data(dataset)
+    named = ("branch", "step", "force_N", "displacement_mm")
+    runs = [data.run == run for run in range(int(data.run.max()) + 1)]
+    held = is_held([tuple(columns[n][mine] for n in named) for mine in runs])  # type: ignore[misc]
+    assert is_continuous(data, hold_ids(data)) is not held
+    return held
+
+
 @pytest.mark.parametrize("name", DESIGNS)
 def test_reduction_and_diagnosis_agree_on_what_is_held(name: str) -> None:
     design = DESIGNS[name]
-    dataset = imported(noisy(design), meta(design))
-    columns, data = dataset.columns, gap_data(dataset)
-    runs = []
-    for run in range(int(data.run.max()) + 1):
-        mine = data.run == run
-        runs.append((columns["branch"][mine], columns["step"][mine], columns["force_N"][mine]))
-    held = is_held(runs)
-    assert held is not design.continuous
-    assert is_continuous(data, hold_ids(data)) is not held
+    assert agreed(imported(noisy(design), meta(design))) is not design.continuous
+
+
+@pytest.mark.parametrize("rests", [True, False])
+def test_they_agree_on_levels_whose_ramps_were_recorded_too(rests: bool) -> None:
+    """Far across zero, so that the force goes through more than half of its range on the way: to
+    where it rests, or on and on."""
+    design = DESIGNS["bench"]
+    level = np.repeat([30.0, -80, 100, -60, 90, -100, 60], 14)
+    before = np.concatenate([np.zeros(14), level[:-14]])
+    coming = (np.arange(98) % 14 + 1) / (3 if rests else 14)
+    force = before + (level - before) * np.minimum(1.0, coming)
+    rows = pd.DataFrame({
+        "time_s": np.arange(98.0), "direction": "x", "repetition": 1, "branch": "cycle",
+        "step": np.repeat(np.arange(1, 8), 14), "force_N": force, "displacement_mm": force / 95,
+    })  # fmt: skip
+    assert agreed(imported(rows, meta(design))) is rests

@@ -212,8 +212,9 @@ def test_a_recording_that_begins_at_a_turn_has_no_empty_pass() -> None:
 
 def test_two_samples_of_a_level_count_as_held() -> None:
     branch, step = np.array(["loading"] * 4), np.array([1, 1, 2, 2])
-    assert is_held([(branch, step, np.array([10.0, 11.0, 20.0, 21.0]))])
-    assert not is_held([(branch, np.full(4, 1), np.array([0.0, 10.0, 20.0, 30.0]))])
+    pair, ramp = np.array([10.0, 11.0, 20.0, 21.0]), np.array([0.0, 10.0, 20.0, 30.0])
+    assert is_held([(branch, step, pair, pair)])
+    assert not is_held([(branch, np.full(4, 1), ramp, ramp)])
 
 
 def test_bins_of_a_falling_pass_begin_with_the_highest() -> None:

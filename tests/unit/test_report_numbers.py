@@ -15,6 +15,7 @@ from rig.analyze import analyze
 from rig.couple import couple
 from rig.dataset import load
 from rig.diagnose import diagnose
+from rig.digits import likely
 from rig.identify import identify
 from rig.report.document import Block, Section, Table, rich
 from rig.report.report import Report, make
@@ -75,6 +76,9 @@ def test_every_number_stands_in_the_json(which: str, request: pytest.FixtureRequ
     assert len(numbers) > 150
     for pointer, value, text, scale in numbers:
         assert look_up(data, pointer) == value, pointer
+        if text in ("> 99", "< 1"):  # probabilities next to certain
+            assert likely(value) == f"{text} %", pointer
+            continue
         assert abs(float(text) - value * scale) <= 0.501 * last_digit(text), (pointer, text)
 
 
@@ -136,6 +140,12 @@ def test_shares_as_percent(share: float, text: str) -> None:
     shown_text = Node(share).percent()[0]
     assert not isinstance(shown_text, str)
     assert shown_text.text == text
+
+
+@pytest.mark.parametrize("p", [0.0, 0.004, 0.5, 0.934, 0.996, 1.0])
+def test_probabilities_are_told_as_on_the_terminal(p: float) -> None:
+    shown_text = "".join(c if isinstance(c, str) else c.text for c in Node(p).probability())
+    assert shown_text == likely(p)
 
 
 def test_numbers_keep_their_digits() -> None:

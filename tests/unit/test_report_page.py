@@ -202,7 +202,7 @@ def test_where_an_effect_may_sit_is_said_with_the_numbers_of_the_json(
            "indistinguishable_from": [], "places": places}  # fmt: skip
     blocks = tuple(_effects(Node({"effects": [one]}, "/gap")))
     text = Page(render(Document("", "", (), (Section("s", "", blocks),), ""))).text
-    assert ("leave open: joint 1 (62.0 %), joint 5 (38.0 %)." in text) == (len(places) > 1)
+    assert ("leave open: joint 1 (62 %), joint 5 (38 %)." in text) == (len(places) > 1)
 
 
 def test_what_many_runs_have_to_themselves_is_its_range() -> None:
