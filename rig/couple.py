@@ -19,6 +19,7 @@ from identification.workspace import Workspace
 from rig.coupling_path import read_path, run_path
 from rig.errors import InputError
 from rig.model import ArmModel, CouplingSpec, load_model
+from rig.units import MM_PER_M
 
 Array = NDArray[np.float64]
 _AXES = ("x", "y", "z")
@@ -61,16 +62,16 @@ class CouplingResult:
             "kind": self.spec.described,
             "workspace_m3": _volumes(first),
             "workspace_others_m3": [_volumes(w) for w in others],
-            "single_N_per_mm": _per_axis(self.single / 1e3),
-            "single_standard_uncertainty_N_per_mm": _per_axis(self.u_single / 1e3),
-            "coupled_N_per_mm": {k: _per_axis(v / 1e3) for k, v in self.pair.items()},
+            "single_N_per_mm": _per_axis(self.single / MM_PER_M),
+            "single_standard_uncertainty_N_per_mm": _per_axis(self.u_single / MM_PER_M),
+            "coupled_N_per_mm": {k: _per_axis(v / MM_PER_M) for k, v in self.pair.items()},
             "coupled_standard_uncertainty_N_per_mm": {
-                k: _per_axis(v / 1e3) for k, v in self.u_pair.items()
+                k: _per_axis(v / MM_PER_M) for k, v in self.u_pair.items()
             },
             "gain": {k: _per_axis(v / self.single) for k, v in self.pair.items()},
             "decision": [
                 {
-                    "required_N_per_mm": d.required / 1e3,
+                    "required_N_per_mm": d.required / MM_PER_M,
                     "direction": d.direction,
                     "state": d.state,
                 }
@@ -230,9 +231,9 @@ def _notes(model: ArmModel, spec: CouplingSpec) -> list[str]:
     distance = distance_of(node, spec.beta)
     if abs(distance - spec.base_distance) > 0.5e-3:
         notes.append(
-            f"With this pose and angle the bases stand {distance * 1e3:.1f} mm apart, not "
-            f"{spec.base_distance * 1e3:g} mm: the latter counts for the workspace, the pose for "
-            "the stiffness."
+            f"With this pose and angle the bases stand {distance * MM_PER_M:.1f} mm apart, not "
+            f"{spec.base_distance * MM_PER_M:g} mm: the latter counts for the workspace, the pose "
+            "for the stiffness."
         )
     if model.effects:
         notes.append("The model's effects are left out: stiffness here is that of the springs.")

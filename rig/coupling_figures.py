@@ -14,6 +14,7 @@ from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
 from rig.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
 from rig.plotting import COLOURS, write_figures
+from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,12 +55,14 @@ def stiffness(result: CouplingResult) -> Figure:
     bars: list[tuple[str, Array, Array | None, str, str]] = []
     if is_published_setup(result):
         bars.append(("single, published", np.array(PUBLISHED_SINGLE), None, "white", COLOURS[0]))
-    bars.append(("single", result.single[:2] / 1e3, result.u_single[:2] / 1e3, COLOURS[0], ""))
+    bars.append(
+        ("single", result.single[:2] / MM_PER_M, result.u_single[:2] / MM_PER_M, COLOURS[0], "")
+    )
     if is_published_setup(result):
         bars.append(("coupled, published", np.array(PUBLISHED_COUPLED), None, "white", COLOURS[1]))
     colours = {"rigid": COLOURS[1], "compliant": COLOURS[2], "point": COLOURS[3]}
     for kind, k in result.pair.items():
-        bars.append((f"coupled, {kind}", k[:2] / 1e3, result.u_pair[kind][:2] / 1e3,
+        bars.append((f"coupled, {kind}", k[:2] / MM_PER_M, result.u_pair[kind][:2] / MM_PER_M,
                      colours[kind], ""))  # fmt: skip
     width = 0.8 / len(bars)
     for i, (label, values, u, fill, edge) in enumerate(bars):
@@ -101,7 +104,7 @@ def maps(result: CouplingResult) -> Figure:
     )
     pair = Coupling(spec.beta, spec.kind, spec.half)
     found = [
-        stiffness_map(model.arm, points, stance, load, c).stiffness / 1e3 for c in (None, pair)
+        stiffness_map(model.arm, points, stance, load, c).stiffness / MM_PER_M for c in (None, pair)
     ]
     figure = _figure(10.5, 4.6)
     titles = ("one arm", f"two arms, {spec.described}")
@@ -139,7 +142,7 @@ def place(result: TaskResult) -> Figure:
     best = result.best
     figure = _figure(7.5, 5.0)
     axes = figure.add_subplot()
-    x, y = 1e3 * best.distances, np.rad2deg(best.betas)
+    x, y = MM_PER_M * best.distances, np.rad2deg(best.betas)
     margins = best.margins.T
     known = margins[np.isfinite(margins)]
     low, high = np.quantile(known, [0.01, 0.99])
@@ -149,11 +152,11 @@ def place(result: TaskResult) -> Figure:
     if known.min() < 1 < known.max():
         lines = axes.contour(x, y, margins, levels=[1.0], colors="white", linewidths=1.5)
         axes.clabel(lines, fmt={1.0: "just met"}, fontsize=8)
-    axes.plot(1e3 * best.base_distance, np.rad2deg(best.beta), "*", color="white",
+    axes.plot(MM_PER_M * best.base_distance, np.rad2deg(best.beta), "*", color="white",
               markeredgecolor="black", markersize=15, label="best")  # fmt: skip
     axes.set_xlabel("Base distance in mm")
     axes.set_ylabel("beta in deg")
-    needs = ", ".join(f"{n.name} {n.stiffness / 1e3:g} N/mm" for n in result.model.required)
+    needs = ", ".join(f"{n.name} {n.stiffness / MM_PER_M:g} N/mm" for n in result.model.required)
     axes.set_title(f"Where the second arm should stand for {needs}", fontsize=10)
     axes.grid(visible=False)
     axes.legend(loc="upper right", fontsize=8)
@@ -166,9 +169,9 @@ def schedule(result: CouplingResult) -> Figure:
     plan = result.schedule
     figure = _figure(7.5, 4.2)
     axes = figure.add_subplot()
-    axes.step(plan.time, plan.required / 1e3, where="post", color="black", label="required")
-    axes.plot(plan.time, plan.single / 1e3, color=COLOURS[0], label="single")
-    axes.plot(plan.time, plan.coupled / 1e3, color=COLOURS[1], label="coupled")
+    axes.step(plan.time, plan.required / MM_PER_M, where="post", color="black", label="required")
+    axes.plot(plan.time, plan.single / MM_PER_M, color=COLOURS[0], label="single")
+    axes.plot(plan.time, plan.coupled / MM_PER_M, color=COLOURS[1], label="coupled")
     # told apart without their colours, too
     shades = {"couple": (COLOURS[1], "coupled", ""), "infeasible": ("red", "infeasible", "///")}
     named: set[str] = set()

@@ -13,6 +13,7 @@ from identification.inverse import tool_pose
 from identification.maps import Need, Placement, Stance, Task, best_placement
 from rig.errors import InputError
 from rig.model import ArmModel, CouplingSpec, load_model
+from rig.units import MM_PER_M
 
 Array = NDArray[np.float64]
 DISTANCES_MM = (800.0, 2400.0)
@@ -39,7 +40,7 @@ class TaskResult:
         return {
             "schema": "rig.placement/1",
             "model": self.model.name,
-            "base_distance_mm": 1e3 * best.base_distance,
+            "base_distance_mm": MM_PER_M * best.base_distance,
             "beta_deg": float(np.rad2deg(best.beta)),
             "angle_between_arms_deg": between_arms_deg(best.beta),
             "q_rad": [float(v) for v in best.q],
@@ -50,8 +51,8 @@ class TaskResult:
             "stiffness": [
                 {
                     "direction": need.name,
-                    "required_N_per_mm": need.stiffness / 1e3,
-                    "reached_N_per_mm": float(k) / 1e3,
+                    "required_N_per_mm": need.stiffness / MM_PER_M,
+                    "reached_N_per_mm": float(k) / MM_PER_M,
                 }
                 for need, k in zip(self.model.required, best.stiffness, strict=True)
             ],
@@ -63,7 +64,7 @@ class TaskResult:
         best = self.best
         beta = float(np.rad2deg(best.beta))
         lines = [
-            f"Best place for the second arm: base distance {1e3 * best.base_distance:.0f} mm, "
+            f"Best place for the second arm: base distance {MM_PER_M * best.base_distance:.0f} mm, "
             f"beta = {beta:.1f} deg ({between_arms_deg(best.beta):.1f} deg between the arms)",
             "  arm A: q = ("
             + ", ".join(f"{v:.2f}" for v in np.rad2deg(best.q))
@@ -71,7 +72,8 @@ class TaskResult:
         ]
         for need, k in zip(self.model.required, best.stiffness, strict=True):
             lines.append(
-                f"  {need.name}: {need.stiffness / 1e3:g} N/mm required, {k / 1e3:.1f} reached"
+                f"  {need.name}: {need.stiffness / MM_PER_M:g} N/mm required, "
+                f"{k / MM_PER_M:.1f} reached"
             )
         verdict = "the task can be done" if best.feasible else "no placement reaches the task"
         lines.append(f"  reached over required: {best.margin:.2f}; {verdict}")
@@ -100,7 +102,7 @@ def best_for(
     _check_ranges(distances_mm, betas_deg)
     spec = read.coupling
     task, azimuth = _task(read, spec)
-    distances = np.linspace(distances_mm[0] / 1e3, distances_mm[1] / 1e3, _GRID[0])
+    distances = np.linspace(distances_mm[0] / MM_PER_M, distances_mm[1] / MM_PER_M, _GRID[0])
     betas = np.deg2rad(np.linspace(*betas_deg, _GRID[1]))
     try:
         best = best_placement(read.arm, task, distances, betas)

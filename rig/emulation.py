@@ -30,6 +30,7 @@ from drivers.errors import CannotConnect, DeviceError
 from rig.child_process import ChildProcess
 from rig.emulation_child import ENDING_S, Child
 from rig.errors import InputError
+from rig.units import M_PER_MM
 
 if TYPE_CHECKING:
     from rig.emulation_host import EmulationHost
@@ -60,7 +61,7 @@ class EmulatedRig:
         tools = tools_mm or {}
         self._procedure = {
             "poses": [
-                (list(q), [1e-3 * mm for mm in tools.get(name, (0.0, 0.0, 0.0))])
+                (list(q), [M_PER_MM * mm for mm in tools.get(name, (0.0, 0.0, 0.0))])
                 for name, q in (poses or {}).items()
             ],
             "programs": {name: list(q) for name, q in (programs or {}).items()},
@@ -273,7 +274,7 @@ def _settings_of_files(names: Sequence[str]) -> dict[str, Any]:
         protocol = load_protocol(Path(names[1]))
         poses = protocol.poses.values()
         procedure = {
-            "poses": [(p.q_rad, [1e-3 * mm for mm in p.tcp_xyz_mm]) for p in poses],
+            "poses": [(p.q_rad, [M_PER_MM * mm for mm in p.tcp_xyz_mm]) for p in poses],
             "programs": {p.program: p.q_rad for p in poses if p.program},
             "zero_after_s": protocol.zero.after_s,
         }

@@ -10,6 +10,7 @@ from identification.gap.effects import base_slip, contact_seating, lost_motion, 
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
 from identification.gap.forms.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
+from rig.units import MM_PER_M
 
 # What an entry says besides its law; kept, not interpreted.
 ABOUT = (
@@ -47,7 +48,7 @@ CONSTANTS: dict[str, Key] = {
     "flow_time": Key("flow_time_s", "size"),
     "flow_exponent": Key("flow_exponent", "positive"),
     "axis": Key("axis", "text", options=tuple(base_slip.AXES)),
-    "depth": Key("axis_below_base_mm", factor=1e3),
+    "depth": Key("axis_below_base_mm", factor=MM_PER_M),
     "law": Key("law", "text", options=FRICTION_LAWS),
     "placed": Key("placed", "text", options=PLACED),
     "zone": Key("zone_Nm", "positive"),
@@ -98,8 +99,8 @@ SHAPES: dict[str, Key] = {
     "at_load": Key("at_N", "positive"),
     "power": Key("power_of_load", "positive"),
     "drags_over": Key("drags_over_N", "positive"),
-    "at_response": Key("at_mm", "positive", factor=1e3),
-    "above": Key("above_mm", "positive", factor=1e3),
+    "at_response": Key("at_mm", "positive", factor=MM_PER_M),
+    "above": Key("above_mm", "positive", factor=MM_PER_M),
     "time_constant": Key("time_constant_s", "positive"),
     "at": Key("at_s"),
     "sensor": Key("sensor", "text", options=("mean", "1", "2", "3", "4", "5", "6")),
@@ -119,22 +120,22 @@ _COEFFICIENTS: dict[str, Key] = {
     "place": Key("place_rad"),
     "rest": Key("reading_at_rest_rad"),
     "over_nominal": Key("compliance_over_nominal"),
-    "depth": Key("depth_mm", factor=1e3),
+    "depth": Key("depth_mm", factor=MM_PER_M),
     "tangent": Key("tangent"),
     "gives": Key("compliance_across_over_nominal_times_tangent"),
-    "offset": Key("offset_mm", factor=1e3),
+    "offset": Key("offset_mm", factor=MM_PER_M),
     "angle": Key("angle_rad"),
     "turn": Key("turn_rad"),
     "gain": Key("excess_share_of_reading"),
     "share": Key("share"),
-    "shift": Key("shift_mm", factor=1e3),
+    "shift": Key("shift_mm", factor=MM_PER_M),
 }
 _DRIFTS = {"drift": "", "drift_rate": "_per_s", "drift_per_root": "_per_sqrt_s", "drift_knot": "",
            "drift_per_kelvin": "_per_K"}  # fmt: skip
 for _name, _unit in _DRIFTS.items():
     _stem = "drift_at" if _name == "drift_knot" else "drift"
     _COEFFICIENTS[f"{_name} force"] = Key(f"{_stem}_N{_unit}")
-    _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=1e3)
+    _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=MM_PER_M)
 
 
 MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent", "placed", "forgets",

@@ -16,6 +16,7 @@ from rig.gap_data import arm_setup
 from rig.model import ArmModel
 from rig.plan import AMPLIFIER_S, TARE_S
 from rig.protocol import MeasurementProtocol, Run
+from rig.units import MM_PER_M
 
 # Act on what the instruments see of everything else: realised last.
 _LAST = ("displacement_scale", "time_lag")
@@ -105,7 +106,7 @@ def planned_data(model: ArmModel, procedure: MeasurementProtocol) -> GapData:
     setups = tuple(
         arm_setup(
             model.arm, run.pose, np.array(poses[run.pose].q_rad),
-            np.array(poses[run.pose].tcp_xyz_mm) / 1e3, run.direction,
+            np.array(poses[run.pose].tcp_xyz_mm) / MM_PER_M, run.direction,
             np.array(procedure.directions[run.direction]), model,
         )
         for run in procedure.runs

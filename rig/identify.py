@@ -23,6 +23,7 @@ from rig.digits import counted
 from rig.errors import InputError
 from rig.model import load_model, load_robot
 from rig.reduce import curves
+from rig.units import MM_PER_M
 
 Array = NDArray[np.float64]
 
@@ -194,9 +195,9 @@ def _plan(dataset: Dataset, gains: Gains) -> Plan:
     tcp = next(iter(dataset.meta.poses.values())).tcp_xyz_mm
     return Plan(
         u_force=instruments.force.standard_uncertainty_N,
-        u_displacement=instruments.displacement.standard_uncertainty_mm / 1e3,
+        u_displacement=instruments.displacement.standard_uncertainty_mm / MM_PER_M,
         gains=gains,
-        tool=tool_offset(np.array(tcp) / 1e3),
+        tool=tool_offset(np.array(tcp) / MM_PER_M),
     )
 
 
@@ -225,7 +226,7 @@ def _observations(
             Observation(
                 q=np.array(stood.q_rad),
                 direction=np.array(curve.unit_vector),
-                tool=tool_offset(np.array(stood.tcp_xyz_mm) / 1e3),
+                tool=tool_offset(np.array(stood.tcp_xyz_mm) / MM_PER_M),
                 compliance=1 / k,
                 u_compliance=scale * stated / k**2,
                 joints=joints,

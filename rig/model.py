@@ -25,6 +25,7 @@ from rig.model_schema import (
     SegmentFile,
     TubeFile,
 )
+from rig.units import MM_PER_M
 from rig.yamlfile import Document, read_document
 from rig.yamlnodes import Problem
 
@@ -174,7 +175,7 @@ def _read(path: Path) -> tuple[Arm, float]:
             links=_segments(document, written.link_segments),
         ),
     )
-    return arm, written.reach_mm / 1e3
+    return arm, written.reach_mm / MM_PER_M
 
 
 def _check_model(document: Document[ModelFile]) -> None:
@@ -248,7 +249,7 @@ def _beside(model: str, robot: str) -> str | Path:
 def _tool(document: Document[ModelFile]) -> Array:
     written = document.value.tool
     if written.flange_T_tcp is None:
-        return tool_offset([0.0, 0.0, (written.length_mm or 0.0) / 1e3])
+        return tool_offset([0.0, 0.0, (written.length_mm or 0.0) / MM_PER_M])
     matrix = np.array(written.flange_T_tcp)
     return _checked(document, ("tool", "flange_T_tcp"), lambda: tool_transform(matrix))
 
@@ -269,7 +270,9 @@ def _pose(document: Document[ModelFile], arm: Arm, tool: Array) -> Array:
     target = _checked(
         document,
         ("pose", "direction"),
-        lambda: tool_pose(np.array(pose.position_mm) / 1e3, direction, np.deg2rad(pose.turn_deg)),
+        lambda: tool_pose(
+            np.array(pose.position_mm) / MM_PER_M, direction, np.deg2rad(pose.turn_deg)
+        ),
     )
     found = _checked(document, ("pose",), lambda: solutions(arm, target @ np.linalg.inv(tool)))
     if pose.branch not in found:
@@ -330,8 +333,8 @@ def _section(
         what = f'"{written.material}" is unknown.{did_you_mean(written.material, MATERIALS)}'
         document.refuse([document.problem((*place, "material"), what)])
         raise AssertionError
-    wall = None if written.wall_mm is None else written.wall_mm / 1e3
-    return _checked(document, place, lambda: tube(material, written.diameter_mm / 1e3, wall))
+    wall = None if written.wall_mm is None else written.wall_mm / MM_PER_M
+    return _checked(document, place, lambda: tube(material, written.diameter_mm / MM_PER_M, wall))
 
 
 def _written_outside(written: ModelFile) -> dict[str, Any]:
@@ -367,7 +370,7 @@ def _coupling(document: Document[ModelFile]) -> CouplingSpec | None:
     if isinstance(written.kind, BeamKind):
         beam = written.kind.beam
         section = _section(document, ("coupling", "kind", "beam"), beam)
-        half = cantilever(section, beam.half_length_mm / 1e3)
+        half = cantilever(section, beam.half_length_mm / MM_PER_M)
         described = (
             f"{beam.material} beam, diameter {beam.diameter_mm:g} mm, "
             f"half length {beam.half_length_mm:g} mm"
@@ -380,7 +383,7 @@ def _coupling(document: Document[ModelFile]) -> CouplingSpec | None:
         kind = written.kind
         described = kind
     return CouplingSpec(
-        base_distance=written.base_distance_mm / 1e3,
+        base_distance=written.base_distance_mm / MM_PER_M,
         beta=float(np.deg2rad(written.beta_deg)),
         load_axes=written.load_axes,
         kind=kind,
@@ -403,7 +406,7 @@ def _check_compliance(document: Document[ModelFile], half: Array) -> None:
 
 def _requirement(document: Document[ModelFile], i: int) -> Requirement:
     written = document.value.required[i]
-    stiffness = written.stiffness_N_per_mm * 1e3
+    stiffness = written.stiffness_N_per_mm * MM_PER_M
     if isinstance(written.direction, str):
         return Requirement(written.direction, AXES[written.direction], stiffness)
     given = written.direction

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.units import MM_PER_M
+
 Array = NDArray[np.float64]
 
 _PLAIN = re.compile(r"(?!true|false|null)[a-z]{4,}(_[a-z]+)*")  # read as text by every YAML
@@ -22,7 +24,7 @@ def arm_lines(
 ) -> list[str]:
     """The arm in its pose: q (6,) rad, tool tcp_mm (3,), springs (6,) Nm/rad with their standard
     deviations."""
-    x, y, z = (v / 1e3 for v in tcp_mm)
+    x, y, z = (v / MM_PER_M for v in tcp_mm)
     return [
         f"robot: {robot}",
         f"pose: {{q_rad: {flow(list(q))}}}",

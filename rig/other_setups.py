@@ -12,6 +12,7 @@ from rig.dataset import Dataset
 from rig.gap_data import arm_setup
 from rig.meta import Meta
 from rig.model import AXES, ArmModel, load_robot
+from rig.units import MM_PER_M
 
 _NEARER_M = 0.2  # of the point of load towards the base's axis: levers about a quarter shorter
 
@@ -25,7 +26,7 @@ def elsewhere(dataset: Dataset, model: ArmModel | None = None) -> list[Elsewhere
         return []
     arm = load_robot(meta.robot)
     first = next(iter(dict.fromkeys(str(p) for p in dataset.columns["pose"][dataset.used])))
-    tcp = np.array(meta.poses[first].tcp_xyz_mm) / 1e3
+    tcp = np.array(meta.poses[first].tcp_xyz_mm) / MM_PER_M
     out = []
     for name, (text, q) in other_poses(arm, meta, first).items():
         setups = tuple(
@@ -45,7 +46,7 @@ def elsewhere(dataset: Dataset, model: ArmModel | None = None) -> list[Elsewhere
 def other_poses(arm: Arm, meta: Meta, first: str) -> dict[str, tuple[str, Array]]:
     """Name -> (what to do, joint positions (6,) rad): nearer to the base, and elbow turned."""
     pose = meta.poses[first]
-    q, tool = np.array(pose.q_rad), tool_offset(np.array(pose.tcp_xyz_mm) / 1e3)
+    q, tool = np.array(pose.q_rad), tool_offset(np.array(pose.tcp_xyz_mm) / MM_PER_M)
     here = arm.fk(q, tool)
     near = here.copy()
     reach = float(np.hypot(here[0, 3], here[1, 3]))
@@ -55,8 +56,8 @@ def other_poses(arm: Arm, meta: Meta, first: str) -> dict[str, tuple[str, Array]
     found = _nearest(arm, near @ np.linalg.inv(tool), q)
     if found is not None:
         text = (
-            f"Repeat the procedure with the point of load {1e3 * share * reach:.0f} mm nearer to "
-            "the base: levers, links, base and gains scale differently."
+            f"Repeat the procedure with the point of load {MM_PER_M * share * reach:.0f} mm nearer "
+            "to the base: levers, links, base and gains scale differently."
         )
         out[f"{first}_nearer"] = (text, found)
     turned = [

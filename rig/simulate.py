@@ -24,6 +24,7 @@ from rig.gap_forms import effects_of
 from rig.gap_path import left_out, predict
 from rig.model import ArmModel, load_model, told_first
 from rig.protocol import MeasurementProtocol, Run, load_protocol
+from rig.units import MM_PER_M, N_PER_MM
 
 Array = NDArray[np.float64]
 SCHEMA = "rig.simulation/1"
@@ -97,8 +98,8 @@ class Simulation:
         if self.effects:
             lines.append(f"With the effects {', '.join(self.effects)}; k is that of the springs.")
         for c in self.curves:
-            u = 1e-3 * c.stiffness * c.relative_u
-            k = f"{1e-3 * c.stiffness:.2f} N/mm (standard uncertainty {u:.2g} N/mm)"
+            u = N_PER_MM * c.stiffness * c.relative_u
+            k = f"{N_PER_MM * c.stiffness:.2f} N/mm (standard uncertainty {u:.2g} N/mm)"
             lines.append(
                 f"\nPose {c.pose}, direction {c.direction}: "
                 + (k if np.isfinite(c.stiffness) else "the arm does not give way along it")
@@ -154,7 +155,7 @@ def _compliance(model: ArmModel, procedure: MeasurementProtocol, run: Run) -> tu
     """
     pose = procedure.poses[run.pose]
     n = np.array(procedure.directions[run.direction])
-    tool = tool_offset(np.array(pose.tcp_xyz_mm) / 1e3)
+    tool = tool_offset(np.array(pose.tcp_xyz_mm) / MM_PER_M)
     q = np.array(pose.q_rad)
     C = model.arm.compliance(q, tool, links=model.links, base=model.mounting)
     with np.errstate(divide="ignore"):
@@ -205,7 +206,7 @@ def _notes(
 def _levels(c: PredictedCurve) -> list[str]:
     lines = [f"  {'force in N':>12} {'displacement in mm':>20}"]
     for force, moved in zip(c.force, c.displacement, strict=True):
-        lines.append(f"  {force:12.5g} {1e3 * moved:20.4f}")
+        lines.append(f"  {force:12.5g} {MM_PER_M * moved:20.4f}")
     return lines
 
 
@@ -222,13 +223,13 @@ def _holds(c: PredictedCurve, path: CurvePath) -> list[str]:
         if repetition in shown:
             lines.append(
                 f"  {repetition:10d} {path.branch[i]:<10} {c.force[i]:12.5g} "
-                f"{1e3 * c.displacement[i]:20.4f} {1e3 * path.springs[i]:15.4f}"
+                f"{MM_PER_M * c.displacement[i]:20.4f} {MM_PER_M * path.springs[i]:15.4f}"
             )
     return lines
 
 
 def _csv_row(c: PredictedCurve, i: int) -> str:
-    row = f"{c.pose},{c.direction},{c.force[i]:.10g},{1e3 * c.displacement[i]:.10g}"
+    row = f"{c.pose},{c.direction},{c.force[i]:.10g},{MM_PER_M * c.displacement[i]:.10g}"
     if c.path is None:
         return row
     p = c.path
@@ -236,7 +237,7 @@ def _csv_row(c: PredictedCurve, i: int) -> str:
 
 
 def _curve_json(c: PredictedCurve) -> dict[str, Any]:
-    k = 1e-3 * c.stiffness
+    k = N_PER_MM * c.stiffness
     known = bool(np.isfinite(k))
     u = k * c.relative_u
     return {
@@ -248,7 +249,7 @@ def _curve_json(c: PredictedCurve) -> dict[str, Any]:
             "ci95": [k - TWO_SIDED * u, k + TWO_SIDED * u] if known else [None, None],
         },
         "force_N": [float(f) for f in c.force],
-        "displacement_mm": [float(1e3 * u) for u in c.displacement],
+        "displacement_mm": [float(MM_PER_M * u) for u in c.displacement],
         **({} if c.path is None else _path_json(c.path)),
     }
 
@@ -259,5 +260,5 @@ def _path_json(path: CurvePath) -> dict[str, Any]:
         "branch": list(path.branch),
         "step": list(path.step),
         "session_s": [float(t) for t in path.session],
-        "springs_alone_mm": [float(1e3 * u) for u in path.springs],
+        "springs_alone_mm": [float(MM_PER_M * u) for u in path.springs],
     }

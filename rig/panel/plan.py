@@ -8,6 +8,7 @@ from identification.arm import Arm, along, tool_offset
 from rig.model import load_robot
 from rig.panel.state import Plan, PlannedRun
 from rig.protocol import MeasurementProtocol, Pose
+from rig.units import MM_PER_M, N_PER_MM
 
 Point = tuple[float, float, float]
 
@@ -42,7 +43,9 @@ def prediction_of(protocol: MeasurementProtocol) -> dict[str, list[tuple[float, 
     for run in protocol.runs:
         pose = protocol.poses[run.pose]
         C = arm.compliance(np.array(pose.q_rad), _tool(pose))
-        stiffness_N_per_mm = 1e-3 * float(along(C, np.array(protocol.directions[run.direction])))
+        stiffness_N_per_mm = N_PER_MM * float(
+            along(C, np.array(protocol.directions[run.direction]))
+        )
         levels = {0.0, *run.forces_N}
         curve = curves.setdefault(f"{run.pose}|{run.direction}", [])
         merged = levels | {force for force, _ in curve}
@@ -53,9 +56,9 @@ def prediction_of(protocol: MeasurementProtocol) -> dict[str, list[tuple[float, 
 def _outline(arm: Arm, pose: Pose) -> tuple[Point, ...]:
     frames = arm.frames(np.array(pose.q_rad))
     tool = arm.fk(np.array(pose.q_rad), _tool(pose))
-    points = 1e3 * np.vstack([frames[:, :3, 3], tool[None, :3, 3]])
+    points = MM_PER_M * np.vstack([frames[:, :3, 3], tool[None, :3, 3]])
     return tuple((float(x), float(y), float(z)) for x, y, z in points)
 
 
 def _tool(pose: Pose) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    return tool_offset(np.array(pose.tcp_xyz_mm) / 1e3)
+    return tool_offset(np.array(pose.tcp_xyz_mm) / MM_PER_M)
