@@ -67,6 +67,12 @@ def played(load: Array, starts: NDArray[np.bool_], radius: float) -> Array:
     return out
 
 
+SEATS: dict[str, Callable[[Array], Array]] = {
+    "exponential": lambda x: -np.expm1(-x),
+    "hyperbolic": lambda x: x / (1 + x),
+}
+
+
 def forms(bench: Bench, word: str, variants: list[Variant]) -> list[Form]:
     """Forms of joint 1 (of the fixture) that the comparison is about, by laws of its own."""
     rows = bench.rows
@@ -82,13 +88,15 @@ def forms(bench: Bench, word: str, variants: list[Variant]) -> list[Form]:
     for v in (v for v in variants if v.word == word):
         if word == "joint_yield" and v.label.startswith("joint 1 at") and v.label.endswith("sharp"):
             parts = [joint(c * played(torque, rows.starts, r)) for r in v.info["radius"]]
-        elif word == "joint_hysteresis" and v.label.startswith(("joint 1 spectrum", "joint 1 r ")):
+        elif word == "joint_hysteresis" and (
+            v.label == "joint 1 spectrum" or v.label.startswith("joint 1 r ")
+        ):
             stops = [torque - played(torque, rows.starts, r) for r in v.info["radius"]]
             parts = [joint(-c * s) for s in stops]
-        elif word == "contact_seating" and v.label != "mixture":
-            x = rows.force / v.info["force_N"]
-            law = np.abs(x) / (1 + np.abs(x)) if "hyper" in v.label else -np.expm1(-np.abs(x))
-            parts = [stacked(bench, np.sign(x) * law)]
+        elif word == "contact_seating" and len(v.columns) == 1 and v.info["laws"][0][0] in SEATS:
+            law = SEATS[v.info["laws"][0][0]]
+            x = np.abs(rows.force) / v.info["force_N"]
+            parts = [stacked(bench, np.sign(rows.force) * law(x))]
         else:
             continue
         out.append(Form(np.column_stack(parts), v))
