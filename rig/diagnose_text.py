@@ -184,7 +184,7 @@ def _effects(r: GapResult) -> str:
     for e in r.effects:
         lines += _one_effect(e, _title(e, [other.name for other in r.effects]))
     ranked = sorted(r.probabilities.items(), key=lambda i: -i[1])
-    shown = ", ".join(f"{w} {p:.2f}" for w, p in ranked if p >= LEAST_PROBABILITY)
+    shown = ", ".join(f"{w} {likely(p)}" for w, p in ranked if p >= LEAST_PROBABILITY)
     lines.append(f"Probability of being the main cause: {shown}")
     return "\n".join(lines)
 

@@ -12,6 +12,7 @@ from identification.gap.data import BRANCH_NAMES
 from identification.gap.remainder import Remainder, remainder
 from rig.diagnose import Diagnosis
 from rig.diagnose_text import LEAST_PROBABILITY
+from rig.digits import likely
 from rig.errors import InputError
 from rig.gap_layout import (
     blank,
@@ -162,6 +163,14 @@ def _curve_panel(r: Shown, p: Points, axes: Any, s: int) -> None:
         axes.plot(x[leg], (p.after * scale)[leg], "-" if len(leg) > 1 else ".", color=GREEN,
                   linewidth=1.1, markersize=4, zorder=3,
                   label="_" if i else "simulated after (each run)")  # fmt: skip
+    told = np.concatenate([y[mine], (p.after * scale)[mine]])
+    low, high = float(told.min()), float(told.max())
+    if np.ptp((p.before * scale)[mine]) > _BEYOND * (high - low) > 0:
+        margin = 0.5 * (high - low)
+        axes.set_ylim(low - margin, high + margin)
+
+
+_BEYOND = 4.0  # times what was measured: what is simulated leaves the panel, else it hides that
 
 
 def _gap_panel(r: Shown, p: Points, axes: Any, s: int) -> None:
@@ -257,7 +266,7 @@ def probabilities(r: Shown) -> Figure:
         axes.barh(i, p, 0.7, color=BLUE if chosen else "0.75", linewidth=0,
                   hatch="//" if word in alike else None, edgecolor="white")  # fmt: skip
         note = "  verdict" if chosen else "  can't be told from it here" if word in alike else ""
-        axes.text(p + 0.01, i, f"{100 * p:.1f} %{note}", va="center", fontsize=9,
+        axes.text(p + 0.01, i, f"{likely(p)}{note}", va="center", fontsize=9,
                   fontweight="bold" if chosen else "normal")  # fmt: skip
     axes.set_yticks(range(len(ranked)), list(ranked))
     axes.set_ylim(max(len(ranked), 3) - 0.4, -0.6)
@@ -266,7 +275,7 @@ def probabilities(r: Shown) -> Figure:
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("Probability of being the main cause")
     rest = 1 - sum(ranked.values())
-    axes.set_title(f"Which effect causes the gap (all others together {100 * max(rest, 0):.1f} %)",
+    axes.set_title(f"Which effect causes the gap (all others together {likely(rest)})",
                    fontsize=11)  # fmt: skip
     return figure
 

@@ -330,6 +330,21 @@ def test_small_gaps_show_beside_large_ones() -> None:
     assert axes.yaxis.get_major_formatter()(-0.01) == "\N{MINUS SIGN}0.01"
 
 
+@pytest.mark.parametrize(("further", "leaves"), [(3.0, False), (40.0, True)])
+def test_a_simulation_that_is_far_off_does_not_hide_what_was_measured(
+    slipped: Diagnosis, further: float, leaves: bool
+) -> None:
+    r, p = shown(slipped.result), points(slipped.result)
+    figure = curve(r, replace(p, before=further * p.before))
+    for s, axes in enumerate(a for a in figure.axes if a.get_title()):
+        low, high = axes.get_ylim()
+        measured, before = p.displacement[p.setup == s], further * p.before[p.setup == s]
+        assert low < measured.min()
+        assert high > measured.max()
+        assert bool(high < before.max()) is leaves
+        assert high - low < 4 * np.ptp(measured)
+
+
 def test_the_noise_band_is_as_wide_as_each_point_s_own_noise(slipped: Diagnosis) -> None:
     """y is softer: there the same noise of the force is more of the displacement."""
     r, p = shown(slipped.result), points(slipped.result)
