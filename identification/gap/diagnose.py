@@ -20,7 +20,7 @@ from identification.gap.effects import library
 from identification.gap.ends import without_ends
 from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Explanation, Found, Likeness
-from identification.gap.faults import SIGNS
+from identification.gap.faults import SIGNS, SILENT
 from identification.gap.fit import Fit, fit
 from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
@@ -227,9 +227,10 @@ def _left(engine: Engine, fitted: Fit) -> float:
 
 
 def _likeness(found: Found, verdict: str) -> Likeness | None:
-    """Of an unknown gap; none of one whose channels count in opposite senses."""
+    """Of an unknown gap; none of one whose channels count in opposite senses, or of which one says
+    nothing."""
     course = found.engine.bench.course
-    if verdict != "unknown" or any(f.kind == SIGNS for f in course.faults):
+    if verdict != "unknown" or any(f.kind in (SIGNS, SILENT) for f in course.faults):
         return None
     return found.looks_like
 

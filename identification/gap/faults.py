@@ -1,7 +1,8 @@
 """Readings that nothing on a rig makes: faults of an instrument, which no effect explains.
 
 A laser on a loose mount rings in spells; a camera loses its target, and hands out its last number;
-a dial is misread by a whole turn; an amplifier is full; a specimen has long been broken.
+a dial is misread by a whole turn; an amplifier is full; a specimen has long been broken; a cable is
+not plugged in.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -25,8 +27,8 @@ class Fault:
     text: str
 
 
-SIGNS, BURSTS, FROZEN, GOES_BACK, JUMPS, FULL, BROKEN = (
-    "signs", "bursts", "frozen", "goes back", "jumps", "full", "broken",
+SIGNS, BURSTS, FROZEN, GOES_BACK, JUMPS, FULL, BROKEN, SILENT = (
+    "signs", "bursts", "frozen", "goes back", "jumps", "full", "broken", "silent",
 )  # fmt: skip
 
 
@@ -118,9 +120,25 @@ def _broken(data: GapData) -> str:
     )
 
 
+def _silent(data: GapData) -> str:
+    said = []
+    if quiet := ", ".join(silent(data, "force")):
+        said.append(
+            f"The force does not answer the displacement ({quiet}): it stays within its noise. See "
+            "whether anything bears at all, and to the force sensor and its cables."
+        )
+    if quiet := ", ".join(silent(data, "displacement")):
+        sensor = "laser" if data.arm else "displacement sensor"
+        said.append(
+            f"The displacement does not answer the force ({quiet}): it stays within its noise. See "
+            f"whether the {sensor} looks at the target, and to its cables."
+        )
+    return " ".join(said)
+
+
 _DETECTORS: dict[str, Callable[[GapData], str]] = {
     SIGNS: _signs, BURSTS: _bursts, FROZEN: _lost, GOES_BACK: _goes_back, JUMPS: _jumps,
-    FULL: _full, BROKEN: _broken,
+    FULL: _full, BROKEN: _broken, SILENT: _silent,
 }  # fmt: skip
 
 
@@ -145,6 +163,33 @@ def goes_against(data: GapData) -> tuple[str, ...]:
         far = np.ptp(moved) > _CLEARLY * data.instruments.displacement
         grows = float(np.abs(raw[first]).max()) < _BEGINS * float(np.abs(raw).max())
         if far and grows and float(force @ u) < _AGAINST * size:
+            out.append(f"{setup.pose}/{setup.direction}" if data.arm else setup.direction)
+    return tuple(out)
+
+
+_ANSWERS, _NOISE = 0.02, 8.0  # of what is simulated; standard uncertainties, from end to end
+_EXPECTED = 30.0  # standard uncertainties that are simulated, of either channel
+_LEVELS = 3  # of a load: without one, either channel may go on by itself
+
+
+def silent(data: GapData, channel: Literal["force", "displacement"]) -> tuple[str, ...]:
+    """Poses and directions in which that channel stays within its noise while the other one, which
+    the rig drives, goes far."""
+    out, meter = [], data.instruments
+    driver = "displacement" if channel == "force" else "force"
+    for i, setup in enumerate(data.setups):
+        mine = data.setup == i
+        levels = np.unique(data.step[mine & (data.branch == LOADING)])
+        if not mine.any() or (data.imposed != driver and len(levels) < _LEVELS):
+            continue
+        slope = float(setup.lever**2 @ data.compliance) + setup.outside
+        force, stroke = slope * np.ptp(data.force[mine]), np.ptp(data.displacement[mine])
+        u_force, u_stroke = slope * meter.force, meter.displacement
+        gone, answer, u = (
+            (stroke, force, u_force) if channel == "force" else (force, stroke, u_stroke)
+        )
+        far = gone > _EXPECTED * max(u_force, u_stroke)
+        if far and answer < min(_ANSWERS * gone, _NOISE * u):
             out.append(f"{setup.pose}/{setup.direction}" if data.arm else setup.direction)
     return tuple(out)
 

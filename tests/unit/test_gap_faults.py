@@ -19,6 +19,7 @@ from identification.gap.faults import (
     goes_back,
     jumps_to,
     saturates,
+    silent,
 )
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_levels import creeping, one_hold
@@ -116,6 +117,50 @@ def test_what_stands_still_for_a_reason_is_none(what: str) -> None:
         u[21:] = force[21:] / SPRING
     assert frozen_since(running(force, u)) is None
     assert found_in(running(force, u)) == ()
+
+
+@pytest.mark.parametrize("channel", ["force", "displacement"])
+def test_a_channel_that_says_nothing_while_the_other_goes_is_a_fault(channel: str) -> None:
+    """Of an arm in one direction: the sensor of it is not connected, or looks past the target."""
+    given = arm_data()
+    mine = np.array([s.direction == "x" for s in given.setups])[given.setup]
+    u = getattr(given.instruments, channel)
+    noise = np.random.default_rng(1).normal(0, u, len(mine))
+    data = replace(given, **{channel: np.where(mine, noise, getattr(given, channel))})
+    assert silent(data, channel) == ("P1/x", "P2/x")  # type: ignore[arg-type]
+    found = diagnose_gap(data)
+    assert found.verdict == "unknown"
+    assert found.looks_like is None
+    (note,) = (n for n in found.notes if "does not answer" in n)
+    assert f"The {channel} does not" in note
+    assert "(P1/x, P2/x)" in note
+
+
+def test_nothing_answers_a_stroke_of_a_bench() -> None:
+    noise = np.random.default_rng(2).normal(0, 0.1, 100)
+    empty = running(noise, np.linspace(0, 1e-3, 100), imposed="displacement")
+    assert silent(empty, "force") == ("x",)
+    assert "whether anything bears at all" in " ".join(told(empty))
+
+
+@pytest.mark.parametrize("what", ["drifts", "soft", "weak", "little", "one level"])
+def test_what_answers_little_for_a_reason_is_no_silent_channel(what: str) -> None:
+    noise = np.random.default_rng(2).normal(0, 0.02, 100)
+    stroke = np.linspace(0, 1e-3, 100)
+    data = running(noise, stroke, imposed="displacement")
+    assert silent(data, "force") == ("x",)
+    if what == "drifts":  # at rest, and nobody says who drives
+        data = running(noise, stroke)
+    elif what == "soft":  # thirty times softer than simulated, and hardly beyond the noise
+        data = replace(data, displacement=0.2 * stroke, force=noise + 0.2 * stroke / 1e-5 / 30)
+    elif what == "weak":  # next to nothing, and yet beyond the noise
+        data = replace(data, force=noise + 0.015 * stroke / 1e-5)
+    elif what == "little":  # readings of nothing, to the last digit
+        data = replace(data, displacement=5e-3 * stroke, force=np.zeros(100))
+    else:
+        data = replace(running(noise, stroke), step=np.ones(100, dtype=np.int64))
+    assert silent(data, "force") == ()
+    assert silent(data, "displacement") == ()
 
 
 PRECISE = Instruments(0.1, 1e-7, 0.005, 0.003)
