@@ -55,6 +55,9 @@ def said(parts: tuple[Part, ...], sizes: tuple[float, ...], weight: float = 0.0,
     return Explanation(parts, weight, eta, sizes, weight)
 
 
+OFF = 1e-4  # m: laws that are off by far more than noise
+
+
 def small_engine_of(bench: Bench) -> Engine:
     target = bench.observed - prediction(bench)
     return Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
@@ -104,12 +107,18 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
     three = tuple(part(w, [0]) for w in ("joint_yield", "thermal_drift", "force_drift"))
     for parts, least, share in ((three, 0.3, 1 - THREE), (three, 0.05, 0.0), (three[:2], 1, 0.0)):
         sizes = (1e-5, 0.5e-5, 1e-5 * least)[: len(parts)]
-        one = replace(found, explanations=(said(parts, sizes, 0.0),), unknown=-800.0, alone={})
+        one = replace(found, explanations=(said(parts, sizes, 0.0, OFF),), unknown=-800.0, alone={})
         doubted = BENCH_DOUBT * share * max(0.0, 2 * share - 1) / 2  # the other half is `none`'s
         found_out = weighed(one, {}).probabilities["unknown"]
         assert found_out == pytest.approx(share - doubted)
+    # where three laws fit to the noise there is room for nothing else
+    noise = found.engine.bench.noise.stated
+    for eta, unknown in ((1.9 * noise, 0.0), (2.1 * noise, 1 - THREE)):
+        one = replace(found, explanations=(said(three, (1e-5, 5e-6, 3e-6), 0.0, eta),),
+                      unknown=-800.0, alone={})  # fmt: skip
+        assert weighed(one, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
     # two of them explain nearly as much: then they are meant, whatever the third does
-    third = said(three, (1e-5, 1e-5, 5e-6), 0.0)
+    third = said(three, (1e-5, 1e-5, 5e-6), 0.0, OFF)
     for worth, unknown in ((TAKES_MORE - 1, 0.0), (TAKES_MORE + 1, 0.9)):
         two = said(three[1:], (2e-5, 1e-6), -worth)
         both = replace(found, explanations=(third, two), unknown=-800.0, alone={})
