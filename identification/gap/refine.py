@@ -15,7 +15,8 @@ from identification.gap.effects import (
     joint_backlash,
     joint_hysteresis,
     joint_nonlinear_stiffness,
-    joint_yield,
+    knees,
+    knees_closer,
     pose_error,
     specimens,
     time_lag,
@@ -75,8 +76,8 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
 def _knees(word: _Word) -> list[Variant]:
     if not _shows(word):
         return []
-    places = _places(word.alone, word.beside, joint_yield.is_sharp)
-    finer = _closing_in(word, joint_yield.refined, places, joint_yield.CLOSE)
+    places = _places(word.alone, word.beside, knees.is_sharp)
+    finer = _closing_in(word, knees_closer.refined, places, knees_closer.CLOSE)
     flat = [v for s in places for v in specimens.plateaus(word.engine.bench, s.variant)]
     return finer + flat + _elsewhere(word, finer)
 
@@ -87,7 +88,7 @@ def _elsewhere(word: _Word, finer: list[Variant]) -> list[Variant]:
     bench = word.engine.bench
     others: dict[tuple[str, tuple[object, ...]], Variant] = {}
     for v in (s.variant for s in word.alone):
-        if joint_yield.is_sharp(v) and "weight" not in v.info:
+        if knees.is_sharp(v) and "weight" not in v.info:
             others.setdefault((v.info["memory"], _axle(v)), v)
     able = [v for v in finer if "weight" not in v.info]
     if not able or len({place for _, place in others}) < 2:
@@ -97,13 +98,13 @@ def _elsewhere(word: _Word, finer: list[Variant]) -> list[Variant]:
     moved = []
     for v in (s.variant for s in found[-_ELSEWHERE:]):
         places = [
-            (joint_yield.place_in(there.label), there.info)
+            (knees.place_in(there.label), there.info)
             for (memory, place), there in others.items()
             if memory == v.info["memory"] and place != _axle(v)
         ]
         places += base_slip.between(bench, v) if v.word == base_slip.WORD else []
         moved += [(v, place) for place in places]
-    return joint_yield.elsewhere(bench, moved)
+    return knees_closer.elsewhere(bench, moved)
 
 
 def _axle(variant: Variant) -> tuple[object, ...]:

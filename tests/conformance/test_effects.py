@@ -37,7 +37,10 @@ from tests.conformance.gap_designs import (
     linear,
 )
 
-SHARED = ("__init__", "drift", "flow_back", "flows", "lost_motion", "specimens")  # no word's own
+SHARED = (  # no word's own
+    "__init__", "curves", "drift", "flow_back", "flows", "knees", "knees_closer", "lost_motion",
+    "specimens",
+)  # fmt: skip
 FILES = sorted(p.stem for p in Path(effects.__file__).parent.glob("*.py") if p.stem not in SHARED)
 
 # --- form --------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import by_word, closest, score
 from identification.gap.data import Array
-from identification.gap.effects import joint_backlash, joint_hysteresis, joint_yield, library
+from identification.gap.effects import joint_backlash, joint_hysteresis, knees_closer, library
 from identification.gap.effects.joint_hysteresis import EXPONENTIAL, REACHES
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
@@ -140,9 +140,9 @@ def test_creep_may_be_forgotten_where_the_rig_is_set_up_anew() -> None:
 def test_flow_times_close_in_between_those_of_the_grid() -> None:
     bench = make_bench(arm_data())
     sharp = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")
-    first = joint_yield.refined(bench, sharp)
+    first = knees_closer.refined(bench, sharp)
     slow = next(v for v in first if v.info["flow_s"] == 5.0 and not v.info["square"])
-    finer = joint_yield.refined(bench, slow, joint_yield.CLOSE[0])
+    finer = knees_closer.refined(bench, slow, knees_closer.CLOSE[0])
     times = sorted({v.info["flow_s"] for v in finer})
     assert times == pytest.approx([5 / 2**0.5, 5 / 2**0.25, 5 * 2**0.25, 5 * 2**0.5])
     assert not any(v.info["square"] for v in finer)
@@ -150,7 +150,7 @@ def test_flow_times_close_in_between_those_of_the_grid() -> None:
     assert (min(centres), max(centres)) == pytest.approx((1 - 0.4 * 0.16, 1 + 0.4 * 0.2))
     assert_lawful(bench, finer[::7])
     sudden = next(v for v in first if v.info["flow_s"] == 0)
-    assert joint_yield.refined(bench, sudden, joint_yield.CLOSE[0]) == []
+    assert knees_closer.refined(bench, sudden, knees_closer.CLOSE[0]) == []
 
 
 def engine_with(bench: Bench, effect: Array) -> Engine:
@@ -171,12 +171,12 @@ def test_what_stands_out_is_looked_at_closer() -> None:
     assert any(v.label.endswith("fine") for v in refine(engine, singles))
 
     sharp = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")
-    slow = next(v for v in joint_yield.refined(bench, sharp) if v.info["flow_s"] == 5.0)
-    truth = joint_yield.refined(bench, slow, joint_yield.CLOSE[0])[0]
+    slow = next(v for v in knees_closer.refined(bench, sharp) if v.info["flow_s"] == 5.0)
+    truth = knees_closer.refined(bench, slow, knees_closer.CLOSE[0])[0]
     engine = engine_with(bench, bench.columns[truth.columns[0]])
     singles = score(engine, engine.levels, library(bench, ["joint_yield"]))
     times = {v.info["flow_s"] for v in refine(engine, singles)}
-    assert times - {0.0, *joint_yield.FLOWS_S, *joint_yield.SQUARE_S}
+    assert times - {0.0, *knees_closer.FLOWS_S, *knees_closer.SQUARE_S}
 
 
 @pytest.mark.parametrize("word", ["joint_yield", "time_lag", "joint_backlash"])

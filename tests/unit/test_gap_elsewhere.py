@@ -10,8 +10,9 @@ import pytest
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import Scored, score
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import base_slip, flows, joint_yield, library
+from identification.gap.effects import base_slip, flows, knees_closer, library
 from identification.gap.effects.flows import Flow
+from identification.gap.effects.knees import place_in
 from identification.gap.refine import refine
 from identification.gap.variants import Variant, place_of
 from tests.conformance.gap_designs import linear
@@ -21,8 +22,8 @@ from tests.unit.test_gap_running import SPRING, running
 
 
 def elsewhere(bench: Bench, found: Variant, there: Variant) -> Variant | None:
-    place = joint_yield.place_in(there.label), there.info
-    return next(iter(joint_yield.elsewhere(bench, [(found, place)])), None)
+    place = place_in(there.label), there.info
+    return next(iter(knees_closer.elsewhere(bench, [(found, place)])), None)
 
 
 @pytest.mark.parametrize("word", ["joint_yield", "base_slip"])
@@ -32,7 +33,7 @@ def test_a_knee_elsewhere_begins_at_the_same_load_of_the_rig(word: str, flow_s: 
     sharp = [v for v in library(bench, [word]) if v.info["knee"] == "sharp" and v.label[-1] == "k"]
     sharp = [v for v in sharp if "weight" not in v.info and v.info["memory"] == ""]
     found = next(
-        v for v in joint_yield.refined(bench, sharp[0])
+        v for v in knees_closer.refined(bench, sharp[0])
         if v.info["flow_s"] == flow_s and v.label.endswith("flows back")
     )  # fmt: skip
     others = {place_of(v): v for v in reversed(sharp)}
@@ -95,7 +96,7 @@ def test_what_is_far_worse_beside_the_best_is_not_looked_at_again() -> None:
     engine.extend()
     there = [v for v in finer if v.info["joint"] == 3]
     logs = [s.log_evidence for s in score(engine, engine.levels, there)]
-    assert 0 < len(there) < len(joint_yield.refined(bench, found))
+    assert 0 < len(there) < len(knees_closer.refined(bench, found))
     assert max(logs) - min(logs) < 61.0  # 60, and what priors do
 
 
@@ -106,7 +107,7 @@ def test_what_a_controller_takes_back_it_had_clamped() -> None:
     for taken in (False, True):
         mine = [v for v in sharp if ("taken back" in v.label) == taken]
         assert mine
-        finer = joint_yield.refined(bench, mine[0])
+        finer = knees_closer.refined(bench, mine[0])
         assert any("flows back" in v.label for v in (*mine, *finer)) != taken
         assert any(v.info["flow_s"] > 0 for v in finer) != taken
 
@@ -144,8 +145,8 @@ def test_without_readings_a_joint_is_not_named_for_having_been_looked_at_closely
     data = replace(data, setups=data.setups[:2], **_first_pose(data))
     bench = make_bench(data)
     found = next(v for v in library(bench, ["joint_yield"]) if v.label == "joint 4 at 0.68 sharp")
-    slow = next(v for v in joint_yield.refined(bench, found) if v.info["flow_s"] == 10.0)
-    truth = next(v for v in joint_yield.refined(bench, slow, 0.4) if v.info["flow_s"] > 11)
+    slow = next(v for v in knees_closer.refined(bench, found) if v.info["flow_s"] == 10.0)
+    truth = next(v for v in knees_closer.refined(bench, slow, 0.4) if v.info["flow_s"] > 11)
     effect = bench.columns[truth.columns[0]]
     engine = engine_with(bench, effect)
     singles = score(engine, engine.levels, library(bench, ["joint_yield"]))

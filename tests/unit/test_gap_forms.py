@@ -11,7 +11,7 @@ from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData
 from identification.gap.effects import library
-from identification.gap.effects.joint_yield import refined
+from identification.gap.effects.knees_closer import refined
 from identification.gap.evidence import Engine
 from identification.gap.forms import SESSION, Form, describe, law_of, lawful, realise, rows_of
 from identification.gap.forms.known import less_known

@@ -12,7 +12,7 @@ import pytest
 from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import joint_yield, library
+from identification.gap.effects import knees_closer, library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence import Engine
 from identification.gap.holds import hold_ids, swing_within
@@ -89,7 +89,7 @@ def test_a_table_without_a_clock_says_nothing_of_lags_and_creep(
     bench = make_bench(data)
     assert bench.course.timeless is not clock
     knee = next(v for v in library(bench, ["joint_yield"]) if v.info["knee"] == "sharp")
-    assert any(" flow " in v.label for v in joint_yield.refined(bench, knee)) is clock
+    assert any(" flow " in v.label for v in knees_closer.refined(bench, knee)) is clock
     words = {v.word for v in library(bench, ["joint_creep", "time_lag", "joint_hysteresis"])}
     assert ({"joint_creep", "time_lag"} <= words) is clock
     assert "joint_hysteresis" in words

@@ -13,7 +13,7 @@ from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.drift import free_paths, shares
-from identification.gap.effects.joint_yield import grown
+from identification.gap.effects.knees import grown
 from identification.gap.holds import hold_ids, is_continuous
 from identification.gap.leftover import _FALL
 from identification.gap.parameters import parameters

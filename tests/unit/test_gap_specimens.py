@@ -10,7 +10,8 @@ import pytest
 from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import joint_yield, library
+from identification.gap.effects import knees_closer, library
+from identification.gap.effects.knees import is_sharp
 from identification.gap.effects.specimens import PLATEAU, off, own_stiffness, plateaus
 from identification.gap.pool import Pool
 from tests.unit.test_gap_model import survive
@@ -87,7 +88,7 @@ def test_plateaus_hold_what_they_are_made_of() -> None:
     """Beyond the knee no stiffness, beyond the plateau's end some again: exactly in their span."""
     u = np.linspace(0.0, 10e-3, 500)
     bench = make_bench(running(SPRING * u, u, imposed="displacement"))
-    knees = [v for v in library(bench, ["joint_yield"]) if joint_yield.is_sharp(v)]
+    knees = [v for v in library(bench, ["joint_yield"]) if is_sharp(v)]
     v = plateaus(bench, knees[0])[10]
     assert PLATEAU in v.label
     knee, end = v.info["centre"], float(v.label.split()[-1])
@@ -101,7 +102,7 @@ def test_plateaus_hold_what_they_are_made_of() -> None:
 def test_nothing_that_comes_back_has_a_plateau() -> None:
     u = np.concatenate([U, U[::-1]])
     bench = make_bench(measured(u, yielding(u, SPRING)))
-    knees = [v for v in library(bench, ["joint_yield"]) if joint_yield.is_sharp(v)]
+    knees = [v for v in library(bench, ["joint_yield"]) if is_sharp(v)]
     assert knees
     assert all(plateaus(bench, v) == [] for v in knees)
 
@@ -111,6 +112,6 @@ def test_knees_of_their_own_spring_survive_the_file() -> None:
     bench = replace(make_bench(measured(u, yielding(u, 8 * SPRING))), columns=Pool())
     own = [v for v in library(bench, ["joint_yield"]) if v.info.get("other_springs")]
     assert own
-    sharp = next(v for v in own if joint_yield.is_sharp(v))
-    survive(bench, [own[0], sharp, *joint_yield.refined(bench, sharp)[:2]])
-    assert joint_yield.refined(bench, sharp)[0].info["other_springs"]
+    sharp = next(v for v in own if is_sharp(v))
+    survive(bench, [own[0], sharp, *knees_closer.refined(bench, sharp)[:2]])
+    assert knees_closer.refined(bench, sharp)[0].info["other_springs"]

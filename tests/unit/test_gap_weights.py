@@ -14,11 +14,11 @@ from identification.gap.data import Array, Setup
 from identification.gap.effects import (
     joint_hysteresis,
     joint_nonlinear_stiffness,
-    joint_yield,
+    knees_closer,
     library,
 )
-from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
-from identification.gap.effects.joint_yield import is_sharp
+from identification.gap.effects.curves import above, beyond, hinge
+from identification.gap.effects.knees import is_sharp
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
 from identification.gap.history import bristles, flowing_play, play
@@ -146,7 +146,7 @@ def test_a_controller_may_take_a_joint_back_that_carries_weight() -> None:
     assert taken
     assert {v.label for v in knees} >= set(kept)
     sharp = next(v for v in taken if v.label.endswith("at 0.75 sharp"))
-    finer = joint_yield.refined(bench, sharp)
+    finer = knees_closer.refined(bench, sharp)
     assert_lawful(bench, [*taken[:8], *finer[::25]])
     lasting = next(v for v in knees if v.label == "joint 2 under weight at 0.75 sharp")
     state, other = (bench.columns[v.columns[0]][: bench.rows.n] for v in (sharp, lasting))

@@ -19,7 +19,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.joint_nonlinear_stiffness import hinge
+from identification.gap.effects.curves import hinge
 from identification.gap.variants import Variant, variant
 
 WORD = "base_compliance"

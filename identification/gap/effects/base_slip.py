@@ -18,7 +18,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.base_compliance import moments
-from identification.gap.effects.joint_yield import knee_at, knee_variants
+from identification.gap.effects.knees import knee_at, knee_variants
 from identification.gap.variants import Variant
 
 WORD = "base_slip"
@@ -75,7 +75,7 @@ def variants(bench: Bench) -> list[Variant]:
 
 def between(bench: Bench, found: Variant) -> list[tuple[str, dict[str, Any]]]:
     """A lying axis about which it slips, between the depths of the grid: name, and what
-    `joint_yield.elsewhere` wants to know of a place."""
+    `knees_closer.elsewhere` wants to know of a place."""
     axis = str(found.info["axis"])
     out = []
     for depth in BETWEEN_M if axis != "z" else ():

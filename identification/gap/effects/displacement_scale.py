@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.effects.curves import hinge
 from identification.gap.effects.force_scale import BENDS, SCALES
-from identification.gap.effects.joint_nonlinear_stiffness import hinge
 from identification.gap.variants import Variant, variant
 
 WORD = "displacement_scale"

@@ -18,6 +18,7 @@ import numpy as np
 
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array
+from identification.gap.effects.curves import above, beyond, hinge
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
@@ -160,23 +161,6 @@ def _root(hinges: int = len(HINGES)) -> Array:
 
 
 TOOLS_KG = (0.5, 1.5, 2.5)
-
-
-def beyond(torque: Array, weight: Array, bend: float) -> Array:
-    """(n,) by how much the size of the net torque is beyond a bend, with its sign, more than under
-    the weight (n,) alone."""
-    net = torque + weight
-    return np.asarray(hinge(net, bend) - hinge(weight, bend))
-
-
-def hinge(x: Array, bend: float) -> Array:
-    """(n,) by how much the size of x (n,) is beyond a bend, with its sign."""
-    return np.asarray(np.sign(x) * np.maximum(np.abs(x) - bend, 0.0))
-
-
-def above(torque: Array, weight: Array, bend: float) -> Array:
-    """(n,) by how much the net torque is above a bend more than under the weight (n,) alone."""
-    return np.asarray(np.maximum(torque + weight - bend, 0.0) - np.maximum(weight - bend, 0.0))
 
 
 def _came_back(bench: Bench) -> bool:

@@ -11,8 +11,8 @@ from identification.gap.data import Array, Setup
 from identification.gap.effects import pose_error
 from identification.gap.effects.base_compliance import bent_column, moments
 from identification.gap.effects.contact_seating import lost
+from identification.gap.effects.curves import above, beyond, hinge
 from identification.gap.effects.joint_creep import in_session
-from identification.gap.effects.joint_nonlinear_stiffness import above, beyond, hinge
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
 from identification.gap.effects.load_misalignment import (
     USUAL,

@@ -9,8 +9,8 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects import force_drift, force_scale, time_lag
+from identification.gap.effects.curves import hinge
 from identification.gap.effects.drift import RATES
-from identification.gap.effects.joint_nonlinear_stiffness import hinge
 from identification.gap.forms.law import Law, Term, along
 from identification.gap.variants import Variant
 

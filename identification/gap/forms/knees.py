@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
-from identification.gap.effects import base_slip, flow_back, joint_yield
+from identification.gap.effects import base_slip, flow_back, knees
 from identification.gap.effects.flows import Flow, states
 from identification.gap.forms.law import (
     ACROSS,
@@ -28,7 +28,7 @@ from identification.gap.variants import (
     Variant,
 )
 
-_MEMORY = {"": KEPT, LASTING: ACROSS, TAKEN_BACK: LOST, joint_yield.HARDENED: KEPT,
+_MEMORY = {"": KEPT, LASTING: ACROSS, TAKEN_BACK: LOST, knees.HARDENED: KEPT,
            UNDER_WEIGHT: HUNG, BACK_UNDER_WEIGHT: HUNG_LOST, SET_UP_ANEW: ANEW}  # fmt: skip
 _SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
@@ -47,7 +47,7 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
         constants |= {"joint": int(info["joint"])}
         unit = float(bench.compliance[info["joint"]])
     radius = [float(r) for r in info["radius"]]
-    begins = "grows_beyond" if info["memory"] == joint_yield.HARDENED else "threshold"
+    begins = "grows_beyond" if info["memory"] == knees.HARDENED else "threshold"
     terms = [Term("compliance", {begins: r}) for r in radius]
     own = bool(info.get("other_springs"))
     if len(v.columns) > len(radius) + own:
@@ -93,7 +93,7 @@ def _states(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
     made = states(bench, Flow(load, radius, flow, fresh, weight, square))
     out = dict(zip(plays, made.T, strict=True))
     growing, beyond = _with(law, "grows_beyond")
-    out |= zip(growing, joint_yield.grown(load, beyond, fresh).T, strict=True)
+    out |= zip(growing, knees.grown(load, beyond, fresh).T, strict=True)
     for i in _with(law, "after")[0]:
         out[i] = _back(bench, law.terms[i], load, fresh)
     return out
