@@ -89,6 +89,11 @@ class Bench:
         return bool(q.stop > q.start)
 
     @property
+    def torque_unit(self) -> str:
+        """Of thresholds and friction."""
+        return "Nm" if self.data.arm else "N"
+
+    @property
     def has_zero_force(self) -> bool:
         """Force at zero load is a channel; where the displacement is imposed, there is no such."""
         zero = self.layout.zero_force

@@ -124,8 +124,18 @@ class Found:
 
 _LEAST_COMPLIANCE = 0.1  # of the simulated one
 
+LEAST_FACTOR = 1e-6  # of what is simulated: less is not told from nothing
+
 
 def normal(value: float, variance: float, unit: str) -> Parameter:
     """A value with the 95 % interval of a normal law of that variance."""
     half = TWO_SIDED * variance**0.5
     return Parameter(value, value - half, value + half, unit)
+
+
+def from_zero(p: Parameter) -> Parameter:
+    """Of what is not below zero, however little the data tell of it."""
+    if p.low >= 0:
+        return p
+    value, low, high, *inner = (max(v, 0.0) for v in (p.value, p.low, p.high, *p.ci90))
+    return Parameter(value, low, high, p.unit, (inner[0], inner[1]))

@@ -11,13 +11,14 @@ import numpy as np
 
 from identification.gap.compare import Scored, logsumexp, score
 from identification.gap.data import Array
+from identification.gap.effects import EFFECTS
 from identification.gap.effects.base_slip import ACROSS, slides
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import Fit, fit
 from identification.gap.imperfection import IMPERFECTION, STEP, level_priors
-from identification.gap.interval import Parameter, Softer
-from identification.gap.parameters import NOT_NEGATIVE, from_zero, parameters
+from identification.gap.interval import Parameter, Softer, from_zero
+from identification.gap.parameters import parameters
 from identification.gap.parts import Part, energies, log_joints, part_sizes, signs_kept
 from identification.gap.penalties import SAME_JOINT, pettiness
 from identification.gap.readings import as_moved
@@ -78,7 +79,8 @@ def _known(
         of_rivals = [(r[word], w) for r, w in others if word in r]
         wide = {n: _wider(p, _moves(n, p.value, i, beside, of_rivals)) for n, p in own.items()}
         found = {n: _stretched(p) for n, p in wide.items()} if beside else wide
-        found = {n: from_zero(p) if n in NOT_NEGATIVE else p for n, p in found.items()}
+        sizes = EFFECTS[word].not_negative
+        found = {n: from_zero(p) if n in sizes else p for n, p in found.items()}
         out.append(Known(found, shapes.places()))
     return out
 

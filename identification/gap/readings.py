@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from identification.gap.bench import Bench
-from identification.gap.effects import displacement_scale, time_lag
+from identification.gap.effects import EFFECTS, displacement_scale, time_lag
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
@@ -63,18 +63,6 @@ def as_moved(
     if gain is None or not bench.data.arm or bench.has_q:
         return read
     return [
-        {name: p.over(gain) if name in _LENGTHS.get(part.word, ()) else p for name, p in r.items()}
+        {name: p.over(gain) if name in EFFECTS[part.word].lengths else p for name, p in r.items()}
         for part, r in zip(parts, read, strict=True)
     ]
-
-
-# what grows with the reading: lengths, and shares of the springs as they are
-_LENGTHS = {
-    "joint_backlash": ("width",),
-    "contact_seating": ("depth",),
-    "joint_yield": ("slope_beyond_over_elastic",),
-    "base_slip": ("slope_beyond_over_elastic",),
-    "joint_hysteresis": ("share_through_friction",),
-    "joint_creep": ("creep_fraction", "creep_fraction_of_run"),
-    "joint_nonlinear_stiffness": ("change_of_compliance_over_range",),
-}

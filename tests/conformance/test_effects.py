@@ -38,8 +38,8 @@ from tests.conformance.gap_designs import (
 )
 
 SHARED = (  # no word's own
-    "__init__", "curves", "drift", "flow_back", "flows", "knees", "knees_closer", "lost_motion",
-    "specimens",
+    "__init__", "curves", "drift", "flow_back", "flows", "gains", "knees", "knees_closer",
+    "lost_motion", "specimens", "thresholds",
 )  # fmt: skip
 FILES = sorted(p.stem for p in Path(effects.__file__).parent.glob("*.py") if p.stem not in SHARED)
 

@@ -12,7 +12,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.gap import forms, parameters, readings, refine
+from identification.gap import forms, refine
+from identification.gap.effects import EFFECTS
+from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.words import IN_JOINTS, KINDS, NEED_ARM, WORDS
 from rig import diagnose_text, gap_keys, gap_path
@@ -27,7 +29,7 @@ ANSWERS = {"none", "unknown"}
 
 TABLES = {
     "kinds": KINDS,
-    "parameters": parameters._TABLE,
+    "effects": EFFECTS,
     "forms": forms._TABLE,
     "grammar of model files": gap_keys.GRAMMAR,
     "meanings": diagnose_text.MEANING,
@@ -41,6 +43,11 @@ TABLES = {
 @pytest.mark.parametrize("name", TABLES)
 def test_table_holds_every_word(name: str) -> None:
     assert sorted(TABLES[name]) == sorted(WORDS)
+
+
+def test_effects_come_in_the_order_of_the_words_and_under_their_own() -> None:
+    assert tuple(EFFECTS) == WORDS
+    assert all(effect.word == word for word, effect in EFFECTS.items())
 
 
 # --- subsets: a new word goes to one of the two sides ------------------------------------------
@@ -64,7 +71,7 @@ NO_HINGE = {  # instruments, drifts and seats, which the other engine has no par
 
 SIDES: dict[str, tuple[Collection[str], set[str], Collection[str]]] = {
     "refined": (refine._FINER, ANY_GRID, WORDS),
-    "lengths": (readings._LENGTHS, NO_LENGTH, WORDS),
+    "lengths": ([w for w in WORDS if EFFECTS[w].lengths], NO_LENGTH, WORDS),
     "meanings without an arm": (
         diagnose_text._OF_ONE_SPRING, ALIKE_WITHOUT_ARM, set(WORDS) - NEED_ARM,
     ),
@@ -108,16 +115,19 @@ def names() -> dict[str, set[str]]:
     out: dict[str, set[str]] = defaultdict(set)
     for word, design in PAIRS:
         bench, variants, _ = of(word, design)
-        kinds = {(len(v.columns), *sorted(v.info)): v for v in variants}
+        kinds = {  # a stand whose axis lies deep enough slides
+            (len(v.columns), v.info.get("depth_m", 0.0), *sorted(v.info)): v for v in variants
+        }
         for (k, *_), v in kinds.items():
             part = Part(v, v.scales[0])
-            out[word] |= set(parameters.parameters(bench, part, np.ones(k), np.eye(k)))
+            out[word] |= set(parameters(bench, part, np.ones(k), np.eye(k)))
     return out
 
 
-@pytest.mark.parametrize("word", readings._LENGTHS)
-def test_lengths_are_parameters_of_their_word(word: str) -> None:
-    assert set(readings._LENGTHS[word]) <= names()[word]
+@pytest.mark.parametrize("word", WORDS)
+def test_lengths_and_what_is_not_negative_are_parameters_of_their_word(word: str) -> None:
+    effect = EFFECTS[word]
+    assert {*effect.lengths, *effect.not_negative} <= names()[word]
 
 
 @pytest.mark.parametrize(("word", "key"), judge.SHARED)

@@ -12,7 +12,8 @@ import pytest
 
 from identification.gap.bench import Bench, make_bench
 from identification.gap.effects import library
-from identification.gap.effects.time_lag import late
+from identification.gap.effects.joint_creep import run_seconds
+from identification.gap.effects.time_lag import closest_lag, late
 from identification.gap.evidence import (
     HOLD_PART,
     ROW_PART,
@@ -22,8 +23,7 @@ from identification.gap.evidence import (
 from identification.gap.explanation import Explanation
 from identification.gap.fit import fit
 from identification.gap.interval import NOMINAL, Parameter, Softer
-from identification.gap.lags import closest_lag
-from identification.gap.parameters import parameters, run_seconds
+from identification.gap.parameters import parameters
 from identification.gap.parts import Part
 from identification.gap.posterior import (
     Known,

@@ -1,13 +1,55 @@
-"""The library: one file an effect, each a family of shapes. `variants(bench)` fills the pool."""
+"""The library: one file an effect, each with a declaration at its end (`Effect`)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from importlib import import_module
 
 from identification.gap.bench import Bench
+from identification.gap.effect import Effect
+from identification.gap.effects import (
+    base_compliance,
+    base_slip,
+    contact_seating,
+    displacement_scale,
+    force_drift,
+    force_scale,
+    joint_backlash,
+    joint_creep,
+    joint_hysteresis,
+    joint_nonlinear_stiffness,
+    joint_stiffness_error,
+    joint_yield,
+    link_flexibility,
+    load_misalignment,
+    pose_error,
+    thermal_drift,
+    time_lag,
+    zero_shift,
+)
 from identification.gap.variants import Variant
 from identification.gap.words import NEED_ARM, STANDING, WORDS
+
+_ALL = (
+    joint_yield.EFFECT,
+    joint_backlash.EFFECT,
+    joint_nonlinear_stiffness.EFFECT,
+    joint_hysteresis.EFFECT,
+    joint_creep.EFFECT,
+    link_flexibility.EFFECT,
+    base_compliance.EFFECT,
+    base_slip.EFFECT,
+    contact_seating.EFFECT,
+    load_misalignment.EFFECT,
+    force_drift.EFFECT,
+    force_scale.EFFECT,
+    displacement_scale.EFFECT,
+    thermal_drift.EFFECT,
+    zero_shift.EFFECT,
+    time_lag.EFFECT,
+    pose_error.EFFECT,
+    joint_stiffness_error.EFFECT,
+)
+EFFECTS: dict[str, Effect] = {effect.word: effect for effect in _ALL}
 
 
 def library(bench: Bench, words: Iterable[str] = WORDS) -> list[Variant]:
@@ -19,5 +61,5 @@ def library(bench: Bench, words: Iterable[str] = WORDS) -> list[Variant]:
             continue
         if word in NEED_ARM and not bench.data.arm:
             continue
-        out += import_module(f"identification.gap.effects.{word}").variants(bench)
+        out += EFFECTS[word].variants(bench)
     return out

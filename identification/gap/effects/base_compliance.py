@@ -19,7 +19,9 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
 from identification.gap.effects.curves import hinge
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, variant
 
 WORD = "base_compliance"
@@ -122,3 +124,16 @@ def bent_column(bench: Bench, m: Array, beyond: float) -> Array:
     """Stacked column of a rotation by what a moment exceeds `beyond` Nm, either way, about an axis
     of lever m (n,) m."""
     return bench.outside_column(m * hinge(m * bench.load, beyond))
+
+
+def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    return {
+        f"compliance_about_{'xyz'[a]}": found.one(i, "rad/Nm") for i, a in enumerate(v.info["axes"])
+    }
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+)

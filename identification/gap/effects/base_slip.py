@@ -17,9 +17,13 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
 from identification.gap.effects.base_compliance import moments
 from identification.gap.effects.knees import knee_at, knee_variants
+from identification.gap.effects.thresholds import moved, of_knee, over
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant
+from identification.uncertainty import TWO_SIDED
 
 WORD = "base_slip"
 _HALF = 0.5**0.5
@@ -103,3 +107,36 @@ def _about(
 
 def _name(info: dict[str, Any]) -> str:
     return f"axis {info['axis']} {info['depth_m']:g} m below"
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    return of_knee(bench, v, found, _named)
+
+
+def _named(bench: Bench, v: Variant, threshold: Parameter) -> dict[str, Parameter]:
+    """Of a stand that slides the force across at which it does; of a slip about a lying axis, with
+    what is not known of its depth."""
+    if slides(v.info):
+        return {"threshold_of_force": over(threshold, SLIDES_M)}
+    if v.info["axis"] == "z":
+        return {"threshold": threshold}
+    half = TWO_SIDED * abs(threshold.value) * _depth_sd(bench, np.asarray(v.info["load"]))
+    return {"threshold": moved(threshold, 0.0, half)}
+
+
+def _depth_sd(bench: Bench, moment: Array) -> float:
+    """Relative sd of a moment (n,) about a lying axis whose depth is known to a step of those that
+    are looked at: the moment is the force times height over the axis."""
+    loaded = np.abs(bench.load) > 0.5 * np.abs(bench.load).max()
+    lever = float(np.median(np.abs(moment[loaded] / bench.load[loaded])))
+    step = BETWEEN_M[1] - BETWEEN_M[0]
+    return step / 12**0.5 / max(lever, step)
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+    not_negative=("threshold", "threshold_of_force"),
+    lengths=("slope_beyond_over_elastic",),
+)

@@ -19,6 +19,8 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effect import Effect
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, variant
 
 WORD = "contact_seating"
@@ -236,3 +238,21 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     if len(found.columns) > 1:
         return [_then_seats(bench, w, 1 / len(SLACKS) / len(FINER)) for w in wide]
     return [_slack(bench, law, w, 1 / len(FINER)) for w in wide]
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    f0, top = float(v.info["force_N"]), float(np.abs(bench.load).max())
+    scales = v.info["laws"]
+    at_top = np.array([LAWS[law](np.array(top / scale)) for law, scale in scales])
+    return {
+        "depth": found.linear(at_top, "mm", 1e3),
+        "force_scale": Parameter(f0, f0 / 2, f0 * 2, "N"),
+    }
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+    lengths=("depth",),
+)

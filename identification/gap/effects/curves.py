@@ -6,6 +6,8 @@ import numpy as np
 
 from identification.gap.data import Array
 
+BENT_SLOPE = 0.75  # of the straight line of least squares through zero of x |x|, 0 to 1
+
 
 def hinge(x: Array, bend: float) -> Array:
     """(n,) by how much the size of x (n,) is beyond a bend, with its sign."""

@@ -13,8 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.effect import Effect
 from identification.gap.effects.curves import hinge
-from identification.gap.effects.force_scale import BENDS, SCALES
+from identification.gap.effects.gains import BENDS, SCALES, factor
 from identification.gap.variants import Variant, variant
 
 WORD = "displacement_scale"
@@ -42,3 +43,10 @@ def _of_two_ranges(bench: Bench, straight: int, share: float, top: float) -> Var
     prior = 0.5 / len(CHANGES_AT)
     return variant(WORD, f"gain that changes at {share:g}", [straight, beyond], SCALES,
                    positive=False, prior=prior, above=share * top, share=share)  # fmt: skip
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=factor,
+)

@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.interval import Found, Parameter
 from identification.gap.turns import way_back
 from identification.gap.variants import Variant, variant
 from identification.gap.white import white_sd
@@ -185,3 +186,33 @@ def steady_root(pieces: int) -> Array:
 
 
 _PLACE, _TURNS = 0.15, 30.0  # variance where it starts; of its rate at the end, over that at first
+
+
+def changes(
+    bench: Bench, v: Variant, found: Found, unit: str, scale: float = 1.0
+) -> dict[str, Parameter]:
+    """Change from start to end of the session, per direction where it has its own."""
+    names, path = v.info["names"], v.info["path"]
+    per = len(found.w) // len(names)
+    out = {}
+    for i, name in enumerate(names):
+        f = np.zeros(len(found.w))
+        mine = slice(i * per, (i + 1) * per)
+        if path == "free":
+            f[mine.start], f[mine.stop - 1] = -1.0, 1.0
+        else:
+            f[mine] = _end(bench, str(path))
+        over = "drift" if path == "each run" else "drift_over_session"
+        key = over + (f"_{name}" if name else "")
+        out[key] = found.linear(f, unit, scale)
+    return out
+
+
+def _end(bench: Bench, path: str) -> float:
+    """Where a path is at the end of the session: 1, but temperatures may have come back."""
+    temperature = bench.rows.temperature
+    if temperature is None or "temperature" not in path:
+        return 1.0
+    number = path.removeprefix("temperature ")
+    v = temperature[:, int(number) - 1] if number.isdigit() else temperature.mean(axis=1)
+    return float((v[-1] - v[0]) / np.ptp(v))

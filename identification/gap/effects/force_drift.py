@@ -18,8 +18,10 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
 from identification.gap.effects.drift import (
     FreePath,
+    changes,
     free_path,
     free_paths,
     free_variant,
@@ -28,6 +30,7 @@ from identification.gap.effects.drift import (
     rates,
     shares,
 )
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, variant
 
 WORD = "force_drift"
@@ -169,3 +172,14 @@ def _tared(bench: Bench, path: Array) -> Array:
         return np.asarray(path - path[0])
     starts = np.flatnonzero(bench.rows.starts)
     return np.asarray(path - path[starts][np.cumsum(bench.rows.starts) - 1])
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    return changes(bench, v, found, "N")
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+)

@@ -16,11 +16,11 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
+from identification.gap.effects.gains import BENDS, SCALES, factor
 from identification.gap.variants import Variant, variant
 
 WORD = "force_scale"
-SCALES = (0.03, 0.08, 0.2)
-BENDS = np.diag([1.0, 0.08])  # at full range, of what the gain is off
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -64,3 +64,10 @@ def shown(bench: Bench, excess: Array) -> Array:
     if bench.imposed:
         return bench.stacked(bench.slope * excess)
     return bench.force_column(-excess)
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=factor,
+)

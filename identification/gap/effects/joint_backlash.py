@@ -30,8 +30,10 @@ import numpy as np
 
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effect import Effect
 from identification.gap.effects.lost_motion import KEPT, KINDS, SOFTER, UNEVEN, Play
 from identification.gap.flanks import Flanks, placed, shapes
+from identification.gap.interval import Found, Parameter, normal
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
@@ -315,3 +317,21 @@ def _resting(bench: Bench, joint: int, places: dict[bytes, list[int]]) -> list[i
     if b"rest" not in places:
         places[b"rest"] = [bench.add(c) for c in resting_columns(bench, joint).values()]
     return places[b"rest"]
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """What nobody reached of a play was taken to be as the shape has it: a rectangular
+    distribution, from nothing to twice that (GUM 4.3.7)."""
+    arm = bench.data.arm
+    seen = found.one(0, "rad" if arm else "mm", 1.0 if arm else 1e3)
+    sd = float(np.hypot(seen.sd, unreached(bench, v) * seen.value / 3**0.5))
+    return {"width": normal(seen.value, sd**2, seen.unit)}
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+    not_negative=("width",),
+    lengths=("width",),
+)

@@ -22,7 +22,10 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effect import Effect
+from identification.gap.effects.curves import BENT_SLOPE
 from identification.gap.history import half_sample, retarded, row_time
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import SET_UP_ANEW, Variant, smooth_root, variant
 
 WORD = "joint_creep"
@@ -129,3 +132,41 @@ BENT = " more than in proportion"
 def bent(load: Array) -> Array:
     """Loads (n, k) by their squares, with their signs, alike at the largest."""
     return np.asarray(load * np.abs(load) / (float(np.abs(load).max()) or 1.0))
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    times, seconds = np.asarray(v.info["times_s"]), run_seconds(bench)
+    whole = in_session(bench, times)
+    power = np.maximum(found.w, 0.0)
+    mean = (
+        float(np.exp(power @ np.log(times) / power.sum())) if power.sum() > 0 else float(times[0])
+    )
+    joint = v.info.get("joint")
+    line = BENT_SLOPE if v.info.get("bent") else 1.0
+    return {
+        "creep_fraction": found.per_spring(np.full(len(times), line), joint),
+        "creep_fraction_of_run": found.per_spring(
+            -line * whole * np.expm1(-seconds / times), joint
+        ),
+        "run": Parameter(seconds, seconds, seconds, "s"),
+        "retardation_time": Parameter(mean, mean / 3, mean * 3, "s"),
+    }
+
+
+def run_seconds(bench: Bench) -> float:
+    """s from the first sample of a run to its last, mean over runs."""
+    data = bench.data
+    number = np.unique(data.run, return_inverse=True)[1]
+    first = np.full(number.max() + 1, np.inf)
+    last = np.full(number.max() + 1, -np.inf)
+    np.minimum.at(first, number, data.time)
+    np.maximum.at(last, number, data.time)
+    return float(np.mean(last - first))
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+    lengths=("creep_fraction", "creep_fraction_of_run"),
+)

@@ -29,8 +29,10 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effect import Effect
 from identification.gap.effects.specimens import with_other_springs
 from identification.gap.history import Path, bristles, play, worked_in
+from identification.gap.interval import Found, Parameter, from_zero
 from identification.gap.variants import (
     LASTING,
     SET_UP_ANEW,
@@ -308,3 +310,33 @@ def _exponential(
                         radius=reach[k : k + 2], law=law)
             )  # fmt: skip
     return out
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """Of the strengths that slip, which takes a load beyond them; of friction in proportion to the
+    load, at the largest one."""
+    radius, joint = np.asarray(v.info["radius"]), int(v.info["joint"])
+    if v.info.get("other_springs"):
+        found = found.without_line(joint)
+    largest = float(np.abs(bench.torque[:, joint]).max())
+    slips = (radius < _SLIPS * largest).astype(float)
+    if v.info["law"] in BY_LOAD:
+        radius = np.full(len(radius), largest)
+    if v.info["law"] == "Iwan":  # what never slips is a spring like the joint's own
+        found = found.on_spring(slips - 1, joint)
+    return {
+        "friction": from_zero(found.linear(slips * radius, bench.torque_unit)),
+        "share_through_friction": found.per_spring(slips, joint),
+    }
+
+
+_SLIPS = 0.98  # of the largest load: what slips beyond that only hardly shows
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+    not_negative=("friction",),
+    lengths=("share_through_friction",),
+)

@@ -18,7 +18,9 @@ import numpy as np
 
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
 from identification.gap.effects.curves import above, beyond, hinge
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
@@ -233,3 +235,19 @@ def _finely(bench: Bench, j: int, top: float) -> tuple[tuple[float, ...], list[i
     start = float(np.abs(x).min()) if x.min() * x.max() > 0 else 0.0
     places = tuple(round(start + b * (1 - start), 6) for b in FINE)
     return places, [bench.add_joint(j, c * hinge(x, b)) for b in places]
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """What the compliance at the largest torque has more than at none: a hinge adds itself, a
+    power its exponent, a line nothing."""
+    grows = {"line": 0.0, "quadratic": 2.0, "even": 2.0, "cubic": 3.0}
+    change = np.array([grows.get(kind, 1.0) for kind in v.info["kinds"]])
+    return {"change_of_compliance_over_range": found.linear(change, "1", bench.sense)}
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+    lengths=("change_of_compliance_over_range",),
+)

@@ -14,8 +14,13 @@ from __future__ import annotations
 from itertools import combinations
 from math import comb
 
+import numpy as np
+
 from identification.gap.bench import Bench
+from identification.gap.effect import Effect
+from identification.gap.interval import LEAST_FACTOR, Found, Parameter
 from identification.gap.variants import Variant, variant
+from identification.uncertainty import TWO_SIDED
 
 WORD = "joint_stiffness_error"
 SCALES = (1.0, 3.0)
@@ -58,3 +63,30 @@ def variants(bench: Bench) -> list[Variant]:
                     positive=False, prior=0.5 / len(columns), joints=rest)
         )  # fmt: skip
     return out
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """Factor on the stiffness: of compliance where force is imposed, else of force. The spring it
+    acts on is known to its stated relative sd only, by which the factor can be told no better."""
+    out = {}
+    for i, j in enumerate(v.info["joints"]):
+        change, variance = float(found.w[i]), float(found.cov[i, i])
+        stated = 0.0
+        if j in found.softer.value:  # what the spring itself was given belongs to the whole
+            change += found.softer.value[j]
+            variance += found.softer.variance[j] + 2 * float(found.softer.cross[j][i])
+            stated = float(bench.data.compliance_relative_sd[j])
+        whole = max(1 + change, LEAST_FACTOR)
+        nats = TWO_SIDED * float(np.hypot(max(variance, 0.0) ** 0.5 / whole, stated))
+        spread = np.exp(min(nats, -np.log(LEAST_FACTOR)))
+        value = whole if bench.imposed else 1 / whole
+        name = bench.data.spring_name(j)
+        out[f"factor_{name}"] = Parameter(value, value / spread, value * spread, "1")
+    return out
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+)

@@ -22,8 +22,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from identification.gap.bench import Bench
+from identification.gap.bench import TOOL_SD_KG, Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
 from identification.gap.effects.flow_back import flowing_back
 from identification.gap.effects.knees import (
     SCALES,
@@ -34,7 +35,10 @@ from identification.gap.effects.knees import (
     memories,
 )
 from identification.gap.effects.specimens import OWN, off, own_stiffness, with_other_springs
+from identification.gap.effects.thresholds import moved, of_knee
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import BACK_UNDER_WEIGHT, TAKEN_BACK, UNDER_WEIGHT, Variant
+from identification.uncertainty import TWO_SIDED
 
 WORD = "joint_yield"
 
@@ -96,3 +100,38 @@ def _under_weight(
 
 
 _PUSHED = 0.2  # of the joint's largest torque: so far beyond its weight some push must go
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    return of_knee(bench, v, found, _named)
+
+
+def _named(bench: Bench, v: Variant, found: Parameter) -> dict[str, Parameter]:
+    """The threshold as net torque and as what the push brings, where weights make them two: for
+    the sense, and in the setups, of the largest push."""
+    info = v.info
+    joint = int(info["joint"])
+    if not bench.data.arm or not bench.feels_weight(joint):
+        return {"threshold": found}
+    load, weight = np.asarray(info["load"]), bench.weight(joint)
+    net = load + weight if "weight" in info else load
+    sense = float(np.sign(net[int(np.abs(net).argmax())]))
+    hangs = float(np.mean(weight[sense * load > 0.5 * (sense * load).max()]))
+    per_kg = float(np.abs(bench.weight_per_kg(joint)).max())
+    half = TWO_SIDED * TOOL_SD_KG * per_kg
+    if "weight" in info:  # both are near: what of the tool is wrong in one is wrong in the other
+        push = moved(found, -sense * hangs, 0.0)
+        return {"threshold": moved(found, 0.0, half), "threshold_of_load": push}
+    value = abs(found.value + sense * hangs)
+    low, high = value - (found.value - found.low), value + (found.high - found.value)
+    net_of = moved(Parameter(value, low, high, found.unit), 0.0, half)
+    return {"threshold": net_of, "threshold_of_load": found}
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+    not_negative=("threshold", "threshold_of_load"),
+    lengths=("slope_beyond_over_elastic",),
+)

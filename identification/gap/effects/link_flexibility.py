@@ -18,6 +18,8 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, variant
 
 WORD = "link_flexibility"
@@ -61,3 +63,23 @@ def _placed(bench: Bench, links: Array, placed: str) -> list[Variant]:
         out.append(variant(WORD, f"both arms{where}", columns, SCALES, both, each=True,
                            segments=list(range(count)), placed=placed))  # fmt: skip
     return out
+
+
+def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """Of bending the mean along the segment, as an even tube has it."""
+    shares = {"bending": [*BENDING.values(), 0.0], "twist": [*np.zeros(len(BENDING)), 1.0]}
+    out, segments = {}, v.info["segments"]
+    for i, k in enumerate(segments):
+        for strain, share in shares.items():
+            f = np.zeros((len(segments), len(STRAINS)))
+            f[i] = share
+            key = f"{strain}_compliance_over_nominal_segment{k + 1}"
+            out[key] = found.linear(f.ravel(), "1")
+    return out
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+)

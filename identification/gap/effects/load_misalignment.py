@@ -20,6 +20,8 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
+from identification.gap.effect import Effect
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, variant
 
 WORD = "load_misalignment"
@@ -186,3 +188,25 @@ def gives(bench: Bench, load: Array) -> Array:
     """Stacked column of what a rig without an arm, as stiff across as along, gives way under a load
     (n,) N across."""
     return bench.outside_column(bench.stated_slope * load)
+
+
+def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """Tangents at the largest load, as it was come to; of single runs their mean."""
+    info = v.info
+    names, count = list(info["directions"]), len(info["shapes"][0])
+    if "poses" in info:
+        names = [f"{name}_{pose}" for name, pose in zip(names, info["poses"], strict=True)]
+    common = np.eye(2 * len(names) * count, len(found.w))
+    rows = common.reshape(len(names), count, 2, -1).sum(axis=1)
+    return {
+        f"tangent_{name}_{k + 1}": found.linear(rows[i, k], "1")
+        for i, name in enumerate(names)
+        for k in range(2)
+    }
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+)

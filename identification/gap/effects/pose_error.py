@@ -23,6 +23,8 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, variant
 
 WORD = "pose_error"
@@ -187,3 +189,26 @@ def _variant(
         offset_m=np.zeros(3), angles_rad=np.zeros(6), turn_rad=np.zeros(3), reads=1.0,
         pose=pose, read=read,
     )  # fmt: skip
+
+
+def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """Tool offset, angles of the joints, turn of the base."""
+    kind = v.info["kind"]
+    out: dict[str, Parameter] = {}
+    if kind == "base":
+        return {f"base_turned_about_{a}": found.one(i, "rad") for i, a in enumerate("xyz")}
+    if kind in ("tool", "both"):
+        out |= {f"offset_{a}": found.one(i, "mm", 1e3) for i, a in enumerate("xyz")}
+    if kind in ("joints", "both"):
+        first = 3 if kind == "both" else 0
+        out |= {
+            f"angle_joint{i - first + 1}": found.one(i, "rad") for i in range(first, len(found.w))
+        }
+    return out
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+)

@@ -14,8 +14,10 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
+from identification.gap.effect import Effect
 from identification.gap.effects.drift import (
     by_direction,
+    changes,
     free_path,
     free_paths,
     free_variant,
@@ -23,6 +25,7 @@ from identification.gap.effects.drift import (
     rates,
     shares,
 )
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, variant
 
 WORD = "thermal_drift"
@@ -58,3 +61,14 @@ def _temperatures(bench: Bench) -> dict[str, Array]:
     candidates = {"mean temperature": t.mean(axis=1)}
     candidates |= {f"temperature {j + 1}": t[:, j] for j in range(t.shape[1])}
     return {k: (v - v[0]) / np.ptp(v) for k, v in candidates.items() if np.ptp(v) > 0}
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    return changes(bench, v, found, "mm", 1e3)
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+)

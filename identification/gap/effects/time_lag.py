@@ -20,7 +20,17 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.history import averaged, delayed, retarded, sampling_time
+from identification.gap.effect import Effect
+from identification.gap.history import (
+    averaged,
+    delayed,
+    half_sample,
+    retarded,
+    sampling_time,
+    settling_share,
+    standing_on,
+)
+from identification.gap.interval import Found, Parameter, normal
 from identification.gap.variants import Variant, variant
 from identification.gap.white import white_sd
 
@@ -204,3 +214,78 @@ def _true_force(bench: Bench, kind: str, lag: float) -> Array:
 # Of a sample's weight: what is read while the load is still seen coming depends on a hand's path.
 _SETTLED, _ON_THE_WAY = 0.02, 0.2
 _HOLDS_BACK = 0.05  # of a sample's weight: keeps what nobody saw from running away
+
+
+def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
+    a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
+    is read as the lag of every kind that does the same, each the more the closer it comes."""
+    n, info = bench.rows.n, v.info
+    w = found.w
+    does = sum((v * bench.columns[c][:n] for v, c in zip(w, v.columns, strict=True)),
+               np.zeros(n))  # fmt: skip
+    total = found.linear(np.ones(len(w)), "1")
+    relative = total.sd / max(abs(total.value), 1e-6)
+    lags, misses, spread = np.zeros((3, len(KINDS)))
+    for k, kind in enumerate(KINDS):
+        lags[k], misses[k] = closest_lag(bench, info["channel"], kind, does)
+        more, _ = closest_lag(bench, info["channel"], kind, does * (1 + min(relative, 0.5)))
+        spread[k] = more - lags[k]
+    # what the noise hides of a miss tells no kind from another
+    hidden = 1 / max(float(np.linalg.norm(does / bench.noise.response)), 1.0)
+    share = 1 / (misses**2 + hidden**2)
+    share /= share.sum()
+    value = float(share @ lags)
+    variance = float(share @ (spread**2 + (lags - value) ** 2))
+    return {"lag": normal(value, variance + _turning_sd(bench, value) ** 2, "s")}
+
+
+def _turning_sd(bench: Bench, lag: float) -> float:
+    """s by which a lag is uncertain because nobody recorded when the load began to move: between
+    two samples, so that it took half a sample more or less. What a lag shows at the first sample of
+    a hold is the share of that way which it is late."""
+    rows = bench.rows
+    begins = rows.hold_starts & ~rows.starts
+    if rows.continuous or not begins.any():
+        return 0.0
+    half = half_sample(rows)
+    gaps = np.diff(rows.session, prepend=rows.session[0])
+    way = float(np.median((gaps - settling_share(rows) - standing_on(rows))[begins]))
+    return 0.5 * half / max(way, half) * max(lag - half, 0.0)
+
+
+_LAGS = np.geomspace(0.2, 16.0, 32)  # of the time between two samples: lags that are compared
+
+
+def closest_lag(bench: Bench, channel: str, kind: str, does: Array) -> tuple[float, float]:
+    """Lag s of that kind that does most nearly the same (n,), and what it misses, as a share."""
+    lags, columns = _lagging(bench, channel, kind)
+    scale = 1 / bench.noise.response
+    y, does_each = does * scale, columns * scale
+    i = int(np.sum((does_each - y) ** 2, axis=1).argmin())
+    best = (np.inf, float(lags[i]))
+    for k in (i - 1, i):  # between two lags, what a lag does is straight
+        if 0 <= k < len(lags) - 1:
+            way, ahead = does_each[k + 1] - does_each[k], y - does_each[k]
+            at = float(np.clip(way @ ahead / max(float(way @ way), 1e-300), 0.0, 1.0))
+            left = float(np.sum((ahead - at * way) ** 2))
+            best = min(best, (left, float(lags[k] + at * (lags[k + 1] - lags[k]))))
+    return best[1], float(np.sqrt(best[0] / max(float(y @ y), 1e-300)))
+
+
+def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
+    """Lags (k,) s and what each does to the responses (k, n). Kept with the bench: a cache of the
+    module would keep the benches of many diagnoses alive."""
+    if (channel, kind) not in bench.lags:
+        lags = _LAGS * sampling_time(bench.rows)
+        does = [late(bench, channel, kind, float(t))[: bench.rows.n] for t in lags]
+        bench.lags[channel, kind] = lags, np.array(does)
+    return bench.lags[channel, kind]
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+    not_negative=("lag",),
+)

@@ -8,6 +8,8 @@ Source: knocked targets, re-clamped sensors, a zero key pressed between runs.
 from __future__ import annotations
 
 from identification.gap.bench import Bench
+from identification.gap.effect import Effect
+from identification.gap.interval import Found, Parameter
 from identification.gap.variants import Variant, variant
 
 WORD = "zero_shift"
@@ -36,3 +38,17 @@ def variants(bench: Bench) -> list[Variant]:
                     runs=[], shifts=shifted)
         )  # fmt: skip
     return out
+
+
+def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    if len(found.w) == 1:
+        run = v.info["runs"][0] + 1
+        return {f"shift_before_run{run}": found.one(0, "mm", 1e3)}
+    return {f"shift{i + 1}": found.one(i, "mm", 1e3) for i in range(len(found.w))}
+
+
+EFFECT = Effect(
+    WORD,
+    variants=variants,
+    parameters=_parameters,
+)
