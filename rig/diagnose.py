@@ -17,9 +17,9 @@ from identification.gap.diagnose import (
     diagnose_gap,
     explain_gap,
 )
-from identification.gap.forms.known import less_known
 from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
+from identification.gap.known import less_known
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
 from rig.errors import InputError, did_you_mean

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.forms import Form, Law, Term, lasting
+from identification.gap.forms import Form, lasting
+from identification.gap.law import Law, Term
 from identification.gap.words import WORDS
 from rig.errors import close_to, did_you_mean
 from rig.gap_keys import (

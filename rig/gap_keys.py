@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from identification.gap.effects import base_slip, contact_seating, lost_motion, time_lag
+from identification.gap.effects.friction_law import FRICTION_LAWS, SLIP_AT_A_STRENGTH
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
-from identification.gap.forms.friction import FRICTION_LAWS, SLIP_AT_A_STRENGTH
-from identification.gap.forms.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
+from identification.gap.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
 from rig.units import MM_PER_M
 
 # What an entry says besides its law; kept, not interpreted.

@@ -9,8 +9,9 @@ import numpy as np
 
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
-from identification.gap.forms import OF_SESSION, SESSION, Form, realise
-from identification.gap.forms.law import along, in_pose
+from identification.gap.effects import EFFECTS
+from identification.gap.forms import Form, realise
+from identification.gap.law import along, in_pose
 from identification.times import MOUNT_S, SCREW_S, UNLOAD_S
 from rig.gap_data import arm_setup
 from rig.model import ArmModel
@@ -176,10 +177,12 @@ def left_out(forms: Sequence[Form]) -> tuple[str, ...]:
     """What of these is no prediction, because it was the measured session's: a line each."""
     out = []
     for f in forms:
-        if f.word in OF_SESSION:
+        laws = EFFECTS[f.word].laws
+        if not laws.lasts:
             whats = [_WORDS[f.word]]
         else:
-            whats = [_CHANCE[t.coefficient] for t in f.law.terms if t.coefficient in SESSION]
+            chance = [t.coefficient for t in f.law.terms if t.coefficient in laws.of_session]
+            whats = [_CHANCE[coefficient] for coefficient in chance]
             whats += [_OF_RUNS for t in f.law.terms if "run" in t.shape]
         out += [f"{f.word}: {w} belongs to the measured session; left out." for w in whats]
     return tuple(dict.fromkeys(out))

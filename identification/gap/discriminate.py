@@ -29,7 +29,8 @@ from identification.gap.designs import (
 from identification.gap.evidence import Engine, Level, eta_levels
 from identification.gap.explanation import Explanation, Found
 from identification.gap.fit import Fit, fit
-from identification.gap.forms import Form, Law, describe, law_of, lawful, realise, rows_of
+from identification.gap.forms import Form, describe, law_of, lawful, realise, rows_of
+from identification.gap.law import Law
 from identification.gap.twins import PLACE, twin_of
 from identification.gap.variants import Variant
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.gap.compare import Scored, by_word, closest, marginal, score
 from identification.gap.effects import (
+    EFFECTS,
     base_slip,
     contact_seating,
     joint_backlash,
@@ -24,7 +25,6 @@ from identification.gap.effects import (
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Explanation, conditioned
 from identification.gap.fit import fit
-from identification.gap.forms import about_springs
 from identification.gap.parts import Part
 from identification.gap.variants import Variant, place_of
 from identification.gap.words import LINEAR
@@ -222,12 +222,12 @@ _BESIDE = 2  # words
 
 def _about_springs(word: _Word) -> list[Variant]:
     """What goes through the springs, with the springs as they are found to be beside it."""
-    bench, out = word.engine.bench, []
+    bench, laws, out = word.engine.bench, EFFECTS[word.name].laws, []
     for found in dict.fromkeys(s[0].variant for s in (word.alone, word.beside) if s):
         v = found
         for _ in range(_STEPS):
             softer = _estimate(word.engine, v).softer
-            v = about_springs(bench, found, bench.compliance * np.maximum(1 + softer, 0.1))
+            v = laws.about_springs(bench, found, bench.compliance * np.maximum(1 + softer, 0.1))
         out.append(v)
     return out
 

@@ -18,7 +18,8 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.base_slip import lever_of, places
 from identification.gap.evidence import LEVER_M, Engine
-from identification.gap.forms import Form, Law, Term, law_of, rows_of
+from identification.gap.forms import Form, law_of, rows_of
+from identification.gap.law import Law, Term
 from identification.gap.parts import Part
 
 _SAME = 1.0  # nats of misfit that another place may cost: nobody would call that evidence

@@ -38,8 +38,9 @@ from tests.conformance.gap_designs import (
 )
 
 SHARED = (  # no word's own
-    "__init__", "curves", "drift", "flow_back", "flows", "gains", "knees", "knees_closer",
-    "lost_motion", "specimens", "thresholds",
+    "__init__", "curves", "drift", "drift_law", "flow_back", "flows", "friction_law", "gains",
+    "knees", "knees_closer", "knees_law", "lost_motion", "lost_motion_law", "specimens",
+    "thresholds",
 )  # fmt: skip
 FILES = sorted(p.stem for p in Path(effects.__file__).parent.glob("*.py") if p.stem not in SHARED)
 

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.gap import forms, refine
+from identification.gap import refine
 from identification.gap.effects import EFFECTS
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
@@ -30,7 +30,6 @@ ANSWERS = {"none", "unknown"}
 TABLES = {
     "kinds": KINDS,
     "effects": EFFECTS,
-    "forms": forms._TABLE,
     "grammar of model files": gap_keys.GRAMMAR,
     "meanings": diagnose_text.MEANING,
     "words that are drawn": drawn.EFFECTS,
@@ -91,14 +90,19 @@ def test_words_that_grids_meet_badly_are_refined() -> None:
 
 def test_laws_that_go_through_springs_name_them_in_model_files() -> None:
     about = {w for w, grammar in gap_keys.GRAMMAR.items() if "about" in grammar.constants}
-    assert about == forms._THROUGH_SPRINGS
+    assert about == {w for w in WORDS if EFFECTS[w].laws.through_springs}
 
 
 def test_what_belongs_to_a_session_is_said_to_be_left_out() -> None:
-    assert set(gap_path._WORDS) == forms.OF_SESSION
-    chance = {c for g in gap_keys.GRAMMAR.values() for c, _ in g.terms} & forms.SESSION
-    of_session = {c for w in forms.OF_SESSION for c, _ in gap_keys.GRAMMAR[w].terms}
-    assert set(gap_path._CHANCE) == chance - of_session
+    gone = {w for w in WORDS if not EFFECTS[w].laws.lasts}
+    assert set(gap_path._WORDS) == gone
+    chance = {c for w in WORDS if w not in gone for c in EFFECTS[w].laws.of_session}
+    assert set(gap_path._CHANCE) == chance
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_what_is_of_a_session_is_a_coefficient_of_model_files(word: str) -> None:
+    assert {*EFFECTS[word].laws.of_session} <= {c for c, _ in gap_keys.GRAMMAR[word].terms}
 
 
 def test_both_sides_say_alike_what_joints_show() -> None:

@@ -12,9 +12,9 @@ import pytest
 from identification.gap.bench import make_bench
 from identification.gap.diagnose import Effect, GapResult
 from identification.gap.discriminate import NextMeasurement
-from identification.gap.effects import library
+from identification.gap.effects import EFFECTS, library
 from identification.gap.fit import Fit
-from identification.gap.forms import OF_SESSION, SESSION, law_of
+from identification.gap.forms import law_of
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
 from identification.gap.variants import Variant
@@ -100,8 +100,9 @@ def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.
     if word in ("joint_stiffness_error", "displacement_scale", "time_lag"):
         w = 0.1 / (1 + np.arange(len(v.columns)))
     law, _ = law_of(bench, v)
+    laws = EFFECTS[word].laws
     kept = np.array([
-        word not in OF_SESSION and t.coefficient not in SESSION and "run" not in t.shape
+        laws.lasts and t.coefficient not in laws.of_session and "run" not in t.shape
         for t in law.terms
     ])  # fmt: skip
     base, b = result.fit.base, len(result.fit.base)
@@ -136,7 +137,7 @@ def test_a_model_predicts_on_its_own_procedure_what_was_fitted(
     write_model(replace(diagnosis, result=result), dataset, tmp_path / "m.yaml")
     found = simulate(tmp_path / "m.yaml", procedure)
     rows = result.bench.rows
-    if word in OF_SESSION:
+    if not EFFECTS[word].laws.lasts:
         assert found.effects == ()
         assert left_behind(forms(result)) == (word,)
         assert f"; {OF_THIS_SESSION}\n  - name: {word}\n" in (tmp_path / "m.yaml").read_text()

@@ -13,7 +13,8 @@ from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import by_word, closest, score
 from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, joint_hysteresis, knees_closer, library
-from identification.gap.effects.joint_hysteresis import EXPONENTIAL, REACHES
+from identification.gap.effects.friction_law import EXPONENTIAL
+from identification.gap.effects.joint_hysteresis import REACHES
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
 from identification.gap.refine import _FINER, _closing_in, _Word, refine

@@ -13,6 +13,7 @@ from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
+from identification.gap.effects.lost_motion import PLACED
 from identification.gap.evidence import Engine
 from identification.gap.flanks import Flanks, _crossed, placed
 from identification.gap.forms import law_of, rows_of
@@ -175,7 +176,7 @@ def test_no_play_is_placed_where_there_is_none(bench: Bench) -> None:
 )
 def test_placed_plays_are_their_laws_and_explain_the_data(bench: Bench) -> None:
     fresh = replace(bench, columns=Pool())
-    made = [v for v in joint_backlash.variants(fresh) if v.info["kind"] in joint_backlash.PLACED]
+    made = [v for v in joint_backlash.variants(fresh) if v.info["kind"] in PLACED]
     assert len(made) == 2
     pool = np.column_stack(fresh.columns)
     n = fresh.rows.n

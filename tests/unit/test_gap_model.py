@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 
 from identification.gap.bench import Bench, make_bench
 from identification.gap.effects import joint_backlash, library, lost_motion
-from identification.gap.forms import Form, Law, Term, describe, realise
+from identification.gap.forms import Form, describe, realise
+from identification.gap.law import Law, Term
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
 from identification.gap.variants import Variant

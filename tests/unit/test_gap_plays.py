@@ -14,8 +14,8 @@ from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, library, lost_motion
 from identification.gap.effects.joint_backlash import TOOLS_KG
 from identification.gap.effects.lost_motion import Play
+from identification.gap.effects.lost_motion_law import describe, net_of
 from identification.gap.evidence import Engine
-from identification.gap.forms.friction import _net, describe_backlash
 from identification.gap.refine import refine
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
@@ -59,8 +59,8 @@ def test_a_preload_is_found_to_a_percent() -> None:
     x = bench.true_torque[:, 0] + bench.weight(0) - 26.3
     found = closed_in(bench, x, 1.0)
     assert found.info["preload_Nm"] == pytest.approx(-26.3, rel=0.01)
-    law, _ = describe_backlash(bench, found)
-    np.testing.assert_allclose(_net(bench, law), x, atol=0.3)
+    law, _ = describe(bench, found)
+    np.testing.assert_allclose(net_of(bench, law), x, atol=0.3)
     assert found.info["zone_Nm"] == pytest.approx(1.0, rel=0.1)
 
 

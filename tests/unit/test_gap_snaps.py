@@ -12,7 +12,7 @@ from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.effects.joint_hysteresis import BY_LOAD
+from identification.gap.effects.friction_law import BY_LOAD
 from identification.gap.interval import NOMINAL
 from identification.gap.leftover import COMES_BACK, _judged
 from identification.gap.parameters import parameters

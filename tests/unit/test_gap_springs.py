@@ -12,9 +12,9 @@ from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import score
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import library
+from identification.gap.effects import EFFECTS, library
 from identification.gap.evidence import Engine
-from identification.gap.forms import about_springs, law_of, rows_of
+from identification.gap.forms import law_of, rows_of
 from identification.gap.pool import Pool
 from identification.gap.refine import refine
 from identification.gap.variants import Variant
@@ -34,7 +34,7 @@ def test_columns_about_other_springs_are_those_of_a_rig_with_these_springs() -> 
     data = arm_data()
     bench = make_bench(data)
     v = misaligned(bench)
-    about = about_springs(bench, v, bench.compliance * SOFTER)
+    about = EFFECTS[v.word].laws.about_springs(bench, v, bench.compliance * SOFTER)
     there = make_bench(data, compliance=bench.compliance * SOFTER)
     wanted = misaligned(there)
     assert about.label != v.label

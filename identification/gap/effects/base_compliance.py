@@ -22,6 +22,7 @@ from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.effects.curves import hinge
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term
 from identification.gap.variants import Variant, variant
 
 WORD = "base_compliance"
@@ -132,8 +133,34 @@ def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     }
 
 
+def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: axes through a point `depth` below the base, what couples two that lie turned, and
+    what a moment adds."""
+    terms = [Term("compliance", {"axis": "xyz"[a]}) for a in v.info["axes"]]
+    terms += [Term("compliance_xy")] if v.info["turned"] else []
+    bends = v.info.get("bends_Nm", ())
+    terms += [Term("compliance", {"axis": "xyz"[a], "beyond": at}) for a, at in bends]
+    return Law({"depth": float(v.info["depth_m"])}, tuple(terms)), np.ones(len(terms))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """`(r x n)_a^2` times the load, of a coupling `2 (r x n)_x (r x n)_y`; of what is added
+    beyond a moment times what goes beyond it."""
+    m, out = moments(bench, law.constants["depth"]), []
+    lever = dict(zip("xyz", m.T, strict=True))
+    for t in law.terms:
+        axis = str(t.shape.get("axis", "xy"))
+        if "beyond" in t.shape:
+            out.append(bent_column(bench, lever[axis], t.shape["beyond"]))
+            continue
+        square = lever[axis] ** 2 if axis in lever else 2 * lever["x"] * lever["y"]
+        out.append(bench.outside_column(square * bench.load))
+    return out
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
 )

@@ -20,8 +20,10 @@ from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.effects.base_compliance import moments
 from identification.gap.effects.knees import knee_at, knee_variants
+from identification.gap.effects.knees_law import law_of_knee, states_of
 from identification.gap.effects.thresholds import moved, of_knee, over
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws
 from identification.gap.variants import Variant
 from identification.uncertainty import TWO_SIDED
 
@@ -133,10 +135,23 @@ def _depth_sd(bench: Bench, moment: Array) -> float:
     return step / 12**0.5 / max(lever, step)
 
 
+def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
+    place = {"axis": v.info["axis"], "depth": float(v.info["depth_m"])}
+    return law_of_knee(v, place, float(v.info["natural"]))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Column of every term, in their order: state of radius `threshold` on the moment, lagging."""
+    lever = lever_of(bench, law.constants["axis"], law.constants["depth"])
+    states = states_of(bench, law, lever * bench.true_load)
+    return [bench.outside_column(lever * states[i]) for i in range(len(law.terms))]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
     not_negative=("threshold", "threshold_of_force"),
     lengths=("slope_beyond_over_elastic",),
 )

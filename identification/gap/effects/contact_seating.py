@@ -21,6 +21,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effect import Effect
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term
 from identification.gap.variants import Variant, variant
 
 WORD = "contact_seating"
@@ -250,9 +251,24 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     }
 
 
+def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: saturating curves of the force."""
+    terms = tuple(
+        Term("depth", {"law": law, "force_scale": float(f0)}) for law, f0 in v.info["laws"]
+    )
+    return Law({}, terms), np.ones(len(terms))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """The saturating curves of `LAWS`, of the force on the seat."""
+    each = [(str(t.shape["law"]), float(t.shape["force_scale"])) for t in law.terms]
+    return [bench.outside_column(lost(bench, *one)) for one in each]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
     lengths=("depth",),
 )

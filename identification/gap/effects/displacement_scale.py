@@ -13,9 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.effects.curves import hinge
-from identification.gap.effects.gains import BENDS, SCALES, factor
+from identification.gap.effects.gains import BENDS, SCALES, bent, factor, law_of_gain
+from identification.gap.law import Law, Laws
 from identification.gap.variants import Variant, variant
 
 WORD = "displacement_scale"
@@ -45,8 +47,18 @@ def _of_two_ranges(bench: Bench, straight: int, share: float, top: float) -> Var
                    positive=False, prior=prior, above=share * top, share=share)  # fmt: skip
 
 
+def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
+    return law_of_gain(v, "at_response")
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """A share of the response to the load."""
+    return [bench.outside_column(bent(bench.line, t, "at_response")) for t in law.terms]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=factor,
+    laws=Laws(_describe, _columns),
 )

@@ -30,7 +30,9 @@ from identification.gap.effects.drift import (
     rates,
     shares,
 )
+from identification.gap.effects.drift_law import OF_SESSION, law_of_path, path_of
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term
 from identification.gap.variants import Variant, variant
 
 WORD = "force_drift"
@@ -178,8 +180,45 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     return changes(bench, v, found, "N")
 
 
+def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms of the path."""
+    if v.info["path"] == "each run":
+        each_run = tuple(
+            Term("drift", {"run": r, "along": AXES[name]}) for r, name in v.info["places"]
+        )
+        return Law({"path": "each run", "quantity": "force"}, each_run), np.ones(len(each_run))
+    constants, terms, scale = law_of_path(bench, v)
+    law = constants | {"quantity": "force"}
+    if v.info["names"] == ("",):
+        along = {k: v.info[k] for k in ("along",) if k in v.info}
+        return Law(law, tuple(replace(t, shape={**t.shape, **along}) for t in terms)), scale
+    named = tuple(
+        replace(t, shape={**t.shape, "along": AXES[name]})
+        for name in v.info["names"]
+        for t in terms
+    )
+    return Law(law, named), np.tile(scale, len(v.info["names"]))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Measured = true + d(t), less what was tared away; zero plateaus show d itself."""
+    out = []
+    for t in law.terms:
+        if "run" in t.shape:
+            path = since(bench, t.shape["run"])
+            out.append(component(bench, t.shape["along"], path))
+            continue
+        if "along" in t.shape:
+            out.append(component(bench, t.shape["along"], path_of(bench, law, t)))
+            continue
+        d = _tared(bench, path_of(bench, law, t))
+        out.append(drifting(bench, d))
+    return out
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns, through_springs=True, of_session=OF_SESSION, lasts=False),
 )

@@ -17,7 +17,8 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
-from identification.gap.effects.gains import BENDS, SCALES, factor
+from identification.gap.effects.gains import BENDS, SCALES, bent, factor, law_of_gain
+from identification.gap.law import Law, Laws
 from identification.gap.variants import Variant, variant
 
 WORD = "force_scale"
@@ -66,8 +67,23 @@ def shown(bench: Bench, excess: Array) -> Array:
     return bench.force_column(-excess)
 
 
+def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
+    return law_of_gain(v, "at_load")
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Less force than read deflects less."""
+    return [
+        component(bench, "xyz".index(t.shape["axis"]))
+        if "axis" in t.shape
+        else shown(bench, bent(bench.load, t, "at_load"))
+        for t in law.terms
+    ]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=factor,
+    laws=Laws(_describe, _columns, through_springs=True),
 )

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.effects.curves import BENT_SLOPE
+from identification.gap.data import Array
+from identification.gap.effects.curves import BENT_SLOPE, hinge
 from identification.gap.interval import LEAST_FACTOR, Found, Parameter
+from identification.gap.law import Law, Term
 from identification.gap.variants import Variant
 
 SCALES = (0.03, 0.08, 0.2)
@@ -26,3 +28,23 @@ def factor(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     ]
     of = v.info.get("component")
     return {f"factor_{of}" if of else "factor": Parameter(ends[0], ends[1], ends[2], "1")}
+
+
+def law_of_gain(v: Variant, of: str) -> tuple[Law, Array]:
+    """Terms: the share of what is shown that is too much, `1 - 1 / gain`; where it bends, that
+    which comes on top in proportion to the reading, or to what of it lies above a range. of:
+    what the reading at full range is called."""
+    if "component" in v.info:
+        return Law({}, (Term("gain", {"axis": str(v.info["component"])}),)), np.ones(1)
+    if len(v.columns) == 1:
+        return Law({}, (Term("gain"),)), np.ones(1)
+    if "above" in v.info:
+        return Law({}, (Term("gain"), Term("gain", {"above": float(v.info["above"])}))), np.ones(2)
+    return Law({}, (Term("gain"), Term("gain", {of: float(v.info["full"])}))), np.ones(2)
+
+
+def bent(read: Array, term: Term, of: str) -> Array:
+    """(n,) readings (n,) as a term weighs them."""
+    if "above" in term.shape:
+        return hinge(read, term.shape["above"])
+    return read * np.abs(read) / term.shape[of] if of in term.shape else read

@@ -31,17 +31,27 @@ import numpy as np
 from identification.gap.bench import TOOL_KG, Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effect import Effect
-from identification.gap.effects.lost_motion import KEPT, KINDS, SOFTER, UNEVEN, Play
+from identification.gap.effects import lost_motion_law
+from identification.gap.effects.lost_motion import (
+    HELD,
+    KEPT,
+    KINDS,
+    PLACED,
+    SOFTER,
+    UNEVEN,
+    Play,
+    net,
+    resting_columns,
+)
 from identification.gap.flanks import Flanks, placed, shapes
 from identification.gap.interval import Found, Parameter, normal
+from identification.gap.law import Laws
 from identification.gap.variants import Variant, variant
 
 WORD = "joint_backlash"
-PLACED = ("gap", "held", "dragged")
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.
 _REFINED, _BENCH_REFINED = ("free", "soft", "slow", "arctan", *KEPT), ("soft", "slow", "sprung")
 SMOOTH = ("soft", "slow", "arctan", "sprung")
-HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 TOOLS_KG = (0.0, 1.5, 3.0)
 _PRELOADS = 8  # over the range of the net torque
 _PRELOAD_PRIOR = 0.25
@@ -137,13 +147,6 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
             share = _by_preload(bench) / _PRELOADS
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
     return out
-
-
-def net(bench: Bench, j: int, crossing: str, kg: float, preload: float = 0.0) -> Array:
-    """(n,) Nm whose zero the play is passed at: of the load, or with the weights and a tool of that
-    mass; with a preload (Nm)."""
-    torque = bench.true_torque[:, j]
-    return preload + (torque + bench.weight(j, kg) if crossing == "weight" else torque)
 
 
 def unreached(bench: Bench, variant: Variant) -> float:
@@ -300,19 +303,6 @@ def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[i
     return places[key]
 
 
-def resting_columns(bench: Bench, joint: int) -> dict[str, Array]:
-    """Pose -> column (size,) of a reading that is off in it: the controller sends the joint to
-    where its reading should be, whichever side of its play it lies at."""
-    if not bench.has_q:
-        return {}
-    poses, out = [s.pose for s in bench.data.setups], {}
-    for pose in dict.fromkeys(poses):
-        q = np.zeros((bench.rows.n, bench.data.joints))
-        q[np.array([p == pose for p in poses])[bench.rows.setup], joint] = 1.0
-        out[pose] = bench.stacked(q=q)
-    return out
-
-
 def _resting(bench: Bench, joint: int, places: dict[bytes, list[int]]) -> list[int]:
     if b"rest" not in places:
         places[b"rest"] = [bench.add(c) for c in resting_columns(bench, joint).values()]
@@ -332,6 +322,7 @@ EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(lost_motion_law.describe, lost_motion_law.columns, of_session=("place", "rest")),
     not_negative=("width",),
     lengths=("width",),
 )

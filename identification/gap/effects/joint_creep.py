@@ -26,6 +26,7 @@ from identification.gap.effect import Effect
 from identification.gap.effects.curves import BENT_SLOPE
 from identification.gap.history import half_sample, retarded, row_time
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import ANEW, Law, Laws, Term
 from identification.gap.variants import SET_UP_ANEW, Variant, smooth_root, variant
 
 WORD = "joint_creep"
@@ -164,9 +165,34 @@ def run_seconds(bench: Bench) -> float:
     return float(np.mean(last - first))
 
 
+def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: Kelvin-Voigt elements with their retardation time."""
+    joint, unit = int(v.info["joint"]), float(bench.compliance[int(v.info["joint"])])
+    name = "compliance"
+    if v.info.get("bent"):
+        name, unit = "compliance_quadratic", unit / float(np.abs(bench.true_torque[:, joint]).max())
+    times = np.asarray(v.info["times_s"])
+    terms = tuple(Term(name, {"retardation_time": float(t)}) for t in times)
+    forgets = {"forgets": ANEW} if v.info["memory"] else {}
+    return Law({"joint": joint} | forgets, terms), unit * in_session(bench, times)
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Retarded torques, or their squares, on the session clock."""
+    joint = law.constants["joint"]
+    times = np.array([t.shape["retardation_time"] for t in law.terms])
+    bent = np.array([t.coefficient == "compliance_quadratic" for t in law.terms])
+    torque = bench.true_torque[:, joint][:, None]
+    load = np.where(bent, torque * np.abs(torque), torque)
+    fresh = bench.rebuilt if law.constants.get("forgets") == ANEW else None
+    z = retarded(load, times, bench.rows, bench.rest, fresh)
+    return [bench.joint_column(joint, bench.sense * column) for column in z.T]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
     lengths=("creep_fraction", "creep_fraction_of_run"),
 )

@@ -30,9 +30,17 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
 from identification.gap.effect import Effect
+from identification.gap.effects import friction_law
+from identification.gap.effects.friction_law import (
+    BY_LOAD,
+    EXPONENTIAL,
+    LAWS,
+    by_ratio,
+)
 from identification.gap.effects.specimens import with_other_springs
 from identification.gap.history import Path, bristles, play, worked_in
 from identification.gap.interval import Found, Parameter, from_zero
+from identification.gap.law import Laws
 from identification.gap.variants import (
     LASTING,
     SET_UP_ANEW,
@@ -57,10 +65,7 @@ NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # bends ever more from the first load on is a spectrum of strengths. Specimens yield.
 _SMALL = 5
 TOOLS_KG = (0.0, 0.5, 1.0, 2.0, 2.5, 3.0)  # beside TOOL_KG, with which it is looked for at first
-EXPONENTIAL, _CLOSER = ("Dahl", "Bouc-Wen"), 6  # laws; reaches of a closer look
-# Leaves, belts, cables and wedges are pressed by what they carry: friction in proportion to that.
-BY_LOAD = tuple(f"{law} by load" for law in EXPONENTIAL)
-LAWS = (*EXPONENTIAL, *BY_LOAD)
+_CLOSER = 6  # reaches of a closer look
 NEARER = 0.4  # times the reaches of others: at the largest load, and shorter below
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off by more than that
@@ -265,16 +270,6 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
     return out
 
 
-def by_ratio(load: Array, span: float) -> Array:
-    """Loads (n,) stretched so that a friction in proportion to them turns over a share of them: as
-    they are at the span, ever longer towards none."""
-    whole = (1 + _NONE) * span * np.log1p(np.abs(load) / (_NONE * span))
-    return np.asarray(np.sign(load) * whole)
-
-
-_NONE = 0.05  # of the range: loads below that are as good as none
-
-
 def _keeps_its_sign(bench: Bench) -> bool:
     """Whether a specimen's answer never turns against its load: friction in proportion to the load
     can't do that."""
@@ -337,6 +332,7 @@ EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(friction_law.describe, friction_law.columns),
     not_negative=("friction",),
     lengths=("share_through_friction",),
 )

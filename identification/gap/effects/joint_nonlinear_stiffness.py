@@ -21,6 +21,7 @@ from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.effects.curves import above, beyond, hinge
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term
 from identification.gap.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
@@ -245,9 +246,54 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     return {"change_of_compliance_over_range": found.linear(change, "1", bench.sense)}
 
 
+def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: a line, hinges `beyond` a torque or above a net one, powers; `measured_to`: where they
+    were seen."""
+    joint, top = int(v.info["joint"]), float(v.info["torque"])
+    c = float(bench.compliance[joint])
+    terms, unit = [], []
+    for kind in v.info["kinds"]:
+        if kind == "line":
+            terms.append(Term("compliance"))
+        elif isinstance(kind, tuple):
+            terms.append(Term("compliance", {f"net_{kind[0]}": kind[1]}))
+        elif isinstance(kind, float):
+            terms.append(Term("compliance", {"beyond": kind * top}))
+        else:
+            terms.append(Term(f"compliance_{kind}"))
+        unit.append(c / top ** (_POWERS.get(kind, 1) - 1))
+    constants = {"joint": joint, "measured_to": top}
+    if "tool_kg" in v.info:
+        constants["tool"] = float(v.info["tool_kg"])
+    return Law(constants, tuple(terms)), np.array(unit, dtype=float)
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Deflection of the joint over its torque."""
+    joint = law.constants["joint"]
+    x, weight = bench.true_torque[:, joint], bench.weight(joint, law.constants.get("tool", TOOL_KG))
+    shapes = {
+        "compliance_quadratic": x * np.abs(x),
+        "compliance_cubic": x**3,
+        "compliance_even": x**2,
+    }
+    out = []
+    for t in law.terms:
+        bent = hinge(x, t.shape.get("beyond", 0.0))
+        for key, bend in (("net_above", above), ("net_beyond", beyond)):
+            if key in t.shape:
+                bent = bend(x, weight, t.shape[key])
+        out.append(bench.joint_column(joint, shapes.get(t.coefficient, bent)))
+    return out
+
+
+_POWERS = {"quadratic": 2, "cubic": 3, "even": 2}
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
     lengths=("change_of_compliance_over_range",),
 )

@@ -17,8 +17,10 @@ from math import comb
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.interval import LEAST_FACTOR, Found, Parameter
+from identification.gap.law import Law, Laws, Term
 from identification.gap.variants import Variant, variant
 from identification.uncertainty import TWO_SIDED
 
@@ -85,8 +87,22 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     return out
 
 
+def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: joints whose compliance is another."""
+    joints = [int(j) for j in v.info["joints"]]
+    terms = tuple(Term("compliance", {"joint": j}) for j in joints)
+    return Law({}, terms), np.asarray(bench.compliance[joints])
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Deflection of the joint per unit of compliance: its torque."""
+    joints = [t.shape["joint"] for t in law.terms]
+    return [bench.joint_column(j, bench.torque[:, j]) for j in joints]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
 )

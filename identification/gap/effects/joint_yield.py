@@ -34,9 +34,11 @@ from identification.gap.effects.knees import (
     knees,
     memories,
 )
+from identification.gap.effects.knees_law import law_of_knee, states_of
 from identification.gap.effects.specimens import OWN, off, own_stiffness, with_other_springs
 from identification.gap.effects.thresholds import moved, of_knee
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws
 from identification.gap.variants import BACK_UNDER_WEIGHT, TAKEN_BACK, UNDER_WEIGHT, Variant
 from identification.uncertainty import TWO_SIDED
 
@@ -128,10 +130,28 @@ def _named(bench: Bench, v: Variant, found: Parameter) -> dict[str, Parameter]:
     return {"threshold": net_of, "threshold_of_load": found}
 
 
+def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    joint = int(v.info["joint"])
+    return law_of_knee(v, {"joint": joint}, float(bench.compliance[joint]))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Column of every term, in their order: state of radius `threshold` on the torque, lagging; of
+    a term without one the line of its own spring."""
+    joint = law.constants["joint"]
+    torque = bench.true_torque[:, joint]
+    states = states_of(bench, law, torque)
+    return [
+        bench.joint_column(joint, bench.sense * states[i] if i in states else torque)
+        for i in range(len(law.terms))
+    ]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
     not_negative=("threshold", "threshold_of_load"),
     lengths=("slope_beyond_over_elastic",),
 )

@@ -20,6 +20,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term
 from identification.gap.variants import Variant, variant
 
 WORD = "link_flexibility"
@@ -78,8 +79,36 @@ def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     return out
 
 
+def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: segments, how they strain, as multiples of the nominal tube of the robot file."""
+    terms = tuple(
+        Term("over_nominal", {"segment": int(k), "strain": strain})
+        for k in v.info["segments"]
+        for strain in STRAINS
+    )
+    return Law({"placed": v.info["placed"]}, terms), np.ones(len(terms))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Compliance of the segment along the direction times the load."""
+    place = PLACED.index(law.constants.get("placed", PLACED[0]))
+    each = np.stack([s.links[place] for s in bench.data.setups])[bench.rows.setup]
+    most = max(t.shape["segment"] for t in law.terms)
+    if most >= each.shape[1]:
+        raise ValueError(
+            f"link_flexibility of segment {most + 1}: the robot has {each.shape[1]} of them"
+        )
+    return [
+        bench.outside_column(
+            each[:, t.shape["segment"], STRAINS.index(t.shape["strain"])] * bench.load
+        )
+        for t in law.terms
+    ]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
 )

@@ -14,14 +14,15 @@ Source: how well screws are set up by eye on floors and stands; friction of stee
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array, Flags
+from identification.gap.data import Array, Flags, Setup
 from identification.gap.effect import Effect
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term, along, in_pose, triple
 from identification.gap.variants import Variant, variant
 
 WORD = "load_misalignment"
@@ -52,7 +53,7 @@ def variants(bench: Bench) -> list[Variant]:
     for name in dict.fromkeys(s.direction for s in bench.data.setups):
         mine = np.array([s.direction == name for s in bench.data.setups])[bench.rows.setup]
         known[name] = [
-            _Known(label, shapes, _columns(bench, shapes, mine), share, _read(bench, shapes, mine))
+            _Known(label, shapes, _in_pool(bench, shapes, mine), share, _read(bench, shapes, mine))
             for label, shapes, share in _kinds(bench, float(np.abs(bench.load[mine]).max()) or 1.0)
         ]
     groups = [([name], f"direction {name}", 0.3) for name in known]
@@ -83,7 +84,7 @@ def _each_pose(bench: Bench) -> list[Variant]:
     out = []
     for label, powers, share in (("", (1,), 1.0), (", turning", (1, 2, 3), 0.7)):
         shapes = [tuple(Shape(p, top) for p in powers) for top in tops]
-        columns = [_columns(bench, each, rows.setup == k) for k, each in enumerate(shapes)]
+        columns = [_in_pool(bench, each, rows.setup == k) for k, each in enumerate(shapes)]
         out.append(
             variant(WORD, f"each pose{label}", [c for mine in columns for c in mine], SCALES,
                     positive=False, prior=_ALL * _EACH_POSE_SHARE * share,
@@ -101,7 +102,7 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
         return []
     common = [c for k in straight.values() for c in k.columns]
     shapes = [k.shapes for k in straight.values()]
-    own = [c for r in runs for c in _columns(bench, shapes[0], bench.rows.run == r)]
+    own = [c for r in runs for c in _in_pool(bench, shapes[0], bench.rows.run == r)]
     root = np.diag([1.0] * len(common) + [_BETWEEN_RUNS] * len(own))
     return [variant(WORD, "each run", [*common, *own], SCALES, root, positive=False,
                     prior=_ALL * _EACH_RUN_SHARE, directions=list(straight), shapes=shapes,
@@ -132,7 +133,7 @@ def _kinds(bench: Bench, top: float) -> list[tuple[str, tuple[Shape, ...], float
     return out
 
 
-def _columns(bench: Bench, shapes: tuple[Shape, ...], mine: Flags) -> list[int]:
+def _in_pool(bench: Bench, shapes: tuple[Shape, ...], mine: Flags) -> list[int]:
     loads = [np.where(mine, across(bench, shape), 0.0) for shape in shapes]
     both = np.eye(2)[:, None, :].repeat(len(bench.data.setups), axis=1)  # along either tangent
     return [bench.add(pulled(bench, load, each)) for load in loads for each in both]
@@ -205,8 +206,72 @@ def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     }
 
 
+def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
+    shares reached at a load, in proportion to it or to a power of it; shares that drag; what a rig
+    without an arm gives way under these; shares of single runs (numbers from 0) beyond these."""
+    names = v.info["directions"]
+    of_pose = v.info.get("poses", [""] * len(names))
+    setups = [
+        next(s for s in bench.data.setups if s.direction == d and p in ("", s.pose))
+        for d, p in zip(names, of_pose, strict=True)
+    ]
+    poses = [{"pose": p} if p else {} for p in of_pose]
+    terms, given = [], []
+    for s, pose, shapes in zip(setups, poses, v.info["shapes"], strict=True):
+        terms += [
+            Term("tangent", _sideways(s, k) | _goes(how) | pose) for how in shapes for k in range(2)
+        ]
+    for s, shapes, read in zip(setups, v.info["shapes"], v.info["read"], strict=True):
+        along_it = {"along": triple(s.unit_vector)}
+        given += [
+            (Term("gives", along_it | _goes(how)), tangent / USUAL)
+            for how, tangent in zip(shapes, read, strict=False)
+        ]
+    for run in v.info.get("runs", ()):
+        s = bench.data.setups[bench.rows.setup[int(np.argmax(bench.rows.run == run))]]
+        terms += [Term("tangent", _sideways(s, k) | {"run": int(run)}) for k in range(2)]
+    units = [1.0] * len(terms) + [unit for _, unit in given]
+    return Law({}, (*terms, *(term for term, _ in given))), np.array(units, dtype=float)
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Deflections under the load across, for setups of the same direction and sense."""
+    out = []
+    for t in law.terms:
+        drags, at = t.shape.get("drags_over", 0.0), t.shape.get("at_load")
+        power = 1.0 if at is None else 0.0 if drags else 1 + t.shape.get("power", 1.0)
+        how = Shape(power, at or 1.0, drags)
+        there = (along(bench, t.shape["along"]) > 0) & in_pose(bench, t.shape.get("pose"))
+        if "run" in t.shape:
+            there &= bench.rows.run == t.shape["run"]
+        load = np.where(there, across(bench, how), 0.0)
+        if t.coefficient == "gives":
+            out.append(gives(bench, load))
+            continue
+        shares = np.stack([s.tangents @ np.array(t.shape["across"]) for s in bench.data.setups])
+        out.append(pulled(bench, load, shares))
+    return out
+
+
+def _goes(how: Shape) -> dict[str, Any]:
+    shape: dict[str, Any] = {}
+    if how.power != 1:
+        shape["at_load"] = how.at_N
+    if how.power > 2:
+        shape["power"] = float(how.power - 1)
+    if how.drags_N:
+        shape["drags_over"] = how.drags_N
+    return shape
+
+
+def _sideways(setup: Setup, k: int) -> dict[str, Any]:
+    return {"along": triple(setup.unit_vector), "across": triple(setup.tangents[k])}
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns, through_springs=True),
 )

@@ -13,6 +13,8 @@ KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it
 SOFTER = 2.5  # of soft ends one than the other
 UNEVEN = {"softer up": (SOFTER, 1.0), "softer down": (1.0, SOFTER)}
 _LOOSE = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "arctan")
+PLACED = ("gap", "held", "dragged")  # by the data: flanks.py
+HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 KINDS = (*_LOOSE, "rubbing", *KEPT)
 _RADII = {"friction": 1.0, "friction 3": 3.0, "rubbing": 0.7, "friction 1/2": 0.5}  # zones
 
@@ -82,3 +84,23 @@ def _side(x: Array, zone: float, fresh: Flags) -> Array:
     knows[0] = True
     last = np.maximum.accumulate(np.where(knows, np.arange(len(x)), 0))
     return np.where(pushed[last], np.sign(x[last]), 0.0)
+
+
+def net(bench: Bench, j: int, crossing: str, kg: float, preload: float = 0.0) -> Array:
+    """(n,) Nm whose zero the play is passed at: of the load, or with the weights and a tool of that
+    mass; with a preload (Nm)."""
+    torque = bench.true_torque[:, j]
+    return preload + (torque + bench.weight(j, kg) if crossing == "weight" else torque)
+
+
+def resting_columns(bench: Bench, joint: int) -> dict[str, Array]:
+    """Pose -> column (size,) of a reading that is off in it: the controller sends the joint to
+    where its reading should be, whichever side of its play it lies at."""
+    if not bench.has_q:
+        return {}
+    poses, out = [s.pose for s in bench.data.setups], {}
+    for pose in dict.fromkeys(poses):
+        q = np.zeros((bench.rows.n, bench.data.joints))
+        q[np.array([p == pose for p in poses])[bench.rows.setup], joint] = 1.0
+        out[pose] = bench.stacked(q=q)
+    return out

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term, triple
 from identification.gap.variants import Variant, variant
 
 WORD = "pose_error"
@@ -207,8 +208,50 @@ def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     return out
 
 
+def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: offset of the tool in the flange frame, angles of the joints, turn of the base; about
+    where they are."""
+    terms = []
+    if v.info["kind"] in ("tool", "both"):
+        terms += [Term("offset", {"axis": a}) for a in "xyz"]
+    if v.info["kind"] in ("joints", "both"):
+        terms += [Term("angle", {"joint": j}) for j in range(bench.data.joints)]
+    if v.info["kind"] == "base":
+        terms = [Term("turn", {"axis": a}) for a in "xyz"]
+    about: dict[str, Any] = {
+        "about_offset": triple(v.info["offset_m"]),
+        "about_angles": tuple(float(a) for a in v.info["angles_rad"]),
+        "about_turn": triple(v.info["turn_rad"]),
+        "reads": float(v.info["reads"]),
+    }
+    if v.info["pose"]:
+        about["only_in"] = str(v.info["pose"])
+    if not v.info["read"]:
+        about["unread"] = True
+    return Law(about, tuple(terms)), np.ones(len(terms))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Change of the levers, by the secants of the library."""
+    at = np.array(law.constants["about_offset"]), np.array(law.constants["about_angles"])
+    reads = float(law.constants["reads"])
+    pose = str(law.constants.get("only_in", ""))
+    read = not law.constants.get("unread", False)
+    moved = secants(bench, *at, bench.compliance, reads, pose, read)
+    about = np.array(law.constants.get("about_turn", (0.0, 0.0, 0.0)))
+    turns = turned(bench, about, bench.compliance, reads)
+    columns = {"offset": moved[:3], "angle": moved[3:], "turn": turns}
+    return [
+        columns[t.coefficient][
+            t.shape["joint"] if "joint" in t.shape else "xyz".index(t.shape["axis"])
+        ]
+        for t in law.terms
+    ]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns, through_springs=True),
 )

@@ -25,7 +25,9 @@ from identification.gap.effects.drift import (
     rates,
     shares,
 )
+from identification.gap.effects.drift_law import OF_SESSION, law_of_path, path_of
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term, along
 from identification.gap.variants import Variant, variant
 
 WORD = "thermal_drift"
@@ -67,8 +69,30 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     return changes(bench, v, found, "mm", 1e3)
 
 
+def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms of the path for every direction."""
+    constants, terms, scale = law_of_path(bench, v)
+    every: list[Term] = []
+    vectors = {s.direction: s.unit_vector for s in reversed(bench.data.setups)}
+    names = list(dict.fromkeys(s.direction for s in bench.data.setups))
+    for name in names:
+        n = tuple(float(x) for x in vectors[name])
+        every += [Term(t.coefficient, {**t.shape, "along": n}) for t in terms]
+    law = Law(constants | {"quantity": "displacement"}, tuple(every))
+    return law, np.tile(scale, len(names))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """Along the term's direction; against it, the other way round."""
+    return [
+        bench.outside_column(along(bench, t.shape["along"]) * path_of(bench, law, t))
+        for t in law.terms
+    ]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns, of_session=OF_SESSION, lasts=False),
 )

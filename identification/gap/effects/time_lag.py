@@ -31,6 +31,7 @@ from identification.gap.history import (
     standing_on,
 )
 from identification.gap.interval import Found, Parameter, normal
+from identification.gap.law import Law, Laws, Term
 from identification.gap.variants import Variant, variant
 from identification.gap.white import white_sd
 
@@ -283,9 +284,28 @@ def _lagging(bench: Bench, channel: str, kind: str) -> tuple[Array, Array]:
     return bench.lags[channel, kind]
 
 
+def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """One term: 1 where the lag is as long as stated; of a window half delay, half filter."""
+    constants = {
+        "channel": str(v.info["channel"]),
+        "way": str(v.info["kind"]),
+        "lag": float(v.info["lag_s"]),
+    }
+    terms = (Term("share"),) * len(v.columns)
+    return Law(constants, terms), np.ones(len(terms))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """The channel shows where the load was a little earlier."""
+    c = law.constants
+    kinds = ("delay", "filter") if c["way"] == "window" else (c["way"],)
+    return [late(bench, c["channel"], kind, c["lag"]) for kind in kinds]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns),
     not_negative=("lag",),
 )

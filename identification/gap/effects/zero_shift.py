@@ -7,9 +7,13 @@ Source: knocked targets, re-clamped sensors, a zero key pressed between runs.
 
 from __future__ import annotations
 
+import numpy as np
+
 from identification.gap.bench import Bench
+from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.interval import Found, Parameter
+from identification.gap.law import Law, Laws, Term
 from identification.gap.variants import Variant, variant
 
 WORD = "zero_shift"
@@ -47,8 +51,32 @@ def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     return {f"shift{i + 1}": found.one(i, "mm", 1e3) for i in range(len(found.w))}
 
 
+def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: one lasting jump before a run, or the offsets of whole runs (numbers from 0)."""
+    if v.info["runs"]:
+        terms = tuple(Term("shift", {"run": int(r), "lasts": True}) for r in v.info["runs"])
+    else:
+        terms = tuple(Term("shift", {"run": int(r), "lasts": False}) for r in v.info["shifts"])
+    return Law({}, terms), np.ones(len(terms))
+
+
+def _columns(bench: Bench, law: Law) -> list[Array]:
+    """The runs of that setup, from the jump on or that one alone."""
+    rows, out = bench.rows, []
+    for t in law.terms:
+        r = t.shape["run"]
+        mine = np.zeros(rows.n)
+        if np.any(rows.run == r):
+            setup = rows.setup[int(np.argmax(rows.run == r))]
+            mine = np.where((rows.setup == setup) & (rows.run >= r), 1.0, 0.0)
+            mine = mine if t.shape["lasts"] else np.where(rows.run == r, 1.0, 0.0)
+        out.append(bench.outside_column(mine))
+    return out
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
+    laws=Laws(_describe, _columns, of_session=("shift",), lasts=False),
 )

@@ -1,14 +1,17 @@
-"""`joint_yield` and `base_slip`: plays beyond thresholds, in absolute torques and compliances."""
+"""Knees in absolute units: plays beyond thresholds, in newton metres and compliances."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
-from identification.gap.effects import base_slip, flow_back, knees
+from identification.gap.effects import flow_back
 from identification.gap.effects.flows import Flow, states
-from identification.gap.forms.law import (
+from identification.gap.effects.knees import HARDENED, grown
+from identification.gap.law import (
     ACROSS,
     ANEW,
     HUNG,
@@ -28,26 +31,20 @@ from identification.gap.variants import (
     Variant,
 )
 
-_MEMORY = {"": KEPT, LASTING: ACROSS, TAKEN_BACK: LOST, knees.HARDENED: KEPT,
+_MEMORY = {"": KEPT, LASTING: ACROSS, TAKEN_BACK: LOST, HARDENED: KEPT,
            UNDER_WEIGHT: HUNG, BACK_UNDER_WEIGHT: HUNG_LOST, SET_UP_ANEW: ANEW}  # fmt: skip
 _SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
 
-def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+def law_of_knee(v: Variant, place: dict[str, Any], unit: float) -> tuple[Law, Array]:
     """Terms: plays (threshold), what flows back once the threshold `after` was passed, and a spring
-    of its own."""
+    of its own. place: constants that say where it is; unit: of all coefficients."""
     info = v.info
     constants = {"memory": _MEMORY[info["memory"]], "flow_time": float(info["flow_s"])}
     if info.get("square"):
         constants["flow_exponent"] = _SQUARE
-    if v.word == base_slip.WORD:
-        constants |= {"axis": info["axis"], "depth": float(info["depth_m"])}
-        unit = float(v.info["natural"])
-    else:
-        constants |= {"joint": int(info["joint"])}
-        unit = float(bench.compliance[info["joint"]])
     radius = [float(r) for r in info["radius"]]
-    begins = "grows_beyond" if info["memory"] == knees.HARDENED else "threshold"
+    begins = "grows_beyond" if info["memory"] == HARDENED else "threshold"
     terms = [Term("compliance", {begins: r}) for r in radius]
     own = bool(info.get("other_springs"))
     if len(v.columns) > len(radius) + own:
@@ -57,30 +54,10 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
         ratchet = {"ratchets_beyond": flow_back.RATCHET_FROM * top}
         terms.append(Term("compliance", ratchet | after))
     terms += [Term("compliance")] * own
-    return Law(constants, tuple(terms)), np.full(len(terms), unit)
+    return Law(constants | place, tuple(terms)), np.full(len(terms), unit)
 
 
-def columns(bench: Bench, law: Law) -> list[Array]:
-    """Column of every term, in their order: state of radius `threshold` on the torque (or moment),
-    lagging; of a term without one the line of its own spring."""
-    c = law.constants
-    if "joint" in c:
-        load = bench.true_torque[:, c["joint"]]
-    else:
-        lever = base_slip.lever_of(bench, c["axis"], c["depth"])
-        load = lever * bench.true_load
-    states, out = _states(bench, law, load), []
-    for i in range(len(law.terms)):
-        if i not in states:
-            out.append(bench.joint_column(c["joint"], load))
-        elif "joint" in c:
-            out.append(bench.joint_column(c["joint"], bench.sense * states[i]))
-        else:
-            out.append(bench.outside_column(lever * states[i]))
-    return out
-
-
-def _states(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
+def states_of(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
     """Number of the term -> its state (n,); those of a kind are made in one go. None of a spring of
     its own."""
     fresh = fresh_after(bench, law.constants["memory"])
@@ -93,7 +70,7 @@ def _states(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
     made = states(bench, Flow(load, radius, flow, fresh, weight, square))
     out = dict(zip(plays, made.T, strict=True))
     growing, beyond = _with(law, "grows_beyond")
-    out |= zip(growing, knees.grown(load, beyond, fresh).T, strict=True)
+    out |= zip(growing, grown(load, beyond, fresh).T, strict=True)
     for i in _with(law, "after")[0]:
         out[i] = _back(bench, law.terms[i], load, fresh)
     return out

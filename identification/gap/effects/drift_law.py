@@ -1,0 +1,67 @@
+"""Paths of drifts on absolute clocks, in seconds and kelvin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.bench import Bench
+from identification.gap.data import Array
+from identification.gap.effects.drift import RATES
+from identification.gap.law import Law, Term
+from identification.gap.variants import Variant
+
+OF_SESSION = ("drift_knot", "drift_per_kelvin")  # coefficients of paths without a law
+
+
+def law_of_path(bench: Bench, v: Variant) -> tuple[dict[str, object], tuple[Term, ...], Array]:
+    """Constants, terms and scales of a path of the library, in seconds and kelvin."""
+    span, label = bench.course.session_span, str(v.info["path"])
+    if label == "linear":
+        return {"path": "linear"}, (Term("drift_rate"),), np.array([1 / span])
+    if label == "root":
+        return {"path": "root"}, (Term("drift_per_root"),), np.array([span**-0.5])
+    if label.startswith("T "):
+        share = float(label[2:])
+        rise = 1 / (1 - np.exp(-1 / share))
+        term = Term("drift", {"time_constant": share * span})
+        return {"path": "exponential"}, (term,), np.array([rise])
+    if label == "rates":
+        rises = [1 / (1 - np.exp(-1 / r)) for r in RATES]
+        terms = (Term("drift_rate"), *(Term("drift", {"time_constant": r * span}) for r in RATES))
+        return {"path": "rates"}, terms, np.array([1 / span, *rises])
+    if label == "free":
+        places = np.linspace(0, span, int(v.info["pieces"]))
+        terms = tuple(Term("drift_knot", {"at": float(t)}) for t in places)
+        return {"path": "free"}, terms, np.ones(len(terms))
+    values = bench.rows.temperature
+    assert values is not None
+    sensor = "mean" if label.startswith("mean") else label.rsplit(maxsplit=1)[-1]
+    read = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
+    term = Term("drift_per_kelvin", {"sensor": sensor})
+    return {"path": "temperature"}, (term,), np.array([1 / float(np.ptp(read))])
+
+
+def path_of(bench: Bench, law: Law, term: Term) -> Array:
+    """(n,): the path per unit of the coefficient, 0 at the start of the session."""
+    t = bench.rows.session - bench.rows.session.min()
+    path = law.constants["path"]
+    if path == "linear" or term.coefficient == "drift_rate":
+        return np.asarray(t)
+    if path == "root":
+        return np.asarray(np.sqrt(t))
+    if path in ("exponential", "rates"):
+        return np.asarray(1 - np.exp(-t / term.shape["time_constant"]))
+    if path == "free":
+        places = sorted({x.shape["at"] for x in law.terms if _twin(x, term)})
+        hat = np.equal(places, term.shape["at"]).astype(float)
+        return np.asarray(np.interp(t, places, hat))
+    values = bench.rows.temperature
+    if values is None:
+        return np.zeros(bench.rows.n)
+    sensor = term.shape["sensor"]
+    v = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
+    return np.asarray(v - v[0])
+
+
+def _twin(one: Term, other: Term) -> bool:
+    return one.shape.get("along") == other.shape.get("along")
