@@ -12,7 +12,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.gap import refine
 from identification.gap.effects import EFFECTS
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
@@ -23,7 +22,7 @@ from rig.worlds.benches import draw as benches
 from rig.worlds.hidden import draw as hidden
 from rig.worlds.hidden import textbook
 from rig.worlds.hidden import words as drawn
-from tests.conformance.effect_benches import OUTSIDE, PAIRS, of
+from tests.conformance.effect_benches import OUTSIDE, PAIRS, module, of
 
 ANSWERS = {"none", "unknown"}
 
@@ -51,15 +50,6 @@ def test_effects_come_in_the_order_of_the_words_and_under_their_own() -> None:
 
 # --- subsets: a new word goes to one of the two sides ------------------------------------------
 
-ANY_GRID = {  # linear in all that is unknown, or hardly changed between the points of a grid
-    "joint_creep", "link_flexibility", "base_compliance", "force_scale", "displacement_scale",
-    "thermal_drift", "zero_shift", "joint_stiffness_error",
-}  # fmt: skip
-NO_LENGTH = {  # in newtons, seconds, angles that springs give, or of an instrument
-    "link_flexibility", "base_compliance", "load_misalignment", "force_drift", "force_scale",
-    "displacement_scale", "thermal_drift", "zero_shift", "time_lag", "pose_error",
-    "joint_stiffness_error",
-}  # fmt: skip
 ALIKE_WITHOUT_ARM = {  # said in words that speak of no joint and no laser
     "load_misalignment", "force_drift", "force_scale", "thermal_drift", "zero_shift", "time_lag",
 }  # fmt: skip
@@ -69,8 +59,6 @@ NO_HINGE = {  # instruments, drifts and seats, which the other engine has no par
 }  # fmt: skip
 
 SIDES: dict[str, tuple[Collection[str], set[str], Collection[str]]] = {
-    "refined": (refine._FINER, ANY_GRID, WORDS),
-    "lengths": ([w for w in WORDS if EFFECTS[w].lengths], NO_LENGTH, WORDS),
     "meanings without an arm": (
         diagnose_text._OF_ONE_SPRING, ALIKE_WITHOUT_ARM, set(WORDS) - NEED_ARM,
     ),
@@ -84,8 +72,17 @@ def test_word_is_in_the_table_or_named_as_left_out(name: str) -> None:
     assert sorted([*some, *others]) == sorted(words)
 
 
-def test_words_that_grids_meet_badly_are_refined() -> None:
-    assert set(refine._GRIDS) <= set(refine._FINER)
+@pytest.mark.parametrize("word", WORDS)
+def test_every_effect_is_complete(word: str) -> None:
+    """What its file declares is what is used, and its shapes say something on some bench. Whether
+    what it gives is right, test_effects and the tests of model files ask."""
+    assert EFFECTS[word] is module(word).EFFECT
+    assert EFFECTS[word].variants is module(word).variants
+    assert names()[word]
+
+
+def test_words_that_are_scored_beside_the_leading_one_are_refined() -> None:
+    assert all(effect.finer is not None for effect in EFFECTS.values() if effect.beside)
 
 
 def test_laws_that_go_through_springs_name_them_in_model_files() -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from identification.arm import tool_offset
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.effects import library
+from identification.gap.effects import EFFECTS, library
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
 from rig.diagnose import diagnose
@@ -321,7 +320,7 @@ def test_null_is_exactly_nothing_and_columns_are_finite(tmp_path: Path, word: st
     """Coefficient zero switches an effect off; every column is finite and none is all zero."""
     data = gap_data(measure(tmp_path, nothing, ("P1", "P2")))
     bench = make_bench(data)
-    variants = import_module(f"identification.gap.effects.{word}").variants(bench)
+    variants = EFFECTS[word].variants(bench)
     assert variants
     assert {v.word for v in variants} == {word}
     columns = np.column_stack(bench.columns)

@@ -10,14 +10,21 @@ import pytest
 
 from identification.gap.base import base_columns
 from identification.gap.bench import Bench, make_bench
+from identification.gap.closer import Word, closing_in
 from identification.gap.compare import by_word, closest, score
 from identification.gap.data import Array
-from identification.gap.effects import joint_backlash, joint_hysteresis, knees_closer, library
+from identification.gap.effects import (
+    EFFECTS,
+    joint_backlash,
+    joint_hysteresis,
+    knees_closer,
+    library,
+)
 from identification.gap.effects.friction_law import EXPONENTIAL
 from identification.gap.effects.joint_hysteresis import REACHES
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
-from identification.gap.refine import _FINER, _closing_in, _Word, refine
+from identification.gap.refine import refine
 from identification.gap.variants import Variant, variant
 from tests.unit.test_gap_forms import arm_data, bench_without_arm
 
@@ -201,8 +208,9 @@ def test_what_shows_nothing_is_not_looked_at_closely(word: str) -> None:
         families = {w: [s for s in alone if s.variant.word == w] for w in words}
         lead = closest(families[words[0]]).log_evidence
         beside_it = [s._replace(log_evidence=lead + beside) for s in mine]
-        looked = _Word(engine, families, [words[0], word], families[word], beside_it)
-        return len(_FINER[word](looked))
+        finer = EFFECTS[word].finer
+        assert finer is not None
+        return len(finer(Word(engine, families, [words[0], word], families[word], beside_it)))
 
     few, many = told(0.5, 1.0), told(0.5, 20.0)
     assert few == 0 if word != "joint_backlash" else few < many
@@ -220,7 +228,7 @@ def test_plays_are_closed_in_on_only_where_one_shows(
         looked.append(closer)
         return []
 
-    monkeypatch.setattr("identification.gap.refine._closing_in", spy)
+    monkeypatch.setattr(joint_backlash, "closing_in", spy)
     bench = make_bench(arm_data())
     variants = library(bench, ["joint_nonlinear_stiffness", "joint_backlash"])
     curve = next(v for v in variants if v.word != "joint_backlash" and v.info["joint"] == 1)
@@ -232,7 +240,8 @@ def test_plays_are_closed_in_on_only_where_one_shows(
     alone = [mine._replace(log_evidence=none)]
     families["joint_backlash"] = alone
     seen = [mine._replace(log_evidence=lead + beside)]
-    _FINER["joint_backlash"](_Word(engine, families, list(families), alone, seen))
+    assert joint_backlash.EFFECT.finer is not None
+    joint_backlash.EFFECT.finer(Word(engine, families, list(families), alone, seen))
     assert looked[0] == (joint_backlash.CLOSE if closely else joint_backlash.CLOSE[:1])
 
 
@@ -251,11 +260,11 @@ def test_looks_move_on_until_the_best_stays(monkeypatch: pytest.MonkeyPatch) -> 
             for v in family
         ]
 
-    monkeypatch.setattr("identification.gap.refine._scored_beside", scored)
+    monkeypatch.setattr("identification.gap.closer.scored_beside", scored)
     word = SimpleNamespace(engine=SimpleNamespace(extend=lambda: None, bench=None),
                            families={}, ranked=[])  # fmt: skip
     start = SimpleNamespace(variant=variant("joint_backlash", "start", [0], (1.0,), at=0.0))
-    finer = _closing_in(word, refined, [start], (0.5, 0.1))  # type: ignore[arg-type, list-item]
+    finer = closing_in(word, refined, [start], (0.5, 0.1))  # type: ignore[arg-type, list-item]
     best = min((float(v.info["at"]) for v in finer), key=lambda at: abs(at - 3.2))
     assert best == pytest.approx(3.2, abs=0.15)
     assert len(finer) == 3 * 3  # one look a share, wherever it ended

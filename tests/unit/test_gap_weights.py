@@ -9,6 +9,7 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
+from identification.gap.closer import places
 from identification.gap.compare import Scored, score
 from identification.gap.data import Array, Setup
 from identification.gap.effects import (
@@ -25,7 +26,7 @@ from identification.gap.history import bristles, flowing_play, play
 from identification.gap.interval import TWO_SIDED, Softer
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
-from identification.gap.refine import _places, refine
+from identification.gap.refine import refine
 from identification.gap.rows import reduce_rows
 from identification.gap.several import family_of
 from identification.gap.variants import variant
@@ -359,9 +360,9 @@ def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> 
 
     alone = [scored(1, "round"), scored(1, "sharp"), scored(2, "sharp")]
     beside = [scored(3, "sharp"), scored(3, "sharp"), scored(4, "sharp"), scored(5, "sharp")]
-    found = _places(alone, beside, is_sharp)
+    found = places(alone, beside, is_sharp)
     assert [s.variant.info["joint"] for s in found] == [1, 3, 4]
-    assert _places(alone, [], is_sharp) == alone[1:]
+    assert places(alone, [], is_sharp) == alone[1:]
 
 
 def test_a_joint_shows_strong_friction_in_a_single_loading_a_specimen_none() -> None:

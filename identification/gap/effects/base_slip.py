@@ -11,6 +11,7 @@ Source: Coulomb friction in the bolted joint of the mounting, effective radius a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
+from identification.gap.effects import knees_closer
 from identification.gap.effects.base_compliance import moments
 from identification.gap.effects.knees import knee_at, knee_variants
 from identification.gap.effects.knees_law import law_of_knee, states_of
@@ -152,6 +154,8 @@ EFFECT = Effect(
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns),
-    not_negative=("threshold", "threshold_of_force"),
     lengths=("slope_beyond_over_elastic",),
+    finer=partial(knees_closer.finer, between=between),
+    beside=True,
+    not_negative=("threshold", "threshold_of_force"),
 )

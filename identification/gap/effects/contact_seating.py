@@ -18,6 +18,7 @@ from collections.abc import Callable
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.closer import Word, closing_in
 from identification.gap.data import Array, Flags
 from identification.gap.effect import Effect
 from identification.gap.interval import Found, Parameter
@@ -265,10 +266,17 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     return [bench.outside_column(lost(bench, *one)) for one in each]
 
 
+def _look_closer(word: Word) -> list[Variant]:
+    kinds = {slack_of(s.variant): s for s in reversed(word.alone)}
+    slacks = [s for kind, s in kinds.items() if kind]
+    return closing_in(word, refined, slacks)
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns),
     lengths=("depth",),
+    finer=_look_closer,
 )

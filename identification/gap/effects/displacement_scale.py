@@ -61,4 +61,6 @@ EFFECT = Effect(
     variants=variants,
     parameters=factor,
     laws=Laws(_describe, _columns),
+    lengths=(),
+    finer=None,
 )

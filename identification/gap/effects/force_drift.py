@@ -12,11 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.closer import about_springs
 from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.effects.drift import (
@@ -216,9 +218,12 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     return out
 
 
+_LAWS = Laws(_describe, _columns, through_springs=True, of_session=OF_SESSION, lasts=False)
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
-    laws=Laws(_describe, _columns, through_springs=True, of_session=OF_SESSION, lasts=False),
+    laws=_LAWS,
+    lengths=(),
+    finer=partial(about_springs, _LAWS),
 )

@@ -86,4 +86,6 @@ EFFECT = Effect(
     variants=variants,
     parameters=factor,
     laws=Laws(_describe, _columns, through_springs=True),
+    lengths=(),
+    finer=None,
 )

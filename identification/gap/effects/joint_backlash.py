@@ -22,6 +22,7 @@ Source: lost motion in catalogues of strain wave gears.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 from math import exp
 from typing import Any
@@ -29,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.bench import TOOL_KG, Bench
+from identification.gap.closer import Word, closing_in, nearly_leads, places, seen
 from identification.gap.data import Array, Flags
 from identification.gap.effect import Effect
 from identification.gap.effects import lost_motion_law
@@ -318,11 +320,29 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     return {"width": normal(seen.value, sd**2, seen.unit)}
 
 
+def _look_closer(word: Word) -> list[Variant]:
+    """Beside the leading word; and alone, where it explains nearly as much: that may be a curve
+    which does what the play does. Ends of which one is softer where a play is there to see."""
+    shown = seen(word)
+    looks = [(word, places(word.alone, word.beside), shown)]
+    if word.beside and nearly_leads(word):
+        looks.append((replace(word, ranked=[WORD]), word.alone[:1], True))
+    out: list[Variant] = []
+    for of, starts, closely in looks:
+        closer = CLOSE if closely else CLOSE[:1]
+        out += closing_in(of, refined, starts, closer)
+        if closely:
+            out += closing_in(of, uneven, starts, CLOSE)
+    return out
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
     laws=Laws(lost_motion_law.describe, lost_motion_law.columns, of_session=("place", "rest")),
-    not_negative=("width",),
     lengths=("width",),
+    finer=_look_closer,
+    beside=True,
+    not_negative=("width",),
 )

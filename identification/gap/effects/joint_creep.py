@@ -195,4 +195,5 @@ EFFECT = Effect(
     parameters=_parameters,
     laws=Laws(_describe, _columns),
     lengths=("creep_fraction", "creep_fraction_of_run"),
+    finer=None,
 )

@@ -28,6 +28,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.closer import Word, places
 from identification.gap.data import Array, Flags
 from identification.gap.effect import Effect
 from identification.gap.effects import friction_law
@@ -328,11 +329,24 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
 _SLIPS = 0.98  # of the largest load: what slips beyond that only hardly shows
 
 
+def _look_closer(word: Word) -> list[Variant]:
+    bench, out = word.engine.bench, []
+    for s in places(word.alone, word.beside):
+        out += closer(bench, s.variant)
+        out += growing(bench, s.variant)
+        out += outlasting(bench, s.variant)
+    for s in places(word.alone, word.beside, hangs):
+        out += refined(bench, s.variant)
+    return out
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
     laws=Laws(friction_law.describe, friction_law.columns),
-    not_negative=("friction",),
     lengths=("share_through_friction",),
+    finer=_look_closer,
+    beside=True,
+    not_negative=("friction",),
 )

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.bench import TOOL_KG, Bench
+from identification.gap.closer import Word, closing_in
 from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.effects.curves import above, beyond, hinge
@@ -290,10 +291,19 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
 _POWERS = {"quadratic": 2, "cubic": 3, "even": 2}
 
 
+def _look_closer(word: Word) -> list[Variant]:
+    odd = [s.variant for s in word.alone if "line" in s.variant.info]
+    bench = word.engine.bench
+    bends = [s for s in word.alone if " bend " in s.variant.label]
+    finer = closing_in(word, corners, bends[:1])
+    return finer + [f for v in odd[:1] for f in refined(bench, v)]
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns),
     lengths=("change_of_compliance_over_range",),
+    finer=_look_closer,
 )

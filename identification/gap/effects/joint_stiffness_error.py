@@ -105,4 +105,6 @@ EFFECT = Effect(
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns),
+    lengths=(),
+    finer=None,
 )

@@ -25,6 +25,7 @@ import numpy as np
 from identification.gap.bench import TOOL_SD_KG, Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
+from identification.gap.effects import knees_closer
 from identification.gap.effects.flow_back import flowing_back
 from identification.gap.effects.knees import (
     SCALES,
@@ -152,6 +153,8 @@ EFFECT = Effect(
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns),
-    not_negative=("threshold", "threshold_of_load"),
     lengths=("slope_beyond_over_elastic",),
+    finer=knees_closer.finer,
+    beside=True,
+    not_negative=("threshold", "threshold_of_load"),
 )

@@ -3,24 +3,39 @@ other places of the word."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.closer import Word, closing_in, evidence, places, scored_beside, shows
 from identification.gap.effects import flows
 from identification.gap.effects.flows import Flow
-from identification.gap.effects.knees import SCALES, fresh_of, place_in, with_back
-from identification.gap.effects.specimens import OWN, with_other_springs
-from identification.gap.variants import BACK_UNDER_WEIGHT, TAKEN_BACK, Variant
+from identification.gap.effects.knees import SCALES, fresh_of, is_sharp, place_in, with_back
+from identification.gap.effects.specimens import OWN, plateaus, with_other_springs
+from identification.gap.variants import BACK_UNDER_WEIGHT, TAKEN_BACK, Variant, place_of
 
 FINE = 13  # radii about a threshold that was found on the grid, from 0.84 to 1.2 of it
 FLOWS_S = (1.2, 2.5, 5.0, 10.0, 25.0)  # in proportion to the overstress,
 SQUARE_S = (2.5, 6.0, 15.0)  # or with its square
 CLOSE = (0.4,)  # of a closer look
 _BETWEEN = (-0.5, -0.25, 0.25, 0.5)  # powers of two of a flow time
+
+Place = tuple[str, Mapping[str, Any]]  # with which a knee's label begins; its `knee_at`
+Between = Callable[[Bench, Variant], Sequence[Place]]
+
+
+def finer(word: Word, between: Between | None = None) -> list[Variant]:
+    """Closer to the best knees that were found, and these at the word's other places. between:
+    places about a knee that was found, where the grid of them is coarse."""
+    if not shows(word):
+        return []
+    best = places(word.alone, word.beside, is_sharp)
+    closer = closing_in(word, refined, best, CLOSE)
+    flat = [v for s in best for v in plateaus(word.engine.bench, s.variant)]
+    return closer + flat + _elsewhere(word, closer, between)
 
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
@@ -53,7 +68,37 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     return out
 
 
-Place = tuple[str, Mapping[str, Any]]  # with which a knee's label begins; its `knee_at`
+def _elsewhere(word: Word, closer: list[Variant], between: Between | None) -> list[Variant]:
+    """The best of the finer knees at the other places of the word: without joint readings one may
+    be as good as another, and that none was looked for there as closely is no evidence."""
+    bench = word.engine.bench
+    others: dict[tuple[str, tuple[object, ...]], Variant] = {}
+    for v in (s.variant for s in word.alone):
+        if is_sharp(v) and "weight" not in v.info:
+            others.setdefault((v.info["memory"], _axle(v)), v)
+    able = [v for v in closer if "weight" not in v.info]
+    if not able or len({place for _, place in others}) < 2:
+        return []
+    word.engine.extend()
+    found = sorted(scored_beside(word.engine, word.families, word.ranked, able), key=evidence)
+    moved = []
+    for v in (s.variant for s in found[-_ELSEWHERE:]):
+        there = [
+            (place_in(other.label), other.info)
+            for (memory, place), other in others.items()
+            if memory == v.info["memory"] and place != _axle(v)
+        ]
+        there += between(bench, v) if between is not None else []
+        moved += [(v, place) for place in there]
+    return elsewhere(bench, moved)
+
+
+def _axle(variant: Variant) -> tuple[object, ...]:
+    """Joint, or axis and its depth."""
+    return (*place_of(variant), variant.info.get("depth_m"))
+
+
+_ELSEWHERE = 3  # shapes that are looked at elsewhere
 
 
 def elsewhere(bench: Bench, found: Sequence[tuple[Variant, Place]]) -> list[Variant]:

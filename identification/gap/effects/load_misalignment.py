@@ -14,11 +14,13 @@ Source: how well screws are set up by eye on floors and stands; friction of stee
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.closer import about_springs
 from identification.gap.data import Array, Flags, Setup
 from identification.gap.effect import Effect
 from identification.gap.interval import Found, Parameter
@@ -269,9 +271,12 @@ def _sideways(setup: Setup, k: int) -> dict[str, Any]:
     return {"along": triple(setup.unit_vector), "across": triple(setup.tangents[k])}
 
 
+_LAWS = Laws(_describe, _columns, through_springs=True)
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
-    laws=Laws(_describe, _columns, through_springs=True),
+    laws=_LAWS,
+    lengths=(),
+    finer=partial(about_springs, _LAWS),
 )

@@ -17,16 +17,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.closer import Estimate, Word, estimate, evidence
+from identification.gap.compare import by_word, closest, marginal, score
 from identification.gap.data import Array
 from identification.gap.effect import Effect
+from identification.gap.explanation import conditioned
 from identification.gap.interval import Found, Parameter
 from identification.gap.law import Law, Laws, Term, triple
+from identification.gap.parts import Part
 from identification.gap.variants import Variant, variant
+from identification.gap.words import LINEAR
 
 WORD = "pose_error"
 OFFSETS_M = (0.01, 0.04, 0.15)
@@ -110,15 +116,6 @@ def refined(bench: Bench, found: Variant, estimate: Callable[[Variant], Estimate
                   "compliance": compliance, "reads": reads},
         )  # fmt: skip
     return [out]
-
-
-class Estimate(NamedTuple):
-    """Most probable coefficients (k,) of a variant, relative changes (m,) of the springs'
-    compliance, and what the displacement reads, over what it is."""
-
-    coefficients: Array
-    softer: Array
-    reads: float
 
 
 def secants(
@@ -249,9 +246,44 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     ]
 
 
+def _look_closer(word: Word) -> list[Variant]:
+    """Where arm and tool are, by what is found alone and beside the words that explain most of
+    what that leaves: a second effect must not decide it."""
+    engine, kinds = word.engine, {_kind(s.variant): s for s in reversed(word.alone)}
+    finer = [
+        f
+        for s in kinds.values()
+        for f in refined(engine.bench, s.variant, partial(estimate, engine))
+    ]
+    engine.extend()
+    best = max(score(engine, engine.levels, finer), key=evidence)
+    levels, energy = conditioned(engine, (Part(best.variant, best.scale),))
+    names = ({*word.ranked} | LINEAR) & word.families.keys() - {best.variant.word}
+    others = [s.variant for w in sorted(names) for s in word.families[w]]
+    found = by_word(score(engine, levels, others, energy))
+    for name in sorted(found, key=lambda w: -marginal(found[w]))[:_BESIDE]:
+        other = closest(found[name])
+        there = partial(estimate, engine, beside=(Part(other.variant, other.scale),))
+        again = refined(engine.bench, kinds[_kind(best.variant)].variant, there)
+        finer += [replace(v, label=f"{v.label} beside {name}") for v in again]
+    same = [v for v in finer if _kind(v) == _kind(best.variant)]
+    share = best.variant.prior / len(same)  # they are one place, looked at more than once
+    return [replace(v, prior=share) if v in same else v for v in finer]
+
+
+def _kind(variant: Variant) -> tuple[str, str, bool]:
+    """What stands elsewhere, in which pose only, and whether readings show it."""
+    return str(variant.info["kind"]), str(variant.info["pose"]), bool(variant.info["read"])
+
+
+_BESIDE = 2  # words
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns, through_springs=True),
+    lengths=(),
+    finer=_look_closer,
 )

@@ -95,4 +95,6 @@ EFFECT = Effect(
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns, of_session=OF_SESSION, lasts=False),
+    lengths=(),
+    finer=None,
 )

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.bench import Bench
+from identification.gap.closer import Word, closing_in, shows
 from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.history import (
@@ -302,10 +303,20 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     return [late(bench, c["channel"], kind, c["lag"]) for kind in kinds]
 
 
+def _look_closer(word: Word) -> list[Variant]:
+    if not shows(word):
+        return []
+    channels = {s.variant.info["channel"]: s for s in reversed(word.beside or word.alone)}
+    return closing_in(word, refined, list(channels.values()))
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns),
+    lengths=(),
+    finer=_look_closer,
+    beside=True,
     not_negative=("lag",),
 )

@@ -79,4 +79,6 @@ EFFECT = Effect(
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns, of_session=("shift",), lasts=False),
+    lengths=(),
+    finer=None,
 )
