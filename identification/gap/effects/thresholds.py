@@ -36,7 +36,7 @@ def of_knee(
     beyond = np.maximum(top - np.asarray(info["radius"]), 0.0)
     slope = knee.per_spring(beyond / max(top - threshold.value, 1e-9 * top), info.get("joint"))
     least = v.least  # what bends less does not give way
-    value, low, high = (max(v, least) for v in (slope.value, slope.low, slope.high))
+    value, low, high = (max(s, least) for s in (slope.value, slope.low, slope.high))
     if bench.imposed and not bench.data.arm:
         threshold = _carried(threshold, *found.of_spring(int(info["joint"])))
     out = named(bench, v, threshold)

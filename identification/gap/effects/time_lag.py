@@ -222,9 +222,8 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
     a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
     is read as the lag of every kind that does the same, each the more the closer it comes."""
-    n, info = bench.rows.n, v.info
-    w = found.w
-    does = sum((v * bench.columns[c][:n] for v, c in zip(w, v.columns, strict=True)),
+    n, info, w = bench.rows.n, v.info, found.w
+    does = sum((much * bench.columns[c][:n] for much, c in zip(w, v.columns, strict=True)),
                np.zeros(n))  # fmt: skip
     total = found.linear(np.ones(len(w)), "1")
     relative = total.sd / max(abs(total.value), 1e-6)
