@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +74,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         ),
         tangential=_tangential(columns, setups, setup),
         q=_readings(dataset, columns, poses),
-        temperature=_optional(columns, _MAY_MISS[_TEMPERATURES], 6),
+        temperature=_optional(columns, _thermometers(dataset), 6),
         output_encoder=meta.joint_encoder == "output",
         datum=meta.datum,
         tare=meta.tare,
@@ -84,14 +85,18 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     )
 
 
-_JOINTS, _TEMPERATURES = "joint readings", "joint temperatures"
-_OF_JOINTS = (_JOINTS, _TEMPERATURES)
+_JOINTS, _TEMPERATURES = "joint readings", "temperatures"
 _MAY_MISS = {
     _JOINTS: [f"q{j}_rad" for j in range(1, 7)],
     "force components": [f"force_{a}_N" for a in "xyz"],
-    _TEMPERATURES: [f"temperature{j}_C" for j in range(1, 7)],
 }
 _FEW = 0.05  # of the samples
+
+
+def _thermometers(dataset: Dataset) -> list[str]:
+    """Columns of temperatures, from the first on: an arm's joints have six, a rig may have one."""
+    names = (f"temperature{j}_C" for j in range(1, 7))
+    return list(takewhile(lambda name: name in dataset.columns, names))
 
 
 def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...], tuple[str, ...]]:
@@ -99,9 +104,9 @@ def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...
     where it is there throughout. And what to say of those, and of channels that do not count: such
     as are there in no sample of a level, and temperatures, which are worth no sample."""
     aside, without = [], []
-    for what, names in _MAY_MISS.items():
-        has = all(n in dataset.columns for n in names)
-        if not has or (what in _OF_JOINTS and dataset.meta.robot == "none"):
+    for what, names in {**_MAY_MISS, _TEMPERATURES: _thermometers(dataset)}.items():
+        has = names and all(n in dataset.columns for n in names)
+        if not has or (what == _JOINTS and dataset.meta.robot == "none"):
             continue
         values = [dataset.columns[n].astype(float) for n in names]
         there, count = np.isfinite(values).all(axis=0), int(used.sum())
@@ -178,8 +183,9 @@ def _springs(dataset: Dataset) -> tuple[Array, Array]:
 def _optional(
     columns: dict[str, NDArray[np.generic]], names: list[str], width: int
 ) -> Array | None:
-    """(n,) or (n, width) where every column is there and finite throughout."""
-    if not all(n in columns for n in names):
+    """(n,), or (n, names) where more than one may be there: where every column is there and finite
+    throughout."""
+    if not names or not all(n in columns for n in names):
         return None
     values = np.column_stack([columns[n].astype(float) for n in names])
     if not np.isfinite(values).all():

@@ -234,7 +234,11 @@ GRAMMAR: dict[str, Grammar] = {
         (*_PATHS, *((c, (*shape, "along")) for c, shape in _PATHS), ("drift", ("run", "along"))),
     ),
     "thermal_drift": Grammar(
-        ("path", "quantity"), tuple((c, (*shape, "along")) for c, shape in _PATHS)
+        ("path", "quantity"),
+        (
+            *((c, (*shape, "along")) for c, shape in _PATHS),
+            ("drift_per_kelvin", ("sensor", "time_constant", "along")),
+        ),
     ),
     "zero_shift": Grammar((), (("shift", ("run", "lasts")),)),
 }

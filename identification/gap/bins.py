@@ -78,11 +78,14 @@ class Bins:
 
 def _hold_edges(hold: Ints, time: Array) -> Ints:
     """Bins of 1, 1, 2, 4, 8 ... samples from the start of every hold; where these are taken ever
-    more seldom, as creep often is, no bin over more than twice its time since then."""
+    more seldom, as creep often is, no bin over more than twice its time since then. None is a large
+    part of the recording: a room warms and cools while a weight hangs."""
     starts = np.flatnonzero(np.concatenate([[True], np.diff(hold) != 0]))
     count = np.diff(np.append(starts, len(hold)))
     within = np.arange(len(hold)) - np.repeat(starts, count)
     edge = (within & (within - 1)) == 0  # 0, 1, 2, 4, 8 ...
+    most = max(_FINE, len(hold) // CONTINUOUS_ROWS)
+    edge |= (np.repeat(count, count) > _LONG) & (within % most == 0)
     since = np.maximum(time - np.repeat(time[starts], count), 0.0)
     begin = np.flatnonzero(edge)
     size = np.diff(np.append(begin, len(hold)))
@@ -95,6 +98,7 @@ def _hold_edges(hold: Ints, time: Array) -> Ints:
     return np.flatnonzero(edge).astype(np.int64)
 
 
+_LONG, _FINE = 64, 8  # samples of a hold that is; of a bin, at least
 _SELDOM = 3.0  # times: samples evenly spaced keep a bin below 2
 
 

@@ -73,7 +73,8 @@ class GapData:
 
     time s within the run; session s, or None; run, setup, repetition, branch, step (n,) ints
     (step -1: none). force N, displacement m along the direction. tangential (n, 2) N or None: force
-    across it. q (n, m) rad or None: joint readings minus commanded pose. temperature (n, m) degC.
+    across it. q (n, m) rad or None: joint readings minus commanded pose. temperature (n, t) degC or
+    None: of the joints, or what was read of a rig.
     compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
     simulated (n,) m or None: displacement that another simulator predicts for every sample.
     timed: whether `time` was recorded; it counts samples otherwise. on_the_way (n,) or None:

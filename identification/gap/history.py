@@ -177,6 +177,18 @@ def retarded(
     return _prefix(keep, held * (ramped + stood) + load * (1 - held))
 
 
+def followed(values: Array, clock: Array, times: Array) -> Array:
+    """First-order lags (n, k) with times (k,) s behind values (n,) that were read at clock (n,) s,
+    from where they began on: exact for values that go straight from reading to reading."""
+    rise = (values - values[0])[:, None]
+    before = np.vstack([np.zeros((1, 1)), rise[:-1]])
+    step = np.diff(clock, prepend=clock[0])[:, None] / times
+    keep = np.exp(-step)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(step > 0, -np.expm1(-step) / step, 1.0)
+    return _prefix(keep, rise * (1 - share) + before * (share - keep))
+
+
 _REST_RAMP_S = 5.0  # the last of a rest: the screw comes to the load
 
 

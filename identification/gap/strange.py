@@ -22,7 +22,7 @@ from identification.gap.base import Base
 from identification.gap.bench import Bench
 from identification.gap.compare import by_word, log_mean, marginal, score
 from identification.gap.data import Array, Ints
-from identification.gap.effects.drift import by_direction, free_path, path_root
+from identification.gap.effects.drift import by_direction, free_path, path_root, waited
 from identification.gap.evidence import Engine
 from identification.gap.explanation import Found, Likeness
 from identification.gap.history import retarded, row_time
@@ -129,7 +129,7 @@ def _swings(bench: Bench, base: Base, target: Array) -> list[Variant]:
     span = bench.course.session_span
     least = LEAST_SWINGS * bench.rows.n / min(int(m.sum()) for m in masks)
     most = bench.rows.n / _SHORTEST_ROWS / 2
-    if bench.course.rests:
+    if bench.course.rests or waited(bench).any():
         least = max(least, RESTING_SWINGS)
     count = np.arange(least, max(most, least), 1 / _PER_PERIOD)
     time = (bench.rows.session - bench.rows.session.min()) / span

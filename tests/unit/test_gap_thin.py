@@ -80,6 +80,16 @@ def test_a_hole_in_a_column_costs_its_samples_and_not_the_channel(
     assert note in data.notes
 
 
+@pytest.mark.parametrize(("sensors", "read"), [((1,), 1), ((1, 2), 2), ((1, 3), 1), ((3,), 0)])
+def test_a_rig_has_as_many_thermometers_as_it_has(sensors: tuple[int, ...], read: int) -> None:
+    design = DESIGNS["bench"]
+    table = noisy(design)
+    for k in sensors:
+        table[f"temperature{k}_C"] = 20.0 + np.arange(len(table)) / len(table)
+    data = gap_data(imported(table, meta(design)))
+    assert (0 if data.temperature is None else data.temperature.shape[1]) == read
+
+
 @pytest.mark.parametrize("column", ["q3_rad", "temperature2_C"])
 def test_no_level_goes_for_a_hole_nor_any_sample_for_a_temperature(column: str) -> None:
     design = DESIGNS["rich"]

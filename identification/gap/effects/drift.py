@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.gap.bench import Bench
-from identification.gap.data import Array
+from identification.gap.data import Array, Flags
+from identification.gap.history import followed
 from identification.gap.interval import Found, Parameter
 from identification.gap.turns import way_back
 from identification.gap.variants import Variant, variant
@@ -53,9 +54,17 @@ def own_clock(bench: Bench) -> bool:
     """Whether time and load part company: the load comes and goes at least three times, in runs or
     in cycles of one, or there is none at all. Else a path in time is a curve of the load, or the
     creep under one that stands, unless that goes back."""
-    if hangs(bench) and not _goes_back(bench):
+    if hangs(bench) and not _goes_back(bench.response):
         return False
-    return bench.course.passes >= 3
+    return bench.course.passes >= 3 or _goes_back(bench.response[waited(bench)])
+
+
+def waited(bench: Bench) -> Flags:
+    """(n,) rows of the one hold that most of the session went by in; none where there is none."""
+    rows = bench.rows
+    span = np.bincount(rows.hold, np.diff(rows.session, append=rows.session[-1]))
+    longest = int(span.argmax())
+    return np.asarray((rows.hold == longest) & (span[longest] > 0.5 * bench.course.session_span))
 
 
 def hangs(bench: Bench) -> bool:
@@ -63,17 +72,21 @@ def hangs(bench: Bench) -> bool:
     return bench.course.stands and _loaded(bench)
 
 
-def _goes_back(bench: Bench) -> bool:
-    """Whether what is read under a standing load goes to and fro, as nothing does that creeps, by a
-    good part of its way: by means of even pieces, beyond what these scatter."""
-    count = min(_STRETCHES, bench.rows.n // _OF_EACH)
+def _goes_back(read: Array) -> bool:
+    """Whether what is read (n,) under a standing load goes to and fro, as nothing does that creeps,
+    by a good part of its way: by means of even pieces, beyond what these scatter."""
+    count = min(_STRETCHES, len(read) // _OF_EACH)
     if count < LEAST_PIECES:
         return False
-    pieces = np.array_split(bench.response, count)
+    pieces = np.array_split(read, count)
     mean = np.array([p.mean() for p in pieces])
     noise = white_sd(np.diff(mean, 2))
-    back = min(way_back(mean * sign) for sign in (1.0, -1.0))
-    return bool(back > max(_BACK * float(np.ptp(mean)), _CLEARLY * noise))
+    return bool(_back(mean) > max(_BACK * float(np.ptp(mean)), _CLEARLY * noise))
+
+
+def _back(path: Array) -> float:
+    """How far a path (n,) goes back, whichever way it went."""
+    return min(way_back(path * sign) for sign in (1.0, -1.0))
 
 
 _STRETCHES, _OF_EACH = 100, 4  # pieces at most; rows of each at least
@@ -92,10 +105,11 @@ def paths(bench: Bench) -> dict[str, Array]:
     return {} if bench.rows.continuous else {"linear": every["linear"]}
 
 
-def shares(bench: Bench, usual: tuple[float, ...]) -> tuple[float, ...]:
+def shares(bench: Bench, usual: tuple[float, ...], path: Array | None = None) -> tuple[float, ...]:
     """Sizes of a drift, of the deflection or the largest force: the usual ones; up to all that is
-    seen, and steeper, in a recording without load; small ones where it is but a curve."""
-    if not own_clock(bench):
+    seen, and steeper, in a recording without load; small ones where it is but a curve. path (n,):
+    what it follows, where that was recorded; what goes to and fro is no curve of the load."""
+    if not own_clock(bench) and (path is None or _back(path) < _BACK * np.ptp(path)):
         return usual[:SMALL]
     if not bench.rows.continuous:
         return usual
@@ -201,18 +215,21 @@ def changes(
         if path == "free":
             f[mine.start], f[mine.stop - 1] = -1.0, 1.0
         else:
-            f[mine] = _end(bench, str(path))
+            f[mine] = _end(bench, v)
         over = "drift" if path == "each run" else "drift_over_session"
         key = over + (f"_{name}" if name else "")
         out[key] = found.linear(f, unit, scale)
     return out
 
 
-def _end(bench: Bench, path: str) -> float:
-    """Where a path is at the end of the session: 1, but temperatures may have come back."""
-    temperature = bench.rows.temperature
+def _end(bench: Bench, v: Variant) -> Array | float:
+    """Where the paths of a direction are at the end of the session: 1, but temperatures may have
+    come back, and what follows one late is behind it."""
+    temperature, path = bench.rows.temperature, str(v.info["path"])
     if temperature is None or "temperature" not in path:
         return 1.0
     number = path.removeprefix("temperature ")
-    v = temperature[:, int(number) - 1] if number.isdigit() else temperature.mean(axis=1)
-    return float((v[-1] - v[0]) / np.ptp(v))
+    t = temperature[:, int(number) - 1] if number.isdigit() else temperature.mean(axis=1)
+    if "lags_s" in v.info:
+        return np.asarray(followed(t, bench.rows.session, v.info["lags_s"])[-1] / np.ptp(t))
+    return float((t[-1] - t[0]) / np.ptp(t))

@@ -7,6 +7,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effects.drift import RATES
+from identification.gap.history import followed
 from identification.gap.law import Law, Term
 from identification.gap.variants import Variant
 
@@ -37,8 +38,10 @@ def law_of_path(bench: Bench, v: Variant) -> tuple[dict[str, object], tuple[Term
     assert values is not None
     sensor = "mean" if label.startswith("mean") else label.rsplit(maxsplit=1)[-1]
     read = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
-    term = Term("drift_per_kelvin", {"sensor": sensor})
-    return {"path": "temperature"}, (term,), np.array([1 / float(np.ptp(read))])
+    lags = v.info.get("lags_s")
+    late = [{}] if lags is None else [{"time_constant": float(t)} for t in lags]
+    terms = tuple(Term("drift_per_kelvin", {"sensor": sensor, **how}) for how in late)
+    return {"path": "temperature"}, terms, np.full(len(terms), 1 / float(np.ptp(read)))
 
 
 def path_of(bench: Bench, law: Law, term: Term) -> Array:
@@ -60,6 +63,8 @@ def path_of(bench: Bench, law: Law, term: Term) -> Array:
         return np.zeros(bench.rows.n)
     sensor = term.shape["sensor"]
     v = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
+    if "time_constant" in term.shape:
+        return followed(v, bench.rows.session, np.array([term.shape["time_constant"]]))[:, 0]
     return np.asarray(v - v[0])
 
 

@@ -196,4 +196,5 @@ EFFECT = Effect(
     laws=Laws(_describe, _columns),
     lengths=("creep_fraction", "creep_fraction_of_run"),
     finer=None,
+    not_negative=("creep_fraction", "creep_fraction_of_run"),
 )

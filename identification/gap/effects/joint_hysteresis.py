@@ -348,5 +348,5 @@ EFFECT = Effect(
     lengths=("share_through_friction",),
     finer=_look_closer,
     beside=True,
-    not_negative=("friction",),
+    not_negative=("friction", "share_through_friction"),
 )

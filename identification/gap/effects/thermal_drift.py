@@ -1,10 +1,12 @@
 """Displacement moves with time or temperature, not with the load; encoders do not see it.
 
 A path on the session clock, one coefficient per direction (the drift is a vector): warm-up with one
-time constant, a line, a free smooth path, or the recorded temperatures. 10 to 400 um over hours.
+time constant, a line, a free smooth path, or the recorded temperatures, which masses of several
+kilograms follow late. 10 to 400 um over hours.
 
 Size: 10 to 400 um over hours; 0.3 to 30 % of the deflection.
-Prior: either sign per direction, sd out of SHARES, equally likely.
+Prior: either sign per direction, sd out of SHARES, equally likely; as much on all that follows a
+temperature late as on what follows it at once.
 Source: warm-up of arms with a lag, 1 um/K of laser sensors.
 """
 
@@ -26,23 +28,27 @@ from identification.gap.effects.drift import (
     shares,
 )
 from identification.gap.effects.drift_law import OF_SESSION, law_of_path, path_of
+from identification.gap.history import followed
 from identification.gap.interval import Found, Parameter
 from identification.gap.law import Law, Laws, Term, along
 from identification.gap.variants import Variant, variant
 
 WORD = "thermal_drift"
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the deflection
+LAGS = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the session
+_SEEN = 2  # rows within a lag
 
 
 def variants(bench: Bench) -> list[Variant]:
     """Paths times directions."""
-    scales = tuple(s * bench.reach for s in shares(bench, SHARES))
     named, masks = zip(*by_direction(bench).items(), strict=True)
     out = []
     for label, path in {**paths(bench), **_temperatures(bench)}.items():
         columns = [bench.add(bench.outside_column(m * path)) for m in masks]
+        scales = _scales(bench, path if "temperature" in label else None)
         out.append(variant(WORD, label, columns, scales, positive=False, path=label, names=named))
-    free = free_paths(bench)
+    out += _late(bench)
+    scales, free = _scales(bench), free_paths(bench)
     if not free:
         return out
     every = [bench.add(bench.outside_column(m * path)) for m in masks for path in rates(bench)]
@@ -63,6 +69,33 @@ def _temperatures(bench: Bench) -> dict[str, Array]:
     candidates = {"mean temperature": t.mean(axis=1)}
     candidates |= {f"temperature {j + 1}": t[:, j] for j in range(t.shape[1])}
     return {k: (v - v[0]) / np.ptp(v) for k, v in candidates.items() if np.ptp(v) > 0}
+
+
+def _scales(bench: Bench, path: Array | None = None) -> tuple[float, ...]:
+    """m, of a path; of a recorded temperature (n,) by how that went."""
+    return tuple(s * bench.reach for s in shares(bench, SHARES, path))
+
+
+def _late(bench: Bench) -> list[Variant]:
+    """What warms up after the temperature that is recorded, in lags that are neighbours, which
+    makes all lags between them."""
+    lags, out = _lags(bench), []
+    named, masks = zip(*by_direction(bench).items(), strict=True)
+    for label, path in _temperatures(bench).items():
+        ways = followed(path, bench.rows.session, lags)
+        for k in range(len(lags) - 1):
+            columns = [bench.add(bench.outside_column(m * way))
+                       for m in masks for way in ways[:, k : k + 2].T]  # fmt: skip
+            out.append(variant(WORD, f"{label} late {lags[k]:.3g} s", columns, _scales(bench, path),
+                               positive=False, prior=1 / (len(lags) - 1), path=label, names=named,
+                               lags_s=lags[k : k + 2]))  # fmt: skip
+    return out
+
+
+def _lags(bench: Bench) -> Array:
+    """(k,) s: of the session, as far as a few rows tell of one."""
+    lags = np.array(LAGS) * bench.course.session_span
+    return lags[lags > _SEEN * bench.course.session_span / bench.rows.n]
 
 
 def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
