@@ -73,10 +73,10 @@ def strength(bench: Bench, v: Variant, columns: Array, times: float) -> Array:
     if "centre" in v.info:
         unit[: len(v.info["radius"])] = np.equal(v.info["radius"], v.info["centre"])
         unit[len(v.info["radius"]) :] = 0.0
-    w, limits = v.root @ unit, Limits.of([v])
-    if limits is not None and np.any(limits.rows[0] @ w < 0):
-        w = v.root @ np.eye(len(unit))[0]  # the first alone: together they break a limit
-        assert np.all(limits.rows[0] @ w >= 0)
+    limits, first = Limits.of([v]), np.eye(len(unit))[0]
+    apart = np.where(first > 0, 1.0, 0.4 * (-1.0) ** np.arange(len(unit)))  # where a play rests
+    ways = [v.root @ u for u in (unit, apart, first)]
+    w = next(w for w in ways if limits is None or np.all(limits.rows[0] @ w >= 0))
     moved = columns[:, list(v.columns)] @ w
     u = moved[: bench.rows.n]
     size = np.sqrt(np.mean((u - u.mean()) ** 2)) or np.sqrt(np.mean(u**2))

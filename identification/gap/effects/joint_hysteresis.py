@@ -309,13 +309,13 @@ def _exponential(
 
 
 def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
-    """Of the strengths that slip, which takes a load beyond them; of friction in proportion to the
-    load, at the largest one."""
+    """Of the strengths that slip, which takes a load beyond them, and of those near the largest one
+    the less the less they do; of friction in proportion to the load, at the largest one."""
     radius, joint = np.asarray(v.info["radius"]), int(v.info["joint"])
     if v.info.get("other_springs"):
         found = found.without_line(joint)
     largest = float(np.abs(bench.torque[:, joint]).max())
-    slips = (radius < _SLIPS * largest).astype(float)
+    slips = np.clip((1 - radius / max(largest, _TINY)) / _HARDLY, 0.0, 1.0)
     if v.info["law"] in BY_LOAD:
         radius = np.full(len(radius), largest)
     if v.info["law"] == "Iwan":  # what never slips is a spring like the joint's own
@@ -326,7 +326,8 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
     }
 
 
-_SLIPS = 0.98  # of the largest load: what slips beyond that only hardly shows
+_HARDLY = 0.2  # of the largest load: what slips beyond the rest of it shows less
+_TINY = 1e-300
 
 
 def _look_closer(word: Word) -> list[Variant]:
