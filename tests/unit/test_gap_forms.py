@@ -68,6 +68,21 @@ def bench() -> Bench:
     return make_bench(arm_data())
 
 
+def test_an_arms_friction_takes_off_its_spring_or_comes_on_top(bench: Bench) -> None:
+    """Of every law: what is held back, and what slips, are together the line of the spring."""
+    found = [v for v in library(bench, ["joint_hysteresis"]) if v.info["joint"] == 0]
+    for law in ("Dahl", "Bouc-Wen"):
+        held = [v for v in found if v.info["law"] == law]
+        slips = [v for v in found if v.info["law"] == f"{law} that slips"]
+        assert len(held) == len(slips) > 2
+        for a, b in zip(held, slips, strict=True):
+            assert (a.prior, a.info["memory"]) == (b.prior, b.info["memory"])
+            for one, other in zip(a.columns, b.columns, strict=True):
+                both = bench.columns[other] - bench.columns[one]
+                line = bench.joint_column(0, bench.elastic[:, 0])
+                np.testing.assert_allclose(both, line, atol=1e-9 * np.abs(line).max())
+
+
 def bench_without_arm(imposed: str | None = None) -> Bench:
     t = np.arange(240.0)
     force = 100 * np.sin(t / 15) * np.minimum(1, t / 100)

@@ -24,7 +24,9 @@ SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
 EXPONENTIAL = ("Dahl", "Bouc-Wen")
 # Leaves, belts, cables and wedges are pressed by what they carry: friction in proportion to that.
 BY_LOAD = tuple(f"{law} by load" for law in EXPONENTIAL)
-LAWS = (*EXPONENTIAL, *BY_LOAD)
+# Where the stated spring is that of small loads, what slips comes on top.
+SLIPPING = tuple(f"{law} that slips" for law in EXPONENTIAL)
+LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)
 _MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
            SET_UP_ANEW.strip(): ANEW, LASTING.strip(): ACROSS}  # fmt: skip
@@ -48,8 +50,8 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
 
 def columns(bench: Bench, law: Law) -> list[Array]:
     """Column of every term, in their order: what the friction holds back, `S_r(tau)` (stop
-    operator), or reach, or load, times bristle state; what slips beside it (Prandtl's law):
-    `P_r(tau)`; of a term without a strength the line of its own spring."""
+    operator), or reach, or load, times bristle state; of laws that slip what that leaves of the
+    load, as `P_r(tau)` does of Prandtl's; of a term without a strength its own spring's line."""
     c = law.constants
     joint, iwan = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
@@ -73,6 +75,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
         held = (z * (np.abs(load)[:, None] if by_load else size))[kept]
         grown = np.array([_grown(bench, law, t) for t in law.terms if t.shape])
         held = held * grown.reshape(len(size), bench.rows.n).T
+        held -= load[kept][:, None] if c["law"] in SLIPPING else 0.0
     each = iter(held.T)
     return [
         bench.joint_column(joint, -bench.sense * next(each) if t.shape else torque)

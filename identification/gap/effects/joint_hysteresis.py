@@ -10,9 +10,9 @@ spring feels so much less, and deflects less. A spectrum of strengths makes any 
 Masing's rules (Iwan 1967). Friction that does not obey them: an asperity model whose bristles
 bend exponentially (Dahl 1968), one that lets go elastically (Bouc 1967, Wen 1976; beta = gamma);
 of a specimen either in proportion to the load that presses its parts together (Amontons).
-Where the stated spring is that of small loads, which make nothing slip, every element adds its play
-instead (Prandtl 1928). The coefficients are the shares of the joint's compliance that work through
-friction, 0 to 1, or what it has more than was stated.
+Where the stated spring is that of small loads, which make nothing slip, every element adds what it
+slips instead (plays: Prandtl 1928). The coefficients are the shares of the joint's compliance that
+work through friction, 0 to 1, or what it has more than was stated.
 
 Size: friction of 2 to 20 % of the torque gears see; about 1 arcmin lost at ratio >= 80.
 Prior: shares positive in sum, sd out of SCALES, equally likely; spectrum and single strengths a
@@ -36,6 +36,7 @@ from identification.gap.effects.friction_law import (
     BY_LOAD,
     EXPONENTIAL,
     LAWS,
+    SLIPPING,
     by_ratio,
 )
 from identification.gap.effects.specimens import with_other_springs
@@ -271,11 +272,14 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
     return out
 
 
-def _keeps_its_sign(bench: Bench) -> bool:
-    """Whether a specimen's answer never turns against its load: friction in proportion to the load
-    can't do that."""
+def _exponential_laws(bench: Bench) -> tuple[str, ...]:
+    """Of an arm in both conventions, as spectra are; a specimen's friction brings a spring of its
+    own. Friction in proportion to the load can't turn a specimen's answer against its load."""
+    if bench.data.arm:
+        return (*EXPONENTIAL, *SLIPPING)
     with_load = bench.load * bench.response
-    return not bench.data.arm and bool(with_load.min() >= -_TURNED * with_load.max(initial=0.0))
+    keeps = with_load.min() >= -_TURNED * with_load.max(initial=0.0)
+    return (*EXPONENTIAL, *BY_LOAD) if keeps else EXPONENTIAL
 
 
 _TURNED = 0.01  # of the largest product of both
@@ -288,7 +292,8 @@ def _exponential(
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches (k,) of the range of torque."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
     span, out = bench.reach_of(torque), []
-    for law in LAWS if _keeps_its_sign(bench) else EXPONENTIAL:
+    prior = 0.25 / (len(reaches) - 1) / (2 if bench.data.arm else 1)  # two conventions
+    for law in _exponential_laws(bench):
         by_load, elastic = law in BY_LOAD, law.startswith("Bouc-Wen")
         reach = span * reaches * (NEARER if by_load else 1.0)
         load = torque if path is None else path.load
@@ -298,11 +303,12 @@ def _exponential(
         else:
             z = bristles(load, reach, path.fresh, elastic)[path.kept]
         held = z * (np.abs(torque)[:, None] if by_load else reach)
+        held -= torque[:, None] if law in SLIPPING else 0.0
         columns = [bench.add_joint(joint, -bench.sense * c * h) for h in held.T]
         for k in range(len(reach) - 1):
             out.append(
                 variant(WORD, f"{name} {law} {reaches[k]:.3g}", columns[k : k + 2], SCALES,
-                        smooth_root(2, 0.5), prior=0.25 / (len(reach) - 1), each=True, joint=joint,
+                        smooth_root(2, 0.5), prior=prior, each=True, joint=joint,
                         radius=reach[k : k + 2], law=law)
             )  # fmt: skip
     return out
