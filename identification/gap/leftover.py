@@ -92,14 +92,15 @@ def _unstrained(explanation: Explanation, asked: float) -> Explanation:
 
 
 def _as_simulated(engine: Engine, none: Explanation, fitted: Fit) -> Explanation:
-    """Of a rig without an arm: nothing is wrong as long as its springs are as stiff as stated. What
-    is normal in the compliance is not in the stiffness: by both."""
-    off = 0.0
-    found = dict(zip(engine.base.names, fitted.base.tolist(), strict=True))
-    for j, sd in enumerate(engine.bench.data.compliance_relative_sd.tolist()):
-        change = found.get(f"spring{j + 1}", 0.0)
-        of_the_inverse = change / max(1 + change, _TINY)
-        off = max(off, abs(change) / sd, abs(of_the_inverse) / sd) if sd > 0 else off
+    """Of a rig without an arm: nothing is wrong while springs and gains are as stated. What is
+    normal in the compliance is not in the stiffness, nor what is normal in a gain in the share of
+    its readings that is too much: by both."""
+    base, off = engine.base, 0.0
+    for name, change, sd in zip(base.names, fitted.base.tolist(), base.sd.tolist(), strict=True):
+        if not name.startswith(("spring", "gain")) or not sd > 0:
+            continue
+        whole = 1 + change if name.startswith("spring") else 1 - change
+        off = max(off, abs(change) / sd, abs(change / max(whole, _TINY)) / sd)
     lost = float(np.log(max(_share(off, AS_STATED), 1e-300)))
     return replace(none, log_weight=none.log_weight + lost, log_good=none.log_good + lost)
 
