@@ -5,8 +5,9 @@
    every hold is left out, because the arm creeps on after the screw has stopped.
 2. Zero lines. An amplifier drifts: between neighbouring zero-load plateaus of a run its zero is
    taken as a straight line over time and subtracted; before the first and after the last plateau
-   it keeps its value. With a plateau on one side only, that one counts. The uncertainty of the
-   line is part of every level's. A run without plateaus is taken as it is, and said to be so.
+   it keeps its value. With a plateau on one side only, that one counts. Of a plateau that the load
+   was still on its way to, the later half counts. The uncertainty of the line is part of every
+   level's. A run without plateaus is taken as it is, and said to be so.
 3. Datum. Displacement counts from the zero-load plateau before the run, whether the laser was
    zeroed once (`datum: setup`) or before each run: what a run did not load is no deflection under
    its load. How far the plateaus of the repetitions lie apart is noted. The plateau after the run
@@ -14,10 +15,10 @@
 4. A level's uncertainty is the scatter of its samples' mean and the stated uncertainty of a
    sample, in quadrature: the stated one is common to a hold and does not average out.
 5. A recording that was not held at levels (no steps, or force running through half of its range
-   within one) is cut at its turning points into passes of rising (`loading`) and falling force
-   (`unloading`), and each pass into bins of equal width in force. If there is but one repetition,
-   the cycles count as repetitions, neighbouring ones taken together where there are many: their
-   errors are not independent.
+   within one and not coming to rest there) is cut at its turning points into passes of rising
+   (`loading`) and falling force (`unloading`), and each pass into bins of equal width in force. If
+   there is but one repetition, the cycles count as repetitions, neighbouring ones taken together
+   where there are many: their errors are not independent.
 
 No threshold here is absolute; all refer to ranges of the data or to stated uncertainties.
 """
@@ -219,19 +220,25 @@ def _mean(values: Array, stated: float) -> tuple[float, float]:
 
 def _plateaus(run: _Run, stated: _Stated) -> list[_Plateau]:
     """The run's zero-load holds; all their samples count, since nothing creeps there that the
-    load has moved before the run."""
-    found = []
+    load has moved before the run; but not the way down, where that was recorded under their name:
+    then the later half."""
+    found, still = [], _STILL * float(np.nanmax(np.abs(run.force), initial=0.0))
     for block in _blocks(run):
         if run.branch[block.start] != "zero":
             continue
         rows = np.arange(block.start, block.stop)
         rows = rows[np.isfinite(run.force[rows]) & np.isfinite(run.displacement[rows])]
+        if rows.size and np.ptp(run.force[rows]) > still:
+            rows = rows[rows.size // 2 :]
         if rows.size:
             force, u_force = _mean(run.force[rows], stated.force)
             displacement, u_displacement = _mean(run.displacement[rows], stated.displacement)
             time = float(run.time[rows].mean())
             found.append(_Plateau(time, force, displacement, u_force, u_displacement))
     return found
+
+
+_STILL = 0.05  # of the largest force of the run: no load is further from none
 
 
 def _zeroed(run: _Run, plateaus: list[_Plateau]) -> _Run:

@@ -167,31 +167,43 @@ def goes_against(data: GapData) -> tuple[str, ...]:
     return tuple(out)
 
 
-_ANSWERS, _NOISE = 0.02, 8.0  # of what is simulated; standard uncertainties, from end to end
+_SURE = 4.0  # standard errors of what goes with it
+_QUIET = 2.0  # standard uncertainties: what is stated is known to a factor of two (GUM G.4.2)
 _EXPECTED = 30.0  # standard uncertainties that are simulated, of either channel
-_LEVELS = 3  # of a load: without one, either channel may go on by itself
+_LEVELS = 3  # of a force that is said to be stepped: without one a displacement may stay
 
 
 def silent(data: GapData, channel: Literal["force", "displacement"]) -> tuple[str, ...]:
-    """Poses and directions in which that channel stays within its noise while the other one, which
-    the rig drives, goes far."""
+    """Poses and directions in which that channel is noise while the other one, which the rig
+    drives, goes far: nothing of it goes with that, as little as that may be. A force that stays
+    while nobody said that a stroke is imposed is the force of a rig that drifts."""
     out, meter = [], data.instruments
-    driver = "displacement" if channel == "force" else "force"
     for i, setup in enumerate(data.setups):
         mine = data.setup == i
         levels = np.unique(data.step[mine & (data.branch == LOADING)])
-        if not mine.any() or (data.imposed != driver and len(levels) < _LEVELS):
+        stepped = data.imposed == "force" or len(levels) >= _LEVELS
+        driven = data.imposed == "displacement" if channel == "force" else stepped
+        if not mine.any() or not driven:
             continue
         slope = float(setup.lever**2 @ data.compliance) + setup.outside
-        force, stroke = slope * np.ptp(data.force[mine]), np.ptp(data.displacement[mine])
+        force, stroke = slope * data.force[mine], data.displacement[mine]
         u_force, u_stroke = slope * meter.force, meter.displacement
         gone, answer, u = (
             (stroke, force, u_force) if channel == "force" else (force, stroke, u_stroke)
         )
-        far = gone > _EXPECTED * max(u_force, u_stroke)
-        if far and answer < min(_ANSWERS * gone, _NOISE * u):
+        if np.ptp(gone) > _EXPECTED * max(u_force, u_stroke) and _is_noise(gone, answer, u):
             out.append(f"{setup.pose}/{setup.direction}" if data.arm else setup.direction)
     return tuple(out)
+
+
+def _is_noise(gone: Array, answer: Array, u: float) -> bool:
+    """Whether an answer (n,) is noise of standard uncertainty u, of which nothing goes with what
+    was gone (n,), in the same unit."""
+    x, y = gone - gone.mean(), answer - answer.mean()
+    with_it = float(x @ y) / float(x @ x)
+    left = y - with_it * x
+    error = float(np.sqrt((left @ left) / max(len(x) - 2, 1) / (x @ x)))
+    return bool(abs(with_it) <= _SURE * error and np.sqrt(np.mean(y**2)) < _QUIET * u)
 
 
 _SETTLED = 2  # samples of a hold at least: a lag, or a joint that still creeps

@@ -119,46 +119,57 @@ def test_what_stands_still_for_a_reason_is_none(what: str) -> None:
     assert found_in(running(force, u)) == ()
 
 
-@pytest.mark.parametrize("channel", ["force", "displacement"])
-def test_a_channel_that_says_nothing_while_the_other_goes_is_a_fault(channel: str) -> None:
-    """Of an arm in one direction: the sensor of it is not connected, or looks past the target."""
+def test_a_laser_that_says_nothing_while_the_load_goes_is_a_fault() -> None:
+    """Of an arm in one direction: it is not connected, or looks past the target."""
     given = arm_data()
     mine = np.array([s.direction == "x" for s in given.setups])[given.setup]
-    u = getattr(given.instruments, channel)
-    noise = np.random.default_rng(1).normal(0, u, len(mine))
-    data = replace(given, **{channel: np.where(mine, noise, getattr(given, channel))})
-    assert silent(data, channel) == ("P1/x", "P2/x")  # type: ignore[arg-type]
+    noise = np.random.default_rng(1).normal(0, given.instruments.displacement, len(mine))
+    data = replace(given, displacement=np.where(mine, noise, given.displacement))
+    assert silent(data, "displacement") == ("P1/x", "P2/x")
     found = diagnose_gap(data)
     assert found.verdict == "unknown"
     assert found.looks_like is None
     (note,) = (n for n in found.notes if "does not answer" in n)
-    assert f"The {channel} does not" in note
-    assert "(P1/x, P2/x)" in note
+    assert "The displacement does not answer the force (P1/x, P2/x)" in note
 
 
-def test_nothing_answers_a_stroke_of_a_bench() -> None:
-    noise = np.random.default_rng(2).normal(0, 0.1, 100)
-    empty = running(noise, np.linspace(0, 1e-3, 100), imposed="displacement")
+@pytest.mark.parametrize("n", [100, 200_000])
+@pytest.mark.parametrize("times", [1.0, 1.5])
+def test_nothing_answers_a_stroke_of_a_bench(n: int, times: float) -> None:
+    noise = np.random.default_rng(2).normal(0, 0.1 * times, n)
+    empty = running(noise, np.linspace(0, 1e-3, n), imposed="displacement")
     assert silent(empty, "force") == ("x",)
     assert "whether anything bears at all" in " ".join(told(empty))
 
 
-@pytest.mark.parametrize("what", ["drifts", "soft", "weak", "little", "one level"])
+def test_nothing_answers_the_levels_of_a_load() -> None:
+    noise = np.random.default_rng(2).normal(0, 1e-6, 100)
+    for step, imposed, quiet in ((np.arange(100) // 30, None, ("x",)), (np.zeros(100), None, ()),
+                                 (np.zeros(100), "force", ("x",))):  # fmt: skip
+        data = bench_data(np.linspace(0, 200, 100), noise, step=step.astype(int), imposed=imposed)
+        assert silent(data, "displacement") == quiet
+
+
+@pytest.mark.parametrize("what", ["drifts", "in steps", "soft", "cautious", "weak", "little"])
 def test_what_answers_little_for_a_reason_is_no_silent_channel(what: str) -> None:
     noise = np.random.default_rng(2).normal(0, 0.02, 100)
     stroke = np.linspace(0, 1e-3, 100)
     data = running(noise, stroke, imposed="displacement")
     assert silent(data, "force") == ("x",)
+    loud = replace(data.instruments, force=0.02)
     if what == "drifts":  # at rest, and nobody says who drives
         data = running(noise, stroke)
-    elif what == "soft":  # thirty times softer than simulated, and hardly beyond the noise
-        data = replace(data, displacement=0.2 * stroke, force=noise + 0.2 * stroke / 1e-5 / 30)
-    elif what == "weak":  # next to nothing, and yet beyond the noise
-        data = replace(data, force=noise + 0.015 * stroke / 1e-5)
-    elif what == "little":  # readings of nothing, to the last digit
+    elif what == "in steps":  # the same, with numbers
+        data = bench_data(noise, stroke, step=np.arange(100) // 20)
+    elif what == "soft":  # thirty times softer than simulated
+        data = replace(data, force=noise + stroke / 1e-5 / 30)
+    elif what == "cautious":  # a hundred times, by a cell that is better than stated
+        stated = replace(data.instruments, force=0.5)
+        data = replace(data, force=noise + stroke / 1e-5 / 100, instruments=stated)
+    elif what == "weak":  # next to nothing, but beyond the noise
+        data = replace(data, instruments=loud, force=2.5 * noise)
+    else:  # readings of nothing, to the last digit
         data = replace(data, displacement=5e-3 * stroke, force=np.zeros(100))
-    else:
-        data = replace(running(noise, stroke), step=np.ones(100, dtype=np.int64))
     assert silent(data, "force") == ()
     assert silent(data, "displacement") == ()
 
