@@ -85,7 +85,8 @@ def _hold_edges(hold: Ints, time: Array) -> Ints:
     within = np.arange(len(hold)) - np.repeat(starts, count)
     edge = (within & (within - 1)) == 0  # 0, 1, 2, 4, 8 ...
     most = max(_FINE, len(hold) // CONTINUOUS_ROWS)
-    edge |= (np.repeat(count, count) > _LONG) & (within % most == 0)
+    late = np.repeat(count > max(_LONG, _PART * len(hold)), count) & (within >= most)
+    edge = np.where(late, within % most == 0, edge)
     since = np.maximum(time - np.repeat(time[starts], count), 0.0)
     begin = np.flatnonzero(edge)
     size = np.diff(np.append(begin, len(hold)))
@@ -98,7 +99,8 @@ def _hold_edges(hold: Ints, time: Array) -> Ints:
     return np.flatnonzero(edge).astype(np.int64)
 
 
-_LONG, _FINE = 64, 8  # samples of a hold that is; of a bin, at least
+_LONG, _PART = 64, 0.05  # samples of a hold that is, and its part of the recording, at least
+_FINE = 8  # samples of its bins, at least
 _SELDOM = 3.0  # times: samples evenly spaced keep a bin below 2
 
 

@@ -57,7 +57,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
             good *= STATED
         fewer = _simpler(e, ranked, kept, arm)
         said = found.foretold.get(e.words) or fewer or e
-        closely = e.eta <= _CLOSELY * found.engine.bench.noise.stated
+        closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
         many = 1.0 if closely or not _tells_of_three(said) else THREE
         for word, share in _main(_of(e, fewer.words) if fewer is said else said, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good

@@ -20,7 +20,7 @@ from identification.gap.effects import (
     knees_closer,
     library,
 )
-from identification.gap.effects.friction_law import EXPONENTIAL
+from identification.gap.effects.friction_law import EXPONENTIAL, SLIPPING
 from identification.gap.effects.joint_hysteresis import REACHES
 from identification.gap.evidence import Engine
 from identification.gap.forms import law_of, rows_of
@@ -45,7 +45,7 @@ def test_reaches_of_bristles_close_in(memory: str) -> None:
     grid = [v for v in library(bench, ["joint_hysteresis"]) if v.info["memory"] == memory]
     found = next(v for v in grid if v.info["law"] == "Dahl")
     finer = joint_hysteresis.closer(bench, found)
-    assert {v.info["law"] for v in finer} == set(EXPONENTIAL)
+    assert {v.info["law"] for v in finer} == {*EXPONENTIAL, *SLIPPING}
     assert {(v.info["joint"], v.info["memory"]) for v in finer} == {(found.info["joint"], memory)}
     low, high = (float(r) for r in found.info["radius"])
     assert min(v.info["radius"][0] for v in finer) == pytest.approx(0.9 * low)
@@ -61,9 +61,14 @@ def test_spectra_have_no_reach_and_a_specimen_keeps_its_other_springs() -> None:
     spectrum = next(v for v in library(bench, ["joint_hysteresis"]) if v.info["law"] == "Iwan")
     assert joint_hysteresis.closer(bench, spectrum) == []
     plain = bench_without_arm()
-    dahl = next(v for v in library(plain, ["joint_hysteresis"]) if v.info["law"] == "Dahl")
-    finer = joint_hysteresis.closer(plain, dahl)
-    assert sum(v.label.endswith("other springs") for v in finer) == len(finer) / 2
+    grid = library(plain, ["joint_hysteresis"])
+    for law in ("Dahl", "Dahl by load"):
+        found = next(v for v in grid if v.info["law"] == law)
+        finer = joint_hysteresis.closer(plain, found)
+        assert sum(v.label.endswith("other springs") for v in finer) == len(finer) / 2
+        same = [v.info["radius"] for v in finer if v.info["law"] == law]
+        assert min(r[0] for r in same) == pytest.approx(0.9 * found.info["radius"][0])
+        assert max(r[1] for r in same) == pytest.approx(1.1 * found.info["radius"][1])
 
 
 def test_a_specimens_spectrum_has_strengths_between_the_strengths() -> None:
@@ -106,13 +111,14 @@ def test_friction_may_grow_with_what_the_gear_carries(memory: str) -> None:
     grid = library(bench, ["joint_hysteresis"])
     found = next(v for v in grid if v.info["memory"] == memory and v.info["joint"] == 1)
     finer = joint_hysteresis.growing(bench, found)
-    assert {v.info["law"] for v in finer} == set(EXPONENTIAL)
+    assert {v.info["law"] for v in finer} == {*EXPONENTIAL, *SLIPPING}
     assert_lawful(bench, finer)
     net = np.abs(bench.true_torque[:, 1] + bench.weight(1))
     n = bench.rows.n
     for v in finer:
         assert (v.info["joint"], v.info["memory"]) == (1, memory)
-        same, grows = (bench.columns[c][:n] for c in v.columns)
+        own = bench.joint_column(1, bench.elastic[:, 1])[:n] * (v.info["law"] in SLIPPING)
+        same, grows = (bench.columns[c][:n] - own for c in v.columns)
         np.testing.assert_allclose(grows, same * net / net.max(), atol=1e-12 * np.abs(same).max())
     assert joint_hysteresis.growing(bench_without_arm(), found) == []
 

@@ -11,6 +11,7 @@ from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData
 from identification.gap.effects import library
+from identification.gap.effects.joint_hysteresis import REACHES
 from identification.gap.effects.knees_closer import refined
 from identification.gap.evidence import Engine
 from identification.gap.forms import Form, describe, law_of, lawful, realise, rows_of
@@ -77,6 +78,7 @@ def test_an_arms_friction_takes_off_its_spring_or_comes_on_top(bench: Bench) -> 
         assert len(held) == len(slips) > 2
         for a, b in zip(held, slips, strict=True):
             assert (a.prior, a.info["memory"]) == (b.prior, b.info["memory"])
+            assert a.prior == pytest.approx(0.25 / 2 / (len(REACHES) - 1))  # half of it each
             for one, other in zip(a.columns, b.columns, strict=True):
                 both = bench.columns[other] - bench.columns[one]
                 line = bench.joint_column(0, bench.elastic[:, 0])

@@ -313,6 +313,36 @@ def test_friction_with_a_spring_of_its_own_is_counted_against_that_spring() -> N
     assert (through.value, sd(through)) == pytest.approx((share.mean(), share.std()), rel=0.03)
 
 
+@pytest.mark.parametrize("label", ["Dahl{} 0.08", "Bouc-Wen{} 0.2", "spectrum{}"])
+def test_friction_means_the_same_in_both_conventions(label: str) -> None:
+    """One curve: 0.3 of the spring rubs; or a spring that is 0.3 stiffer, and 0.3 slips on it."""
+    bench, found = make_bench(arm_data()), []
+    for on_top in ("", " that slips"):
+        rubs = of(bench, "joint_hysteresis", label.format(on_top))
+        joint, k = int(rubs.info["joint"]), len(rubs.columns)
+        w = np.zeros(k)
+        w[0] = 0.3
+        s = -0.3 if on_top else 0.0
+        softer = Softer({joint: s}, {joint: 0.0}, {joint: np.zeros(k)})
+        found.append(parameters(bench, Part(rubs, 1.0), w, np.zeros((k, k)), softer))
+    held, slips = found
+    for name in ("friction", "share_through_friction"):
+        assert held[name].value == pytest.approx(slips[name].value, rel=1e-9), name
+        assert held[name].value > 0
+    assert held["share_through_friction"].value == pytest.approx(0.3, rel=0.02)
+
+
+@pytest.mark.parametrize(("nearly", "counts"), [(0.7, 1.0), (0.9, 0.5), (0.999, 0.0)])
+def test_strengths_near_the_largest_load_count_the_less(nearly: float, counts: float) -> None:
+    load = 80 * np.sin(np.arange(300) / 15)
+    bench = make_bench(bench_data(load, load * 1e-5, step=np.full(300, -1), branch=np.full(300, 3)))
+    rubs = of(bench, "joint_hysteresis", "r 0.2")
+    radius = np.array([nearly, 10.0]) * np.abs(bench.torque).max()
+    one = replace(rubs, info={**rubs.info, "radius": radius})
+    read = parameters(bench, Part(one, 1.0), np.array([0.2, 0.0]), np.zeros((2, 2)))
+    assert read["friction"].value == pytest.approx(0.2 * radius[0] * counts, abs=0.01 * radius[0])
+
+
 def test_friction_is_not_below_zero() -> None:
     """However little the data tell of it: an interval that reaches below ends there."""
     load = 80 * np.sin(np.arange(300) / 15)

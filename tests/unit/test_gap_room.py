@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,10 @@ from identification.gap.bins import Bins
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
+from identification.gap.effects.drift import own_clock
 from identification.gap.history import followed
+from identification.gap.parameters import parameters
+from identification.gap.parts import Part
 from tests.unit.test_gap_operators import bench_data
 
 
@@ -55,6 +60,33 @@ def test_a_temperature_that_goes_to_and_fro_may_do_much(back: float, large: bool
     assert all((max(v.scales) > 0.1 * 8e-4) is large for v in found)
 
 
+def test_what_is_late_is_behind_at_the_end_and_as_likely_as_what_is_not() -> None:
+    """And no lag is looked for that a few rows can't tell."""
+    n = 400
+    warm = np.linspace(0.0, 5.0, n)
+    data = bench_data(80.0 * (np.arange(n) % 50), np.zeros(n), temperature=warm[:, None],
+                      step=np.full(n, -1), session=np.arange(n, dtype=float))  # fmt: skip
+    bench = make_bench(data)
+    found = [v for v in library(bench, ["thermal_drift"]) if v.info.get("sensor") == "1"]
+    late = [v for v in found if "lags_s" in v.info]
+    assert sum(v.prior for v in late) == pytest.approx(1.0)
+    assert min(v.info["lags_s"][0] for v in late) > 2
+    last = max(late, key=lambda v: v.info["lags_s"][0])
+    w = np.array([1e-5, 0.0])
+    told = parameters(bench, Part(last, 1.0), w, np.zeros((2, 2)))["drift_over_session_x"]
+    behind = last.info["lags_s"][0] / bench.course.session_span
+    assert told.value == pytest.approx(1e-2 * (1 - behind * (1 - np.exp(-1 / behind))), rel=1e-3)
+
+
+def test_a_screw_that_relaxes_and_is_put_right_is_no_room() -> None:
+    n = 1000
+    sags = 1 - 0.05 * (np.arange(n) % 250) / 250
+    data = hung(np.zeros(n), 120.0)
+    noise = 1e-6 * np.random.default_rng(4).standard_normal(n)
+    data = replace(data, force=data.force * sags, displacement=1e-5 * data.force * sags + noise)
+    assert not own_clock(make_bench(data))
+
+
 def test_a_long_hold_shows_what_swings_in_it() -> None:
     """Though most of the session is one level, and nothing tells the temperature."""
     n, every_s = 1000, 120.0
@@ -67,13 +99,15 @@ def test_a_long_hold_shows_what_swings_in_it() -> None:
 
 
 def test_bins_of_long_holds_are_a_small_part_of_the_recording() -> None:
-    """Those of short ones are as they were: 1, 1, 2, 4 ... samples."""
-    for n, most in ((64, 32), (65, 8), (1000, 8), (20_000, 40)):
-        hold = np.zeros(n, dtype=np.int64)
-        data = bench_data(np.zeros(n), np.zeros(n))
-        bins = Bins.of(data, hold, running=False)
-        assert bins.count.max() == most
-        assert bins.count[:4].tolist() == [1, 1, 2, 4]
+    """Those of short ones, and of many, are as they were: 1, 1, 2, 4 ... samples."""
+    for n, holds, wanted in (
+        (64, 1, [1, 1, 2, 4, 8, 16, 32]), (80, 1, [1, 1, 2, 4, *[8] * 9]),
+        (20_000, 1, [1, 1, 2, 4, 8, 16, 8, *[40] * 499]),
+        (3000, 30, [1, 1, 2, 4, 8, 16, 32, 36] * 30),
+    ):  # fmt: skip
+        hold = np.repeat(np.arange(holds), n // holds)
+        bins = Bins.of(bench_data(np.zeros(n), np.zeros(n)), hold, running=False)
+        assert bins.count.tolist() == wanted
 
 
 def test_what_follows_late_is_exact_between_readings() -> None:

@@ -56,7 +56,10 @@ def own_clock(bench: Bench) -> bool:
     creep under one that stands, unless that goes back."""
     if hangs(bench) and not _goes_back(bench.response):
         return False
-    return bench.course.passes >= 3 or _goes_back(bench.response[waited(bench)])
+    stays = (
+        bench.response - bench.slope * bench.load
+    )  # a screw that relaxes takes the springs along
+    return bench.course.passes >= 3 or _goes_back(stays[waited(bench)])
 
 
 def waited(bench: Bench) -> Flags:
@@ -225,11 +228,22 @@ def changes(
 def _end(bench: Bench, v: Variant) -> Array | float:
     """Where the paths of a direction are at the end of the session: 1, but temperatures may have
     come back, and what follows one late is behind it."""
-    temperature, path = bench.rows.temperature, str(v.info["path"])
-    if temperature is None or "temperature" not in path:
+    sensor = v.info.get("sensor")
+    if sensor is None:
         return 1.0
-    number = path.removeprefix("temperature ")
-    t = temperature[:, int(number) - 1] if number.isdigit() else temperature.mean(axis=1)
+    t = temperature_of(bench, sensor)
     if "lags_s" in v.info:
         return np.asarray(followed(t, bench.rows.session, v.info["lags_s"])[-1] / np.ptp(t))
     return float((t[-1] - t[0]) / np.ptp(t))
+
+
+def temperature_of(bench: Bench, sensor: str) -> Array:
+    """(n,) deg C of a thermometer by its number from 1, or their mean; 0 where it was not read."""
+    values, none = bench.rows.temperature, np.zeros(bench.rows.n)
+    if values is None or (sensor != MEAN and int(sensor) > values.shape[1]):
+        return none
+    return np.asarray(values.mean(axis=1) if sensor == MEAN else values[:, int(sensor) - 1])
+
+
+MEAN = "mean"  # of all thermometers
+TEMPERATURE = "temperature"  # path that was read

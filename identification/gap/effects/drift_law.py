@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effects.drift import RATES
+from identification.gap.effects.drift import RATES, TEMPERATURE, temperature_of
 from identification.gap.history import followed
 from identification.gap.law import Law, Term
 from identification.gap.variants import Variant
@@ -34,14 +34,11 @@ def law_of_path(bench: Bench, v: Variant) -> tuple[dict[str, object], tuple[Term
         places = np.linspace(0, span, int(v.info["pieces"]))
         terms = tuple(Term("drift_knot", {"at": float(t)}) for t in places)
         return {"path": "free"}, terms, np.ones(len(terms))
-    values = bench.rows.temperature
-    assert values is not None
-    sensor = "mean" if label.startswith("mean") else label.rsplit(maxsplit=1)[-1]
-    read = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
-    lags = v.info.get("lags_s")
+    sensor, lags = str(v.info["sensor"]), v.info.get("lags_s")
     late = [{}] if lags is None else [{"time_constant": float(t)} for t in lags]
     terms = tuple(Term("drift_per_kelvin", {"sensor": sensor, **how}) for how in late)
-    return {"path": "temperature"}, terms, np.full(len(terms), 1 / float(np.ptp(read)))
+    per_kelvin = 1 / float(np.ptp(temperature_of(bench, sensor)))
+    return {"path": TEMPERATURE}, terms, np.full(len(terms), per_kelvin)
 
 
 def path_of(bench: Bench, law: Law, term: Term) -> Array:
@@ -58,14 +55,10 @@ def path_of(bench: Bench, law: Law, term: Term) -> Array:
         places = sorted({x.shape["at"] for x in law.terms if _twin(x, term)})
         hat = np.equal(places, term.shape["at"]).astype(float)
         return np.asarray(np.interp(t, places, hat))
-    values = bench.rows.temperature
-    if values is None:
-        return np.zeros(bench.rows.n)
-    sensor = term.shape["sensor"]
-    v = values.mean(axis=1) if sensor == "mean" else values[:, int(sensor) - 1]
+    read = temperature_of(bench, term.shape["sensor"])
     if "time_constant" in term.shape:
-        return followed(v, bench.rows.session, np.array([term.shape["time_constant"]]))[:, 0]
-    return np.asarray(v - v[0])
+        return followed(read, bench.rows.session, np.array([term.shape["time_constant"]]))[:, 0]
+    return np.asarray(read - read[0])
 
 
 def _twin(one: Term, other: Term) -> bool:

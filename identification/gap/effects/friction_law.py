@@ -27,13 +27,14 @@ BY_LOAD = tuple(f"{law} by load" for law in EXPONENTIAL)
 # Where the stated spring is that of small loads, what slips comes on top.
 SLIPPING = tuple(f"{law} that slips" for law in EXPONENTIAL)
 LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
+ON_TOP = ("Prandtl", *SLIPPING)
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)
 _MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
            SET_UP_ANEW.strip(): ANEW, LASTING.strip(): ACROSS}  # fmt: skip
 
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: friction elements; of Iwan's law with their strength, else with their reach."""
+    """Terms: friction elements; with their strength where the law has one, else with a reach."""
     joint, law = int(v.info["joint"]), str(v.info["law"])
     key = "strength" if law in SLIP_AT_A_STRENGTH else "reach"
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
@@ -53,9 +54,9 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     operator), or reach, or load, times bristle state; of laws that slip what that leaves of the
     load, as `P_r(tau)` does of Prandtl's; of a term without a strength its own spring's line."""
     c = law.constants
-    joint, iwan = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
+    joint, at_strength = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
-    size = np.array([t.shape["strength" if iwan else "reach"] for t in law.terms if t.shape])
+    size = np.array([t.shape["strength" if at_strength else "reach"] for t in law.terms if t.shape])
     load, kept = torque, np.ones(len(torque), dtype=bool)
     rest, weight = bench.rest, None
     if c["memory"] == HUNG:
@@ -63,7 +64,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     if c["memory"] == WORKED:
         path = worked_in(torque, fresh)
         load, fresh, kept, rest = path.load, path.fresh, path.kept, path.fresh
-    if iwan:
+    if at_strength:
         tiled = np.tile(load[:, None], (1, len(size)))
         state = play(tiled, size, rest, fresh, 0.0 if weight is None else weight[:, None])
         held = (-state if c["law"] == "Prandtl" else load[:, None] - state)[kept]

@@ -36,6 +36,7 @@ from identification.gap.effects.friction_law import (
     BY_LOAD,
     EXPONENTIAL,
     LAWS,
+    ON_TOP,
     SLIPPING,
     by_ratio,
 )
@@ -150,6 +151,7 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
     if found.info["law"] in LAWS:
         low, high = found.info["radius"]
         reach = np.geomspace(0.9 * float(low), 1.1 * float(high), _CLOSER)
+        reach /= NEARER if found.info["law"] in BY_LOAD else 1.0
         finer = _exponential(bench, joint, name, reach / span, *how)
     elif not bench.data.arm and bench.course.unloads:
         finer = _spectra(bench, joint, name, span, *how, BETWEEN)
@@ -194,16 +196,17 @@ def growing(bench: Bench, found: Variant) -> list[Variant]:
     carries = np.abs(torque + bench.weight(joint))
     top, out = float(carries.max()), []
     reach = bench.reach_of(torque) * np.geomspace(REACHES[0], REACHES[-1], _GROWING)
-    for law in EXPONENTIAL:
+    for law in _exponential_laws(bench):
         load, anew = (torque, fresh) if path is None else (path.load, path.fresh)
         z = bristles(load, reach, anew, law.startswith("Bouc-Wen"), weight)
         held = reach * (z if path is None else z[path.kept])
-        both = zip(held.T, (held * carries[:, None] / top).T, strict=True)
+        slips = torque[:, None] if law in SLIPPING else 0.0
+        both = zip((held - slips).T, (held * carries[:, None] / top - slips).T, strict=True)
         for r, states in zip(reach, both, strict=True):
             columns = [bench.add_joint(joint, unit * h) for h in states]
             out.append(
                 variant(WORD, f"{name} {law} {r:.3g} Nm grows", columns, SCALES, each=True,
-                        prior=0.25 / (2 * _GROWING), joint=joint, radius=np.array([r, r]), law=law,
+                        prior=0.25 / (4 * _GROWING), joint=joint, radius=np.array([r, r]), law=law,
                         memory=memory, grows_to=top)
             )  # fmt: skip
     return out
@@ -322,10 +325,13 @@ def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
         found = found.without_line(joint)
     largest = float(np.abs(bench.torque[:, joint]).max())
     slips = np.clip((1 - radius / max(largest, _TINY)) / _HARDLY, 0.0, 1.0)
-    if v.info["law"] in BY_LOAD:
+    law = str(v.info["law"])
+    if law in BY_LOAD:
         radius = np.full(len(radius), largest)
-    if v.info["law"] == "Iwan":  # what never slips is a spring like the joint's own
+    if law == "Iwan":  # what never slips is a spring like the joint's own
         found = found.on_spring(slips - 1, joint)
+    if law in ON_TOP:  # of all that gives way at large loads, as of the other convention
+        found = found.on_spring(slips, joint)
     return {
         "friction": from_zero(found.linear(slips * radius, bench.torque_unit)),
         "share_through_friction": found.per_spring(slips, joint),

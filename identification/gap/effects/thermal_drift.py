@@ -18,6 +18,8 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.effects.drift import (
+    MEAN,
+    TEMPERATURE,
     by_direction,
     changes,
     free_path,
@@ -26,6 +28,7 @@ from identification.gap.effects.drift import (
     paths,
     rates,
     shares,
+    temperature_of,
 )
 from identification.gap.effects.drift_law import OF_SESSION, law_of_path, path_of
 from identification.gap.history import followed
@@ -43,10 +46,14 @@ def variants(bench: Bench) -> list[Variant]:
     """Paths times directions."""
     named, masks = zip(*by_direction(bench).items(), strict=True)
     out = []
-    for label, path in {**paths(bench), **_temperatures(bench)}.items():
+    for label, path in paths(bench).items():
         columns = [bench.add(bench.outside_column(m * path)) for m in masks]
-        scales = _scales(bench, path if "temperature" in label else None)
-        out.append(variant(WORD, label, columns, scales, positive=False, path=label, names=named))
+        out.append(variant(WORD, label, columns, _scales(bench), positive=False, path=label,
+                           names=named))  # fmt: skip
+    for sensor, path in _temperatures(bench).items():
+        columns = [bench.add(bench.outside_column(m * path)) for m in masks]
+        out.append(variant(WORD, _called(sensor), columns, _scales(bench, path), positive=False,
+                           path=TEMPERATURE, names=named, sensor=sensor))  # fmt: skip
     out += _late(bench)
     scales, free = _scales(bench), free_paths(bench)
     if not free:
@@ -62,13 +69,17 @@ def variants(bench: Bench) -> list[Variant]:
 
 
 def _temperatures(bench: Bench) -> dict[str, Array]:
-    """Mean rise of the recorded temperatures, and each joint's; normalised to their range."""
+    """Sensor -> (n,) rise of what it read, in shares of its range; their mean, and each."""
     t = bench.rows.temperature
     if t is None:
         return {}
-    candidates = {"mean temperature": t.mean(axis=1)}
-    candidates |= {f"temperature {j + 1}": t[:, j] for j in range(t.shape[1])}
-    return {k: (v - v[0]) / np.ptp(v) for k, v in candidates.items() if np.ptp(v) > 0}
+    sensors = [MEAN, *(str(j + 1) for j in range(t.shape[1]))]
+    read = {s: temperature_of(bench, s) for s in sensors}
+    return {s: (v - v[0]) / np.ptp(v) for s, v in read.items() if np.ptp(v) > 0}
+
+
+def _called(sensor: str) -> str:
+    return "mean temperature" if sensor == MEAN else f"temperature {sensor}"
 
 
 def _scales(bench: Bench, path: Array | None = None) -> tuple[float, ...]:
@@ -81,13 +92,14 @@ def _late(bench: Bench) -> list[Variant]:
     makes all lags between them."""
     lags, out = _lags(bench), []
     named, masks = zip(*by_direction(bench).items(), strict=True)
-    for label, path in _temperatures(bench).items():
+    for sensor, path in _temperatures(bench).items():
         ways = followed(path, bench.rows.session, lags)
         for k in range(len(lags) - 1):
             columns = [bench.add(bench.outside_column(m * way))
                        for m in masks for way in ways[:, k : k + 2].T]  # fmt: skip
-            out.append(variant(WORD, f"{label} late {lags[k]:.3g} s", columns, _scales(bench, path),
-                               positive=False, prior=1 / (len(lags) - 1), path=label, names=named,
+            out.append(variant(WORD, f"{_called(sensor)} late {lags[k]:.3g} s", columns,
+                               _scales(bench, path), positive=False, prior=1 / (len(lags) - 1),
+                               path=TEMPERATURE, names=named, sensor=sensor,
                                lags_s=lags[k : k + 2]))  # fmt: skip
     return out
 
