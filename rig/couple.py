@@ -19,7 +19,7 @@ from identification.workspace import Workspace
 from rig.coupling_path import read_path, run_path
 from rig.errors import InputError
 from rig.model import ArmModel, CouplingSpec, load_model
-from rig.units import MM_PER_M
+from rig.units import MM_PER_M, N_PER_MM
 
 Array = NDArray[np.float64]
 _AXES = ("x", "y", "z")
@@ -62,16 +62,16 @@ class CouplingResult:
             "kind": self.spec.described,
             "workspace_m3": _volumes(first),
             "workspace_others_m3": [_volumes(w) for w in others],
-            "single_N_per_mm": _per_axis(self.single / MM_PER_M),
-            "single_standard_uncertainty_N_per_mm": _per_axis(self.u_single / MM_PER_M),
-            "coupled_N_per_mm": {k: _per_axis(v / MM_PER_M) for k, v in self.pair.items()},
+            "single_N_per_mm": _per_axis(self.single * N_PER_MM),
+            "single_standard_uncertainty_N_per_mm": _per_axis(self.u_single * N_PER_MM),
+            "coupled_N_per_mm": {k: _per_axis(v * N_PER_MM) for k, v in self.pair.items()},
             "coupled_standard_uncertainty_N_per_mm": {
-                k: _per_axis(v / MM_PER_M) for k, v in self.u_pair.items()
+                k: _per_axis(v * N_PER_MM) for k, v in self.u_pair.items()
             },
             "gain": {k: _per_axis(v / self.single) for k, v in self.pair.items()},
             "decision": [
                 {
-                    "required_N_per_mm": d.required / MM_PER_M,
+                    "required_N_per_mm": d.required * N_PER_MM,
                     "direction": d.direction,
                     "state": d.state,
                 }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.model import told_first
-from rig.units import MM_PER_M
+from rig.units import N_PER_MM
 
 if TYPE_CHECKING:
     from rig.couple import CouplingResult
@@ -54,7 +54,7 @@ def _stiffness(result: CouplingResult) -> str:
     rows |= {name: (result.pair[name], result.u_pair[name]) for name in result.pair}
     for name, (values, u) in rows.items():
         cells = "".join(
-            f" {f'{v / MM_PER_M:.1f} ({s / MM_PER_M:.1f})':>18}"
+            f" {f'{v * N_PER_MM:.1f} ({s * N_PER_MM:.1f})':>18}"
             for v, s in zip(values, u, strict=True)
         )
         lines.append(f"  {name:<14}{cells}")
@@ -78,8 +78,8 @@ def _decisions(result: CouplingResult) -> str:
     lines = ["When to couple"]
     for d in result.decisions:
         lines.append(
-            f"  {d.direction}: {d.required / MM_PER_M:g} N/mm required, "
-            f"single {d.single / MM_PER_M:.1f}, coupled {d.coupled / MM_PER_M:.1f} -> {d.state}"
+            f"  {d.direction}: {d.required * N_PER_MM:g} N/mm required, "
+            f"single {d.single * N_PER_MM:.1f}, coupled {d.coupled * N_PER_MM:.1f} -> {d.state}"
         )
     return "\n".join(lines) if result.decisions else ""
 
@@ -111,7 +111,7 @@ def compare(result: CouplingResult) -> list[Beside]:
     Coupled is the rigid pair, as the paper has it. Shown, never judged by.
     """
     rows = []
-    pair, single = result.pair["rigid"] / MM_PER_M, result.single / MM_PER_M
+    pair, single = result.pair["rigid"] * N_PER_MM, result.single * N_PER_MM
     for i, axis in enumerate("xy"):
         stated, coupled = PUBLISHED_SINGLE[i], PUBLISHED_COUPLED[i]
         times = coupled / stated

@@ -14,7 +14,7 @@ from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
 from rig.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
 from rig.plotting import COLOURS, write_figures
-from rig.units import MM_PER_M
+from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,13 +56,13 @@ def stiffness(result: CouplingResult) -> Figure:
     if is_published_setup(result):
         bars.append(("single, published", np.array(PUBLISHED_SINGLE), None, "white", COLOURS[0]))
     bars.append(
-        ("single", result.single[:2] / MM_PER_M, result.u_single[:2] / MM_PER_M, COLOURS[0], "")
+        ("single", result.single[:2] * N_PER_MM, result.u_single[:2] * N_PER_MM, COLOURS[0], "")
     )
     if is_published_setup(result):
         bars.append(("coupled, published", np.array(PUBLISHED_COUPLED), None, "white", COLOURS[1]))
     colours = {"rigid": COLOURS[1], "compliant": COLOURS[2], "point": COLOURS[3]}
     for kind, k in result.pair.items():
-        bars.append((f"coupled, {kind}", k[:2] / MM_PER_M, result.u_pair[kind][:2] / MM_PER_M,
+        bars.append((f"coupled, {kind}", k[:2] * N_PER_MM, result.u_pair[kind][:2] * N_PER_MM,
                      colours[kind], ""))  # fmt: skip
     width = 0.8 / len(bars)
     for i, (label, values, u, fill, edge) in enumerate(bars):
@@ -104,7 +104,7 @@ def maps(result: CouplingResult) -> Figure:
     )
     pair = Coupling(spec.beta, spec.kind, spec.half)
     found = [
-        stiffness_map(model.arm, points, stance, load, c).stiffness / MM_PER_M for c in (None, pair)
+        stiffness_map(model.arm, points, stance, load, c).stiffness * N_PER_MM for c in (None, pair)
     ]
     figure = _figure(10.5, 4.6)
     titles = ("one arm", f"two arms, {spec.described}")
@@ -156,7 +156,7 @@ def place(result: TaskResult) -> Figure:
               markeredgecolor="black", markersize=15, label="best")  # fmt: skip
     axes.set_xlabel("Base distance in mm")
     axes.set_ylabel("beta in deg")
-    needs = ", ".join(f"{n.name} {n.stiffness / MM_PER_M:g} N/mm" for n in result.model.required)
+    needs = ", ".join(f"{n.name} {n.stiffness * N_PER_MM:g} N/mm" for n in result.model.required)
     axes.set_title(f"Where the second arm should stand for {needs}", fontsize=10)
     axes.grid(visible=False)
     axes.legend(loc="upper right", fontsize=8)
@@ -169,9 +169,9 @@ def schedule(result: CouplingResult) -> Figure:
     plan = result.schedule
     figure = _figure(7.5, 4.2)
     axes = figure.add_subplot()
-    axes.step(plan.time, plan.required / MM_PER_M, where="post", color="black", label="required")
-    axes.plot(plan.time, plan.single / MM_PER_M, color=COLOURS[0], label="single")
-    axes.plot(plan.time, plan.coupled / MM_PER_M, color=COLOURS[1], label="coupled")
+    axes.step(plan.time, plan.required * N_PER_MM, where="post", color="black", label="required")
+    axes.plot(plan.time, plan.single * N_PER_MM, color=COLOURS[0], label="single")
+    axes.plot(plan.time, plan.coupled * N_PER_MM, color=COLOURS[1], label="coupled")
     # told apart without their colours, too
     shades = {"couple": (COLOURS[1], "coupled", ""), "infeasible": ("red", "infeasible", "///")}
     named: set[str] = set()

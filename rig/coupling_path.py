@@ -15,7 +15,7 @@ from identification.arm import Arm
 from identification.when import Schedule, schedule
 from rig.errors import InputError, did_you_mean
 from rig.model import ArmModel, CouplingSpec
-from rig.units import MM_PER_M
+from rig.units import N_PER_MM
 
 Array = NDArray[np.float64]
 _Q = tuple(f"q{i}_rad" for i in range(1, 7))
@@ -71,7 +71,7 @@ def read_path(path: Path) -> Path6:
         table["time_s"],
         np.stack([table[n] for n in _Q], axis=-1) if with_q else None,
         np.stack([table[n] for n in _DIRECTION], axis=-1),
-        table["required_N_per_mm"] * MM_PER_M,
+        table["required_N_per_mm"] / N_PER_MM,
     )
 
 
@@ -105,7 +105,7 @@ def _check_rows(model: ArmModel, path: Path6, q: Array) -> None:
     back = np.diff(path.time, prepend=path.time[0]) < 0
     outside = (q < arm.q_min) | (q > arm.q_max)
     checks: list[tuple[NDArray[np.bool_], Callable[[int], str]]] = [
-        (path.required < 0, lambda i: f"required_N_per_mm is {path.required[i] / MM_PER_M:g} N/mm; "
+        (path.required < 0, lambda i: f"required_N_per_mm is {path.required[i] * N_PER_MM:g} N/mm; "
          "wanted: at least 0 N/mm"),
         (back, lambda i: f"time_s goes back to {path.time[i]:g} s; wanted: rows in order of time"),
         (np.abs(length - 1) > 1e-3, lambda i: f"direction_x, _y, _z have length {length[i]:.6g}; "

@@ -13,7 +13,7 @@ from identification.inverse import tool_pose
 from identification.maps import Need, Placement, Stance, Task, best_placement
 from rig.errors import InputError
 from rig.model import ArmModel, CouplingSpec, load_model
-from rig.units import MM_PER_M
+from rig.units import MM_PER_M, N_PER_MM
 
 Array = NDArray[np.float64]
 DISTANCES_MM = (800.0, 2400.0)
@@ -51,8 +51,8 @@ class TaskResult:
             "stiffness": [
                 {
                     "direction": need.name,
-                    "required_N_per_mm": need.stiffness / MM_PER_M,
-                    "reached_N_per_mm": float(k) / MM_PER_M,
+                    "required_N_per_mm": need.stiffness * N_PER_MM,
+                    "reached_N_per_mm": float(k) * N_PER_MM,
                 }
                 for need, k in zip(self.model.required, best.stiffness, strict=True)
             ],
@@ -72,8 +72,8 @@ class TaskResult:
         ]
         for need, k in zip(self.model.required, best.stiffness, strict=True):
             lines.append(
-                f"  {need.name}: {need.stiffness / MM_PER_M:g} N/mm required, "
-                f"{k / MM_PER_M:.1f} reached"
+                f"  {need.name}: {need.stiffness * N_PER_MM:g} N/mm required, "
+                f"{k * N_PER_MM:.1f} reached"
             )
         verdict = "the task can be done" if best.feasible else "no placement reaches the task"
         lines.append(f"  reached over required: {best.margin:.2f}; {verdict}")

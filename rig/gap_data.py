@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import takewhile
 
@@ -103,7 +104,7 @@ def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...
     """The samples to use (n,), without a few that lack what all others have: a channel counts only
     where it is there throughout. And what to say of those, and of channels that do not count: such
     as are there in no sample of a level, and temperatures, which are worth no sample."""
-    aside, without = [], []
+    aside, without = [], list(_unread_thermometers(dataset))
     for what, names in {**_MAY_MISS, _TEMPERATURES: _thermometers(dataset)}.items():
         has = names and all(n in dataset.columns for n in names)
         if not has or (what == _JOINTS and dataset.meta.robot == "none"):
@@ -120,6 +121,14 @@ def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...
                 f"{missing} of {count} samples lack {what}: taken as if none had been recorded."
             )
     return used, tuple(aside), tuple(without)
+
+
+def _unread_thermometers(dataset: Dataset) -> Iterator[str]:
+    """What to say of columns behind a gap in the numbers."""
+    read = _thermometers(dataset)
+    left = [f"temperature{j}_C" for j in range(len(read) + 1, 7)]
+    if behind := [name for name in left if name in dataset.columns]:
+        yield f"{', '.join(behind)}: not used; thermometers count from temperature1_C without gaps."
 
 
 def _levels(dataset: Dataset, used: Flags) -> set[tuple[object, ...]]:

@@ -12,6 +12,7 @@ from rig.errors import InputError
 from rig.model_write import arm_lines, coupling_lines
 from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
 from rig.storage.files import in_place_of
+from rig.units import KNM
 
 if TYPE_CHECKING:
     from rig.identify import IdentifyResult
@@ -28,9 +29,9 @@ def text(result: IdentifyResult) -> str:
         "  joint  kNm/rad     u    95 % interval    from data  at least",
     ]
     for j in range(6):
-        c, u = fit.stiffness[j] / 1e3, fit.stiffness[j] * fit.relative_sd[j] / 1e3
-        low, high = fit.ci95[j] / 1e3
-        bound = f"{fit.lower_bound[j] / 1e3:.2f}" if fit.lower_bound[j] > 1 else "-"
+        c, u = fit.stiffness[j] * KNM, fit.stiffness[j] * fit.relative_sd[j] * KNM
+        low, high = fit.ci95[j] * KNM
+        bound = f"{fit.lower_bound[j] * KNM:.2f}" if fit.lower_bound[j] > 1 else "-"
         share = max(0.0, 100 * fit.data_share[j])
         verdict = data_say(bool(fit.identified[j]), share)
         lines.append(

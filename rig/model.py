@@ -25,7 +25,7 @@ from rig.model_schema import (
     SegmentFile,
     TubeFile,
 )
-from rig.units import MM_PER_M
+from rig.units import MM_PER_M, N_PER_MM
 from rig.yamlfile import Document, read_document
 from rig.yamlnodes import Problem
 
@@ -406,7 +406,7 @@ def _check_compliance(document: Document[ModelFile], half: Array) -> None:
 
 def _requirement(document: Document[ModelFile], i: int) -> Requirement:
     written = document.value.required[i]
-    stiffness = written.stiffness_N_per_mm * MM_PER_M
+    stiffness = written.stiffness_N_per_mm / N_PER_MM
     if isinstance(written.direction, str):
         return Requirement(written.direction, AXES[written.direction], stiffness)
     given = written.direction

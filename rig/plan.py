@@ -31,7 +31,7 @@ from rig.plan_margins import (
 from rig.protocol import MeasurementProtocol, Run
 from rig.protocolfile import ProtocolFile
 from rig.station import Station
-from rig.units import MM_PER_M
+from rig.units import MM_PER_M, N_PER_MM
 from rig.yamlfile import read_document_text
 from rig.yamlnodes import Key, Problem, refuse
 
@@ -184,7 +184,7 @@ def _planned(
 ) -> PlannedRun:
     pose, vector = protocol.poses[run.pose], protocol.directions[run.direction]
     tool = tool_offset(np.asarray(pose.tcp_xyz_mm) / MM_PER_M)
-    stiffness = float(along(arm.compliance(pose.q_rad, tool), vector)) / MM_PER_M  # N/mm
+    stiffness = float(along(arm.compliance(pose.q_rad, tool), vector)) * N_PER_MM  # N/mm
     top = run.forces_N[-1]
     displacement_mm = top / stiffness
     if run.stop_at_displacement_mm is not None:

@@ -13,14 +13,13 @@ from rig.dataset import Dataset
 from rig.plotting import COLOURS, MARKERS
 from rig.report.compare import aligned
 from rig.report.quality import RunZeros
-from rig.units import MM_PER_M, N_PER_MM
+from rig.units import KNM, MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Json = dict[str, Any]
 MOST_POINTS = 4000  # of a recording that are drawn: more than a page has dots
-K = 1e-3  # Nm/rad in kNm/rad
 
 
 def watermark(figure: Figure, banners: Sequence[str]) -> Figure:
@@ -40,15 +39,15 @@ def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
     figure, axes = _axes(7.5, 3.8, "Joint", "Torsional stiffness in kNm/rad")
     x = np.arange(1, 7)
     prior = sets[0][1]["prior"]
-    middle = K * np.array(prior["joint_stiffness_Nm_per_rad"])
+    middle = KNM * np.array(prior["joint_stiffness_Nm_per_rad"])
     spread = np.exp(TWO_SIDED * np.array(prior["relative_sd"]))
     axes.bar(x, middle * (spread - 1 / spread), 0.8, bottom=middle / spread, color="0.88",
              label="prior, 95 %", zorder=1)  # fmt: skip
     step = 0.5 / max(1, len(sets))
     for i, (label, result) in enumerate(sets):
         quantities = result["joint_stiffness_Nm_per_rad"]
-        value = K * np.array([q["value"] for q in quantities])
-        ci = K * np.array([q["ci95"] for q in quantities])
+        value = KNM * np.array([q["value"] for q in quantities])
+        ci = KNM * np.array([q["ci95"] for q in quantities])
         at = x + (i - (len(sets) - 1) / 2) * step
         colour, known = COLOURS[i % len(COLOURS)], np.array(result["identified"], dtype=bool)
         axes.errorbar(at, value, (value - ci[:, 0], ci[:, 1] - value), fmt="none", color=colour,

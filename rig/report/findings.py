@@ -22,8 +22,7 @@ from rig.report.document import (
 from rig.report.gather import Session
 from rig.report.pictures import Pictures
 from rig.report.results import DEGREES, NOTHING, Node, quantity
-
-K = 1e-3  # Nm/rad in kNm/rad
+from rig.units import KNM
 
 
 def stiffness(session: Session, data: Node, pictures: Pictures) -> Section:
@@ -154,10 +153,10 @@ def _joint_table(found: Node) -> Table:
         (
             str(j + 1),
             _verdict(found["identified"][j].value, found["share_of_data"][j].value),
-            q["value"].number(scale=K),
-            q["standard_uncertainty"].number(2, K),
-            q["ci95"][0].number(scale=K),
-            q["ci95"][1].number(scale=K),
+            q["value"].number(scale=KNM),
+            q["standard_uncertainty"].number(2, KNM),
+            q["ci95"][0].number(scale=KNM),
+            q["ci95"][1].number(scale=KNM),
             found["share_of_data"][j].percent(),
             _bound(found["lower_bound_Nm_per_rad"][j]),
         )
@@ -170,7 +169,7 @@ def _joint_table(found: Node) -> Table:
 
 def _bound(node: Node) -> Rich:
     """A joint that no load turns has a bound of nothing."""
-    return node.number(3, K) if node.value > 1 else (NOTHING,)
+    return node.number(3, KNM) if node.value > 1 else (NOTHING,)
 
 
 def _verdict(identified: bool, share: float) -> Word:

@@ -17,10 +17,10 @@ from rig.report.document import (
     Word,
     row,
 )
-from rig.report.findings import K
 from rig.report.gather import Gathered, Session
 from rig.report.pictures import Pictures
 from rig.report.results import NOTHING, Node, quantity
+from rig.units import KNM
 
 
 def coupling(gathered: Gathered, data: Node, pictures: Pictures) -> Section:
@@ -207,6 +207,6 @@ def _compared_joints(gathered: Gathered, data: Node) -> Table:
         if one["identify"]
     ]
     rows = tuple(
-        row(f"joint {j + 1}", *(quantity(found[j], K) for _, found in columns)) for j in range(6)
+        row(f"joint {j + 1}", *(quantity(found[j], KNM) for _, found in columns)) for j in range(6)
     )
     return Table("Joint stiffness in kNm/rad", ("", *(label for label, _ in columns)), rows)

@@ -88,6 +88,9 @@ def test_a_rig_has_as_many_thermometers_as_it_has(sensors: tuple[int, ...], read
         table[f"temperature{k}_C"] = 20.0 + np.arange(len(table)) / len(table)
     data = gap_data(imported(table, meta(design)))
     assert (0 if data.temperature is None else data.temperature.shape[1]) == read
+    left = [n for n in data.notes if "not used" in n]
+    assert left == ["temperature3_C: not used; thermometers count from temperature1_C without "
+                    "gaps."] * (3 in sensors)  # fmt: skip
 
 
 @pytest.mark.parametrize("column", ["q3_rad", "temperature2_C"])
