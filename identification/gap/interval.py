@@ -106,13 +106,15 @@ class Found:
 
     def on_spring(self, functional: Array, joint: int) -> Found:
         """A linear function of the coefficients counted as compliance of the joint's spring."""
-        s = self.softer
-        value, variance, cross = dict(s.value), dict(s.variance), dict(s.cross)
-        if joint in value:
-            value[joint] += float(functional @ self.w)
-            variance[joint] += float(functional @ (self.cov @ functional + 2 * s.cross[joint]))
-            cross[joint] = s.cross[joint] + self.cov @ functional
-        return replace(self, softer=Softer(value, variance, cross))
+        s, moves = self.softer, self.cov @ functional
+        cross = s.cross.get(joint, np.zeros(len(self.w)))
+        value = s.value.get(joint, 0.0) + float(functional @ self.w)
+        variance = s.variance.get(joint, 0.0) + float(functional @ (moves + 2 * cross))
+        softer = Softer(
+            {**s.value, joint: value}, {**s.variance, joint: variance},
+            {**s.cross, joint: cross + moves},
+        )  # fmt: skip
+        return replace(self, softer=softer)
 
     def of_spring(self, joint: int) -> tuple[float, float]:
         """The spring that was found over that simulated, compliances or, of what is imposed as a
