@@ -58,7 +58,7 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
         fewer = _simpler(e, ranked, kept, arm)
         said = found.foretold.get(e.words) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
-        many = 1.0 if closely or not _tells_of_three(said) else THREE
+        many = (THREE_CLOSELY if closely else THREE) if _tells_of_three(said) else 1.0
         for word, share in _main(_of(e, fewer.words) if fewer is said else said, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
@@ -98,11 +98,11 @@ STATED = 0.1  # so much is left of `none` where what was stated does not explain
 
 # What three troubles at once keep: a single one that the library lacks is likelier. A priori it has
 # 0.05, three have 0.37 * 0.05^2 (`priors`); and of 32 words that were taken away in the blind check
-# 7 were met down to the noise by three others: 0.0009 against 0.05 * 7 / 32. Unless their laws need
-# no more imperfection than noise: of 14 such threes that foretold withheld runs, in four draws of
-# the blind check and five sets of other people's arms, 8 were two effects and what their laws lack,
-# one stood in for a missing word, and beside the others a smooth curve was likelier anyway.
-THREE = 0.1
+# 7 were met down to the noise by three others: 0.0009 against 0.05 * 7 / 32. Where their laws need
+# no more imperfection than noise, and foretell what was withheld, that is otherwise: of 17 such
+# threes in draws of the blind check, with words taken out in half of their cases, and in five sets
+# of other people's arms, 13 were two effects and what their laws lack.
+THREE, THREE_CLOSELY = 0.1, 0.75
 TELLING = LEAST_SHARE  # of the largest: what is smaller is no trouble beside it
 # Nats that a second effect has to bring before it may be the main one: of 700 cases such an effect
 # stood in three times for what another law left, by 2, 5 and 13 nats, and was never the larger one
