@@ -56,10 +56,9 @@ def own_clock(bench: Bench) -> bool:
     creep under one that stands, unless that goes back."""
     if hangs(bench) and not _goes_back(bench.response):
         return False
-    stays = (
-        bench.response - bench.slope * bench.load
-    )  # a screw that relaxes takes the springs along
-    return bench.course.passes >= 3 or _goes_back(stays[waited(bench)])
+    # a screw that relaxes, and is put right, takes the springs to and fro
+    alone = bench.response - bench.slope * bench.load
+    return bench.course.passes >= 3 or _goes_back(alone[waited(bench)])
 
 
 def waited(bench: Bench) -> Flags:
