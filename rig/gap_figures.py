@@ -308,7 +308,7 @@ def withheld(r: Shown) -> Figure:
     for i, (_, before, after, text, _) in enumerate(entries):
         _above(axes, float(np.sqrt(max(before * after * MM_PER_M**2, 1e-300))), i, text)
     axes.set_xlabel(_gap_label(r, "Gap", "rms in mm"))
-    axes.set_title(f"How far the gap shrinks {_after(r)}", fontsize=11)
+    set_title(figure, f"How far the gap shrinks {_after(r)}")
     shared_legend(figure, [axes])
     return figure
 
