@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.curve import Array, Curve, Point
+from identification.running import first_rows
 from identification.turns import turning_points
 from rig.passes import TURN, binned, is_held
 from rig.units import M_PER_MM
@@ -192,9 +193,7 @@ def _run(columns: dict[str, NDArray[Any]], repetition: int, rows: NDArray[np.int
 
 def _blocks(run: _Run) -> Iterator[slice]:
     """Neighbouring samples of one branch and step."""
-    n = run.force.size
-    change = np.flatnonzero((run.branch[1:] != run.branch[:-1]) | (run.step[1:] != run.step[:-1]))
-    edges = [0, *(int(i) + 1 for i in change), n]
+    edges = [*first_rows(run.branch, run.step).tolist(), run.force.size]
     yield from (slice(a, b) for a, b in pairwise(edges))
 
 
