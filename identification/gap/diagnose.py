@@ -33,6 +33,7 @@ from identification.gap.posterior import Known, settled
 from identification.gap.ramps import ramps_told
 from identification.gap.refine import refine
 from identification.gap.search import force, search
+from identification.gap.slack import without_slack
 from identification.gap.strain import what_is_strained
 from identification.gap.strange import with_strangers
 from identification.gap.twins import twin_of
@@ -130,7 +131,7 @@ def explain_gap(
     out, forced = set(withhold), frozenset(add)
     check_words(out | forced)
     tell("preparing", 0.0)
-    bench = make_bench(without_glitches(without_ends(ramps_told(data))))
+    bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(data)))))
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])

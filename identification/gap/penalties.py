@@ -142,17 +142,20 @@ def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     or of a running recording, steep below half of it, or all of it where a path may take any way:
     thousands of samples would show it, but noise of low frequency wanders as far. Of levels
     at rest for every one far below what is stated: that is no gap. What springs may hide, or other
-    channels show, counts by how far it moves."""
+    channels show, counts by how far it moves; or by how far these are beyond what instruments do
+    (`shown`), if it moves nothing."""
     noise, seen = engine.bench.noise.stated, engine.bench.noise.seen
+    shown = np.array([float(p.variant.info.get("shown", 0.0)) for p in parts])
     if seen > 0:
-        sizes = np.maximum(_counted(parts, found), 1e-300)
+        sizes = np.maximum(_counted(parts, found), shown * seen + 1e-300)
         below = 20.0 * float(np.maximum(np.log(seen / sizes), 0.0).sum())
-        least = [1.0 if p.variant.info.get("path") == "free" else _WANDERS for p in parts]
-        return below + sum(_wall(w * seen / float(s)) for w, s in zip(least, sizes, strict=True))
+        share = [1.0 if p.variant.info.get("path") == "free" else _WANDERS for p in parts]
+        return below + sum(_wall(w * seen / float(s)) for w, s in zip(share, sizes, strict=True))
     elsewhere = np.array([p.word in _SHOWN_ELSEWHERE and not _bends(p) for p in parts], dtype=bool)
-    sizes = np.maximum(np.where(elsewhere, found.moved, found.gap), 1e-300)
-    far_below = FAR_BELOW_NOISE if engine.bench.data.arm else _GUESSED
-    return sum(_wall(far_below * noise / float(size)) for size in sizes)
+    least = (FAR_BELOW_NOISE if engine.bench.data.arm else _GUESSED) * noise
+    sizes = np.where(elsewhere, found.moved, found.gap)
+    sizes = np.maximum(sizes, shown * least + 1e-300)
+    return sum(_wall(least / float(size)) for size in sizes)
 
 
 def _bends(part: Part) -> bool:

@@ -18,7 +18,9 @@ STEPS, RUNS, HOLD = 9, 3, 6
 ACROSS = 0.4  # compliance across over that along
 
 
-def pressed(tangent: float, turns: bool = True, bends: float = 0.0, seed: int = 4) -> GapData:
+def pressed(
+    tangent: float, turns: bool = True, bends: float = 0.0, gives: float = ACROSS, seed: int = 4
+) -> GapData:
     """Steps up and down, three times, with force across of a tangent at the top that comes as the
     square of the load where it turns, and gives way; bends: of a curve of its own, no slant."""
     rng = np.random.default_rng(seed)
@@ -30,7 +32,7 @@ def pressed(tangent: float, turns: bool = True, bends: float = 0.0, seed: int = 
     branches = np.where(levels == 0, 0, np.where(np.arange(len(levels)) < STEPS, 1, 2))
     branch = np.tile(np.repeat(branches, HOLD), RUNS)
     run = np.repeat(np.arange(RUNS), n // RUNS)
-    moved = 1e-5 * (load + ACROSS * across) + bends * 1e-5 * load**2 / top
+    moved = 1e-5 * (load + gives * across) + bends * 1e-5 * load**2 / top
     return bench_data(
         load + rng.normal(0, 0.1, n), moved + rng.normal(0, 1e-6, n), step=step, branch=branch,
         run=run, repetition=run + 1, session=np.arange(n, dtype=float), imposed="force",
@@ -51,6 +53,14 @@ def test_a_curve_is_no_slant_where_nothing_acts_across() -> None:
     assert diagnose_gap(pressed(0.004, turns=False, bends=0.06)).verdict == (
         "joint_nonlinear_stiffness"
     )
+
+
+@pytest.mark.parametrize(("tangent", "verdict"), [(0.05, "load_misalignment"), (0.01, "none")])
+def test_a_block_that_gives_nothing_across_shows_a_slant_by_its_force(
+    tangent: float, verdict: str
+) -> None:
+    """Beyond what dynamometers mix up; nothing moves by it."""
+    assert diagnose_gap(pressed(tangent, turns=False, gives=0.0)).verdict == verdict
 
 
 def test_without_components_nobody_speaks_of_a_slant() -> None:

@@ -13,13 +13,15 @@ from identification.gap.interval import Found, Parameter
 from identification.gap.turns import way_back
 from identification.gap.variants import Variant, variant
 from identification.gap.white import white_sd
+from identification.turns import turning_points
 
 RATES = (0.01, 0.03, 0.08, 0.2, 0.5)  # time constants, of the session
 _SEEN = 3  # rows within the time constant
 # Pieces of a free smooth path: slower than a run, as slow as an air conditioner's swing. In a
 # recording that runs on and on three passes of the load tell what comes again, and every further
 # one bears three pieces; where nothing is loaded, nothing tells a quick path from other events.
-PIECES = {"free path": 10, "winding path": 32}
+WINDING = "winding path"
+PIECES = {"free path": 10, WINDING: 32}
 LONG_PIECES, RESTING_PIECES, LEAST_PIECES = 40, 20, 4
 MOST_PIECES, _ROOM_S = 100, 300.0  # of long rests; s of each, in which a room gets no warmer
 
@@ -76,14 +78,20 @@ def hangs(bench: Bench) -> bool:
 
 def _goes_back(read: Array) -> bool:
     """Whether what is read (n,) under a standing load goes to and fro, as nothing does that creeps,
-    by a good part of its way: by means of even pieces, beyond what these scatter."""
+    by a good part of its way: by means of even pieces, beyond what these scatter. By less, where it
+    does so again and again; pieces that are as long as the swings scatter with them, readings do
+    not."""
     count = min(_STRETCHES, len(read) // _OF_EACH)
     if count < LEAST_PIECES:
         return False
     pieces = np.array_split(read, count)
     mean = np.array([p.mean() for p in pieces])
-    noise = white_sd(np.diff(mean, 2))
-    return bool(_back(mean) > max(_BACK * float(np.ptp(mean)), _CLEARLY * noise))
+    way, noise = float(np.ptp(mean)), white_sd(np.diff(mean, 2))
+    if _back(mean) > max(_BACK * way, _CLEARLY * noise):
+        return True
+    noise = white_sd(np.diff(read, 2)) / _OF_EACH**0.5
+    swings = turning_points(mean, max(_SWINGS * way, _CLEARLY * noise))
+    return len(swings) >= _AGAIN
 
 
 def _back(path: Array) -> float:
@@ -93,6 +101,7 @@ def _back(path: Array) -> float:
 
 _STRETCHES, _OF_EACH = 100, 4  # pieces at most; rows of each at least
 _BACK, _CLEARLY = 0.33, 5.0  # of all that was seen; standard deviations
+_SWINGS, _AGAIN = 0.15, 4  # of all that was seen; turning points
 
 
 def paths(bench: Bench) -> dict[str, Array]:
@@ -156,7 +165,9 @@ def free_paths(bench: Bench) -> dict[str, FreePath]:
     if not own_clock(bench):
         return {}
     if not bench.rows.continuous:
-        return {label: FreePath(pieces) for label, pieces in PIECES.items()}
+        most = _resting_pieces(bench) if np.any(waited(bench)) else 0
+        return {label: FreePath(max(pieces, most * (label == WINDING)))
+                for label, pieces in PIECES.items()}  # fmt: skip
     most = _resting_pieces(bench) if bench.course.rests else LONG_PIECES
     pieces = min(3 * (bench.course.passes - 3), most)
     if pieces < LEAST_PIECES:

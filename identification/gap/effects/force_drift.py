@@ -31,6 +31,7 @@ from identification.gap.effects.drift import (
     paths,
     rates,
     shares,
+    waited,
 )
 from identification.gap.effects.drift_law import OF_SESSION, law_of_path, path_of
 from identification.gap.interval import Found, Parameter
@@ -44,10 +45,10 @@ SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
 def variants(bench: Bench) -> list[Variant]:
     """Warm-up paths, several rates at once, and a free smooth path: alike in all directions, of
     every amplifier's own, or of all amplifiers alike. A weight that hangs all the time weighs the
-    same: none where its reading hardly moves."""
+    same, and nobody turns a screw while a load stands: none where its reading hardly moves."""
     top = float(np.abs(bench.rows.measured_force).max())
     scales = tuple(s * top for s in shares(bench, SHARES))
-    if not top > 0 or (hangs(bench) and not bench.imposed):
+    if not top > 0 or (not bench.imposed and (hangs(bench) or _reads_alike(bench))):
         return []
     amplifiers = _Amplifiers(bench, _axes(bench))
     named, free = {k: [path] for k, path in paths(bench).items()}, free_paths(bench)
@@ -64,6 +65,12 @@ def variants(bench: Bench) -> list[Variant]:
                                names=tuple(amplifiers.axes), **same))  # fmt: skip
     out += _each_run(bench, scales)
     return out + [v for k, way in free.items() for v in _free(amplifiers, k, way, scales)]
+
+
+def _reads_alike(bench: Bench) -> bool:
+    """Whether the reading of a load that stands for most of the session stays within its noise."""
+    standing = waited(bench) & ~bench.rows.zero
+    return bool(standing.any() and bench.rows.steady[standing].all())
 
 
 def _free(

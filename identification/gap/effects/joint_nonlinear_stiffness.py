@@ -65,7 +65,7 @@ def variants(bench: Bench) -> list[Variant]:
                         prior=0.1, kinds=(name,), **info)
             )  # fmt: skip
         for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
-            if bench.data.arm and np.mean(hinges[k : k + 2]) < _first_seen(x):
+            if np.mean(hinges[k : k + 2]) < _seen_from(bench, x):
                 continue
             out.append(
                 variant(WORD, f"joint {j + 1} bend {hinges[k]}", [line, *columns[k : k + 2]],
@@ -143,6 +143,17 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
                     hinges=(b,))
         )  # fmt: skip
     return out
+
+
+def _seen_from(bench: Bench, x: Array) -> float:
+    """Share of the range from which on a bend is no step at no load. Of levels to either side of a
+    bench's the second tells: any line goes through zero and the first."""
+    if bench.data.arm:
+        return _first_seen(x)
+    if bench.rows.continuous or not _both_ways(bench):
+        return 0.0
+    first = _first_seen(x)
+    return float(np.abs(x)[np.abs(x) > first].min(initial=1.0)) if first < 1 else 1.0
 
 
 def _first_seen(x: Array) -> float:

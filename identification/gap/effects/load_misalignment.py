@@ -65,7 +65,8 @@ def variants(bench: Bench) -> list[Variant]:
         variant(WORD, label + each[0].label,
                 [c for k in each for c in k.columns] + _given(bench, names, each), SCALES,
                 positive=False, prior=prior * each[0].share, directions=names,
-                shapes=[k.shapes for k in each], read=[k.read for k in each])
+                shapes=[k.shapes for k in each], read=[k.read for k in each],
+                shown=max((t for k in each for t in k.read), default=0.0) / MOST_CROSSTALK)
         for names, label, prior in groups
         for each in zip(*(known[name] for name in names), strict=True)
     ]  # fmt: skip
@@ -164,6 +165,7 @@ def _given(bench: Bench, names: list[str], each: tuple[_Known, ...]) -> list[int
     return out
 
 
+MOST_CROSSTALK = 0.02  # of the load: what data sheets of dynamometers allow
 USUAL = 0.1  # so that the prior of what is given is that of as stiff a rig across as along
 
 
