@@ -254,13 +254,14 @@ def goes_back(data: GapData) -> int | None:
     force, u = (np.add.reduceat(v, first) / count for v in (data.force, data.displacement))
     for run in np.unique(data.run):
         at = np.flatnonzero(data.run[first] == run)
-        size, way = np.abs(force[at]), np.sign(force[at]) * u[at]
+        size, step = np.abs(force[at]), np.diff(u[at])
+        way = np.sign(force[at][1:] + force[at][:-1]) * step  # wherever the datum lies
         far = max(_CLEARLY * data.instruments.displacement, _BACK * float(np.ptp(u[at])))
         same = force[at][1:] * force[at][:-1] >= 0
         branch = data.branch[first][at]  # a force that comes late still grows when it is let go
         same &= branch[1:] == branch[:-1]
         grows = np.diff(size) > _MORE * float(np.ptp(force[at]))
-        wrong = np.flatnonzero(same & grows & (np.diff(way) < -far))
+        wrong = np.flatnonzero(same & grows & (way < -far))
         if wrong.size:
             return int(first[at[wrong[0] + 1]])
     return None

@@ -203,7 +203,17 @@ def test_a_displacement_that_goes_back_under_more_force_was_misread() -> None:
 
 @pytest.mark.parametrize(
     "what",
-    ["fine", "coarse", "small", "other sense", "through zero", "unloading", "next run", "late"],
+    [
+        "fine",
+        "coarse",
+        "small",
+        "other sense",
+        "through zero",
+        "unloading",
+        "next run",
+        "late",
+        "datum",
+    ],
 )
 def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
     data = misread()
@@ -225,6 +235,8 @@ def test_what_goes_back_for_a_reason_was_not(what: str) -> None:
         u[10:] = u[9] + 4e-6 * np.arange(10)
     elif what == "late":
         u[10] = 6.5 / SPRING
+    elif what == "datum":  # far off, as after a jump between two runs
+        u = u - 4e-4
     elif what == "next run":  # the datum is another one
         run = np.repeat([0, 1], 10)
         force = np.tile(np.arange(1.0, 11.0), 2)
