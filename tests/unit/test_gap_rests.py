@@ -166,3 +166,16 @@ def test_creep_in_coloured_noise_or_a_little_swing_is_creep() -> None:
     for beside in (wander, 1e-6 * np.sin(60 * at)):
         white = 3e-7 * rng.standard_normal(2000)
         assert diagnose_gap(under_a_weight(creep + beside + white)).verdict == "joint_creep"
+
+
+@pytest.mark.parametrize("read", [False, True])
+def test_weights_are_written_down_and_do_not_drift(read: bool) -> None:
+    """The same few numbers come again to the last digit; the reading of a cell does not."""
+    noise = np.random.default_rng(6).normal(0, 0.1, (2, 48))
+    load = np.tile(np.repeat([0.0, 20.0, 40.0, 60.0, 40.0, 20.0], 2), 4)
+    moved = 1e-5 * load + 3e-5 * (1 - np.exp(-np.arange(48) / 20)) + 1e-6 * noise[0] / 0.1
+    data = bench_data(load + read * noise[1], moved, session=np.arange(48.0))
+    words = {v.word for v in library(make_bench(data), ["force_drift", "thermal_drift"])}
+    assert words == ({"force_drift", "thermal_drift"} if read else {"thermal_drift"})
+    if not read:
+        assert diagnose_gap(data).verdict == "thermal_drift"

@@ -101,7 +101,7 @@ def _back(path: Array) -> float:
 
 _STRETCHES, _OF_EACH = 100, 4  # pieces at most; rows of each at least
 _BACK, _CLEARLY = 0.33, 5.0  # of all that was seen; standard deviations
-_SWINGS, _AGAIN = 0.15, 4  # of all that was seen; turning points
+_SWINGS, _AGAIN = 0.25, 4  # of all that was seen; turning points
 
 
 def paths(bench: Bench) -> dict[str, Array]:

@@ -45,10 +45,12 @@ SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
 def variants(bench: Bench) -> list[Variant]:
     """Warm-up paths, several rates at once, and a free smooth path: alike in all directions, of
     every amplifier's own, or of all amplifiers alike. A weight that hangs all the time weighs the
-    same, and nobody turns a screw while a load stands: none where its reading hardly moves."""
+    same, and nobody turns a screw while a load stands: none where its reading hardly moves. None
+    of weights, which nobody reads."""
     top = float(np.abs(bench.rows.measured_force).max())
     scales = tuple(s * top for s in shares(bench, SHARES))
-    if not top > 0 or (not bench.imposed and (hangs(bench) or _reads_alike(bench))):
+    still = hangs(bench) or _reads_alike(bench) or _are_weights(bench)
+    if not top > 0 or (still and not bench.imposed):
         return []
     amplifiers = _Amplifiers(bench, _axes(bench))
     named, free = {k: [path] for k, path in paths(bench).items()}, free_paths(bench)
@@ -71,6 +73,19 @@ def _reads_alike(bench: Bench) -> bool:
     """Whether the reading of a load that stands for most of the session stays within its noise."""
     standing = waited(bench) & ~bench.rows.zero
     return bool(standing.any() and bench.rows.steady[standing].all())
+
+
+def _are_weights(bench: Bench) -> bool:
+    """Whether few forces come again and again, to the last digit, and lie much farther apart than
+    readings would scatter: written down, not read. Of levels of a rig without an arm."""
+    values, count = np.unique(bench.data.force, return_counts=True)
+    if bench.data.arm or bench.rows.continuous or len(values) < _FEW:
+        return False
+    apart = float(np.diff(values).min()) > _APART * bench.data.instruments.force
+    return bool(apart and np.mean(count > 1) > _MOSTLY)
+
+
+_FEW, _APART, _MOSTLY = 3, 10.0, 0.5  # values; standard uncertainties; of the values come again
 
 
 def _free(
