@@ -99,12 +99,12 @@ def test_a_long_hold_shows_what_swings_in_it() -> None:
 
 
 def test_swings_that_come_again_and_again_may_be_small_and_quick() -> None:
-    """Nine of them, each a small part of the slow way; of noise there is no swing."""
+    """Eight of them, each a quarter of the slow way; of noise there is no swing."""
     n, every_s = 900, 20.0
     at, rng = np.arange(n) / n, np.random.default_rng(4)
     noise = 1e-6 * rng.standard_normal(n)
     slow = -2.5e-5 * at
-    swings = slow + 6e-6 * np.sin(2 * np.pi * 9 * at)
+    swings = slow + 7e-6 * np.sin(2 * np.pi * 8 * at)
     assert not own_clock(make_bench(hung(slow + noise, every_s)))
     assert own_clock(make_bench(hung(swings + noise, every_s)))
     assert diagnose_gap(hung(swings + noise, every_s)).verdict == "thermal_drift"
