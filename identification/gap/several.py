@@ -2,7 +2,8 @@
 
 A joint mechanism sits in one joint of a variant. Where that leaves what the same mechanism in
 another joint would do, the explanation takes both, as one word: one trouble, seen twice. Only the
-joint readings can tell that from a second mechanism, so nothing is looked for without them.
+joint readings can tell that from a second mechanism, so nothing is looked for without them; but
+nothing else goes on as creep does while the load stands.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from identification.gap.variants import Variant
 from identification.gap.words import IN_JOINTS
 
 MOST = 3  # joints of one word
+_BY_ITSELF = frozenset({"joint_creep"})
 # Nats that a joint more has to bring: the choice among the first one's shapes is not counted again.
 WORTH = 6.0
 _HOPELESS = 2000.0  # nats below, from which no other choice of shapes has been seen to come back
@@ -32,10 +34,10 @@ def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> l
 def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
     """With its joint mechanisms in further joints, as far as that is worth it."""
     bench = engine.bench
-    if not (bench.data.arm and bench.has_q):
+    if not bench.data.arm:
         return start
     best = start
-    for word in sorted(start.words & IN_JOINTS):
+    for word in sorted(start.words & (IN_JOINTS if bench.has_q else _BY_ITSELF)):
         for _ in range(MOST - 1):
             if best.eta <= bench.noise.stated:
                 break  # there is nothing left for another joint to do

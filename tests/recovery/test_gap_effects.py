@@ -145,6 +145,17 @@ def creeps(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
     return joints, np.zeros(len(samples))
 
 
+def creep_at_once(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """Joints 1 and 3: each a fifth of its deflection late, with 8 s and with 40 s."""
+    joints, more = creeps(samples, torque, lever)
+    for joint, late_s in ((0, 8.0), (2, 40.0)):
+        z, before = 0.0, 0.0
+        for i, s in enumerate(samples):
+            z += (torque[i, joint] - z) * (1 - np.exp(-(s.session - before) / late_s))
+            joints[i, joint], before = 0.2 * z / STIFFNESS[joint], s.session
+    return joints, more
+
+
 def hardens(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
     """Joint 3 grows stiffer smoothly: a cubic part of a tenth at the largest torque."""
     joints = np.zeros_like(torque)
@@ -255,6 +266,18 @@ def test_creep_fraction_and_time(results: dict[str, GapResult]) -> None:
     parameters = results["creep"].effects[0].parameters
     assert parameters["creep_fraction"].value == pytest.approx(0.2, rel=0.25)
     assert parameters["retardation_time"].low < 20.0 < parameters["retardation_time"].high
+
+
+@pytest.mark.parametrize("drop", [("q",), ()])
+def test_two_joints_that_creep_are_told_without_their_readings(
+    tmp_path: Path, drop: tuple[str, ...]
+) -> None:
+    """What goes on in each direction by an amount and a time of its own is no other trouble."""
+    found = diagnose(measure(tmp_path, creep_at_once, drop=drop)).result
+    assert found.verdict == "joint_creep"
+    assert [e.name for e in found.effects[:2]] == ["joint_creep"] * 2
+    assert found.looks_like is None
+    assert found.after < 1.2 * found.noise
 
 
 def test_a_gain_that_bends_is_read_as_its_straight_line(results: dict[str, GapResult]) -> None:

@@ -391,6 +391,26 @@ def test_what_bends_before_the_first_load_that_was_read_is_lost_motion() -> None
     assert any(v.label.endswith("bend 0.1") for v in library(close, ["joint_nonlinear_stiffness"]))
 
 
+def test_between_no_load_and_the_second_a_bench_shows_a_step() -> None:
+    """Any line goes through zero and the first level; pushed to one side only, a bend is a bend."""
+    levels = np.arange(-4.0, 5.0) * 20
+    runs = {"run": np.repeat([0, 1], 9), "repetition": np.repeat([1, 2], 9)}
+    for load, first in ((np.tile(levels, 2), "0.5"), (np.tile(np.abs(levels), 2), "0.1")):
+        bench = make_bench(bench_data(load, 1e-5 * load, **runs))
+        found = library(bench, ["joint_nonlinear_stiffness"])
+        bends = [v.label.split()[-1] for v in found if " bend " in v.label]
+        assert bends[0] == first
+
+
+def test_a_joint_without_weight_may_bend_otherwise_to_either_side() -> None:
+    """Where it was pushed both ways; with a weight the curve is one of the net torque."""
+    both = np.concatenate([UP, -UP])
+    none = -TOOL_KG * -5.0  # of arm and tool together
+    for push, gravity, uneven in ((both, none, True), (UP, none, False), (both, 30.0, False)):
+        found = library(hanging(push, gravity=gravity), ["joint_nonlinear_stiffness"])
+        assert any(v.label.endswith("uneven curve") for v in found) is uneven
+
+
 def test_joints_that_creep_do_so_alike() -> None:
     bench = make_bench(arm_data())
     variants = library(bench, ["joint_creep"])

@@ -65,7 +65,7 @@ def variants(bench: Bench) -> list[Variant]:
                         prior=0.1, kinds=(name,), **info)
             )  # fmt: skip
         for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
-            if np.mean(hinges[k : k + 2]) < _seen_from(bench, x):
+            if np.mean(hinges[k : k + 2]) < _seen_from(bench, j, x):
                 continue
             out.append(
                 variant(WORD, f"joint {j + 1} bend {hinges[k]}", [line, *columns[k : k + 2]],
@@ -77,7 +77,7 @@ def variants(bench: Bench) -> list[Variant]:
             out += _locks(bench, j, line, top)
         elif not bench.data.arm and bench.rows.continuous and _came_back(bench):
             out.append(_fine(bench, j, line, top))
-        if not bench.data.arm and _both_ways(bench):
+        if _both_ways(bench, j):
             out.append(_uneven(bench, j, line, top))
         if bench.feels_weight(j):
             out += _net(bench, j, line)
@@ -114,12 +114,12 @@ def _odd(bench: Bench, j: int, line: int, kg: float, prior: float) -> Variant:
                    torque=float(np.abs(torque).max()), line=line)  # fmt: skip
 
 
-def refined(bench: Bench, found: Variant) -> list[Variant]:
+def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Curves alike in both senses, about one that was found, for masses of the tool in between:
-    where they are soft about no torque, it matters where that is."""
+    where they are soft about no torque, it matters where that is. close: share of the steps."""
     if "line" not in found.info or not np.any(bench.weight_per_kg(found.info["joint"])):
         return []
-    masses = float(found.info["tool_kg"]) + _TOOL_STEPS_KG
+    masses = float(found.info["tool_kg"]) + close * _TOOL_STEPS_KG
     share = 0.3 / len(masses)
     return [_odd(bench, found.info["joint"], found.info["line"], kg, share) for kg in masses]
 
@@ -145,12 +145,12 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     return out
 
 
-def _seen_from(bench: Bench, x: Array) -> float:
+def _seen_from(bench: Bench, j: int, x: Array) -> float:
     """Share of the range from which on a bend is no step at no load. Of levels to either side of a
     bench's the second tells: any line goes through zero and the first."""
     if bench.data.arm:
         return _first_seen(x)
-    if bench.rows.continuous or not _both_ways(bench):
+    if bench.rows.continuous or not _both_ways(bench, j):
         return 0.0
     first = _first_seen(x)
     return float(np.abs(x)[np.abs(x) > first].min(initial=1.0)) if first < 1 else 1.0
@@ -182,15 +182,22 @@ def _came_back(bench: Bench) -> bool:
     return bench.course.unloads or bench.course.repeats
 
 
-def _both_ways(bench: Bench) -> bool:
+def _both_ways(bench: Bench, j: int) -> bool:
     """Pulled and pressed, from zero either way, or to and fro, or through a zero that both channels
-    share: any other half of a loop could be anything."""
-    course = bench.course
+    share: any other half of a loop could be anything. Joints of an arm that carry weights have
+    curves of the net torque (`_net`)."""
+    course, push = bench.course, bench.true_torque[:, j]
+    if bench.data.arm:
+        both = min(float(push.max()), -float(push.min())) > _BOTH * float(np.abs(push).max())
+        return both and not bench.feels_weight(j)
     if course.one_sided:
         return False
     if not bench.rows.continuous:
         return len(np.unique(bench.rows.run)) > 1
     return course.crosses_its_zero or (course.unloads and course.passes > 2)
+
+
+_BOTH = 0.2  # of the largest torque
 
 
 def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
@@ -303,11 +310,9 @@ _POWERS = {"quadratic": 2, "cubic": 3, "even": 2}
 
 
 def _look_closer(word: Word) -> list[Variant]:
-    odd = [s.variant for s in word.alone if "line" in s.variant.info]
-    bench = word.engine.bench
+    odd = [s for s in word.alone if "line" in s.variant.info]
     bends = [s for s in word.alone if " bend " in s.variant.label]
-    finer = closing_in(word, corners, bends[:1])
-    return finer + [f for v in odd[:1] for f in refined(bench, v)]
+    return [*closing_in(word, corners, bends[:1]), *closing_in(word, refined, odd[:1])]
 
 
 EFFECT = Effect(
