@@ -17,6 +17,7 @@ import numpy as np
 from identification.gap.data import LOADING, Array, GapData
 from identification.gap.ends import after_break
 from identification.gap.holds import hold_ids, is_continuous
+from identification.running import first_rows
 
 
 @dataclass(frozen=True)
@@ -220,7 +221,7 @@ def bursts(data: GapData) -> bool:
     hold = hold_ids(data)
     if is_continuous(data, hold):
         return False
-    starts = np.flatnonzero(np.diff(hold, prepend=-1))
+    starts = first_rows(hold)
     within = np.arange(len(hold)) - starts[hold]
     settled = np.maximum(_SETTLED, np.bincount(hold)[hold] // 2)
     late = (hold[2:] == hold[:-2]) & (within >= settled)[1:-1]
@@ -249,7 +250,7 @@ def goes_back(data: GapData) -> int | None:
     hold = hold_ids(data)
     if is_continuous(data, hold):
         return None
-    first = np.flatnonzero(np.diff(hold, prepend=-1))
+    first = first_rows(hold)
     count = np.bincount(hold)
     force, u = (np.add.reduceat(v, first) / count for v in (data.force, data.displacement))
     for run in np.unique(data.run):
@@ -277,7 +278,7 @@ def saturates(data: GapData) -> float | None:
     hold = hold_ids(data)
     if not data.arm or is_continuous(data, hold):
         return None
-    first, count = np.flatnonzero(np.diff(hold, prepend=-1)), np.bincount(hold)
+    first, count = first_rows(hold), np.bincount(hold)
     force, u = (np.add.reduceat(v, first) / count for v in (data.force, data.displacement))
     same, seen = _SAME_FORCE * data.instruments.force, 0
     for run in np.unique(data.run):

@@ -20,6 +20,7 @@ from identification.gap.bins import even_path
 from identification.gap.data import ZERO, Array, GapData, Ints
 from identification.gap.turns import way_back
 from identification.gap.white import white_sd
+from identification.running import first_rows
 
 _POINTS = 1000  # bins of a recording: more do not tell the path better
 _CLOSEST = 3e-7  # of the squared range: a piece that leaves less is as good as exact
@@ -105,7 +106,7 @@ _WELL_BEFORE, _NOTHING = 0.75, 4.0  # of the way at no force; standard uncertain
 def on_plateau(data: GapData, hold: Ints) -> bool:
     """Whether levels follow one another on which the force is the same and the displacement is not:
     nobody finds these by setting a force. hold (n,): consecutive ids."""
-    starts = np.flatnonzero(np.diff(hold, prepend=-1))
+    starts = first_rows(hold)
     on = np.diff(data.run[starts]) == 0
     went = [np.abs(np.diff(v[starts])) / (np.ptp(v) or 1.0)
             for v in (data.force, data.displacement)]  # fmt: skip
@@ -215,7 +216,7 @@ def _edges(values: tuple[Array, Array]) -> Ints:
     n = len(values[0])
     if n <= _POINTS:
         return np.arange(n)
-    return np.flatnonzero(np.diff(even_path(*values, _POINTS), prepend=-1) != 0)
+    return first_rows(even_path(*values, _POINTS))
 
 
 def _cost(channel: _Channel, floor: float) -> float:

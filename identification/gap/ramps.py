@@ -13,6 +13,7 @@ import numpy as np
 
 from identification.gap.data import ZERO, Array, Flags, GapData, Ints
 from identification.gap.holds import hold_ids, is_continuous
+from identification.running import first_rows
 
 _SEEN = 4.0  # standard deviations
 _AWAY = 0.01  # of the range: so far the first sample of a ramp has to go at least
@@ -37,7 +38,7 @@ def _moving(data: GapData, hold: Ints) -> Flags:
     or a lag moves one of them, creep the other, and a screw that relaxes both against each other.
     A run that begins unloaded comes from nowhere."""
     n = len(hold)
-    starts = np.flatnonzero(np.diff(hold, prepend=-1))
+    starts = first_rows(hold)
     count = np.diff(np.append(starts, n))
     within = np.arange(n) - np.repeat(starts, count)
     last = within >= np.repeat(count - np.maximum(1, (_LAST * count).astype(int)), count)
