@@ -213,7 +213,7 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         next_measurement=None,
         remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
         looks_like=_likeness(found, verdict),
-        said=ordered([*notes_of(bench), *_disbelieved(found, verdict)]),
+        said=ordered([*notes_of(bench), *_disbelieved(found, verdict), *_across(bench, chosen)]),
         bench=bench,
         engine=engine,
         fit=fitted,
@@ -329,6 +329,21 @@ def _next(
     if verdict in WORDS and len(words) == 2:
         return next_measurement(found, variants, chosen, (words[0], words[1]), others)
     return None
+
+
+def _across(bench: Bench, chosen: Explanation) -> tuple[Note, ...]:
+    """Of an effect that other readings show, and nothing moves by."""
+    each = zip(chosen.parts, chosen.sizes, strict=True)
+    if not any("shown" in p.variant.info and s < _MOVES * bench.noise.stated for p, s in each):
+        return ()
+    text = (
+        "The force across the direction shows that the load acts askew; the displacement does not "
+        "move by it. What makes the gap smaller is springs and gains within what META states."
+    )
+    return (Note(REMARK, text),)
+
+
+_MOVES = 0.2  # of the noise of a sample
 
 
 def _disbelieved(found: Found, verdict: str) -> tuple[Note, ...]:

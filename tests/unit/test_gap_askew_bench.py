@@ -59,8 +59,12 @@ def test_a_curve_is_no_slant_where_nothing_acts_across() -> None:
 def test_a_block_that_gives_nothing_across_shows_a_slant_by_its_force(
     tangent: float, verdict: str
 ) -> None:
-    """Beyond what dynamometers mix up; nothing moves by it."""
-    assert diagnose_gap(pressed(tangent, turns=False, gives=0.0)).verdict == verdict
+    """Beyond what dynamometers mix up; nothing moves by it, as is said."""
+    found = diagnose_gap(pressed(tangent, turns=False, gives=0.0))
+    assert found.verdict == verdict
+    said = any("the displacement does not move by it" in n for n in found.notes)
+    assert said is (verdict == "load_misalignment")
+    assert not any("acts askew" in n for n in diagnose_gap(pressed(0.15)).notes)
 
 
 def test_without_components_nobody_speaks_of_a_slant() -> None:
