@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,9 +162,14 @@ def grid_of(points: Iterable[Point], branch: str) -> Grid:
     return Grid(branch, repetitions, steps, *means)
 
 
-def _merged(sequences: Iterable[list[int]]) -> tuple[int, ...]:
-    """Steps in an order that agrees with every run's: one that the first run lacks comes behind
-    the one that precedes it where it was met."""
+def _merged(sequences: Sequence[list[int]]) -> tuple[int, ...]:
+    """Steps in an order that agrees with every run's: as they are numbered, where the numbers of
+    every run rise, or those of every run fall; else one that the first run lacks comes behind the
+    one that precedes it where it was met."""
+    for falling in (False, True):
+        if all(sequence == sorted(sequence, reverse=falling) for sequence in sequences):
+            # Of two that no run has both, nothing else tells which comes first.
+            return tuple(sorted(set().union(*sequences), reverse=falling))
     order: list[int] = []
     known: set[int] = set()
     for sequence in sequences:
@@ -184,7 +189,8 @@ def _merged(sequences: Iterable[list[int]]) -> tuple[int, ...]:
 
 
 def pointwise(grid: Grid, *, origin: bool) -> tuple[PointwiseStiffness, ...]:
-    """Pointwise stiffness of every repetition, mean and sd. origin: begins at the measured zero."""
+    """Pointwise stiffness of every repetition, mean and sd. origin: begins at the measured zero.
+    Neighbours that no repetition has both are left out."""
     force, displacement = grid.force, grid.displacement
     if origin:
         zero = np.zeros((force.shape[0], 1))
@@ -194,7 +200,11 @@ def pointwise(grid: Grid, *, origin: bool) -> tuple[PointwiseStiffness, ...]:
         each = np.where(du != 0.0, np.diff(force, axis=1) / du, np.nan)
     middle = _mean(0.5 * (force[:, 1:] + force[:, :-1]))
     rows = zip(middle, _mean(each), _sd(each), np.isfinite(each).sum(axis=0), strict=True)
-    return tuple(PointwiseStiffness(float(f), float(k), float(s), int(n)) for f, k, s, n in rows)
+    return tuple(
+        PointwiseStiffness(float(f), float(k), float(s), int(n))
+        for f, k, s, n in rows
+        if np.isfinite(f)
+    )
 
 
 @dataclass(frozen=True)

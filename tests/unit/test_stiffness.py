@@ -310,6 +310,21 @@ def test_a_level_that_the_first_run_skipped_stands_where_it_belongs() -> None:
     assert [p.force for p in result.pointwise] == pytest.approx([10.0, 30.0, 50.0, 70.0, 90.0])
 
 
+def test_levels_that_no_run_has_together_stand_in_the_order_of_their_numbers() -> None:
+    whole = unloading(curve(), lambda f: f / 1e5 + 1e-4, 1e-4)
+    lacking = {1: (3, 4), 2: (4,), 3: (3,)}
+    kept = [p for p in whole.points if p.step not in lacking[p.repetition]]
+    kept += [replace(p, repetition=4) for p in whole.points if p.repetition == 3 and p.step != 4]
+    result = analyze_curve(replace(whole, points=tuple(kept)))
+    assert [(p.branch, p.step) for p in result.levels] == [
+        *(("loading", step) for step in (1, 2, 3, 4, 5)),
+        *(("unloading", step) for step in (5, 4, 3, 2, 1)),
+    ]
+    # no run has both 3 and 4
+    assert [p.force for p in result.pointwise] == pytest.approx([10.0, 30.0, 50.0, 90.0])
+    assert all(p.n > 0 for p in result.pointwise)
+
+
 def test_the_loop_of_a_cycle_without_zero_has_an_area_and_no_share() -> None:
     loop = unloading(curve(factors=(1.0, 1.0, 1.0)), lambda f: f / 1e5 + 1e-4, 1e-4)
     result = analyze_curve(replace(loop, origin=False))
