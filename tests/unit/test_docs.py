@@ -86,6 +86,18 @@ def test_the_readmes_blind_figures_are_those_of_the_page() -> None:
         assert f"| {figure} | {interval} | {cases} |" in first
 
 
+def test_the_readmes_blind_runs_are_those_of_the_page() -> None:
+    readme, page = ((HOME / n).read_text("utf-8") for n in ("README.md", "docs/blind.md"))
+    runs = re.findall(r"`(rig blind --cases \d+ --seed [^`]*)`", readme)
+    assert len(runs) == 4
+    for run in runs:
+        assert f"`{run}`" in page
+    withheld = re.search(r"--withhold each`\), (\d+ of \d+) such effects", readme)
+    assert withheld is not None
+    section = page.partition(f"`{runs[-1]}`")[2].partition("\n## ")[0]
+    assert re.search(rf"unknown: recall .*\| {withheld[1]} \|", section)
+
+
 def test_the_architecture_names_modules_that_exist() -> None:
     text = (HOME / "docs" / "architecture.md").read_text("utf-8")
     dotted = re.findall(r"`((?:rig|identification|drivers)(?:\.\w+)+)`", text)
