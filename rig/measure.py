@@ -281,6 +281,7 @@ def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:
         raise
     except KeyboardInterrupt:
         reason = "interrupted"
+        rig.loader.close()  # else the screen, when it goes, takes this with it
         say(f"Interrupted. {UNLOAD}")
         raise
     finally:

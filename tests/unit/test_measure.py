@@ -10,13 +10,18 @@ from types import SimpleNamespace
 
 import pytest
 
+from drivers.interfaces import LiveView
 from rig import measure
 from rig.dataset import journal_path, load
 from rig.errors import InputError
+from rig.journal import Journal
+from rig.panel.onlooker import Onlooker
+from rig.procedure.limits import UNLOAD
 from rig.procedure.progress import Progress
 from rig.protocol import load_protocol
 from rig.station import load_station
 from tests.unit.example_data import write_journal
+from tests.unit.runner_bench import Bench
 
 PROTOCOL = Path(__file__).parents[2] / "protocols" / "paper_xy.yaml"
 
@@ -78,3 +83,25 @@ def test_a_complete_run_whose_file_could_not_be_written_needs_no_device(
     assert measure.resume(target, print) == target
     assert load(target).complete
     assert not journal_path(target).exists()
+
+
+def test_an_interrupt_is_told_where_the_screen_no_longer_covers_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(tmp_path)
+    said: list[str] = []
+
+    def interrupted(view: LiveView) -> None:
+        if view.step:
+            raise KeyboardInterrupt
+
+    bench.loader.script = interrupted
+    monkeypatch.setattr(bench.loader, "close", lambda: said.append("(the screen goes)"))
+    monkeypatch.setattr(measure, "_finish", lambda *_, **__: None)
+    station = load_station("emulated")
+    rig = measure._Rig(station, bench.devices, bench.loader, bench.clock, Onlooker())
+    with Journal.create(bench.path, {}) as journal:
+        job = measure.Job(tmp_path / "run.h5", bench.protocol, station, journal, Progress())
+        with pytest.raises(KeyboardInterrupt):
+            measure._carry_out(job, rig, said.append)
+    assert said[:2] == ["(the screen goes)", f"Interrupted. {UNLOAD}"]
