@@ -22,6 +22,7 @@ from rig.procedure.recorder import Recorder, Slot, Vector
 
 PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
 OF_A_STEP = ("redo_step", "skip")  # without a step under way there is nothing that they could mean
+HEARD = "Ctrl-C was heard; the open question comes first. Ctrl-C again stops at once."
 
 
 class Changes(TypedDict, total=False):
@@ -159,9 +160,13 @@ class Supervision:
 
         thread = threading.Thread(target=wait_for_answer, name="prompt", daemon=True)
         self._prompts += 1
+        interrupts = self._interrupts
         thread.start()
         try:
             while thread.is_alive():
+                if self._interrupts > interrupts:  # else it would seem that nobody has heard it
+                    interrupts = self._interrupts
+                    self._loader.notify(HEARD, "warning")
                 if watching:
                     self.tick()
                 else:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
 from drivers.errors import ReadTimeout, SafetyStop
-from drivers.interfaces import Command, LiveView
+from drivers.interfaces import Command, LiveView, Prompt
 from rig.errors import MeasurementStopped
+from rig.procedure.supervision import HEARD
 from rig.protocol import parse_protocol
 from tests.unit.runner_bench import ALL, MOVING, PROTOCOL, Bench, at, resumed
 
@@ -84,6 +86,31 @@ def test_the_first_ctrl_c_asks_and_the_second_stops(bench: Bench) -> None:
     bench.runner.interrupt()
     with pytest.raises(KeyboardInterrupt):
         bench.runner.interrupt()
+
+
+def test_a_ctrl_c_under_a_question_is_answered(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ask, heard = bench.loader.ask, threading.Event()
+    notify = bench.loader.notify
+
+    def answered_late(prompt: Prompt) -> str:
+        if prompt.key == "mount" and not heard.is_set():
+            assert bench.runner is not None
+            bench.runner.interrupt()
+            assert heard.wait(10.0)
+        return ask(prompt)
+
+    def told(text: str, level: Literal["info", "warning", "error"] = "info") -> None:
+        notify(text, level)
+        heard.set()
+
+    monkeypatch.setattr(bench.loader, "ask", answered_late)
+    monkeypatch.setattr(bench.loader, "notify", told)
+    bench.loader.answers["interrupt"] = ["continue"]
+    bench.run()
+    assert bench.loader.said.count(HEARD) == 1
+    assert bench.steps() == ALL
 
 
 def test_the_arm_moves_only_if_protocol_and_operator_say_so(tmp_path: Path) -> None:
