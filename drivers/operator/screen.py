@@ -245,7 +245,9 @@ def _notice(level: str, text: str) -> Text:
 
 def _question(prompt: Prompt, typed: str, complaint: str) -> Panel:
     text = Text(prompt.text + "\n", style="bold")
-    if prompt.answers:
+    if len(prompt.answers) == 1:
+        text.append("Press Enter: ", style="cyan")  # alone it confirms where nothing is to choose
+    elif prompt.answers:
         text.append("Type " + " / ".join(prompt.answers), style="cyan")
         text.append(" (or its beginning) and Enter: ", style="dim")
     else:

@@ -146,6 +146,12 @@ def test_a_question_comes_before_turning() -> None:
     assert "LOOSEN" in shown(known(40.0, 0.0), prompt=Prompt("unload", "Turn back."))
 
 
+def test_where_nothing_is_to_choose_enter_is_asked_for() -> None:
+    text = shown(known(40.0, 0.0), prompt=Prompt("unload", "Turn back.", ("ok",)))
+    assert "Press Enter: ▏" in text
+    assert "Type" not in text
+
+
 def test_screen_before_the_first_view() -> None:
     assert "waiting for the first values" in shown(None)
 
