@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 from identification.curve import Array, Curve, Point
 from identification.running import first_rows
 from identification.turns import turning_points
+from rig.digits import counted
 from rig.passes import TURN, binned, is_held
 from rig.units import M_PER_MM
 
@@ -317,7 +318,7 @@ def _bins(
         for number, f, u, n in binned(force, moved, low, high)
     ]
     note = (
-        f"A continuous recording of {forces.size} samples: cut into {len(pieces)} "
+        f"A continuous recording of {counted(forces.size, 'sample')}: cut into {len(pieces)} "
         f"pass{'es' if len(pieces) != 1 else ''} at its turning points and binned by force; "
         "rising force counts as loading"
     )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.dataset import Dataset, Origin, write
+from rig.digits import counted
 from rig.errors import InputError, close_to, did_you_mean
 from rig.journal import journal_path
 from rig.meta import Meta
@@ -164,10 +165,9 @@ class _Table:
             if column.required and column.name not in file.names:
                 hint = close_match(column.name.lower(), [n.lower() for n in file.names])
                 near = next((n for n in file.names if n.lower() == hint), "") if hint else ""
-                mean = f' Is it "{near}"? Rename it.' if near else ""
                 raise InputError(
                     f"{self._path}: the column {column.name} is missing; the header has "
-                    f"{', '.join(file.names[:12])}.{mean}"
+                    f"{', '.join(file.names[:12])}.{_meant(near, column.unit)}"
                 )
         self.notes = []
         for name in file.names:
@@ -300,10 +300,20 @@ class _Table:
         same = np.logical_and.reduce([c[1:] == c[:-1] for c in run])
         back = np.flatnonzero(same & (np.diff(columns["time_s"]) < 0))
         if len(back):
-            self.notes.append(f"time_s goes back {len(back)} times, first at sample {back[0] + 2}")
+            often = counted(len(back), "time")
+            self.notes.append(f"time_s goes back {often}, first at sample {back[0] + 2}")
         if "session_s" in columns and np.any(np.diff(columns["session_s"]) < 0):
             at = int(np.flatnonzero(np.diff(columns["session_s"]) < 0)[0])
             self.notes.append(f"session_s goes back, first at sample {at + 2}")
+
+
+def _meant(near: str, unit: str) -> str:
+    """What to do with a column whose name is nearly that of a missing one, in `unit`."""
+    if not near:
+        return ""
+    if near.lower().endswith(f"_{unit.lower()}"):
+        return f' Is it "{near}"? Rename it.'
+    return f' Is it "{near}"? Convert its values to {unit}, then rename it.'
 
 
 def _reading(name: str, words: set[str]) -> csvcells.Reading:

@@ -134,7 +134,7 @@ def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
     notes = [e["text"] for e in bring(tmp_path, table).events if e["kind"] == "note"]
     assert notes == [
         'column "repitition" is kept and ignored; is "repetition" meant?',
-        "time_s goes back 1 times, first at sample 3",
+        "time_s goes back 1 time, first at sample 3",
         "session_s goes back, first at sample 3",
     ]
 
@@ -199,6 +199,8 @@ REFUSED: list[tuple[str | bytes, str]] = [
      "commas between the cells, not semicolons."),
     ("force_n,displacement_mm\n1,5\n", ': the column force_N is missing; the header has force_n, '
      'displacement_mm. Is it "force_n"? Rename it.'),
+    ("force_kN,displacement_mm\n1,5\n", ': the column force_N is missing; the header has force_kN, '
+     'displacement_mm. Is it "force_kN"? Convert its values to N, then rename it.'),
     ("force_N,time_s\n1,5\n", ": the column displacement_mm is missing; the header has force_N, "
      "time_s."),
     ("force_N,displacement_mm,force_N\n1,5,1\n", ':1: the column "force_N" is there twice (columns '
