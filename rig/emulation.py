@@ -46,7 +46,9 @@ class EmulatedRig:
 
     `poses`: joint angles (6) rad by name, the arm stands in the first; `programs`: joint angles
     by the name of the program on the controller; `tools_mm`: loaded point in the flange frame (3)
-    by pose, the flange itself where there is none; `zero_after_s`: the zero plateau after a run.
+    by pose, the flange itself where there is none; `zero_after_s`: the zero plateau after a run;
+    `before`: how often the force was tared before a run was taken up again, so that what scatters
+    from one loading to the next does not begin anew.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class EmulatedRig:
         programs: Poses | None = None,
         tools_mm: Poses | None = None,
         zero_after_s: float = 6.0,
+        before: int = 0,
     ) -> None:
         self._station = station
         tools = tools_mm or {}
@@ -66,6 +69,7 @@ class EmulatedRig:
             ],
             "programs": {name: list(q) for name, q in (programs or {}).items()},
             "zero_after_s": zero_after_s,
+            "before": before,
         }
         self._child: ChildProcess | None = None
         self._lines: _Lines | None = None

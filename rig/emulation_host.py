@@ -25,8 +25,9 @@ class EmulationHost:
 
     `poses`: joint angles (rad) and tool (m, flange frame) of each pose of the procedure, the
     first one where the arm stands; empty: the world's own. `programs`: what the robot's Dashboard
-    can play; `zero_after_s`: the zero plateau after each run. InputError for an unknown world or a
-    scheduled fault that no emulator has.
+    can play; `zero_after_s`: the zero plateau after each run; `before`: how often the force was
+    tared in an earlier sitting. InputError for an unknown world or a scheduled fault that no
+    emulator has.
     """
 
     def __init__(
@@ -35,6 +36,7 @@ class EmulationHost:
         poses: Sequence[tuple[Sequence[float], Sequence[float]]] = (),
         programs: Mapping[str, Sequence[float]] | None = None,
         zero_after_s: float = ZERO_PLATEAU_S,
+        before: int = 0,
     ) -> None:
         emulation = station.emulation
         if emulation is None:
@@ -43,8 +45,8 @@ class EmulationHost:
                 "for its devices. Use the station emulated, or add the section."
             )
         self.station, self.emulation = station, emulation
-        self.scene = _scene(station, poses, zero_after_s)
-        self.emulators = _emulators(station, self.scene, programs or {})
+        self.scene = _scene(station, poses, zero_after_s, before)
+        self.emulators = _emulators(station, self.scene, programs or {}, before)
         self._check_schedule(emulation.faults)
         self._screw: ScrewServer | None = None
         self._stopping = threading.Event()
@@ -150,6 +152,7 @@ def _scene(
     station: Station,
     poses: Sequence[tuple[Sequence[float], Sequence[float]]],
     zero_after_s: float,
+    before: int,
 ) -> WorldScene:
     assert station.emulation is not None
     gains: dict[str, float] = {}
@@ -158,12 +161,12 @@ def _scene(
     if station.laser is not None:
         gains["displacement_gain_sd"] = station.laser.gain_relative_sd
     seed = station.emulation.seed
-    world = make_world(station.emulation.world, seed, **gains)
+    world = make_world(station.emulation.world, seed, before=before, **gains)
     return WorldScene(world, station.emulation.speed, seed, poses, zero_plateau_s=zero_after_s)
 
 
 def _emulators(
-    station: Station, scene: WorldScene, programs: Mapping[str, Sequence[float]]
+    station: Station, scene: WorldScene, programs: Mapping[str, Sequence[float]], before: int
 ) -> dict[str, Emulator]:
     """The stand-ins of the station's devices, by device; none of them started."""
     from drivers.ild2200.emulator import Ild2200Emulator
@@ -178,7 +181,9 @@ def _emulators(
             scene, programs=programs, frequency_Hz=station.robot.frequency_Hz, seed=seed + 1
         )
     if station.dynamometer is not None:
-        emulators["dynamometer"] = KistlerEmulator(scene, station.dynamometer, seed + 2)
+        # Another sitting, another drift; what the laser's seed decides over belongs to the laser.
+        drift = seed + 2 + 10 * before
+        emulators["dynamometer"] = KistlerEmulator(scene, station.dynamometer, drift)
     if station.laser is not None:
         laser = station.laser
         near = SPARE_RANGE * laser.range_mm

@@ -182,7 +182,7 @@ def _opened(
         onlooker = stack.enter_context(_watched(protocol, station, say, panel))
         if station.emulation is not None:
             say("EMULATED station: whatever is measured here is no measurement of a real arm.")
-            station = stack.enter_context(emulated_rig(station, protocol))
+            station = stack.enter_context(emulated_rig(station, protocol, progress.segment))
         clock = station_clock(station)
         devices = make_devices(station, clock)
         open_devices(devices, stack, say, onlooker.device)
@@ -244,12 +244,13 @@ def _at_speed(station: Station, speed: float) -> Station:
     return replace(station, emulation=replace(station.emulation, speed=speed))
 
 
-def emulated_rig(station: Station, protocol: MeasurementProtocol) -> EmulatedRig:
-    """The emulators of a station, prepared for a protocol: its poses, programs and tools."""
+def emulated_rig(station: Station, protocol: MeasurementProtocol, before: int = 0) -> EmulatedRig:
+    """The emulators of a station, prepared for a protocol: its poses, programs and tools; before:
+    segments that were measured before the run was taken up again."""
     poses = {name: tuple(pose.q_rad) for name, pose in protocol.poses.items()}
     programs = {p.program: tuple(p.q_rad) for p in protocol.poses.values() if p.program}
     tools_mm = {name: tuple(pose.tcp_xyz_mm) for name, pose in protocol.poses.items()}
-    return EmulatedRig(station, poses, programs, tools_mm, protocol.zero.after_s)
+    return EmulatedRig(station, poses, programs, tools_mm, protocol.zero.after_s, before)
 
 
 def _carry_out(job: Job, rig: _Rig, say: Say) -> Path:

@@ -20,12 +20,19 @@ WORLDS = {
 
 
 def make_world(
-    name: str, seed: int, force_gain_sd: float = 0.005, displacement_gain_sd: float = 0.003
+    name: str,
+    seed: int,
+    force_gain_sd: float = 0.005,
+    displacement_gain_sd: float = 0.003,
+    before: int = 0,
 ) -> World:
     """The world `name`, its gains and scatter drawn from `seed`; the gains' relative standard
-    deviations are those the instruments state. Raises InputError for a world nobody knows."""
+    deviations are those the instruments state. before: loadings of an earlier sitting. Raises
+    InputError for a world nobody knows."""
     if name not in WORLDS:
         raise InputError(f'world: "{name}" is not known.{did_you_mean(name, WORLDS)}')
     from rig.worlds.world import World
 
-    return World(import_module(WORLDS[name]).design(), seed, force_gain_sd, displacement_gain_sd)
+    return World(
+        import_module(WORLDS[name]).design(), seed, force_gain_sd, displacement_gain_sd, before
+    )

@@ -85,6 +85,8 @@ class State:
 class World:
     """A rig with its history. The same seed and the same calls give the same states.
 
+    `before` counts loadings of an earlier sitting: those to come scatter apart from them, about
+    the same gains.
     `force_gain` and `displacement_gain` are the true gains of the two chains, drawn once from
     their stated relative standard deviations; whoever senses the world applies them.
     `controller_waits_s`: unloaded so long, the controller takes yielded joints back; longer than
@@ -98,10 +100,10 @@ class World:
         seed: int,
         force_gain_sd: float = 0.005,
         displacement_gain_sd: float = 0.003,
+        before: int = 0,
     ) -> None:
-        gains, self._scatter = (
-            np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2)
-        )
+        streams = np.random.SeedSequence(seed).spawn(2 + before)
+        gains, self._scatter = (np.random.default_rng(streams[i]) for i in (0, 1 + before))
         self.design = design
         self.seed = seed
         self.force_gain = float(1.0 + force_gain_sd * gains.standard_normal())

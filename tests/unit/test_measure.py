@@ -13,6 +13,7 @@ import pytest
 from drivers.interfaces import LiveView
 from rig import measure
 from rig.dataset import journal_path, load
+from rig.emulation_host import EmulationHost
 from rig.errors import InputError
 from rig.journal import Journal
 from rig.panel.onlooker import Onlooker
@@ -32,7 +33,7 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
     said: list[str] = []
     loader = SimpleNamespace(open=lambda: said.append("(screen)"), close=lambda: None)
     stand_ins = {
-        "emulated_rig": lambda station, _protocol: nullcontext(station),
+        "emulated_rig": lambda station, _protocol, _before: nullcontext(station),
         "make_devices": lambda *_: None,
         "open_devices": lambda *_: None,
         "make_loader": lambda *_: loader,
@@ -105,3 +106,24 @@ def test_an_interrupt_is_told_where_the_screen_no_longer_covers_it(
         with pytest.raises(KeyboardInterrupt):
             measure._carry_out(job, rig, said.append)
     assert said[:2] == ["(the screen goes)", f"Interrupted. {UNLOAD}"]
+
+
+def test_a_resumed_run_does_not_meet_the_scatter_of_its_beginning_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[int] = []
+
+    def emulated(_station: object, _protocol: object, before: int) -> object:
+        told.append(before)
+        raise InputError("far enough")
+
+    monkeypatch.setattr(measure, "emulated_rig", emulated)
+    protocol, station = load_protocol(PROTOCOL), load_station("emulated")
+    opened = measure._opened(protocol, station, Progress(segment=3), print, None)
+    with pytest.raises(InputError, match="far enough"), opened:
+        pass
+    assert told == [3]
+    host = EmulationHost(station, before=3)
+    assert host.scene.world.impose(100.0, 1.0) != EmulationHost(station).scene.world.impose(
+        100.0, 1.0
+    )

@@ -356,3 +356,11 @@ def test_feeling_for_the_arm_does_not_change_the_scatter_of_a_loading() -> None:
     for _ in range(20):
         again.impose(0.0, 0.1)
     assert again.impose(50.0, 60.0).displacement_m != first, "another loading, another scatter"
+
+
+def test_another_sitting_scatters_apart_about_the_same_gains() -> None:
+    sittings = [make_world("paper", 1, before=before) for before in (0, 0, 1, 2)]
+    assert len({(w.force_gain, w.displacement_gain) for w in sittings}) == 1
+    moved = [world.impose(100.0, 1.0).displacement_m for world in sittings]
+    assert moved[0] == moved[1]
+    assert len(set(moved)) == 3
