@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 
 
 class InputError(Exception):
@@ -30,5 +30,7 @@ def close_to(word: str, known: Iterable[str], called: Callable[[str], str] = str
 
 
 def closest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that was probably meant, where one is near enough."""
-    return next(iter(get_close_matches(word, sorted(known), n=1)), None)
+    """The known word that was probably meant, where one is near enough, and no other as near."""
+    near = get_close_matches(word, sorted(known), n=2)
+    alike = [SequenceMatcher(None, each, word).ratio() for each in near]
+    return None if not near or alike[1:] == alike[:1] else near[0]

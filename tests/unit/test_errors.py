@@ -12,6 +12,12 @@ def test_the_nearest_word_is_named_or_all_are() -> None:
     assert close_to("xyz", words) == ""
 
 
+def test_of_two_words_as_near_as_each_other_none_is_named() -> None:
+    robots = ("ur10e", "ur16e", "ur5e")
+    assert did_you_mean("ur11e", robots) == " Known: ur10e, ur16e, ur5e."
+    assert did_you_mean("ur10", robots) == ' Did you mean "ur10e"?'
+
+
 def test_words_are_called_otherwise_than_they_are_compared() -> None:
     files = {"station": "station.yml", "paper": "paper.yaml"}
     assert did_you_mean("stations", files, files.__getitem__) == ' Did you mean "station.yml"?'
