@@ -11,7 +11,7 @@ from rig.measure import SAFETY_NOTE, emulated_rig
 from rig.plan import Plan, plan
 from rig.procedure.devices import in_short, make_devices, station_clock
 from rig.protocol import load_protocol
-from rig.station import load_station
+from rig.station import station_for
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Check:
 def check(protocol_file: Path, station_name: str | None) -> Check:
     """Validates protocol and station, then asks every device; one that fails hides no other."""
     protocol = load_protocol(protocol_file)
-    station = load_station(station_name or protocol.station, protocol_file.parent)
+    station = station_for(protocol_file, protocol.station, station_name)
     the_plan = plan(protocol, station)
     name, emulated = station.name, station.emulation is not None
     states: list[DeviceState] = []

@@ -34,7 +34,7 @@ from rig.procedure.recorder import Recorder
 from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
 from rig.runner import Runner
 from rig.software import software_version
-from rig.station import Station, load_station, parse_station
+from rig.station import Station, parse_station, station_for
 from rig.storage.files import check_ending, check_folder
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def measure(
     KeyboardInterrupt after the data so far have been written.
     """
     protocol = load_protocol(protocol_file)
-    station = load_station(station_name or protocol.station, protocol_file.parent)
+    station = station_for(protocol_file, protocol.station, station_name)
     if speed is not None:
         station = _at_speed(station, speed)
     plan(protocol, station)  # refuses loads that joints, laser or dynamometer can't take

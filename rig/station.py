@@ -99,14 +99,21 @@ def load_station(name_or_path: str | Path, beside: Path | None = None) -> Statio
     return _built(read_document(path, StationFile, _check), path)
 
 
+def station_for(protocol_file: Path, its_own: str, other: str | None) -> Station:
+    """The station that a protocol is carried out on: `other` (--station), or `its_own`."""
+    named_in = f"{protocol_file}: " if other is None else "--station: "
+    path = _find(other or its_own, protocol_file.parent, named_in)
+    return _built(read_document(path, StationFile, _check), path)
+
+
 def parse_station(text: str, path: Path) -> Station:
     """As `load_station`, for the text of a station that `path` (a data set) holds."""
     return _built(read_document_text(text, str(path), StationFile, _check), path)
 
 
-def _find(name: str, beside: Path | None) -> Path:
+def _find(name: str, beside: Path | None, named_in: str = "") -> Path:
     if not name.isprintable() or not name.strip():
-        raise InputError(f"station {name!r}: no name of a station and no path.")
+        raise InputError(f"{named_in}station {name!r}: no name of a station and no path.")
     path = Path(name)
     if path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
         near = None if beside is None else beside / path
@@ -117,7 +124,7 @@ def _find(name: str, beside: Path | None) -> Path:
             return folder / f"{name}.yaml"
     known = {p.stem for folder in folders for p in folder.glob("*.yaml")}
     raise InputError(
-        f'station "{name}" is unknown.{did_you_mean(name, known)} '
+        f'{named_in}station "{name}" is unknown.{did_you_mean(name, known)} '
         "Or give the path of a station file (.yaml)."
     )
 

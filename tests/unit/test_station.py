@@ -12,7 +12,7 @@ from rig.errors import InputError
 from rig.meta import Meta
 from rig.model import load_model
 from rig.protocol import load_protocol
-from rig.station import STATIONS, load_station, parse_station, station_names
+from rig.station import STATIONS, load_station, parse_station, station_for, station_names
 from rig.yamlfile import load_yaml
 
 EMULATED = (STATIONS / "emulated.yaml").read_text("utf-8")
@@ -71,6 +71,14 @@ def test_names_beside_the_protocol_come_first(tmp_path: Path) -> None:
 def test_unknown_stations(name: str, message: str) -> None:
     with pytest.raises(InputError, match=f"^{re.escape(message)}"):
         load_station(name)
+
+
+@pytest.mark.parametrize(("other", "named_in"), [(None, "tests/plan.yaml"), ("labor", "--station")])
+def test_an_unknown_station_is_told_with_where_it_was_named(
+    other: str | None, named_in: str
+) -> None:
+    with pytest.raises(InputError, match=f'^{named_in}: station "labor" is unknown. Known: '):
+        station_for(Path("tests/plan.yaml"), "labor", other)
 
 
 def test_emulated_endpoints_need_the_emulation_section() -> None:
