@@ -10,6 +10,7 @@ from drivers.clock import Clock
 from drivers.interfaces import Device, DisplacementSensor, Dynamometer, Loader, Robot
 from rig.errors import InputError
 from rig.station import Station
+from rig.storage.columns import unit_of
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,14 @@ _TELLING = (
 
 def in_short(identity: Mapping[str, str]) -> str:
     """One line about a device: which one it is, and in which state."""
-    return ", ".join(
-        f"{key.replace('_', ' ')} {identity[key]}" for key in _TELLING if key in identity
-    )
+    return ", ".join(_told(key, identity[key]) for key in _TELLING if key in identity)
+
+
+def _told(key: str, value: str) -> str:
+    """`range 10 mm` for `range_mm`."""
+    unit = unit_of(key)
+    name = key.removesuffix(f"_{unit}").replace("_", " ")
+    return f"{name} {value} {unit}".rstrip()
 
 
 def station_clock(station: Station) -> Clock:

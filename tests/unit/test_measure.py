@@ -17,6 +17,7 @@ from rig.emulation_host import EmulationHost
 from rig.errors import InputError
 from rig.journal import Journal
 from rig.panel.onlooker import Onlooker
+from rig.procedure.devices import in_short
 from rig.procedure.limits import UNLOAD
 from rig.procedure.progress import Progress
 from rig.protocol import load_protocol
@@ -45,6 +46,11 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
     with measure._opened(protocol, station, Progress(rows=225), said.append, None):
         assert "no keys are heard" in said[-4]
         assert said[-3:] == ["resuming after 225 rows", measure.SAFETY_NOTE, "(screen)"]
+
+
+def test_units_stand_behind_what_devices_say_of_themselves() -> None:
+    identity = {"model": "ILD2200", "range_mm": "10", "output_rate_Hz": "2500", "averaging": "1"}
+    assert in_short(identity) == "model ILD2200, range 10 mm, output rate 2500 Hz, averaging 1"
 
 
 def test_a_data_set_is_named_as_one(tmp_path: Path) -> None:
