@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
@@ -138,7 +139,11 @@ def _lines(
     yield from _timing(design, old)
     top = max(abs(f) for one in design.levels for f in one)
     yield ""
-    yield from limit_lines(top, f"{stop:g}", "  displacement_rate_mm_per_s: {max: 3, at: warn}")
+    allowed = None if old is None else old.limits.force_N
+    yield from limit_lines(
+        top, f"{stop:g}", "  displacement_rate_mm_per_s: {max: 3, at: warn}",
+        most_N=math.inf if allowed is None else allowed.max,
+    )  # fmt: skip
 
 
 def _sense(design: Design, direction: str) -> float:
@@ -161,23 +166,36 @@ def _poses(design: Design, meta: Meta) -> Iterator[str]:
 
 
 def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
-    rate = float(np.clip(1 / design.sample_s, 0.1, 10))
+    rate = _rate_Hz(design, old)
     gap = min(float(np.diff([0.0, *np.sort(np.abs(levels))]).min()) for levels in design.levels)
     top = max(abs(f) for levels in design.levels for f in levels)
     samples = max(1, min(5, round(design.hold_s * rate)))
     hold = design.hold_s if design.hold_s * rate > samples else 0.0
     zero = max(design.zero_s, 6.0, 1 / rate)
-    yield f"\nsampling: {{rate_Hz: {rate:.4g}, samples_per_step: {samples}}}"
-    yield f"hold_s: {hold:.5g}"
+    yield f"\nsampling: {{rate_Hz: {rate:.2g}, samples_per_step: {samples}}}"
+    yield f"hold_s: {_seconds(hold)}"
     yield (
         f"force_band: {{absolute_N: {min(0.5, gap / 4):.3g}, "
         f"relative: {min(0.01, gap / (4 * top)):.3g}}}"
     )
     yield from settle_lines(old.settle) if old else settle_lines()
     yield f"step_deadline_s: {old.step_deadline_s if old else 300:g}"
-    yield f"zero: {{before_s: {zero:.5g}, after_s: {zero:.5g}}}"
-    yield f"rest_s: {min(design.rest_s, 3600):.5g}"
+    yield f"zero: {{before_s: {_seconds(zero)}, after_s: {_seconds(zero)}}}"
+    yield f"rest_s: {_seconds(min(design.rest_s, 3600))}"
     yield "rated_load_N: null"
+
+
+def _rate_Hz(design: Design, old: MeasurementProtocol | None) -> float:
+    """The old one where about that was measured: slots are late, or missed."""
+    rate = float(np.clip(1 / design.sample_s, 0.1, 10))
+    wanted = rate if old is None else old.sampling.rate_Hz
+    return wanted if abs(rate / wanted - 1) < 0.25 else rate
+
+
+def _seconds(duration_s: float) -> str:
+    """As people set a time: whole seconds, of a short one two digits; not less than was meant."""
+    step = 1.0 if duration_s >= 10 else 0.1
+    return f"{step * math.ceil(duration_s / step - 1e-9):g}"
 
 
 def _displacement_mm(old: MeasurementProtocol | None) -> float:

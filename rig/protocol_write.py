@@ -18,6 +18,9 @@ _SETTLE = Settle(
 )  # fmt: skip
 
 
+_OVER = 1.01  # the widest band about a load that is written
+
+
 def pose_line(name: str, q: ArrayLike, tcp_mm: ArrayLike) -> str:
     """A pose q (6,) rad with its tool tcp_mm (3,), where somebody else brings the arm."""
     tool = f"tcp_xyz_mm: [{numbers(tcp_mm, 6)}]"
@@ -30,12 +33,17 @@ def settle_lines(settle: Settle = _SETTLE) -> list[str]:
     return ["settle:", *(f"  {k}: {v}" for k, v in written.items())]
 
 
-def limit_lines(top_N: float, displacement_mm: str, *more: str) -> list[str]:
-    """What stops the measurement: a force beyond the largest load top_N, a displacement; more:
-    further lines, after these."""
+def limit_lines(
+    top_N: float, displacement_mm: str, *more: str, most_N: float = float("inf")
+) -> list[str]:
+    """What stops the measurement: a force beyond the largest load top_N, and beyond most_N, which
+    was allowed before, if that load is not; a displacement; more: further lines, after these."""
+    force = 1.15 * top_N + 5
+    if top_N < most_N / _OVER < force:
+        force = most_N
     return [
         "limits:",
-        f"  force_N: {{max: {1.15 * top_N + 5:.0f}, at: stop}}",
+        f"  force_N: {{max: {force:.4g}, at: stop}}",
         f"  displacement_mm: {{max: {displacement_mm}, at: stop}}",
         *more,
         "  joint_deviation_deg: {max: 5, at: stop}",
