@@ -76,7 +76,10 @@ class Journal:
                 "Go on with it (--resume), or choose another name for the data set."
             ) from None
         except OSError as error:
-            raise InputError(f"{path}: cannot be created: {error.strerror or error}.") from error
+            raise InputError(
+                f"{path}: cannot be created: {error.strerror or error}. "
+                "Choose another folder with -o."
+            ) from error
         journal = cls(path, descriptor, synced)
         try:
             _lock(descriptor, path)
