@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.digits import number
 from rig.errors import InputError
 from rig.model_write import arm_lines, coupling_lines
 from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
@@ -35,8 +36,8 @@ def text(result: IdentifyResult) -> str:
         share = max(0.0, 100 * fit.data_share[j])
         verdict = data_say(bool(fit.identified[j]), share)
         lines.append(
-            f"  {j + 1}    {c:9.2f} {u:5.2g}  {low:7.2f} to {high:6.2f}  {share:6.1f} %  {bound:>8}"
-            f"  {verdict}"
+            f"  {j + 1}    {c:9.2f} {number(u, 2):>5}  {low:7.2f} to {high:6.2f}  "
+            f"{share:6.1f} %  {bound:>8}  {verdict}"
         )
     prior_sd = dict.fromkeys(f"{100 * sd:.4g}" for sd in fit.prior.relative_sd)
     known = numbers(100 * fit.prior.relative_sd, 4) if len(prior_sd) > 1 else next(iter(prior_sd))

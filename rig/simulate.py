@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from identification.arm import along, tool_offset
 from identification.gap.forms import Form
 from identification.uncertainty import TWO_SIDED
+from rig.digits import number
 from rig.errors import InputError
 from rig.gap_forms import effects_of
 from rig.gap_path import left_out, predict
@@ -99,7 +100,7 @@ class Simulation:
             lines.append(f"With the effects {', '.join(self.effects)}; k is that of the springs.")
         for c in self.curves:
             u = N_PER_MM * c.stiffness * c.relative_u
-            k = f"{N_PER_MM * c.stiffness:.2f} N/mm (standard uncertainty {u:.2g} N/mm)"
+            k = f"{N_PER_MM * c.stiffness:.2f} N/mm (standard uncertainty {number(u, 2)} N/mm)"
             lines.append(
                 f"\nPose {c.pose}, direction {c.direction}: "
                 + (k if np.isfinite(c.stiffness) else "the arm does not give way along it")
