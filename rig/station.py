@@ -83,11 +83,6 @@ class Station:
     path: Path
 
 
-def station_names() -> list[str]:
-    """Stations that the project holds."""
-    return sorted(p.stem for p in STATIONS.glob("*.yaml"))
-
-
 def load_station(name_or_path: str | Path, beside: Path | None = None) -> Station:
     """Reads and checks a station: a name of protocols/stations, or a path.
 

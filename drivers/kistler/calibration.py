@@ -125,14 +125,3 @@ def u_type_a(sd: float, count: int) -> float:
     Slow noise and drift are not in it; the zero lines before and after a run carry these.
     """
     return sd / math.sqrt(count) if count > 1 else math.nan
-
-
-def u_digit_N(settings: KistlerSettings, bits: int = 16) -> Array:
-    """Standard uncertainty (3,) in N of one single value's Fx, Fy, Fz from the converter's digits.
-
-    Rectangular within a digit of the -10..10 V range (GUM 4.3.7), independent between channels.
-    """
-    u_volt = 2 * AMPLIFIER_SPAN_V / 2**bits / math.sqrt(12)
-    matrix = Calibration.from_settings(settings).matrix[:3]
-    result: Array = np.sqrt((matrix**2).sum(axis=1)) * u_volt
-    return result

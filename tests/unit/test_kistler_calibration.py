@@ -17,7 +17,6 @@ from drivers.kistler.calibration import (
     channel_forces,
     channel_sums,
     drift_bound_N_per_s,
-    u_digit_N,
     u_type_a,
     volts_of,
 )
@@ -138,14 +137,6 @@ def test_drift_bound_adds_up_in_the_sums() -> None:
     np.testing.assert_allclose(per_minute, [0.8, 0.8, 4 * 60 * 0.05 / 3.7])
     summed = 60 * drift_bound_N_per_s(settings(channels=3))
     np.testing.assert_allclose(summed, [0.4, 0.4, 60 * 0.05 / 3.7])
-
-
-def test_uncertainty_helpers() -> None:
-    assert u_type_a(0.3, 900) == pytest.approx(0.01)
-    assert math.isnan(u_type_a(0.3, 1))
-    digit = 20 / 65536 / math.sqrt(12)
-    expected = [digit * 50 * math.sqrt(2), digit * 20 * math.sqrt(2), digit * 100 * 2]
-    np.testing.assert_allclose(u_digit_N(settings()), expected)
 
 
 @pytest.mark.parametrize(
@@ -281,3 +272,8 @@ def test_emulator_refuses_channels_it_does_not_have(channel: str, code: int) -> 
     with pytest.raises(NiError) as refused:
         Tasks(Bench(), settings()).inputs(channel)
     assert refused.value.code == code
+
+
+def test_the_uncertainty_of_a_mean() -> None:
+    assert u_type_a(0.3, 900) == pytest.approx(0.01)
+    assert math.isnan(u_type_a(0.3, 1))
