@@ -17,7 +17,8 @@ HEAD = """\
 Made by `docs/build_faults.py` from a run of `tests/wire/test_faults.py`: each fault is shown by the
 emulators to a whole `rig measure`, from the start or in mid-run. Exit status 3: a device failed;
 4: stopped for safety; 0: the fault costs values at most, which are counted and named in the data.
-In every case the rows taken so far are kept, and `rig measure --resume` goes on from there.
+In every case the rows taken so far are kept, and `rig measure --resume` goes on from there; a
+measurement that never began, because a device did not open, leaves no file.
 
 """
 
