@@ -96,7 +96,7 @@ class Ild2200:
             raise
         except OSError as error:
             self.close()
-            raise complaints.unplugged(self._settings.port, error) from None
+            raise complaints.unplugged(self._settings.port, error, connecting=True) from None
 
     def close(self) -> None:
         """Stops the reader and closes the port; never raises, may be called twice."""
@@ -237,7 +237,7 @@ class _Reader:
         try:
             self._read_until_stopped()
         except OSError as error:  # SerialException included: unplugged
-            self._stream.fail(complaints.unplugged(self._settings.port, error))
+            self._stream.fail(complaints.unplugged(self._settings.port, error, connecting=False))
         except DeviceError as error:
             self._stream.fail(error)
 

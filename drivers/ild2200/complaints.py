@@ -40,12 +40,13 @@ def no_port(port: str, baud: int, error: Exception) -> CannotConnect:
     return CannotConnect(DEVICE, fault, remedy)
 
 
-def unplugged(port: str, error: Exception) -> ReadTimeout:
-    """The port vanished under way."""
+def unplugged(port: str, error: Exception, *, connecting: bool) -> ReadTimeout:
+    """The port vanished, under way or before there was anything to resume."""
+    then = "start again" if connecting else "go on with --resume"
     return ReadTimeout(
         DEVICE,
         f"the serial port {port} has gone ({error})",
-        "Plug the adapter in again, check the cable, and resume the measurement.",
+        f"Plug the adapter in again, check the cable, then {then}.",
     )
 
 

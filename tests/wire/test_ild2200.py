@@ -13,7 +13,7 @@ import serial
 
 from drivers.clock import Clock
 from drivers.errors import BadReply, CannotConnect, DeviceError, OutOfRange, ReadTimeout
-from drivers.ild2200 import commands
+from drivers.ild2200 import commands, complaints
 from drivers.ild2200.client import Ild2200
 from drivers.ild2200.commands import Command
 from drivers.ild2200.emulator import FAULTS, Ild2200Emulator
@@ -188,7 +188,7 @@ AT_START: dict[str, Outcome] = {
 IN_MID_RUN: dict[str, Outcome] = {
     **AT_START,
     "silence": (ReadTimeout, r"has sent nothing for .*, then go on with --resume\."),
-    "close": (ReadTimeout, "has gone"),
+    "close": (ReadTimeout, r"has gone .*, then go on with --resume\."),
     "garbage": (BadReply, "bytes that are no values"),
     "laser_off": (BadReply, r"laser off \(65530\)\. .*, then go on with --resume\."),
     "relative_zero": (BadReply, r"relative zero.*, then go on with --resume\."),
@@ -206,6 +206,11 @@ def record(table: FaultTable, fault: str, when: str, error: DeviceError | None) 
     if error is None and fault == "mute_to_commands":
         text = "commands are given at start only"
     table("laser", fault, when, kind, text)
+
+
+def test_a_port_that_vanishes_before_anything_was_measured_is_not_resumed() -> None:
+    said = complaints.unplugged("/dev/ttyUSB0", OSError("gone"), connecting=True)
+    assert said.remedy == "Plug the adapter in again, check the cable, then start again."
 
 
 @pytest.mark.parametrize("fault", sorted(AT_START))
