@@ -26,7 +26,7 @@ _KEPT_COMMENTS = 200
 _FOREIGN = (
     (b"PK\x03\x04", "an Excel or zip file; save the sheet as CSV (UTF-8)"),
     (b"\x1f\x8b", "a gzip file; unpack it first"),
-    (b"\x89HDF", "an HDF5 file; a data set needs no import"),
+    (b"\x89HDF", "an HDF5 file, not a table (CSV); a data set needs no import"),
     (b"PAR1", "a Parquet file; export it as CSV"),
     (b"\xff\xfe", "UTF-16 text; save it as CSV UTF-8"),
     (b"\xfe\xff", "UTF-16 text; save it as CSV UTF-8"),
