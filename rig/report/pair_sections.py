@@ -162,8 +162,8 @@ def _tested(gathered: Gathered, pairs: Sequence[Node]) -> Table:
             p["ratio"]["value"].number(),
             p["ratio"]["ci95"][0].number(),
             p["ratio"]["ci95"][1].number(),
-            p["p"].number(2),
-            p["p_adjusted"].number(2),
+            p["p"].chance(),
+            p["p_adjusted"].chance(),
         )
         for p in pairs
     )

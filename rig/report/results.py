@@ -10,6 +10,7 @@ from rig.digits import likely, number
 from rig.report.document import Inline, Number, Rich
 
 NOTHING = "-"
+_LEAST_P = 1e-3  # what is rarer depends on tails that nobody knows
 DEGREES = 180 / math.pi  # in a radian: protocols and pendants have degrees
 
 
@@ -80,6 +81,12 @@ class Node:
             return (NOTHING,)
         shown = likely(self.value).removesuffix(" %")
         return (Number(shown, self.value, self.pointer, 100.0), " %")
+
+    def chance(self) -> Rich:
+        """A p value; none is nil."""
+        if self.value is not None and self.value < _LEAST_P:
+            return (Number(f"< {_LEAST_P:g}", self.value, self.pointer),)
+        return self.number(2)
 
     def interval(self, digits: int = 4, scale: float = 1.0) -> Rich:
         """`low to high` of a pair."""

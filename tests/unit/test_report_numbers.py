@@ -17,7 +17,7 @@ from rig.dataset import load
 from rig.diagnose import diagnose
 from rig.digits import likely
 from rig.identify import identify
-from rig.report.document import Block, Section, Table, rich
+from rig.report.document import Block, Number, Section, Table, rich
 from rig.report.report import Report, make
 from rig.report.results import Node, look_up
 from rig.report.wishes import Wishes
@@ -79,6 +79,9 @@ def test_every_number_stands_in_the_json(which: str, request: pytest.FixtureRequ
         if text in ("> 99", "< 1"):  # probabilities next to certain
             assert likely(value) == f"{text} %", pointer
             continue
+        if text == "< 0.001":  # a p value
+            assert value < 1e-3, pointer
+            continue
         assert abs(float(text) - value * scale) <= 0.501 * last_digit(text), (pointer, text)
 
 
@@ -120,6 +123,15 @@ def test_so_is_the_diagnosis(of_bench: Report) -> None:
     assert clean(of_bench.to_json())["datasets"][0]["diagnose"] == written
     page = Page(of_bench.to_html())
     assert written["verdict"] in [e.text for e in page.all("strong")]
+
+
+@pytest.mark.parametrize(
+    ("p", "written"), [(0.0, "< 0.001"), (3e-9, "< 0.001"), (0.0123, "0.012"), (1.0, "1.0")]
+)
+def test_no_p_value_is_nil(p: float, written: str) -> None:
+    (shown,) = Node({"p": p})["p"].chance()
+    assert isinstance(shown, Number)
+    assert (shown.text, shown.value, shown.pointer) == (written, p, "/p")
 
 
 def test_pointers_of_names_with_slashes_and_tildes() -> None:
