@@ -122,7 +122,10 @@ def bar(view: LiveView, width: int = BAR_WIDTH) -> Text:
 
 def number(value: float, form: str, unit: str) -> str:
     """A value with its unit, or a dash when there is none."""
-    return f"{value:{form}} {unit}" if math.isfinite(value) else f"- {unit}"
+    if not math.isfinite(value):
+        return f"- {unit}"
+    shown = f"{value:{form}}"
+    return f"{shown if float(shown) else shown.lstrip('-')} {unit}"
 
 
 def screen(
@@ -157,10 +160,11 @@ def screen(
 def _title(view: LiveView | None) -> str:
     if view is None or not view.direction:
         return "stiffness measurement"
-    return (
+    place = (
         f"pose {view.pose}   direction {view.direction}   "
-        f"repetition {view.repetition} of {view.repetitions}   step {view.step} of {view.steps}"
+        f"repetition {view.repetition} of {view.repetitions}"
     )
+    return f"{place}   step {view.step} of {view.steps}" if view.step else place
 
 
 def _live(
@@ -182,11 +186,15 @@ def _live(
         word, far = "STOP", "values are old"
     elif asked == "unload":
         word, far = "LOOSEN", "until the force no longer answers"
+        if not math.isfinite(view.force_N):  # before the first tare
+            far = "until the screw no longer touches"
     elif asked is not None:
         word, far = "HANDS OFF", "the question below first"
     arrow = {"TIGHTEN": "▶▶ ", "LOOSEN": "◀◀ "}.get(word, "")
     colour = DIRECTION_COLOURS.get(word, "bold green" if word == "HOLD" else "bold")
-    target = f"target {number(view.target_N, '.1f', 'N')} ± {number(view.band_N, '.2g', 'N')}"
+    target = f"target {number(view.target_N, '.1f', 'N')}"
+    if view.band_N > 0:
+        target += f" ± {number(view.band_N, '.2g', 'N')}"
     parts: list[RenderableType] = [Text()]
     parts += [Align.center(Text(line, style=style)) for line in large(force)]
     parts += [

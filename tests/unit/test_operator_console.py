@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import pty
 import sys
@@ -19,7 +20,7 @@ from drivers.clock import Clock
 from drivers.errors import DeviceError
 from drivers.interfaces import LimitLevel, LiveView, Prompt
 from drivers.operator.console import ConsoleOperator
-from drivers.operator.screen import bar, hint, large, plain, screen
+from drivers.operator.screen import bar, hint, large, number, plain, screen
 from drivers.operator.settings import OperatorSettings
 from tests.unit.test_operator_hand import view
 
@@ -150,6 +151,24 @@ def test_where_nothing_is_to_choose_enter_is_asked_for() -> None:
     text = shown(known(40.0, 0.0), prompt=Prompt("unload", "Turn back.", ("ok",)))
     assert "Press Enter: ▏" in text
     assert "Type" not in text
+
+
+def test_without_a_step_under_way_none_is_counted() -> None:
+    assert "step 0" not in shown(known(0.0, 0.0, step=0))
+    assert "step 3 of" in shown(known(0.0, 0.0, step=3))
+    assert "±" not in shown(known(0.0, 0.0, step=0, band_N=0.0))
+
+
+def test_without_a_force_the_touch_counts() -> None:
+    unload = Prompt("unload", "Turn back.", ("ok",))
+    assert "until the force no longer answers" in shown(known(5.0, 0.0), prompt=unload)
+    assert "until the screw no longer touches" in shown(known(math.nan, 0.0), prompt=unload)
+
+
+def test_nothing_is_less_than_nothing() -> None:
+    assert number(-0.0004, ".3f", "mm") == "0.000 mm"
+    assert number(-0.0006, ".3f", "mm") == "-0.001 mm"
+    assert number(math.nan, ".3f", "mm") == "- mm"
 
 
 def test_screen_before_the_first_view() -> None:
