@@ -18,6 +18,7 @@ from rig.cli.options import (
     list_written,
     say,
 )
+from rig.errors import InputError
 
 _Weighting = Annotated[
     str,
@@ -104,6 +105,11 @@ def identify(
     from rig.identify import identify as run_identify
     from rig.identify import prior_of
 
+    if write_protocol is not None and not proposals:
+        raise InputError(
+            f"--write-protocol {write_protocol}: with --proposals 0 no next poses are looked for. "
+            "Give --proposals 1 or more, or leave --write-protocol out."
+        )
     result = run_identify(
         datasets,
         prior=None if prior is None else prior_of(prior),

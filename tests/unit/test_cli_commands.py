@@ -82,6 +82,16 @@ def test_wrong_models_and_data_are_refused_by_name(rig: Rig, files: Path, words:
     assert "Traceback" not in err
 
 
+def test_a_protocol_without_proposals_is_refused_before_anything_is_written(
+    rig: Rig, files: Path
+) -> None:
+    status, _, err = rig("identify", "d.h5", "--proposals", "0", "--write-model", "new.yaml",
+                         "--write-protocol", "next.yaml")  # fmt: skip
+    assert status == 2
+    assert err.endswith("Give --proposals 1 or more, or leave --write-protocol out.\n")
+    assert not (files / "new.yaml").exists()
+
+
 def test_diagnose_gives_the_contracts_json(rig: Rig, files: Path) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     status, out, err = rig("diagnose", "d.h5", "--json", "-")
