@@ -56,8 +56,9 @@ def judge(table: Table, residuals: Array, k: float) -> tuple[Status, str]:
         explained = 1.0 - float(np.sum(residuals**2)) / spread
         if explained < STRAIGHT:
             return "doubtful", (
-                f"A line explains only {max(0.0, explained):.0%} of how the displacement varies: "
-                "k is an average over a curve that is not straight; look at the pointwise k."
+                f"A line explains only {100 * max(0.0, explained):.0f} % of how the displacement "
+                "varies: k is an average over a curve that is not straight; look at the pointwise "
+                "k."
             )
     return "ok", ""
 

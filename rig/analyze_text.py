@@ -69,7 +69,8 @@ def _direction(key: str, direction: Direction) -> Iterator[str]:
     yield from _excluded(r.excluded)
     if r.hysteresis is not None:
         loop = r.hysteresis
-        share = "" if math.isnan(loop.relative) else f", {loop.relative:.1%} of the work of loading"
+        percent = 100 * loop.relative
+        share = "" if math.isnan(percent) else f", {percent:.1f} % of the work of loading"
         yield (
             f"Loop between loading and unloading: {number(loop.area * MM_PER_M)} N mm{share}; "
             "k is that of loading."

@@ -45,7 +45,7 @@ class Pace:
         kept = max(1, int(self._speed * self._served / slots))
         return (
             f"This machine can't keep up with {self._speed:g} times real time: "
-            f"{self._missed / slots:.0%} of the sampling slots are missed, and whoever turns "
-            "the screw sees the force too late: levels may be overshot, and values be wrong. "
+            f"{100 * self._missed / slots:.0f} % of the sampling slots are missed, and whoever "
+            "turns the screw sees the force too late: levels may be overshot, and values be wrong. "
             f"Measure again with --speed {kept} or less."
         )

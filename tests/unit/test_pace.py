@@ -18,7 +18,7 @@ def run(speed: float, missed: list[int]) -> tuple[list[str], str | None]:
 def test_it_is_said_once_and_with_a_speed_that_will_do() -> None:
     said, last = run(100, [2] * 30)
     assert said == [
-        "This machine can't keep up with 100 times real time: 67% of the sampling slots are "
+        "This machine can't keep up with 100 times real time: 67 % of the sampling slots are "
         "missed, and whoever turns the screw sees the force too late: levels may be overshot, "
         "and values be wrong. Measure again with --speed 33 or less."
     ]
