@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from identification.gap.data import BRANCH_NAMES, GapData
 from identification.gap.diagnose import (
@@ -17,9 +17,10 @@ from identification.gap.diagnose import (
     diagnose_gap,
     explain_gap,
 )
+from identification.gap.forms import Form
 from identification.gap.heldout import HeldOut
 from identification.gap.interval import Parameter
-from identification.gap.known import less_known
+from identification.gap.known import NotKnown
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
 from rig.errors import InputError, did_you_mean
@@ -120,15 +121,9 @@ def diagnose(
     for META's;
     simulation: CSV with another simulator's curves; withhold: words taken out of the library; add:
     words the explanation must contain. InputError for anything wrong."""
-    known: tuple[dict[str, Any], ...] = ()
-    behind: tuple[str, ...] = ()
     read = None if model is None else load_model(model)
-    if read is None:
-        data = gap_data(dataset)
-    else:
-        data, known, behind = _believing(dataset, read)
-    if simulation is not None:
-        data = with_curves(data, simulation)
+    given = _Believed(gap_data(dataset)) if read is None else _believing(dataset, read)
+    data = given.data if simulation is None else with_curves(given.data, simulation)
     out, forced = tuple(withhold), tuple(add)
     for option, words in (("--withhold", out), ("--add", forced)):
         for word in words:
@@ -141,12 +136,15 @@ def diagnose(
             data,
             withhold=out,
             add=forced,
+            known=given.laws,
             others=lambda: elsewhere(dataset, read),
             progress=progress,
         )
     except NotShown as error:
         raise InputError(f"--add: {error}.") from error
-    return Diagnosis(dataset.uuid, result, dataset.banners(), known, behind, read)
+    except NotKnown as error:
+        raise InputError(f"{model}: effects: {error}. Give a model without effects.") from error
+    return Diagnosis(dataset.uuid, result, dataset.banners(), given.effects, given.behind, read)
 
 
 def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
@@ -159,11 +157,18 @@ def explain(dataset: Dataset) -> tuple[Diagnosis, Callable[[], Diagnosis]]:
     return said(result), lambda: said(whole())
 
 
-def _believing(
-    dataset: Dataset, read: ArmModel
-) -> tuple[GapData, tuple[dict[str, Any], ...], tuple[str, ...]]:
-    """The data with springs, links, mounting and effects of a model as their simulation, those
-    effects, and words of the model that are left out."""
+class _Believed(NamedTuple):
+    """The data with springs, links and mounting of a model as their simulation; laws of the effects
+    that it has; these effects, as the model writes them; words of it that are left out."""
+
+    data: GapData
+    laws: tuple[Form, ...] = ()
+    effects: tuple[dict[str, Any], ...] = ()
+    behind: tuple[str, ...] = ()
+
+
+def _believing(dataset: Dataset, read: ArmModel) -> _Believed:
+    """InputError for a model of another robot."""
     effects = effects_of(read)
     if read.arm.name != dataset.meta.robot:
         raise InputError(
@@ -177,15 +182,9 @@ def _believing(
         gap_data(replace(dataset, meta=believed), read),
         compliance_relative_sd=read.arm.joint_stiffness_relative_sd,
     )
-    lasting, behind = effects.lasting, effects.left_behind
-    words = {*effects.contained, *(f.word for f in lasting)}
+    words = {*effects.contained, *(f.word for f in effects.lasting)}
     known = tuple(e for e in read.effects if e["name"] in words)
-    if not lasting:
-        return data, known, behind
-    try:
-        return less_known(data, lasting), known, behind
-    except ValueError as error:
-        raise InputError(f"{read.name}: effects: {error}. Give a model without effects.") from error
+    return _Believed(data, effects.lasting, known, effects.left_behind)
 
 
 def _looks_like(r: GapResult) -> dict[str, Any] | None:

@@ -28,11 +28,13 @@ class Base:
 
 
 def prediction(bench: Bench) -> Array:
-    """Stacked: what springs of `bench.compliance` predict, or another simulator; of that nobody
-    knows how the joints turn, so that these are taken to do as the springs do."""
+    """Stacked: what springs of `bench.compliance` predict, or another simulator, and the effects
+    that the simulation has; of another simulator nobody knows how the joints turn, so that these
+    are taken to do as the springs do."""
+    known = 0.0 if bench.known is None else bench.known.does
     if bench.rows.simulated is not None:
-        return bench.stacked(bench.rows.simulated, bench.elastic)
-    return bench.stacked(bench.slope * bench.load, bench.elastic) + HALF * _geometry(bench)
+        return bench.stacked(bench.rows.simulated, bench.elastic) + known
+    return bench.stacked(bench.slope * bench.load, bench.elastic) + HALF * _geometry(bench) + known
 
 
 def base_columns(bench: Bench) -> Base:
@@ -44,6 +46,8 @@ def base_columns(bench: Bench) -> Base:
     parts += _datums(bench)
     parts += _offsets(bench)
     parts += _crosstalk(bench)
+    if bench.known is not None:
+        parts += [(n, c, 1.0) for n, c in zip(bench.known.names, bench.known.free.T, strict=True)]
     return _of(parts)
 
 

@@ -36,6 +36,18 @@ class Layout:
     size: int
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Stacked: what effects do that the simulation has, does (size,), and what is not known of
+    them, free (size, k), of independent unit coefficients called names (k); left m: what may stay
+    of them, rms."""
+
+    does: Array
+    free: Array
+    names: tuple[str, ...]
+    left: float
+
+
 _FURTHER, _ONE_WAY = 6, 0.9  # radii; of the range
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
 _BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
@@ -79,6 +91,7 @@ class Bench:
     columns: Pool = field(default_factory=Pool)
     flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
     moves: Array | None = None
+    known: Known | None = None
     # (channel, kind) -> lags (k,) s and what each does (k, n): of this bench alone, no copy's
     lags: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict, init=False)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log
 
@@ -22,9 +22,11 @@ from identification.gap.evidence import Engine, eta_levels
 from identification.gap.explanation import Explanation, Found, Likeness
 from identification.gap.faults import SIGNS, SILENT
 from identification.gap.fit import Fit, fit
+from identification.gap.forms import Form
 from identification.gap.glitches import without_glitches
 from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.interval import Parameter
+from identification.gap.known import knowing
 from identification.gap.leftover import looked_up
 from identification.gap.locate import NOWHERE, Where, locate
 from identification.gap.noise import SWINGS
@@ -107,13 +109,17 @@ def diagnose_gap(
     *,
     withhold: Iterable[str] = (),
     add: Iterable[str] = (),
+    known: Sequence[Form] = (),
     others: Others | None = None,
     progress: Progress | None = None,
 ) -> GapResult:
     """The diagnosis of a data set. withhold: words taken out of the library; add: words that the
-    explanation must contain beside what it has; others: setups that the rig could take up next.
-    Raises ValueError for unknown words, NotShown for words to add that these data can't show."""
-    _, whole = explain_gap(data, withhold=withhold, add=add, others=others, progress=progress)
+    explanation must contain beside what it has; known: effects that the simulation has; others:
+    setups that the rig could take up next. Raises ValueError for unknown words, NotKnown for
+    effects that can't be known here, NotShown for words to add that these data can't show."""
+    _, whole = explain_gap(
+        data, withhold=withhold, add=add, known=known, others=others, progress=progress
+    )
     return whole()
 
 
@@ -122,6 +128,7 @@ def explain_gap(
     *,
     withhold: Iterable[str] = (),
     add: Iterable[str] = (),
+    known: Sequence[Form] = (),
     others: Others | None = None,
     progress: Progress | None = None,
 ) -> tuple[GapResult, Callable[[], GapResult]]:
@@ -132,6 +139,7 @@ def explain_gap(
     check_words(out | forced)
     tell("preparing", 0.0)
     bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(data)))))
+    bench = knowing(bench, known)
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
     variants = library(bench, [w for w in WORDS if w not in out])
@@ -156,8 +164,8 @@ def explain_gap(
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     plain = chosen_of(found, verdict)
     chosen = force(engine, variants, found.explanations, plain, forced)
-    chosen, known = settled(engine, variants, chosen, found.explanations)
-    result = _with_twins(_result(found, verdict, chosen, known), chosen, out)
+    chosen, each = settled(engine, variants, chosen, found.explanations)
+    result = _with_twins(_result(found, verdict, chosen, each), chosen, out)
     if not forced <= plain.words:
         result = replace(result, without_added=_left(engine, fit(engine, plain)))
 

@@ -132,9 +132,10 @@ def _told(engine: Engine, parts: list[Part], left: Array, rows: Flags) -> Array:
 def stated_prediction(engine: Engine) -> Array:
     """(n,) response that the simulation as stated predicts."""
     bench = engine.bench
+    known = 0.0 if bench.known is None else bench.known.does[: bench.rows.n]
     if bench.rows.simulated is not None:
-        return bench.rows.simulated
-    return bench.stated_slope * bench.load
+        return bench.rows.simulated + known
+    return bench.stated_slope * bench.load + known
 
 
 def _stacked_keep(engine: Engine, out: Flags) -> Flags:

@@ -62,6 +62,11 @@ def _undecided(bench: Bench) -> Iterator[str]:
 
 
 def _remarks(bench: Bench) -> Iterator[str]:
+    if bench.known is not None and bench.known.left >= bench.noise.stated:
+        yield (
+            f"Up to {1e3 * bench.known.left:.3g} mm rms of what the simulation's effects do are no "
+            "gap: no law is met better than that."
+        )
     if bench.course.let_go:
         yield _let_go(bench.course.let_go, float(np.ptp(bench.data.force)))
     if bench.imposed:

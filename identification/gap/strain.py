@@ -51,6 +51,7 @@ _CALLED = {
     "scatter": "the datum of a run",
     "datum": "the datum of the displacement",
     "geometry": "the turn of the levers under load",
+    "known": "an effect of the model",
 }
 
 

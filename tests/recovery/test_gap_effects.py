@@ -24,6 +24,7 @@ from rig.dataset import Dataset
 from rig.diagnose import diagnose
 from rig.errors import InputError
 from rig.gap_data import gap_data
+from rig.gap_model import write_model
 from rig.model import load_robot
 from rig.tables import import_table
 from tests.conformance.gap_designs import linear
@@ -266,6 +267,43 @@ def test_creep_fraction_and_time(results: dict[str, GapResult]) -> None:
     parameters = results["creep"].effects[0].parameters
     assert parameters["creep_fraction"].value == pytest.approx(0.2, rel=0.25)
     assert parameters["retardation_time"].low < 20.0 < parameters["retardation_time"].high
+
+
+def yields_far(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+    """As `yields`, thirty times as far, and sooner the more often it did: millimetres, as an arm
+    that is held by its controller."""
+    joints, flowed = np.zeros_like(torque), 0.0
+    for i, s in enumerate(samples):
+        if i and samples[i - 1].direction != s.direction:
+            flowed = 0.0
+        sooner = 1 + 0.004 * (s.repetition - 2)
+        flowed = max(flowed, max(abs(torque[i, 0]) - 45.0 / sooner, 0.0) * 30 / STIFFNESS[0])
+        joints[i, 0] = np.sign(lever[i, 0]) * flowed
+    return joints, np.zeros(len(samples))
+
+
+def test_what_a_model_has_is_no_gap_of_the_next_measurement(tmp_path: Path) -> None:
+    """Nor what such a law leaves of millimetres; what is new beside it is found."""
+    first, second, third = (tmp_path / n for n in ("first", "second", "third"))
+    for folder in (first, second, third):
+        folder.mkdir()
+    measured = measure(first, yields_far)
+    found = diagnose(measured)
+    assert found.result.verdict == "joint_yield"
+    model = tmp_path / "model.yaml"
+    write_model(found, measured, model)
+
+    def later(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+        joints, more = yields_far(samples, 1.01 * torque, lever)
+        return 0.97 * joints, more
+
+    def jumped(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
+        return later(samples, torque, lever)[0], 10 * jumps(samples, torque, lever)[1]
+
+    again = diagnose(measure(second, later, seed=1), model=model)
+    assert again.result.verdict == "none"
+    assert any("no law is met better than that" in n for n in again.result.notes)
+    assert diagnose(measure(third, jumped, seed=2), model=model).result.verdict == "zero_shift"
 
 
 @pytest.mark.parametrize("drop", [("q",), ()])

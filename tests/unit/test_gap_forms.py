@@ -15,7 +15,7 @@ from identification.gap.effects.joint_hysteresis import REACHES
 from identification.gap.effects.knees_closer import refined
 from identification.gap.evidence import Engine
 from identification.gap.forms import Form, describe, law_of, lawful, realise, rows_of
-from identification.gap.known import less_known
+from identification.gap.known import NotKnown, knowing
 from identification.gap.law import HUNG, KEPT, Law, Term
 from identification.gap.parts import Part
 from identification.gap.pool import Pool
@@ -293,32 +293,48 @@ DRIFT = one(
 
 
 @pytest.mark.parametrize("known", [YIELD, DRIFT], ids=["yield", "drift"])
-def test_a_known_effect_leaves_every_channel(bench: Bench, known: Form) -> None:
-    """Data that are nothing but the effect: less the effect, nothing remains."""
-    count = bench.rows.weight.astype(int)
-    data = replace(arm_data(), force=np.repeat(bench.rows.force, count))
-    plain = replace(data, q=np.zeros((len(count.repeat(count)), 6)))
-    there = make_bench(plain)
-    total = realise(there, known)
-    n, holds = there.rows.n, np.add.reduceat(count, np.flatnonzero(there.rows.hold_starts))
-    zero = np.zeros(n)
-    zero[there.rows.zero] = total[there.layout.zero_force]
-    shown = np.repeat(total[:n], count)
+def test_a_known_effect_is_predicted_in_every_channel(known: Form) -> None:
+    """From where the laser was zeroed; what is not known of it is a tenth of its size, and the
+    loads at which it happens."""
+    there = make_bench(arm_data())
+    total, n = realise(there, known), there.rows.n
     for s in range(4):  # the laser is zeroed anew in every setup
-        shown[plain.setup == s] -= shown[plain.setup == s][0]
-    made = replace(
-        plain, displacement=shown,
-        q=np.repeat(total[there.layout.q].reshape(6, -1).T, holds, axis=0),
-        force=plain.force + np.repeat(zero, count),
-    )  # fmt: skip
-    left = less_known(made, [known])
-    assert np.abs(made.displacement).max() > 1e-6
-    assert np.abs(left.displacement).max() < 1e-9
-    assert left.q is not None
-    assert np.abs(left.q).max() < 1e-12
-    np.testing.assert_allclose(left.force, plain.force, atol=1e-9)
-    with pytest.raises(ValueError, match="displacement is imposed"):
-        less_known(replace(made, imposed="displacement", step=made.step - 99), [known])
+        mine = np.flatnonzero(there.rows.setup == s)
+        total[mine] -= total[mine[0]]
+    knows = knowing(there, [known])
+    assert np.abs(total[:n]).max() > 1e-6
+    np.testing.assert_allclose(prediction(knows) - prediction(there), total, atol=1e-15)
+    base = base_columns(knows)
+    size, *load = (base.columns[:, i] for i in base.index("known"))
+    np.testing.assert_allclose(size, 0.1 * total, atol=1e-15)
+    assert len(load) == (known is YIELD)  # a drift happens at any load
+    if load:  # 1 % sooner does as much as 1 % more load, over a compliance alike
+        later = replace(known, law=_at_less(known.law))
+        moved = realise(there, later) - realise(there, known)
+        for s in range(4):
+            mine = np.flatnonzero(there.rows.setup == s)
+            moved[mine] -= moved[mine[0]]
+        sooner = load[0] / 0.03 - size / 0.1  # the load itself is no larger
+        np.testing.assert_allclose(moved / 0.01, sooner, atol=0.03 * np.abs(sooner).max())
+
+
+def _at_less(law: Law) -> Law:
+    return Law(
+        law.constants,
+        tuple(
+            Term(
+                t.coefficient, {k: 0.99 * v if k == "threshold" else v for k, v in t.shape.items()}
+            )
+            for t in law.terms
+        ),
+    )
+
+
+def test_nothing_is_known_as_a_displacement_where_that_is_imposed() -> None:
+    there = make_bench(replace(arm_data(), imposed="displacement", step=arm_data().step - 99))
+    with pytest.raises(NotKnown, match="displacement is imposed"):
+        knowing(there, [YIELD])
+    assert knowing(there, []) is there
 
 
 @pytest.mark.parametrize("readings", [True, False])
