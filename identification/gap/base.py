@@ -111,13 +111,26 @@ def _gains(bench: Bench) -> list[_Part]:
     if bench.imposed:  # only the ratio of the two gains shows
         both = float(np.hypot(meter.force_gain, meter.displacement_gain))
         return [("gain force", bench.stacked(line), both)]
-    force = bench.force_column(-bench.load)
+    force = [("gain force", bench.force_column(-bench.load), meter.force_gain)]
+    if bench.data.arm:  # every component has a sensor and an amplifier of its own
+        force = [(f"gain force {'xyz'[a]}", _of_component(bench, a), meter.force_gain)
+                 for a in range(3)]  # fmt: skip
     # the laser's acts on what it read, however far off the simulated springs are
     read = bench.line if bench.data.arm else line
     return [
-        ("gain force", force, meter.force_gain),
+        *force,
         ("gain displacement", bench.stacked(read), meter.displacement_gain),
     ]
+
+
+def _of_component(bench: Bench, axis: int) -> Array:
+    """(size,): what it does that a component of the force reads too much: less of the push along
+    the direction, and a force across that is none."""
+    setups, which = bench.data.setups, bench.rows.setup
+    read = np.array([s.unit_vector[axis] for s in setups])[which] * bench.load
+    along = np.array([s.unit_vector[axis] for s in setups])[which] * read
+    across = np.stack([s.tangents[:, axis] for s in setups])[which] * read[:, None]
+    return bench.force_column(-along) + bench.stacked(tangential=across)
 
 
 def _datums(bench: Bench) -> list[_Part]:

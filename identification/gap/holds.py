@@ -77,11 +77,33 @@ def scatter_within(values: Array, hold: Ints) -> float | None:
     0.8713). None where there are too few."""
     second = values[3:] - 2 * values[2:-1] + values[1:-2] if len(values) > 3 else np.zeros(0)
     same = (hold[3:] == hold[:-3]) if len(values) > 3 else np.zeros(0, dtype=bool)
-    squares = np.sort((second[same]) ** 2)
+    return _trimmed(second[same] / 6**0.5)
+
+
+def scatter_of_three(values: Array, hold: Ints) -> float | None:
+    """The same of holds that are too short for that, from their last two readings: None where these
+    go on the way that the hold was come to, or there are too few."""
+    first = first_rows(hold)
+    count = np.diff(np.append(first, len(hold)))
+    last = (first + count - 1)[count == _THREE]
+    came = np.sign(np.diff(values[first], prepend=values[0]))[count == _THREE]
+    step = values[last] - values[last - 1]
+    onward = step * came
+    if abs(onward.sum()) > _ONWARD * float(np.sqrt(onward @ onward)):
+        return None
+    return _trimmed(step / 2**0.5)
+
+
+_THREE = 3
+_ONWARD = 2.5  # standard errors
+
+
+def _trimmed(unit: Array) -> float | None:
+    """Standard deviation of values (k,) that scatter about zero."""
+    squares = np.sort(unit**2)
     if squares.size < ENOUGH:
         return None
-    kept = squares[: int(0.95 * squares.size)]
-    return float(np.sqrt(kept.mean() / 6.0) / 0.8713)
+    return float(np.sqrt(squares[: int(0.95 * squares.size)].mean()) / 0.8713)
 
 
 def swing_within(values: Array, hold: Ints) -> float:

@@ -10,7 +10,14 @@ import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
 from identification.gap.history import half_sample
-from identification.gap.holds import ENOUGH, hold_ids, rest_ids, scatter_within, swing_within
+from identification.gap.holds import (
+    ENOUGH,
+    hold_ids,
+    rest_ids,
+    scatter_of_three,
+    scatter_within,
+    swing_within,
+)
 from identification.gap.rows import Rows
 from identification.gap.turns import turns
 from identification.gap.white import LEAST_SAMPLES, white_noise, white_sd
@@ -69,7 +76,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     if rows.continuous:
         per_sample, common = _running(data, rows, slope, imposed), np.zeros(rows.n)
     elif imposed:  # the force answers
-        answer = scatter_within(data.force, hold) or meter.force
+        answer = _scatter(data, data.force, hold) or meter.force
         per_sample = np.hypot(slope * max(answer, 0.33 * meter.force),
                               np.where(rows.rests, 0.0, meter.displacement))  # fmt: skip
         common = np.where(rows.rests, meter.displacement / np.sqrt(rows.hold_weight), 0.0)
@@ -83,12 +90,13 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     stated = meter.displacement
     if rows.continuous or imposed:
         stated = float(np.median(per_sample if rows.continuous else fallback))
-    white = stated if rows.continuous else scatter_within(data.displacement, hold) or 0.0
+    white = stated if rows.continuous else _scatter(data, data.displacement, hold) or 0.0
     raised = 1.0
     if rows.continuous:
         raised = _raised(data)
     elif not imposed:
-        follows = scatter_within(data.displacement - float(np.median(slope)) * data.force, hold)
+        less = data.displacement - float(np.median(slope)) * data.force
+        follows = _scatter(data, less, hold)
         raised = max(1.0, min(white, follows or 0.0) / meter.displacement)
     rounded = 0.0 if rows.continuous or imposed else _rounded(data, hold)
     per_sample = np.maximum(per_sample, rounded)  # next to an edge, one is a whole step off
@@ -363,12 +371,20 @@ def tangent(rows: Rows, force_sd: float) -> Array:
     return np.asarray(np.maximum(*sides)[rows.hold])
 
 
+def _scatter(data: GapData, values: Array, hold: Ints) -> float | None:
+    """What values (n,) scatter in holds. Of an arm, whose instruments are known, by holds that are
+    long enough."""
+    found = scatter_within(values, hold)
+    return scatter_of_three(values, hold) if found is None and not data.arm else found
+
+
 def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Ints) -> Array:
     """Noise of one sample in every row (n,): measured where holds are long enough, else `alone`."""
     if float(rows.weight @ rows.steady) < 0.5 * float(rows.weight.sum()):
-        measured = scatter_within(data.displacement - float(np.median(slope)) * data.force, hold)
+        less = data.displacement - float(np.median(slope)) * data.force
+        measured = _scatter(data, less, hold)
         return alone if measured is None else np.full(rows.n, measured)
-    measured = scatter_within(data.displacement, hold)
+    measured = _scatter(data, data.displacement, hold)
     if measured is None:
         return alone
     # never less than a third of what is stated: second differences can't see everything

@@ -21,8 +21,8 @@ _PIECES, _OF = 20, 5  # medians of so many pieces, of so many readings at least
 def wanders(data: GapData) -> Literal["force", "displacement"] | None:
     """The channel that moves while there is no load, None where that is not plain."""
     spans = float(np.ptp(data.force)), float(np.ptp(data.displacement))
-    if not min(spans) > 0:
-        return None
+    if not min(spans) > 0:  # a displacement that is read, and is the same to the last digit
+        return "force" if spans[0] > 0 else None
     shares = [np.abs(v) / s for v, s in zip((data.force, data.displacement), spans, strict=True)]
     free = np.flatnonzero((np.minimum(*shares) < _NEAR) & (np.maximum(*shares) < _BOTH))
     if len(free) < _FEWEST:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap import strange
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import make_bench
 from identification.gap.choice import WORTH_OF_THIRD, chosen_of
@@ -422,3 +423,20 @@ def test_of_a_withheld_run_the_datum_and_the_forces_across_stay_in() -> None:
     assert not q.all()
     assert keep[layout.tangential].all()
     assert layout.tangential.stop > layout.tangential.start
+
+
+@pytest.mark.parametrize(("eta", "weight", "creeps"), [
+    (0.0, -10.0, True), (1e-4, -10.0, False),
+])  # fmt: skip
+def test_creep_that_leaves_nothing_is_not_something_that_settles(
+    eta: float, weight: float, creeps: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever a shape of its own in every direction brings more."""
+    e = engine(np.zeros(REPETITIONS))
+    settles = strange.Likeness(strange.SETTLES, None, 0.0)
+    monkeypatch.setattr(strange, "strangers", lambda *_: [None])
+    monkeypatch.setattr(strange, "likenesses", lambda *_: (settles,))
+    creep = replace(explained([0], "joint_creep", weight), eta=eta)
+    said = strange.with_strangers(found(e, creep))
+    assert (said.looks_like is None) is creeps
+    assert (said.unknown < -100) is creeps

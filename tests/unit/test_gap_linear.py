@@ -11,6 +11,8 @@ import pytest
 
 from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
+from identification.gap.data import Instruments
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence import Engine
@@ -21,6 +23,7 @@ from identification.gap.pool import Pool
 from identification.gap.signs import Limits, log_odds
 from identification.gap.variants import Variant
 from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_operators import bench_data
 
 
 @pytest.fixture(scope="module")
@@ -203,3 +206,45 @@ def test_the_gap_lies_in_no_joint_that_does_next_to_nothing(bench: Bench) -> Non
     engine = SimpleNamespace(bench=fresh)
     for size, joints in ((0.3, (first, other)), (0.05, (first,))):
         assert _joints(engine, fit, [1.0, size]) == tuple(v.info["joint"] + 1 for v in joints)
+
+
+def test_gains_of_a_bench_may_be_far_off_where_little_is_stated_of_them() -> None:
+    """An excitation that was set wrong: the spring is known to a hundredth."""
+    step = np.tile(np.concatenate([np.arange(9), np.arange(7, 0, -1)]), 3)
+    rng, run = np.random.default_rng(3), np.repeat([0, 1, 2], 16)
+    load = 20.0 * step
+    for force_gain, verdict in ((0.15, "force_scale"), (0.001, "joint_stiffness_error")):
+        data = bench_data(
+            0.55 * load + rng.normal(0, 0.1, 48), 1e-5 * load + rng.normal(0, 1e-6, 48), step=step,
+            run=run, repetition=run + 1, imposed="force",
+            instruments=Instruments(0.1, 1e-6, force_gain, 0.002),
+            compliance_relative_sd=np.array([0.01]),
+        )  # fmt: skip
+        assert diagnose_gap(data).verdict == verdict
+
+
+def test_every_component_of_the_force_has_a_gain_of_its_own() -> None:
+    """What its sensor reads too much is less push along a direction, and a force across it that is
+    none; single directions along the axes each have theirs."""
+    bench = make_bench(arm_data(directions="xyz"))
+    base = base_columns(bench)
+    off = {n[-1]: base.columns[:, i] for i, n in enumerate(base.names) if "gain force" in n}
+    axes = np.array([s.unit_vector for s in bench.data.setups])[bench.rows.setup]
+    for k, axis in enumerate("xyz"):
+        there = np.abs(axes[:, k]) > 0.99
+        whole = bench.force_column(-bench.load)[: bench.rows.n]
+        np.testing.assert_allclose(off[axis][: bench.rows.n], np.where(there, whole, 0.0),
+                                   atol=1e-12)  # fmt: skip
+    turned = np.array([0.6, 0.8, 0.0])
+    askew = tuple(
+        replace(s, unit_vector=turned, tangents=np.array([[-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]))
+        for s in bench.data.setups
+    )
+    n = len(bench.data.force)
+    data = replace(bench.data, setups=askew, tangential=np.zeros((n, 2)))
+    there = make_bench(data)
+    base = base_columns(there)
+    x = base.columns[:, base.names.index("gain force x")]
+    across = x[there.layout.tangential].reshape(2, -1)
+    held = there.rows.hold_means(there.load[:, None])[:, 0]
+    np.testing.assert_allclose(across, [-0.8 * 0.6 * held, 0.0 * held], atol=1e-9)

@@ -11,6 +11,7 @@ from identification.gap.base import base_columns, prediction
 from identification.gap.bench import Bench, make_bench
 from identification.gap.compare import score
 from identification.gap.data import Array
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import joint_backlash, library, lost_motion
 from identification.gap.effects.joint_backlash import TOOLS_KG
 from identification.gap.effects.lost_motion import Play
@@ -194,3 +195,15 @@ def test_what_is_slack_and_smooth_under_a_load_from_one_side_is_a_seat(pulled: b
     kinds = {v.info["kind"] for v in library(bench, ["joint_backlash"])}
     assert {"free", "friction"} <= kinds
     assert ({"soft", "slow", "arctan"} <= kinds) == pulled
+
+
+@pytest.mark.parametrize(("softer", "verdict"), [
+    (1.7, "joint_nonlinear_stiffness"), (8.0, "joint_backlash"),
+])  # fmt: skip
+def test_a_stage_of_a_gear_is_no_play(softer: float, verdict: str) -> None:
+    """Soft about no load, a fifth of the range wide: a play gives way there by far more."""
+    load = 60 * np.sin(np.arange(1200) / 60)
+    u = (load + (softer - 1) * np.clip(load, -12, 12)) / SPRING
+    rng = np.random.default_rng(5)
+    data = running(load + rng.normal(0, 0.1, 1200), u + rng.normal(0, 1e-6, 1200), imposed="force")
+    assert diagnose_gap(data).verdict == verdict

@@ -108,6 +108,8 @@ def test_swings_that_come_again_and_again_may_be_small_and_quick() -> None:
     assert not own_clock(make_bench(hung(slow + noise, every_s)))
     assert own_clock(make_bench(hung(swings + noise, every_s)))
     assert diagnose_gap(hung(swings + noise, every_s)).verdict == "thermal_drift"
+    # the load reads alike all the time, and nobody turns a screw
+    assert not library(make_bench(hung(swings + noise, every_s)), ["force_drift"])
 
 
 def test_bins_of_long_holds_are_a_small_part_of_the_recording() -> None:
@@ -134,3 +136,24 @@ def test_what_follows_late_is_exact_between_readings() -> None:
         z[i] = z[i - 1] + (fine[i] - fine[i - 1]) * (middle - z[i - 1]) / times
     at = np.searchsorted(fine, clock)
     assert followed(read, clock, times) == pytest.approx(z[at], abs=1e-3)
+
+
+@pytest.mark.parametrize(("before", "verdict"), [(True, "thermal_drift"), (False, "joint_creep")])
+def test_what_moves_before_any_load_does_not_creep(before: bool, verdict: str) -> None:
+    """A weight of an hour, with a quarter of an hour without it before and after."""
+    n, every_s = 400, 12.0
+    on = (np.arange(n) >= 75) & (np.arange(n) < 350)
+    step = on.astype(np.int64)
+    rng = np.random.default_rng(7)
+    force = 80.0 * on + rng.normal(0, 0.1, n)
+    drift = 4e-5 * (1 - np.exp(-np.arange(n) / 150))
+    if not before:
+        z = np.zeros(n)
+        for i in range(1, n):
+            z[i] = z[i - 1] + (on[i] - z[i - 1]) / 100
+        drift = 4e-5 * z
+    moved = 1e-5 * force + drift + rng.normal(0, 1e-6, n)
+    clock = every_s * np.arange(n)
+    data = bench_data(force, moved, step=step, branch=step, time=clock, session=clock)
+    assert own_clock(make_bench(data)) is before
+    assert diagnose_gap(data).verdict == verdict

@@ -105,6 +105,8 @@ def test_the_channel_that_moves_without_load(force: float, u: float, channel: st
     data = resting(force * WALK, u * WALK + np.random.default_rng(3).normal(0, 1e-6, N))
     assert wanders(data) == channel
     assert wanders(replace(data, force=np.zeros(N))) is None
+    still = replace(data, displacement=np.zeros(N))  # a load that wanders would move it
+    assert wanders(still) == "force"
     short = slice(0, 15)
     few = running(data.force[short], data.displacement[short], instruments=METER)
     assert wanders(few) is None

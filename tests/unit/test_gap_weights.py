@@ -378,6 +378,19 @@ def test_a_joint_shows_strong_friction_in_a_single_loading_a_specimen_none() -> 
     assert not library(specimen, ["joint_hysteresis"])
 
 
+def test_friction_that_leaves_nothing_and_never_turned_is_a_curve() -> None:
+    """Loaded three times, let go in between: what forgets in every rest shows no loop."""
+    loads = {"up": np.tile(UP[:5], 3), "up and down": np.tile(UP, 3)}
+    for name, levels in loads.items():
+        bench = hanging(levels)
+        n = len(levels) // 3 * 4
+        run = np.repeat([0, 1, 2], n)
+        bench = make_bench(replace(bench.data, run=run, repetition=run + 1))
+        memories = {v.info["memory"] for v in library(bench, ["joint_hysteresis"])}
+        assert ("rested" in memories) is (name == "up and down")
+        assert "under weight" in memories
+
+
 def test_what_bends_before_the_first_load_that_was_read_is_lost_motion() -> None:
     bench = hanging(UP)  # in steps of a quarter
     found = library(bench, ["joint_nonlinear_stiffness"])

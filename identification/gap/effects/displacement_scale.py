@@ -16,7 +16,7 @@ from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
 from identification.gap.effects.curves import hinge
-from identification.gap.effects.gains import BENDS, SCALES, bent, factor, law_of_gain
+from identification.gap.effects.gains import BENDS, SCALES, bent, factor, law_of_gain, scales
 from identification.gap.law import Law, Laws
 from identification.gap.variants import Variant, variant
 
@@ -30,7 +30,7 @@ def variants(bench: Bench) -> list[Variant]:
     line = bench.line
     top = float(np.abs(line).max())
     straight = bench.add(bench.outside_column(line))
-    out = [variant(WORD, "gain", [straight], SCALES, positive=False)]
+    out = [variant(WORD, "gain", [straight], scales(bench), positive=False)]
     if bench.data.arm and top > 0:  # one spring's curve would be the same
         bend = bench.add(bench.outside_column(line * np.abs(line) / top))
         out.append(variant(WORD, "gain that bends", [straight, bend], SCALES, BENDS,

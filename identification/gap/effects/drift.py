@@ -60,7 +60,24 @@ def own_clock(bench: Bench) -> bool:
         return False
     # a screw that relaxes, and is put right, takes the springs to and fro
     alone = bench.response - bench.slope * bench.load
-    return bench.course.passes >= 3 or _goes_back(alone[waited(bench)])
+    moves = _goes_back(alone[waited(bench)]) or _goes(alone[_before(bench)])
+    return bench.course.passes >= 3 or moves
+
+
+def _before(bench: Bench) -> Flags:
+    """(n,) rows of the rest before anything was loaded, in which nothing creeps."""
+    return np.asarray(np.cumsum(~bench.rows.zero | bench.rows.continuous) == 0)
+
+
+def _goes(read: Array) -> bool:
+    """Whether what is read (n,) goes anywhere, beyond what it scatters, by means of a few."""
+    if len(read) < _FEW * _OF_EACH:
+        return False
+    mean = np.array([p.mean() for p in np.array_split(read, len(read) // _OF_EACH)])
+    return bool(np.ptp(mean) > _CLEARLY * white_sd(np.diff(read, 2)) / _OF_EACH**0.5)
+
+
+_FEW = 3  # means
 
 
 def waited(bench: Bench) -> Flags:

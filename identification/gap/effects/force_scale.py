@@ -17,7 +17,7 @@ import numpy as np
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
-from identification.gap.effects.gains import BENDS, SCALES, bent, factor, law_of_gain
+from identification.gap.effects.gains import BENDS, SCALES, bent, factor, law_of_gain, scales
 from identification.gap.law import Law, Laws
 from identification.gap.variants import Variant, variant
 
@@ -28,7 +28,7 @@ def variants(bench: Bench) -> list[Variant]:
     """The gain of the force minus one, alone; and with what it has more at full range."""
     top = float(np.abs(bench.load).max())
     straight = bench.add(shown(bench, bench.load))
-    out = [variant(WORD, "gain", [straight], SCALES, positive=False)]
+    out = [variant(WORD, "gain", [straight], scales(bench), positive=False)]
     if bench.data.arm and top > 0:  # one spring's curve would be the same
         bend = bench.add(shown(bench, bench.load * np.abs(bench.load) / top))
         out.append(variant(WORD, "gain that bends", [straight, bend], SCALES, BENDS,

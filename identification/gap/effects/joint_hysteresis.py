@@ -100,7 +100,8 @@ def _memories(bench: Bench, joint: int) -> dict[str, _How]:
         out[WORKED_IN] = (bench.moved, worked_in(bench.true_torque[:, joint], bench.moved), None)
     if np.sum(bench.rebuilt) > np.sum(bench.moved):
         out[SET_UP_ANEW] = (bench.rebuilt, None, None)
-    if np.sum(bench.rest) > np.sum(bench.moved):
+    # friction that never was seen to turn, and of which nothing stays, is a curve
+    if np.sum(bench.rest) > np.sum(bench.moved) and (bench.course.unloads or not bench.data.arm):
         out[" rested"] = (bench.moved | bench.rest, None, None)
     if bench.feels_weight(joint):
         out[UNDER_WEIGHT] = (bench.moved, None, bench.weight(joint))

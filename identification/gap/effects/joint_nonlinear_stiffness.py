@@ -202,11 +202,12 @@ _BOTH = 0.2  # of the largest torque
 
 def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
     """A curve that pull and push have each its own, or that lies off the zero of either."""
-    x, c = bench.true_torque[:, j], bench.compliance[j]
-    places = float(x.min()) + float(np.ptp(x)) * np.array(ALONG)
+    x, c, arm = bench.true_torque[:, j], bench.compliance[j], bench.data.arm
+    places = float(x.min()) + float(np.ptp(x)) * np.array(PLACES if arm else ALONG)
     columns = [bench.add_joint(j, c * above(x, bench.weight(j), b)) for b in places]
     kinds = ("line", *(("above", float(b)) for b in places))
-    return variant(WORD, f"joint {j + 1} uneven curve", [line, *columns], FINE_SCALES,
+    scales = SCALES if arm else FINE_SCALES
+    return variant(WORD, f"joint {j + 1} uneven curve", [line, *columns], scales,
                    _root(len(places)), positive=False, prior=0.4, kinds=kinds, tool_kg=TOOL_KG,
                    joint=j, torque=top)  # fmt: skip
 
