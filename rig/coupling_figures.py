@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
+from rig.canvas import blank
 from rig.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
 from rig.plotting import COLOURS, write_figures
 from rig.units import MM_PER_M, N_PER_MM
@@ -50,7 +51,7 @@ def _figures(result: CouplingResult, placement: TaskResult | None) -> list[tuple
 
 def stiffness(result: CouplingResult) -> Figure:
     """Bars along x and y: single and coupled, with standard uncertainties; published beside."""
-    figure = _figure(7.5, 4.6)
+    figure = blank(7.5, 4.6)
     axes = figure.add_subplot()
     bars: list[tuple[str, Array, Array | None, str, str]] = []
     if is_published_setup(result):
@@ -106,7 +107,7 @@ def maps(result: CouplingResult) -> Figure:
     found = [
         stiffness_map(model.arm, points, stance, load, c).stiffness * N_PER_MM for c in (None, pair)
     ]
-    figure = _figure(10.5, 4.6)
+    figure = blank(10.5, 4.6)
     titles = ("one arm", f"two arms, {spec.described}")
     panels = figure.subplots(1, 2, sharey=True)
     name = f"{'xyz'[axis]} of the {spec.load_axes} axes"
@@ -140,7 +141,7 @@ def place(result: TaskResult) -> Figure:
     from matplotlib.colors import LogNorm
 
     best = result.best
-    figure = _figure(7.5, 5.0)
+    figure = blank(7.5, 5.0)
     axes = figure.add_subplot()
     x, y = MM_PER_M * best.distances, np.rad2deg(best.betas)
     margins = best.margins.T
@@ -167,7 +168,7 @@ def schedule(result: CouplingResult) -> Figure:
     """Required, single and coupled stiffness along the path; shaded where the pair is coupled."""
     assert result.schedule is not None
     plan = result.schedule
-    figure = _figure(7.5, 4.2)
+    figure = blank(7.5, 4.2)
     axes = figure.add_subplot()
     axes.step(plan.time, plan.required * N_PER_MM, where="post", color="black", label="required")
     axes.plot(plan.time, plan.single * N_PER_MM, color=COLOURS[0], label="single")
@@ -204,12 +205,6 @@ def _plain_numbers(axis: Any) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def _finish(figure: Figure, model: ArmModel) -> Figure:

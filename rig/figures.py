@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analyze import Analysis, Direction
+from rig.canvas import blank
 from rig.digits import number
 from rig.plotting import COLOURS, MARKERS, write_figures
 from rig.units import MM_PER_M, N_PER_MM
@@ -65,9 +66,7 @@ def pointwise(analysis: Analysis) -> Figure:
 
 def _axes(x: str, y: str) -> tuple[Figure, Any]:
     """A figure of its own, outside pyplot: nothing is kept open, no display is needed."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.5, 5.0), layout="constrained")
+    figure = blank(7.5, 5.0)
     axes = figure.add_subplot()
     axes.set_xlabel(x)
     axes.set_ylabel(y)

@@ -10,12 +10,12 @@ import numpy as np
 
 from identification.gap.data import BRANCH_NAMES
 from identification.gap.remainder import Remainder, remainder
+from rig.canvas import blank
 from rig.diagnose import Diagnosis
 from rig.diagnose_text import LEAST_PROBABILITY
 from rig.digits import likely
 from rig.errors import InputError
 from rig.gap_layout import (
-    blank,
     first_column,
     label_below,
     log_axis,

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.canvas import blank
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -56,13 +58,6 @@ def label_below(grid: list[list[Any]], label: str) -> None:
 def set_title(figure: Figure, text: str) -> None:
     """Over the whole figure, in as many lines as its width asks for."""
     figure.suptitle("\n".join(wrap(text, int(10.5 * figure.get_size_inches()[0]))), fontsize=11)
-
-
-def blank(width: float, height: float) -> Figure:
-    """A figure of its own, in inches, outside pyplot: nothing is kept open, no display needed."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def shared_legend(figure: Figure, everywhere: list[Any]) -> None:

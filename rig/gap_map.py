@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.gap.data import Array, Flags
+from rig.canvas import blank
 from rig.gap_points import FALLING, RISING, Points, Shown, session_clock
 from rig.units import MM_PER_M
 
@@ -25,11 +26,9 @@ def gap_map(r: Shown, p: Points) -> Figure:
     Colours are linear within the noise, logarithmic beyond it, alike in all panels: what is pale
     is noise.
     """
-    from matplotlib.figure import Figure
-
     lines = _lines(r, p)
     height = min(0.34 * len(lines) + 1.2, 9.0)
-    figure = Figure(figsize=(12.0, height + 4.6), layout="constrained")
+    figure = blank(12.0, height + 4.6)
     panels = figure.subplots(2, 2, sharex="row", sharey="row", height_ratios=[height, 2.9])
     norm = _norm(p)
     titles = (

@@ -104,7 +104,7 @@ def without_name(message: str, path: Path) -> str:
 def load_drawing() -> None:
     """What `draw` needs in a new process: a first figure takes twice as long as the next one."""
     import rig.report.gap_pictures  # noqa: F401
-    from rig.gap_layout import blank
+    from rig.canvas import blank
     from rig.report.drawing import style, svg_of
 
     with style():

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.uncertainty import TWO_SIDED
 from rig.analyze import Analysis
+from rig.canvas import blank
 from rig.dataset import Dataset
 from rig.plotting import COLOURS, MARKERS
 from rig.report.compare import aligned
@@ -73,11 +74,9 @@ def quality_recorded(dataset: Dataset, zeros: Sequence[RunZeros]) -> bool:
 def quality(dataset: Dataset, zeros: Sequence[RunZeros]) -> Figure:
     """Over the session: lateness, zero of force and displacement, joint temperatures, where
     something of it was recorded."""
-    from matplotlib.figure import Figure
-
     columns = dataset.columns
     panels = [panel for _, panel in _panels(dataset, zeros)]
-    figure = Figure(figsize=(7.5, 1.75 * len(panels) + 0.5), layout="constrained")
+    figure = blank(7.5, 1.75 * len(panels) + 0.5)
     rows = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
     for axes, panel in zip(rows, panels, strict=True):
         panel(axes, dataset, zeros)
@@ -214,9 +213,7 @@ def compared_curves(
 
 
 def _axes(width: float, height: float, x: str, y: str) -> tuple[Figure, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = blank(width, height)
     axes = figure.add_subplot()
     axes.set_xlabel(x)
     axes.set_ylabel(y)

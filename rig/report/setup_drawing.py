@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import tool_offset
+from rig.canvas import blank
 from rig.meta import Meta, MetaPose
 from rig.model import load_robot
 from rig.plotting import COLOURS
@@ -42,10 +43,8 @@ def arm_points(meta: Meta, pose: MetaPose) -> Array:
 
 def arm_setup(meta: Meta, name: str, loads: Sequence[Load]) -> Figure:
     """One pose: the arm from above and from the side, with every direction of load measured."""
-    from matplotlib.figure import Figure
-
     points = arm_points(meta, meta.poses[name])
-    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
+    figure = blank(9.0, 4.4)
     panels = figure.subplots(1, 2)
     for axes, (title, i, j) in zip(panels, _VIEWS, strict=True):
         _arm(axes, points[:, i], points[:, j])
@@ -63,9 +62,7 @@ def arm_setup(meta: Meta, name: str, loads: Sequence[Load]) -> Figure:
 
 def bench_setup(loads: Sequence[Load]) -> Figure:
     """A rig without an arm: one spring a direction between ground, force and displacement."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.5, 0.6 + 1.0 * len(loads)), layout="constrained")
+    figure = blank(7.5, 0.6 + 1.0 * len(loads))
     axes = figure.add_subplot()
     for n, load in enumerate(loads):
         _spring(axes, -float(n), load, COLOURS[n % len(COLOURS)])
