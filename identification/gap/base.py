@@ -112,7 +112,7 @@ def _gains(bench: Bench) -> list[_Part]:
         both = float(np.hypot(meter.force_gain, meter.displacement_gain))
         return [("gain force", bench.stacked(line), both)]
     force = [("gain force", bench.force_column(-bench.load), meter.force_gain)]
-    if bench.data.arm:  # every component has a sensor and an amplifier of its own
+    if _askew(bench):  # every component has a sensor and an amplifier of its own
         force = [(f"gain force {'xyz'[a]}", _of_component(bench, a), meter.force_gain)
                  for a in range(3)]  # fmt: skip
     # the laser's acts on what it read, however far off the simulated springs are
@@ -121,6 +121,16 @@ def _gains(bench: Bench) -> list[_Part]:
         *force,
         ("gain displacement", bench.stacked(read), meter.displacement_gain),
     ]
+
+
+def _askew(bench: Bench) -> bool:
+    """Whether an arm is pushed along more than one axis of the dynamometer at once. What single
+    axes read too much, differently, the springs give way for."""
+    units = np.stack([s.unit_vector for s in bench.data.setups])
+    return bench.data.arm and bool(np.any(np.sum(np.abs(units) > _LITTLE, axis=1) > 1))
+
+
+_LITTLE = 0.02
 
 
 def _of_component(bench: Bench, axis: int) -> Array:

@@ -224,27 +224,20 @@ def test_gains_of_a_bench_may_be_far_off_where_little_is_stated_of_them() -> Non
 
 
 def test_every_component_of_the_force_has_a_gain_of_its_own() -> None:
-    """What its sensor reads too much is less push along a direction, and a force across it that is
-    none; single directions along the axes each have theirs."""
+    """Of a push askew to them: what a sensor reads too much is less push along the direction, and a
+    force across it that is none. Of pushes along the axes one gain is for all."""
     bench = make_bench(arm_data(directions="xyz"))
-    base = base_columns(bench)
-    off = {n[-1]: base.columns[:, i] for i, n in enumerate(base.names) if "gain force" in n}
-    axes = np.array([s.unit_vector for s in bench.data.setups])[bench.rows.setup]
-    for k, axis in enumerate("xyz"):
-        there = np.abs(axes[:, k]) > 0.99
-        whole = bench.force_column(-bench.load)[: bench.rows.n]
-        np.testing.assert_allclose(off[axis][: bench.rows.n], np.where(there, whole, 0.0),
-                                   atol=1e-12)  # fmt: skip
-    turned = np.array([0.6, 0.8, 0.0])
-    askew = tuple(
-        replace(s, unit_vector=turned, tangents=np.array([[-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]))
-        for s in bench.data.setups
-    )
+    names = base_columns(bench).names
+    assert [n for n in names if "gain force" in n] == ["gain force"]
+    turned, tangents = np.array([0.6, 0.8, 0.0]), np.array([[-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    askew = tuple(replace(s, unit_vector=turned, tangents=tangents) for s in bench.data.setups)
     n = len(bench.data.force)
-    data = replace(bench.data, setups=askew, tangential=np.zeros((n, 2)))
-    there = make_bench(data)
-    base = base_columns(there)
-    x = base.columns[:, base.names.index("gain force x")]
-    across = x[there.layout.tangential].reshape(2, -1)
+    there = make_bench(replace(bench.data, setups=askew, tangential=np.zeros((n, 2))))
+    base, rows = base_columns(there), there.rows.n
+    whole = there.force_column(-there.load)[:rows]
     held = there.rows.hold_means(there.load[:, None])[:, 0]
-    np.testing.assert_allclose(across, [-0.8 * 0.6 * held, 0.0 * held], atol=1e-9)
+    for axis, share, across in (("x", 0.36, -0.48), ("y", 0.64, 0.48)):
+        column = base.columns[:, base.names.index(f"gain force {axis}")]
+        np.testing.assert_allclose(column[:rows], share * whole, atol=1e-12)
+        sides = column[there.layout.tangential].reshape(2, -1)
+        np.testing.assert_allclose(sides, [across * held, 0.0 * held], atol=1e-9)
