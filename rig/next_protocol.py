@@ -172,7 +172,7 @@ def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
     samples = max(1, min(5, round(design.hold_s * rate)))
     hold = design.hold_s if design.hold_s * rate > samples else 0.0
     zero = max(design.zero_s, 6.0, 1 / rate)
-    yield f"\nsampling: {{rate_Hz: {rate:.2g}, samples_per_step: {samples}}}"
+    yield f"\nsampling: {{rate_Hz: {rate:g}, samples_per_step: {samples}}}"
     yield f"hold_s: {_seconds(hold)}"
     yield (
         f"force_band: {{absolute_N: {min(0.5, gap / 4):.3g}, "
@@ -188,8 +188,8 @@ def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
 def _rate_Hz(design: Design, old: MeasurementProtocol | None) -> float:
     """The old one where about that was measured: slots are late, or missed."""
     rate = float(np.clip(1 / design.sample_s, 0.1, 10))
-    wanted = rate if old is None else old.sampling.rate_Hz
-    return wanted if abs(rate / wanted - 1) < 0.25 else rate
+    wanted = float(f"{rate:.2g}") if old is None else old.sampling.rate_Hz
+    return wanted if abs(rate / wanted - 1) < 0.25 else float(f"{rate:.2g}")
 
 
 def _seconds(duration_s: float) -> str:

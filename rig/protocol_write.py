@@ -38,12 +38,12 @@ def limit_lines(
 ) -> list[str]:
     """What stops the measurement: a force beyond the largest load top_N, and beyond most_N, which
     was allowed before, if that load is not; a displacement; more: further lines, after these."""
-    force = 1.15 * top_N + 5
+    force = float(round(1.15 * top_N + 5))
     if top_N < most_N / _OVER < force:
         force = most_N
     return [
         "limits:",
-        f"  force_N: {{max: {force:.4g}, at: stop}}",
+        f"  force_N: {{max: {force:.6g}, at: stop}}",
         f"  displacement_mm: {{max: {displacement_mm}, at: stop}}",
         *more,
         "  joint_deviation_deg: {max: 5, at: stop}",

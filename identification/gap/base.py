@@ -11,7 +11,8 @@ from identification.gap.data import Array
 from identification.gap.noise import ENCODER_OFFSET_RAD
 
 HALF = 0.5  # of the geometry is expected, and as much may be missing or there
-CROSSTALK = 0.005  # of a piezoelectric dynamometer, relative; data sheets allow 2 % at most
+# Of a piezoelectric dynamometer, relative; and what data sheets allow at most.
+CROSSTALK, MOST_CROSSTALK = 0.005, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +112,9 @@ def _gains(bench: Bench) -> list[_Part]:
     if bench.imposed:  # only the ratio of the two gains shows
         both = float(np.hypot(meter.force_gain, meter.displacement_gain))
         return [("gain force", bench.stacked(line), both)]
-    force = [("gain force", bench.force_column(-bench.load), meter.force_gain)]
+    force = [("gain force", shown(bench, bench.load), meter.force_gain)]
     if _askew(bench):  # every component has a sensor and an amplifier of its own
-        force = [(f"gain force {'xyz'[a]}", _of_component(bench, a), meter.force_gain)
+        force = [(f"gain force {'xyz'[a]}", component(bench, a), meter.force_gain)
                  for a in range(3)]  # fmt: skip
     # the laser's acts on what it read, however far off the simulated springs are
     read = bench.line if bench.data.arm else line
@@ -133,14 +134,21 @@ def _askew(bench: Bench) -> bool:
 _LITTLE = 0.02
 
 
-def _of_component(bench: Bench, axis: int) -> Array:
-    """(size,): what it does that a component of the force reads too much: less of the push along
-    the direction, and a force across that is none."""
+def component(bench: Bench, axis: int) -> Array:
+    """(size,): what it does that a component of the force reads too much by a share: less of the
+    push along the direction, and a force across that is none."""
     setups, which = bench.data.setups, bench.rows.setup
-    read = np.array([s.unit_vector[axis] for s in setups])[which] * bench.load
-    along = np.array([s.unit_vector[axis] for s in setups])[which] * read
-    across = np.stack([s.tangents[:, axis] for s in setups])[which] * read[:, None]
-    return bench.force_column(-along) + bench.stacked(tangential=across)
+    along = np.array([s.unit_vector[axis] for s in setups])[which]
+    across = np.stack([s.tangents[:, axis] for s in setups])[which]
+    read = along * bench.load
+    return shown(bench, along * read) + bench.stacked(tangential=across * read[:, None])
+
+
+def shown(bench: Bench, excess: Array) -> Array:
+    """(size,): what a share of the readings (n,) N does that is too much."""
+    if bench.imposed:
+        return bench.stacked(bench.slope * excess)
+    return bench.force_column(-excess)
 
 
 def _datums(bench: Bench) -> list[_Part]:

@@ -77,6 +77,7 @@ class GapData:
     None: of the joints, or what was read of a rig.
     compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
     simulated (n,) m or None: displacement that another simulator predicts for every sample.
+    lets_go: whether readings were left out after a part had let go of the stroke (slack.py).
     timed: whether `time` was recorded; it counts samples otherwise. on_the_way (n,) or None:
     samples of ramps under the name of the level they lead to (ramps.py). aside, notes: what is to
     be said of samples that were set aside, and of others.
@@ -105,6 +106,7 @@ class GapData:
     imposed: Literal["force", "displacement"] | None = None
     simulated: Array | None = None
     timed: bool = True
+    lets_go: bool = False
     on_the_way: Flags | None = None
     aside: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

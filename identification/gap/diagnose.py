@@ -342,12 +342,16 @@ def _next(
 def _across(bench: Bench, chosen: Explanation) -> tuple[Note, ...]:
     """Of an effect that other readings show, and nothing moves by."""
     each = zip(chosen.parts, chosen.sizes, strict=True)
-    if not any("shown" in p.variant.info and s < _MOVES * bench.noise.stated for p, s in each):
+    shown = [p for p, s in each if p.variant.info.get("shown", 0.0) > 1
+             and s < _MOVES * bench.noise.stated]  # fmt: skip
+    if not shown:
         return ()
     text = (
         "The force across the direction shows that the load acts askew; the displacement does not "
-        "move by it. What makes the gap smaller is springs and gains within what META states."
+        "move by it."
     )
+    if len(shown) == len(chosen.parts):
+        text += " What makes the gap smaller is springs and gains within what META states."
     return (Note(REMARK, text),)
 
 

@@ -37,12 +37,18 @@ def without_glitches(data: GapData) -> GapData:
     if not off.any():
         return data
     count = int(off.sum())
-    where = f"{data.time[off][0]:.4g} s" if data.timed else f"reading {int(off.argmax()) + 1}"
     note = (
         f"{count} of {len(off)} readings jump off and come back at once: set aside as glitches "
-        f"(the first at {where}). See to cables, converter and clamps."
+        f"(the first {when(data, off)}). See to cables, converter and clamps."
     )
     return picked(data, ~off, note)
+
+
+def when(data: GapData, which: Flags) -> str:
+    """At what time the first of some readings (n,) was taken; which one it is, without a clock."""
+    if data.timed:
+        return f"at {data.time[which][0]:.4g} s"
+    return f"at reading {int(which.argmax()) + 1}"
 
 
 def _while_running(data: GapData) -> Flags:

@@ -14,7 +14,7 @@ from identification.gap.forms import Form, lawful, realise
 
 # What is known of a law that was found in other data: its size, and at which loads it happens.
 SIZE_SD, LOAD_SD = 0.1, 0.03
-_STEP = 1e-3  # of the load
+_TINY = 1e-300
 
 
 class NotKnown(ValueError):
@@ -31,20 +31,26 @@ def knowing(bench: Bench, forms: Sequence[Form]) -> Bench:
     if bench.imposed:
         raise NotKnown("effects of a model are known as displacements, and here the displacement "
                        "is imposed")  # fmt: skip
-    more = 1 + _STEP
-    pushed = replace(bench, load=more * bench.load, torque=more * bench.torque)
-    does, sooner = (
-        np.column_stack([_stacked(at, lawful(f)) for f in forms]) for at in (bench, pushed)
+    less, does, more = (
+        np.column_stack([_stacked(_pushed(bench, by), lawful(f)) for f in forms])
+        for by in (1 - LOAD_SD, 1.0, 1 + LOAD_SD)
     )
-    free = np.hstack([SIZE_SD * does, LOAD_SD * (sooner - does) / _STEP])
+    later, whole = (more - less) / 2, np.linalg.norm(does, axis=0)
+    later *= np.minimum(whole / np.maximum(np.linalg.norm(later, axis=0), _TINY), 1.0)
+    free = np.hstack([SIZE_SD * does, later])
     names = tuple(f"known {what} {f.word}" for what in ("size", "load") for f in forms)
-    rows, noise, whole = bench.rows, bench.noise, does.sum(axis=1)
-    left = LAW_REMAINDER * rows.rms(rows.moved(whole[: rows.n, None])[:, 0])
+    rows, noise, total = bench.rows, bench.noise, does.sum(axis=1)
+    left = LAW_REMAINDER * rows.rms(rows.moved(total[: rows.n, None])[:, 0])
     return replace(
         bench,
-        known=Known(whole, free, names, left),
+        known=Known(total, free, names, left),
         noise=replace(noise, stated=max(noise.stated, left)),
     )
+
+
+def _pushed(bench: Bench, by: float) -> Bench:
+    """The bench under so many times its load."""
+    return bench if by == 1 else replace(bench, load=by * bench.load, torque=by * bench.torque)
 
 
 def _stacked(bench: Bench, form: Form) -> Array:

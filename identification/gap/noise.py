@@ -383,7 +383,8 @@ def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Ints) ->
     if float(rows.weight @ rows.steady) < 0.5 * float(rows.weight.sum()):
         less = data.displacement - float(np.median(slope)) * data.force
         measured = _scatter(data, less, hold)
-        return alone if measured is None else np.full(rows.n, measured)
+        least = 0.0 if data.arm else 0.33 * data.instruments.displacement
+        return alone if measured is None else np.full(rows.n, max(measured, least))
     measured = _scatter(data, data.displacement, hold)
     if measured is None:
         return alone

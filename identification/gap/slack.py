@@ -9,11 +9,13 @@ in than it was met; what plays or gets in touch the same way every time stays.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.gap.bench import displacement_imposed
 from identification.gap.data import Flags, GapData, Ints
-from identification.gap.glitches import picked
+from identification.gap.glitches import picked, when
 from identification.gap.holds import hold_ids, is_continuous
 from identification.gap.white import white_sd
 
@@ -36,10 +38,10 @@ def without_slack(data: GapData) -> GapData:
     if not off.any():
         return data
     note = (
-        f"The part lets go of the rig before the stroke is back where it was met (at "
-        f"{data.time[off][0]:.4g} s): {int(off.sum())} readings without force set aside."
+        f"The part lets go of the rig before the stroke is back where it was met "
+        f"({when(data, off)}): {int(off.sum())} readings without force set aside."
     )
-    return picked(data, ~off, note)
+    return replace(picked(data, ~off, note), imposed="displacement", lets_go=True)
 
 
 def _let_go(data: GapData, mine: Ints) -> Flags:
@@ -60,7 +62,11 @@ def _let_go(data: GapData, mine: Ints) -> Flags:
     start = float(first[-1]) if first.size else 0.0
     edges = np.flatnonzero(np.diff(felt[met:], prepend=True, append=True)) + met
     for begin, end in edges.reshape(-1, 2):
-        went = float(np.ptp(path[begin:end])) > _FURTHER * float(np.ptp(path))
-        later = path[begin] > start + _FURTHER * float(np.ptp(path))
+        least = _FURTHER * float(np.ptp(path))
+        back = path[begin] < path[:begin].max() - least  # a way in that is lost breaks, or snaps
+        lowest = float(path[begin:end].min())
+        again = end == len(path) or path[end - 1] > lowest + 0.25 * least  # after the next turn
+        went = back and again and path[begin] - lowest > least
+        later = path[begin] > start + least
         none[begin + 1 : end if end == len(path) else end - 1] = went and later
     return none

@@ -66,7 +66,8 @@ def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
     if base[worst] <= LIMIT:
         return "many things a little off what META states"
     name = next(v for k, v in _CALLED.items() if engine.base.names[worst].startswith(k))
-    return f"{name} {base[worst]:.0f} standard deviations off what META states"
+    who = "the model" if name == _CALLED["known"] else "META"
+    return f"{name} {base[worst]:.0f} standard deviations off what {who} states"
 
 
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:

@@ -29,7 +29,7 @@ from identification.gap.history import retarded, row_time
 from identification.gap.parts import Part, part_sizes
 from identification.gap.priors import LOG_UNKNOWN
 from identification.gap.variants import Variant, smooth_root, variant
-from identification.gap.verdict import weighed
+from identification.gap.verdict import TAKES_TWO, weighed
 
 KINDS = 6
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the largest response
@@ -54,8 +54,7 @@ def with_strangers(found: Found) -> Found:
         return found
     engine.extend()
     alike = likenesses(engine, variants)
-    if _creeps(found):
-        alike = tuple(a for a in alike if a.kind != SETTLES)
+    alike = tuple(a for a in alike if a.kind != SETTLES or not _creeps(found, a.log_evidence))
     none = found.unknown - LOG_UNKNOWN
     shares = [1.0, *(1.0 / KINDS for _ in alike)]
     unknown = log_mean([none, *(a.log_evidence for a in alike)], shares)
@@ -63,13 +62,15 @@ def with_strangers(found: Found) -> Found:
     return weighed(replace(found, unknown=unknown + LOG_UNKNOWN, looks_like=plain), found.kept)
 
 
-def _creeps(found: Found) -> bool:
-    """Whether creep of the joints leaves no more than noise: in two directions what goes on by
-    amounts and times of its own in each is what two joints do."""
+def _creeps(found: Found, settles: float) -> bool:
+    """Whether creep of the joints leaves no more than noise, and explains about as much as what
+    settles (log evidence): in two directions what goes on by amounts and times of its own in each
+    is what two joints do."""
     return any(
         e.words == {"joint_creep"} and e.eta <= found.engine.bench.noise.stated and e.good
+        and e.log_weight > settles - TAKES_TWO
         for e in found.explanations
-    )
+    )  # fmt: skip
 
 
 SETTLES = "settles"

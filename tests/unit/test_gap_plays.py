@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -207,3 +209,13 @@ def test_a_stage_of_a_gear_is_no_play(softer: float, verdict: str) -> None:
     rng = np.random.default_rng(5)
     data = running(load + rng.normal(0, 0.1, 1200), u + rng.normal(0, 1e-6, 1200), imposed="force")
     assert diagnose_gap(data).verdict == verdict
+
+
+def test_a_play_is_soft_beside_the_spring_of_its_own_direction() -> None:
+    soft, stiff = 3e-5, 1e-6
+    there: Any = SimpleNamespace(
+        data=SimpleNamespace(arm=False), imposed=False,
+        lever=np.repeat(np.eye(2), 5, axis=0), line_slope=np.repeat([soft, stiff], 5),
+    )  # fmt: skip
+    for joint, slope in ((0, soft), (1, stiff)):
+        assert joint_backlash._least(there, joint, 4.0) == pytest.approx(1.5 * 8.0 * slope)

@@ -12,7 +12,7 @@ from identification.gap.bins import Bins
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.effects.drift import own_clock
+from identification.gap.effects.drift import _goes, own_clock
 from identification.gap.history import followed
 from identification.gap.parameters import parameters
 from identification.gap.parts import Part
@@ -157,3 +157,13 @@ def test_what_moves_before_any_load_does_not_creep(before: bool, verdict: str) -
     data = bench_data(force, moved, step=step, branch=step, time=clock, session=clock)
     assert own_clock(make_bench(data)) is before
     assert diagnose_gap(data).verdict == verdict
+
+
+@pytest.mark.parametrize("n", [75, 300, 1000])
+def test_a_rest_that_only_scatters_is_no_drift(n: int) -> None:
+    rng = np.random.default_rng(n)
+    assert not any(_goes(1e-6 * rng.standard_normal(n), 1e-6) for _ in range(50))
+    digit = np.zeros(n)
+    digit[-n // 4 :] = 1e-6  # the last digit, once
+    assert not _goes(digit, 1e-6)
+    assert _goes(np.linspace(0.0, 1e-5, n) + 1e-6 * rng.standard_normal(n), 1e-6)

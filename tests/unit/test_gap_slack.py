@@ -75,6 +75,38 @@ def test_what_has_yielded_is_let_go_where_it_yielded_to() -> None:
     assert kept.displacement[kept.time > 150].min() > 0.5 * STROKE
 
 
+def test_a_force_that_is_lost_on_the_way_in_breaks_or_snaps() -> None:
+    """What happens to the part before the stroke turns is done to it."""
+    path = strokes()
+    at = path / STROKE
+    snaps = np.where(at < 0.3, at / 0.3, np.where(at < 0.5, 0.0, 1.2 * (at - 0.5) / 0.5))
+    breaks = np.where(at < 0.6, at, 0.0)
+    assert without_slack(pressed(100 * snaps, path)).lets_go is False
+    pull = slice(0, 75)
+    assert without_slack(pressed(100 * breaks[pull], path[pull])).lets_go is False
+
+
+@pytest.mark.parametrize(("cycles", "time_s"), [(2, 60.0), (4, 60.0), (4, 20.0), (6, 60.0)])
+def test_what_lets_go_is_no_lag(cycles: int, time_s: float) -> None:
+    """Strokes of a crank; nobody says which channel it drives."""
+    path = STROKE * (1 - np.cos(2 * np.pi * cycles * np.arange(600) / 600)) / 2
+    for imposed in ("displacement", None):
+        data = pressed(np.maximum(relaxes(path, time_s), 0.0), path, imposed=imposed)
+        kept = without_slack(data)
+        assert kept.lets_go
+        assert kept.imposed == "displacement"
+    found = diagnose_gap(data)
+    assert found.bench.imposed
+    assert found.verdict in ("joint_creep", "joint_hysteresis", "unknown")
+    assert found.probabilities["time_lag"] < 0.05
+
+
+def test_readings_are_counted_where_there_is_no_clock() -> None:
+    path = strokes()
+    data = pressed(np.maximum(relaxes(path), 0.0), path, timed=False)
+    assert "(at reading " in without_slack(data).aside[-1]
+
+
 def test_only_where_the_stroke_is_imposed() -> None:
     path = strokes()
     force = np.maximum(relaxes(path), 0.0)

@@ -60,7 +60,7 @@ def own_clock(bench: Bench) -> bool:
         return False
     # a screw that relaxes, and is put right, takes the springs to and fro
     alone = bench.response - bench.slope * bench.load
-    moves = _goes_back(alone[waited(bench)]) or _goes(alone[_before(bench)])
+    moves = _goes_back(alone[waited(bench)]) or _goes(alone[_before(bench)], bench.noise.stated)
     return bench.course.passes >= 3 or moves
 
 
@@ -69,15 +69,15 @@ def _before(bench: Bench) -> Flags:
     return np.asarray(np.cumsum(~bench.rows.zero | bench.rows.continuous) == 0)
 
 
-def _goes(read: Array) -> bool:
-    """Whether what is read (n,) goes anywhere, beyond what it scatters, by means of a few."""
-    if len(read) < _FEW * _OF_EACH:
+def _goes(read: Array, stated: float) -> bool:
+    """Whether what is read (n,) is elsewhere in its last third than in its first, beyond what it
+    scatters, and what is stated of one reading."""
+    third = len(read) // 3
+    if third < _OF_EACH:
         return False
-    mean = np.array([p.mean() for p in np.array_split(read, len(read) // _OF_EACH)])
-    return bool(np.ptp(mean) > _CLEARLY * white_sd(np.diff(read, 2)) / _OF_EACH**0.5)
-
-
-_FEW = 3  # means
+    way = abs(float(read[-third:].mean() - read[:third].mean()))
+    noise = max(white_sd(np.diff(read, 2)), stated) * (2 / third) ** 0.5
+    return bool(way > max(_CLEARLY * noise, stated))
 
 
 def waited(bench: Bench) -> Flags:

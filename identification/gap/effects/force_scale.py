@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.gap.base import component, shown
 from identification.gap.bench import Bench
 from identification.gap.data import Array
 from identification.gap.effect import Effect
@@ -48,23 +49,6 @@ def _of_one(bench: Bench, axis: int) -> Variant:
     column = bench.add(component(bench, axis))
     return variant(WORD, f"gain of {'xyz'[axis]}", [column], SCALES, positive=False, prior=0.2,
                    component="xyz"[axis])  # fmt: skip
-
-
-def component(bench: Bench, axis: int) -> Array:
-    """(size,): what a share of one component of the readings does that is too much: of a push
-    askew to it what it has along the push, and across."""
-    setups = bench.data.setups
-    along = np.array([s.unit_vector[axis] for s in setups])[bench.rows.setup]
-    across = np.stack([s.tangents[:, axis] for s in setups])[bench.rows.setup]
-    read = along * bench.load
-    return shown(bench, along * read) + bench.stacked(tangential=across * read[:, None])
-
-
-def shown(bench: Bench, excess: Array) -> Array:
-    """(size,): what a share of the readings (n,) N does that is too much."""
-    if bench.imposed:
-        return bench.stacked(bench.slope * excess)
-    return bench.force_column(-excess)
 
 
 def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:

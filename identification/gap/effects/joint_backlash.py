@@ -234,7 +234,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
     return [
         variant(WORD, f"joint {j + 1} {flanks.kind}{name}", columns[:k], scales, root[:k, :k],
                 np.eye(k)[0] if flanks.kind == "gap" else _less_rub(k), _PLACED_PRIOR,
-                _least(bench, flanks.zone), each=(True, True), **info)
+                _least(bench, j, flanks.zone), each=(True, True), **info)
         for k, name in ((2, ""), (3, ", other springs"))
     ]  # fmt: skip
 
@@ -262,19 +262,20 @@ def _zone(
         root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
         out.append(
             variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
-                    _less_rub(len(columns)), prior, _least(bench, width), each=(True,),
+                    _less_rub(len(columns)), prior, _least(bench, j, width), each=(True,),
                     within=_inside(len(columns)), **(info | {"kind": kind, "rests": rests}))
         )  # fmt: skip
     return out
 
 
-def _least(bench: Bench, zone: float) -> float:
+def _least(bench: Bench, joint: int, zone: float) -> float:
     """m, of a bench: the play by which its zone is so much softer than the springs as stages of a
     gear's stiffness are not: K3/K1 is 1.5 to 1.85 in catalogues."""
     if bench.data.arm:
         return 0.0
     share = 1 - 1 / _SOFTER if bench.imposed else _SOFTER - 1
-    return share * 2 * zone * float(bench.line_slope.mean())
+    mine = bench.lever[:, joint] != 0
+    return share * 2 * zone * float(bench.line_slope[mine].mean())
 
 
 _SOFTER = 2.5  # times

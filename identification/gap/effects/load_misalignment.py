@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from identification.gap.base import MOST_CROSSTALK
 from identification.gap.bench import Bench
 from identification.gap.closer import about_springs
 from identification.gap.data import Array, Flags, Setup
@@ -66,7 +67,7 @@ def variants(bench: Bench) -> list[Variant]:
                 [c for k in each for c in k.columns] + _given(bench, names, each), SCALES,
                 positive=False, prior=prior * each[0].share, directions=names,
                 shapes=[k.shapes for k in each], read=[k.read for k in each],
-                shown=max((t for k in each for t in k.read), default=0.0) / MOST_CROSSTALK)
+                shown=max(_slant(bench, name) for name in names) / MOST_CROSSTALK)
         for names, label, prior in groups
         for each in zip(*(known[name] for name in names), strict=True)
     ]  # fmt: skip
@@ -151,6 +152,18 @@ def _read(bench: Bench, shapes: tuple[Shape, ...], mine: Flags) -> tuple[float, 
     return tuple(np.linalg.norm(tangents, axis=1).tolist())
 
 
+def _slant(bench: Bench, name: str) -> float:
+    """Tangent that the force across a direction shows of a rig without an arm, beside what it reads
+    at no load; 0 where it was not read."""
+    across_it, setups = bench.rows.tangential, bench.data.setups
+    if bench.data.arm or across_it is None:
+        return 0.0
+    mine = np.array([s.direction == name for s in setups])[bench.rows.setup]
+    line = np.column_stack([bench.load[mine], np.ones(int(mine.sum()))])
+    slopes = np.linalg.lstsq(line, across_it[mine], rcond=_RCOND)[0][0]
+    return float(np.linalg.norm(slopes))
+
+
 _RCOND = 1e-3  # shapes that are alike share what is read
 
 
@@ -165,7 +178,6 @@ def _given(bench: Bench, names: list[str], each: tuple[_Known, ...]) -> list[int
     return out
 
 
-MOST_CROSSTALK = 0.02  # of the load: what data sheets of dynamometers allow
 USUAL = 0.1  # so that the prior of what is given is that of as stiff a rig across as along
 
 
