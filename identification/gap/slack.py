@@ -57,13 +57,18 @@ def _let_go(data: GapData, mine: Ints) -> Flags:
     if min(abs(level), abs(level - force[0])) > _UNLOADED * nothing:
         return none
     felt = force > level + nothing
-    met = int(np.argmax(force > level + _TOUCHED * nothing))
+    touched = force > level + _TOUCHED * nothing
+    if not touched.any():
+        return none
+    met = int(np.argmax(touched))
     first = path[:met][~felt[:met]]
     start = float(first[-1]) if first.size else 0.0
     edges = np.flatnonzero(np.diff(felt[met:], prepend=True, append=True)) + met
     for begin, end in edges.reshape(-1, 2):
         least = _FURTHER * float(np.ptp(path))
-        back = path[begin] < path[:begin].max() - least  # a way in that is lost breaks, or snaps
+        back = (
+            path[begin] < path[: begin + 1].max() - least
+        )  # a way in that is lost breaks, or snaps
         lowest = float(path[begin:end].min())
         again = end == len(path) or path[end - 1] > lowest + 0.25 * least  # after the next turn
         went = back and again and path[begin] - lowest > least

@@ -101,6 +101,17 @@ def test_what_lets_go_is_no_lag(cycles: int, time_s: float) -> None:
     assert found.probabilities["time_lag"] < 0.05
 
 
+def test_a_stroke_that_nothing_bears_and_one_that_starts_pressed_stay() -> None:
+    """A dry run shows noise alone; a first reading without force may be the only one."""
+    path = strokes()
+    for force in (np.zeros(len(path)), np.where(np.arange(len(path)) == 1, 50.0, 0.0)):
+        for u in (path, STROKE - path):
+            data = pressed(force, u)
+            assert len(without_slack(data).force) >= len(path) // 2
+    loud = Instruments(30.0, 1e-6, 0.005, 0.003)
+    assert without_slack(pressed(np.zeros(600), path, instruments=loud)).lets_go is False
+
+
 def test_readings_are_counted_where_there_is_no_clock() -> None:
     path = strokes()
     data = pressed(np.maximum(relaxes(path), 0.0), path, timed=False)
