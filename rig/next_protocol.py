@@ -188,8 +188,9 @@ def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
 def _rate_Hz(design: Design, old: MeasurementProtocol | None) -> float:
     """The old one where about that was measured: slots are late, or missed."""
     rate = float(np.clip(1 / design.sample_s, 0.1, 10))
-    wanted = float(f"{rate:.2g}") if old is None else old.sampling.rate_Hz
-    return wanted if abs(rate / wanted - 1) < 0.25 else float(f"{rate:.2g}")
+    if old is not None and abs(rate / old.sampling.rate_Hz - 1) < 0.25:
+        return old.sampling.rate_Hz
+    return float(f"{rate:.2g}")
 
 
 def _seconds(duration_s: float) -> str:

@@ -37,7 +37,7 @@ class Layout:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownEffects:
     """Stacked: what effects do that the simulation has, does (size,), and what is not known of
     them, free (size, k), of independent unit coefficients called names (k); left m: what may stay
     of them, rms."""
@@ -91,7 +91,7 @@ class Bench:
     columns: Pool = field(default_factory=Pool)
     flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
     moves: Array | None = None
-    known: Known | None = None
+    known: KnownEffects | None = None
     # (channel, kind) -> lags (k,) s and what each does (k, n): of this bench alone, no copy's
     lags: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict, init=False)
 
@@ -304,10 +304,14 @@ class Bench:
     def meets_weight_unlike(self, joint: int) -> bool:
         """Whether pushes go both with the weights and against them, or weights differ between
         poses: else a law of the net torque is one of the push, shifted."""
-        push, weight = self.true_torque[:, joint], self.weight(joint)
-        top = float(np.abs(push).max())
-        both = min(float(push.max()), -float(push.min())) > _BOTH * top
-        return both or float(np.ptp(weight)) > _UNLIKE * top
+        top = float(np.abs(self.true_torque[:, joint]).max())
+        unlike = float(np.ptp(self.weight(joint))) > _UNLIKE * top
+        return self.pushed_both_ways(joint) or unlike
+
+    def pushed_both_ways(self, joint: int) -> bool:
+        """Whether a joint is pushed to either side, by a good part of the most."""
+        push = self.true_torque[:, joint]
+        return min(float(push.max()), -float(push.min())) > _BOTH * float(np.abs(push).max())
 
     def feels_weight(self, joint: int) -> bool:
         """Whether weights make a difference to a joint, beside the torques of the load."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.bench import Bench, Known
+from identification.gap.bench import Bench, KnownEffects
 from identification.gap.data import Array
 from identification.gap.explanation import LAW_REMAINDER
 from identification.gap.forms import Form, lawful, realise
@@ -43,7 +43,7 @@ def knowing(bench: Bench, forms: Sequence[Form]) -> Bench:
     left = LAW_REMAINDER * rows.rms(rows.moved(total[: rows.n, None])[:, 0])
     return replace(
         bench,
-        known=Known(total, free, names, left),
+        known=KnownEffects(total, free, names, left),
         noise=replace(noise, stated=max(noise.stated, left)),
     )
 

@@ -64,11 +64,10 @@ def _let_go(data: GapData, mine: Ints) -> Flags:
     first = path[:met][~felt[:met]]
     start = float(first[-1]) if first.size else 0.0
     edges = np.flatnonzero(np.diff(felt[met:], prepend=True, append=True)) + met
+    least = _FURTHER * float(np.ptp(path))
     for begin, end in edges.reshape(-1, 2):
-        least = _FURTHER * float(np.ptp(path))
-        back = (
-            path[begin] < path[: begin + 1].max() - least
-        )  # a way in that is lost breaks, or snaps
+        # what loses its force on the way in breaks, or snaps
+        back = path[begin] < path[: begin + 1].max() - least
         lowest = float(path[begin:end].min())
         again = end == len(path) or path[end - 1] > lowest + 0.25 * least  # after the next turn
         went = back and again and path[begin] - lowest > least

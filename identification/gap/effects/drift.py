@@ -58,10 +58,11 @@ def own_clock(bench: Bench) -> bool:
     creep under one that stands, unless that goes back."""
     if hangs(bench) and not _goes_back(bench.response):
         return False
+    if bench.course.passes >= 3:
+        return True
     # a screw that relaxes, and is put right, takes the springs to and fro
     alone = bench.response - bench.slope * bench.load
-    moves = _goes_back(alone[waited(bench)]) or _goes(alone[_before(bench)], bench.noise.stated)
-    return bench.course.passes >= 3 or moves
+    return _goes_back(alone[waited(bench)]) or _goes(alone[_before(bench)], bench.noise.stated)
 
 
 def _before(bench: Bench) -> Flags:

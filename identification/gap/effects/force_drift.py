@@ -49,8 +49,7 @@ def variants(bench: Bench) -> list[Variant]:
     of weights, which nobody reads."""
     top = float(np.abs(bench.rows.measured_force).max())
     scales = tuple(s * top for s in shares(bench, SHARES))
-    still = hangs(bench) or _reads_alike(bench) or _are_weights(bench)
-    if not top > 0 or (still and not bench.imposed):
+    if not top > 0 or (not bench.imposed and _cannot_drift(bench)):
         return []
     amplifiers = _Amplifiers(bench, _axes(bench))
     named, free = {k: [path] for k, path in paths(bench).items()}, free_paths(bench)
@@ -69,6 +68,10 @@ def variants(bench: Bench) -> list[Variant]:
     return out + [v for k, way in free.items() for v in _free(amplifiers, k, way, scales)]
 
 
+def _cannot_drift(bench: Bench) -> bool:
+    return hangs(bench) or _reads_alike(bench) or _are_weights(bench)
+
+
 def _reads_alike(bench: Bench) -> bool:
     """Whether the reading of a load that stands for most of the session stays within its noise."""
     standing = waited(bench) & ~bench.rows.zero
@@ -78,8 +81,10 @@ def _reads_alike(bench: Bench) -> bool:
 def _are_weights(bench: Bench) -> bool:
     """Whether few forces come again and again, to the last digit, and lie much farther apart than
     readings would scatter: written down, not read. Of levels of a rig without an arm."""
+    if bench.data.arm or bench.rows.continuous:
+        return False
     values, count = np.unique(bench.data.force, return_counts=True)
-    if bench.data.arm or bench.rows.continuous or len(values) < _FEW:
+    if len(values) < _FEW:
         return False
     apart = float(np.diff(values).min()) > _APART * bench.data.instruments.force
     return bool(apart and np.mean(count > 1) > _MOSTLY)

@@ -186,18 +186,14 @@ def _both_ways(bench: Bench, j: int) -> bool:
     """Pulled and pressed, from zero either way, or to and fro, or through a zero that both channels
     share: any other half of a loop could be anything. Joints of an arm that carry weights have
     curves of the net torque (`_net`)."""
-    course, push = bench.course, bench.true_torque[:, j]
+    course = bench.course
     if bench.data.arm:
-        both = min(float(push.max()), -float(push.min())) > _BOTH * float(np.abs(push).max())
-        return both and not bench.feels_weight(j)
+        return bench.pushed_both_ways(j) and not bench.feels_weight(j)
     if course.one_sided:
         return False
     if not bench.rows.continuous:
         return len(np.unique(bench.rows.run)) > 1
     return course.crosses_its_zero or (course.unloads and course.passes > 2)
-
-
-_BOTH = 0.2  # of the largest torque
 
 
 def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:

@@ -53,8 +53,10 @@ def variants(bench: Bench) -> list[Variant]:
     if not bench.data.arm and bench.rows.tangential is None:
         return []
     known: dict[str, list[_Known]] = {}
+    slants: dict[str, float] = {}
     for name in dict.fromkeys(s.direction for s in bench.data.setups):
         mine = np.array([s.direction == name for s in bench.data.setups])[bench.rows.setup]
+        slants[name] = _slant(bench, mine)
         known[name] = [
             _Known(label, shapes, _in_pool(bench, shapes, mine), share, _read(bench, shapes, mine))
             for label, shapes, share in _kinds(bench, float(np.abs(bench.load[mine]).max()) or 1.0)
@@ -67,7 +69,7 @@ def variants(bench: Bench) -> list[Variant]:
                 [c for k in each for c in k.columns] + _given(bench, names, each), SCALES,
                 positive=False, prior=prior * each[0].share, directions=names,
                 shapes=[k.shapes for k in each], read=[k.read for k in each],
-                shown=max(_slant(bench, name) for name in names) / MOST_CROSSTALK)
+                shown=max(slants[name] for name in names) / MOST_CROSSTALK)
         for names, label, prior in groups
         for each in zip(*(known[name] for name in names), strict=True)
     ]  # fmt: skip
@@ -152,13 +154,12 @@ def _read(bench: Bench, shapes: tuple[Shape, ...], mine: Flags) -> tuple[float, 
     return tuple(np.linalg.norm(tangents, axis=1).tolist())
 
 
-def _slant(bench: Bench, name: str) -> float:
-    """Tangent that the force across a direction shows of a rig without an arm, beside what it reads
-    at no load; 0 where it was not read."""
-    across_it, setups = bench.rows.tangential, bench.data.setups
+def _slant(bench: Bench, mine: Flags) -> float:
+    """Tangent that the force across shows of a rig without an arm in rows mine (n,), beside what it
+    reads at no load; 0 where it was not read."""
+    across_it = bench.rows.tangential
     if bench.data.arm or across_it is None:
         return 0.0
-    mine = np.array([s.direction == name for s in setups])[bench.rows.setup]
     line = np.column_stack([bench.load[mine], np.ones(int(mine.sum()))])
     slopes = np.linalg.lstsq(line, across_it[mine], rcond=_RCOND)[0][0]
     return float(np.linalg.norm(slopes))
