@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from identification.gap import evidence
-from identification.gap.base import HALF, compliance_found, prediction
-from identification.gap.bench import Bench
 from identification.gap.data import UNLOADING
-from identification.gap.noise import ENCODER_OFFSET_RAD
+from identification.gap.evidence import engine
+from identification.gap.model.base import HALF, compliance_found, prediction
+from identification.gap.model.bench import Bench
+from identification.gap.model.noise import ENCODER_OFFSET_RAD
 
 Array = NDArray[np.float64]
 
@@ -47,12 +47,12 @@ def dense(bench: Bench, drop: tuple[str, ...] = ()) -> Dense:
         mine = np.flatnonzero(rows.hold == h)
         common = np.ix_(mine, mine)
         A[common] += np.outer(bench.noise.hold[mine], bench.noise.hold[mine])
-        B[common] += evidence.HOLD_PART**2
+        B[common] += engine.HOLD_PART**2
         within = np.eye(len(mine)) - np.full((len(mine), len(mine)), 1 / len(mine))
-        B[common] += evidence.ROW_PART**2 * within
+        B[common] += engine.ROW_PART**2 * within
     B[:n, :n] += _repeatable(bench) + _of_runs(bench)
     q = np.arange(bench.layout.q.start, bench.layout.q.stop)
-    B[q, q] += evidence.LEVER_M**-2.0
+    B[q, q] += engine.LEVER_M**-2.0
     for name, column, sd in nuisances(bench):
         if not name.startswith(drop) or not drop:
             A += sd**2 * np.outer(column, column)
@@ -82,12 +82,12 @@ def _of_runs(bench: Bench) -> Array:
     rows, out = bench.rows, np.zeros((bench.rows.n, bench.rows.n))
     for run in np.unique(rows.run):
         force = rows.force[rows.run == run]
-        knots = np.linspace(force.min(), force.max(), evidence._HATS)
+        knots = np.linspace(force.min(), force.max(), engine._HATS)
         for back in (False, True):
             mine = (rows.run == run) & ((rows.branch == UNLOADING) == back)
             for k in range(len(knots)):
                 hat = np.interp(rows.force, knots, np.eye(len(knots))[k]) * mine
-                out += evidence.RUN_PART**2 * np.outer(hat, hat)
+                out += engine.RUN_PART**2 * np.outer(hat, hat)
     return out
 
 

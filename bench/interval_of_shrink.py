@@ -16,12 +16,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
 from identification.gap.effects import library
-from identification.gap.evidence import Engine, eta_levels
-from identification.gap.heldout import HeldOut, folds, held_out
-from identification.gap.search import search
+from identification.gap.evidence.engine import Engine, eta_levels
+from identification.gap.judging.heldout import HeldOut, folds, held_out
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
+from identification.gap.search.search import search
 from rig.gap_data import gap_data
 from tests.conformance.gap_designs import Design, imported, meta, noisy
 

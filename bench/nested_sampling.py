@@ -26,16 +26,16 @@ from scipy.special import ndtr, ndtri
 
 from bench.dense_model import Dense, dense, nuisances, stacked
 from bench.nested_cases import CASES, case_data
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import Scored, log_mean, score
 from identification.gap.effects import library
-from identification.gap.evidence import Engine, eta_levels
-from identification.gap.finer import gained
-from identification.gap.imperfection import IMPERFECTION, least_size
-from identification.gap.parts import Part, part_sizes
-from identification.gap.search import search
-from identification.gap.variants import Variant
+from identification.gap.evidence.compare import Scored, log_mean, score
+from identification.gap.evidence.engine import Engine, eta_levels
+from identification.gap.evidence.finer import gained
+from identification.gap.evidence.imperfection import IMPERFECTION, least_size
+from identification.gap.evidence.parts import Part, part_sizes
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant
+from identification.gap.search.search import search
 
 Array = NDArray[np.float64]
 _SPREAD = np.log(2.5)  # of the imperfection's share, one sd of its logarithm

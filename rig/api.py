@@ -280,7 +280,7 @@ def _joint_tables(out: Answer) -> None:
 
 
 def _gap_tables(out: Answer) -> None:
-    from identification.gap.remainder import remainder
+    from identification.gap.answer.remainder import remainder
     from rig.gap_points import held_table, remainder_table, shown
 
     found, r = out.json, out.result.result

@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from identification.gap.answer.forms import Form
+from identification.gap.answer.known import NotKnown
 from identification.gap.data import BRANCH_NAMES, GapData
 from identification.gap.diagnose import (
     Effect,
@@ -17,10 +19,8 @@ from identification.gap.diagnose import (
     diagnose_gap,
     explain_gap,
 )
-from identification.gap.forms import Form
-from identification.gap.heldout import HeldOut
-from identification.gap.interval import Parameter
-from identification.gap.known import NotKnown
+from identification.gap.judging.heldout import HeldOut
+from identification.gap.laws.interval import Parameter
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
 from rig.errors import InputError, did_you_mean
@@ -250,7 +250,7 @@ def _gap(r: GapResult) -> dict[str, Any]:
 
 def _remainder(r: GapResult) -> dict[str, Any]:
     """How large what nobody explains is, and where: a flexible curve over what the fit leaves."""
-    from identification.gap.remainder import remainder
+    from identification.gap.answer.remainder import remainder
 
     rest = remainder(r.engine, r.fit)
     largest = None

@@ -11,8 +11,8 @@ from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
     from identification.gap.diagnose import Effect, GapResult
-    from identification.gap.explanation import Likeness
-    from identification.gap.interval import Parameter
+    from identification.gap.explanations.explanation import Likeness
+    from identification.gap.laws.interval import Parameter
 
 _MORE = 1.01  # times the rest that is not left by rounding
 
@@ -282,7 +282,9 @@ def _row(name: str, before: float, after: float, noise: float) -> str:
 def _next(r: GapResult) -> str:
     if r.next_measurement is None:
         return ""
-    from identification.gap.discriminate import ENOUGH  # the report takes only words from here
+    from identification.gap.answer.discriminate import (
+        ENOUGH,  # the report takes only words from here
+    )
 
     first, second = r.next_measurement.separates
     lines = [f"Next, to tell {first} from {second}:", f"  {r.next_measurement.text}"]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from identification.gap.answer.remainder import Remainder, remainder
 from identification.gap.data import BRANCH_NAMES
-from identification.gap.remainder import Remainder, remainder
 from rig.canvas import blank
 from rig.diagnose import Diagnosis
 from rig.diagnose_text import LEAST_PROBABILITY

@@ -1,6 +1,6 @@
 """Effects as they stand in a model file: every number with its unit in the key, read and written.
 
-Inside, laws are SI (`identification.gap.forms`); here lengths are mm, joints count from 1.
+Inside, laws are SI (`identification.gap.answer.forms`); here lengths are mm, joints count from 1.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.forms import Form, lasting
-from identification.gap.law import Law, Term
+from identification.gap.answer.forms import Form, lasting
+from identification.gap.laws.law import Law, Term
 from identification.gap.words import WORDS
 from rig.errors import close_to, did_you_mean
 from rig.gap_keys import (

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from identification.gap.effects import base_slip, contact_seating, lost_motion, time_lag
-from identification.gap.effects.friction_law import FRICTION_LAWS, SLIP_AT_A_STRENGTH
+from identification.gap.effects import base_slip, contact_seating, time_lag
 from identification.gap.effects.link_flexibility import PLACED, STRAINS
-from identification.gap.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
+from identification.gap.laws import lost_motion
+from identification.gap.laws.friction_law import FRICTION_LAWS, SLIP_AT_A_STRENGTH
+from identification.gap.laws.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOST, WORKED
 from rig.units import MM_PER_M
 
 # What an entry says besides its law; kept, not interpreted.

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from identification.gap.answer.forms import Form, describe, lasting
 from identification.gap.data import Array
 from identification.gap.diagnose import Effect, GapResult
-from identification.gap.forms import Form, describe, lasting
 from rig.dataset import Dataset
 from rig.diagnose import Diagnosis
 from rig.diagnose_text import meanings

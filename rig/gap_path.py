@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.gap.bench import Bench, make_bench
+from identification.gap.answer.forms import Form, realise
 from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
 from identification.gap.effects import EFFECTS
-from identification.gap.forms import Form, realise
-from identification.gap.law import along, in_pose
+from identification.gap.laws.law import along, in_pose
+from identification.gap.model.bench import Bench, make_bench
 from identification.times import MOUNT_S, SCREW_S, UNLOAD_S
 from rig.gap_data import arm_setup
 from rig.model import ArmModel

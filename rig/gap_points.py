@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.bench import Bench
+from identification.gap.answer.remainder import Remainder, branches
 from identification.gap.data import BRANCH_NAMES, ZERO, Array, Ints
 from identification.gap.diagnose import Effect, GapResult
-from identification.gap.heldout import HeldOut, stated_prediction
-from identification.gap.remainder import Remainder, branches
+from identification.gap.judging.heldout import HeldOut, stated_prediction
+from identification.gap.model.bench import Bench
 from rig.units import MM_PER_M
 
 RISING, FALLING = 1, 2

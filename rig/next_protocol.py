@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.gap.designs import Design
-from identification.gap.discriminate import NextMeasurement
+from identification.gap.answer.designs import Design
+from identification.gap.answer.discriminate import NextMeasurement
 from rig.dataset import Dataset
 from rig.diagnose import Diagnosis
 from rig.errors import InputError

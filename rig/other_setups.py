@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.arm import Arm, tool_offset
+from identification.gap.answer.designs import Elsewhere
 from identification.gap.data import Array
-from identification.gap.designs import Elsewhere
 from identification.inverse import solutions
 from rig.dataset import Dataset
 from rig.gap_data import arm_setup

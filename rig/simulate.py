@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import along, tool_offset
-from identification.gap.forms import Form
+from identification.gap.answer.forms import Form
 from identification.uncertainty import TWO_SIDED
 from rig.digits import number
 from rig.errors import InputError

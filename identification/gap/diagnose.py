@@ -8,38 +8,38 @@ from math import log
 
 import numpy as np
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
-from identification.gap.breaks import strangers, told
-from identification.gap.choice import chosen_of
-from identification.gap.compare import score
+from identification.gap.answer.discriminate import NextMeasurement, Others, next_measurement
+from identification.gap.answer.forms import Form
+from identification.gap.answer.known import knowing
+from identification.gap.answer.locate import NOWHERE, Where, locate
+from identification.gap.answer.notes import FAULT, REMARK, Note, notes_of, ordered
+from identification.gap.answer.posterior import Known, settled
+from identification.gap.answer.twins import twin_of
 from identification.gap.data import GapData, Ints
-from identification.gap.discriminate import NextMeasurement, Others, next_measurement
-from identification.gap.earned import earned, noise_of, sample_rms
 from identification.gap.effects import library
-from identification.gap.ends import without_ends
-from identification.gap.evidence import Engine, eta_levels
-from identification.gap.explanation import Explanation, Found, Likeness
-from identification.gap.faults import SIGNS, SILENT
-from identification.gap.fit import Fit, fit
-from identification.gap.forms import Form
-from identification.gap.glitches import without_glitches
-from identification.gap.heldout import HeldOut, folds, held_out, stated_prediction
-from identification.gap.interval import Parameter
-from identification.gap.known import knowing
-from identification.gap.leftover import looked_up
-from identification.gap.locate import NOWHERE, Where, locate
-from identification.gap.noise import SWINGS
-from identification.gap.notes import FAULT, REMARK, Note, notes_of, ordered
-from identification.gap.posterior import Known, settled
-from identification.gap.ramps import ramps_told
-from identification.gap.refine import refine
-from identification.gap.search import force, search
-from identification.gap.slack import without_slack
-from identification.gap.strain import what_is_strained
-from identification.gap.strange import with_strangers
-from identification.gap.twins import twin_of
-from identification.gap.variants import Variant
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.engine import Engine, eta_levels
+from identification.gap.explanations.explanation import Explanation, Found, Likeness
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.judging.choice import chosen_of
+from identification.gap.judging.earned import earned, noise_of, sample_rms
+from identification.gap.judging.heldout import HeldOut, folds, held_out, stated_prediction
+from identification.gap.judging.leftover import looked_up
+from identification.gap.judging.strain import what_is_strained
+from identification.gap.laws.interval import Parameter
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.noise import SWINGS
+from identification.gap.model.variants import Variant
+from identification.gap.recording.ends import without_ends
+from identification.gap.recording.faults import SIGNS, SILENT
+from identification.gap.recording.glitches import without_glitches
+from identification.gap.recording.ramps import ramps_told
+from identification.gap.recording.slack import without_slack
+from identification.gap.search.breaks import strangers, told
+from identification.gap.search.refine import refine
+from identification.gap.search.search import force, search
+from identification.gap.search.strange import with_strangers
 from identification.gap.words import WORDS
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from identification.gap.remainder import Remainder, remainder
+from identification.gap.answer.remainder import Remainder, remainder
 from rig.diagnose import Diagnosis
 from rig.gap_points import Points, Shown, points, shown
 

@@ -9,11 +9,11 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData
-from identification.gap.evidence import Engine
-from identification.gap.variants import Variant
+from identification.gap.evidence.engine import Engine
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant
 from identification.gap.words import NEED_ARM, WORDS
 from tests.conformance.gap_designs import (
     ARMS,

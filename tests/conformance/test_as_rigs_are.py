@@ -11,13 +11,13 @@ import pandas as pd
 import pytest
 
 from identification.arm import tool_offset
-from identification.gap.bench import make_bench
+from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import load_misalignment
 from identification.gap.effects.load_misalignment import Shape
 from identification.gap.effects.pose_error import turned
-from identification.gap.forms import law_of, rows_of
+from identification.gap.model.bench import make_bench
 from rig.gap_data import gap_data
 from rig.model import load_robot
 from tests.conformance.gap_designs import (

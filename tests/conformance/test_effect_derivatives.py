@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.arm import tool_offset
-from identification.gap.bench import Bench
 from identification.gap.effects.pose_error import secants
-from identification.gap.variants import Variant
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant
 from rig.model import load_robot
 from tests.conformance.effect_benches import (
     Array,

@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench
+from identification.gap.answer.parameters import parameters
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation
-from identification.gap.fit import fit
-from identification.gap.interval import Parameter
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
-from identification.gap.signs import Limits
-from identification.gap.variants import Variant
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.evidence.signs import Limits
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import fit
+from identification.gap.laws.interval import Parameter
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant
 from tests.conformance.effect_benches import (
     PAIRS,
     Array,

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from identification.gap import effects
-from identification.gap.bench import make_bench
 from identification.gap.data import GapData
-from identification.gap.explanation import Explanation
-from identification.gap.fit import fit
-from identification.gap.parts import Part
-from identification.gap.pool import Pool
-from identification.gap.variants import Variant
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import fit
+from identification.gap.model.bench import make_bench
+from identification.gap.model.pool import Pool
+from identification.gap.model.variants import Variant
 from identification.gap.words import WORDS
 from tests.conformance.effect_benches import (
     IN_JOINTS,
@@ -37,12 +37,7 @@ from tests.conformance.gap_designs import (
     linear,
 )
 
-SHARED = (  # no word's own
-    "__init__", "curves", "drift", "drift_law", "flow_back", "flows", "friction_law", "gains",
-    "knees", "knees_closer", "knees_law", "lost_motion", "lost_motion_law", "specimens",
-    "thresholds",
-)  # fmt: skip
-FILES = sorted(p.stem for p in Path(effects.__file__).parent.glob("*.py") if p.stem not in SHARED)
+FILES = sorted(p.stem for p in Path(effects.__file__).parent.glob("*.py") if p.stem != "__init__")
 
 # --- form --------------------------------------------------------------------------------------
 

@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.explanation import Explanation
-from identification.gap.fit import fit
-from identification.gap.hands import open_to_hands
-from identification.gap.imperfection import PATH
-from identification.gap.parts import Part
+from identification.gap.evidence.imperfection import PATH
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import fit
+from identification.gap.judging.hands import open_to_hands
+from identification.gap.model.bench import make_bench
 from rig.gap_data import gap_data
 from tests.conformance.effect_benches import of, quick_engine
 from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, meta, noisy

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.gap.holds import hold_ids, is_continuous
+from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.stiffness import analyze_curve
 from rig.dataset import Dataset
 from rig.gap_data import gap_data

@@ -11,8 +11,8 @@ import pytest
 
 from bench.nested_cases import CASES, case_data
 from bench.nested_sampling import MODELS, forms
-from identification.gap.bench import make_bench
 from identification.gap.effects import library
+from identification.gap.model.bench import make_bench
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.gap.bench import Bench, make_bench
+from identification.gap.answer.parameters import parameters
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import joint_backlash, library
-from identification.gap.interval import Parameter
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
-from identification.gap.variants import Variant
+from identification.gap.evidence.parts import Part
+from identification.gap.laws.interval import Parameter
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant
 from rig.gap_data import gap_data
 from rig.worlds.arm import place
 from rig.worlds.hidden.memory import play

@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 
 from identification.arm import tool_offset
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
-from identification.gap.compare import score
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.evidence import Engine, eta_levels
-from identification.gap.refine import refine
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.engine import Engine, eta_levels
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
+from identification.gap.search.refine import refine
 from rig.gap_data import gap_data
 from rig.model import load_robot
 from tests.conformance.gap_designs import (

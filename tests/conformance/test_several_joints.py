@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.explanation import Explanation, explain
-from identification.gap.parts import Part, Sizes
-from identification.gap.penalties import pettiness
-from identification.gap.several import family_of, in_more_joints
+from identification.gap.evidence.parts import Part, Sizes
+from identification.gap.explanations.explanation import Explanation, explain
+from identification.gap.explanations.penalties import pettiness
+from identification.gap.explanations.several import family_of, in_more_joints
+from identification.gap.model.bench import make_bench
 from rig.diagnose_text import render
 from rig.gap_data import gap_data
 from tests.conformance.effect_benches import quick_engine
@@ -101,7 +101,7 @@ def test_a_joint_more_that_is_far_worse_is_given_up(monkeypatch: pytest.MonkeyPa
         polished.append(start.log_weight)
         return start
 
-    monkeypatch.setattr("identification.gap.several.polished", spy)
+    monkeypatch.setattr("identification.gap.explanations.several.polished", spy)
     far = replace(alone(found), log_weight=1e6)
     assert in_more_joints(found.engine, variants, far) is far
     assert not polished

@@ -8,15 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.gap.base import HALF
-from identification.gap.bench import make_bench
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation
-from identification.gap.fit import Fit, fit
-from identification.gap.parts import Part
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.model.base import HALF
+from identification.gap.model.bench import make_bench
 from rig.gap_data import gap_data
 from rig.worlds.arm import place
 from tests.conformance.effect_benches import quick_engine

@@ -9,11 +9,11 @@ import pytest
 
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation
-from identification.gap.fit import Fit, fit
-from identification.gap.parts import Part
-from identification.gap.strain import LIMIT, strain, what_is_strained
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.judging.strain import LIMIT, strain, what_is_strained
 from identification.gap.words import WORDS
 from tests.conformance.effect_benches import of, quick_engine
 from tests.conformance.gap_designs import linear

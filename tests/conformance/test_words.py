@@ -12,9 +12,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from identification.gap.answer.parameters import parameters
 from identification.gap.effects import EFFECTS
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
+from identification.gap.evidence.parts import Part
 from identification.gap.words import IN_JOINTS, KINDS, NEED_ARM, WORDS
 from rig import diagnose_text, gap_keys, gap_path
 from rig.blind import judge, mujoco_effects

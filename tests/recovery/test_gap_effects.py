@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from identification.arm import tool_offset
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import EFFECTS, library
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
 from rig.diagnose import diagnose

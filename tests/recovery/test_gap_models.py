@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
+from identification.gap.answer.discriminate import NextMeasurement
+from identification.gap.answer.forms import law_of
 from identification.gap.diagnose import Effect, GapResult
-from identification.gap.discriminate import NextMeasurement
 from identification.gap.effects import EFFECTS, library
-from identification.gap.fit import Fit
-from identification.gap.forms import law_of
-from identification.gap.parts import Part
-from identification.gap.pool import Pool
-from identification.gap.variants import Variant
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.fit import Fit
+from identification.gap.model.bench import make_bench
+from identification.gap.model.pool import Pool
+from identification.gap.model.variants import Variant
 from identification.gap.words import WORDS
 from rig.dataset import Dataset, write
 from rig.diagnose import Diagnosis, diagnose
@@ -310,7 +310,7 @@ def test_the_next_procedure_can_be_checked(
 
 def test_every_proposal_is_a_procedure(paper: tuple[Dataset, Diagnosis]) -> None:
     """Each of the candidates, whichever wins, becomes a protocol that the plan accepts."""
-    from identification.gap.designs import candidates, present_design
+    from identification.gap.answer.designs import candidates, present_design
     from rig.other_setups import elsewhere
 
     dataset, diagnosis = paper

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.verdict import BENCH_DOUBT
+from identification.gap.explanations.verdict import BENCH_DOUBT
 from rig import cli
 from rig.gap_data import gap_data
 from tests.conformance.gap_designs import DESIGNS, STATED, Design, imported, meta, noisy

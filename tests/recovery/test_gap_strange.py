@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
-from identification.gap.compare import score
 from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.evidence import Engine, eta_levels
-from identification.gap.explanation import Likeness
-from identification.gap.strange import KINDS as KINDS_OF_STRANGERS
-from identification.gap.strange import likenesses, square_of, strangers
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.engine import Engine, eta_levels
+from identification.gap.explanations.explanation import Likeness
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
+from identification.gap.search.strange import KINDS as KINDS_OF_STRANGERS
+from identification.gap.search.strange import likenesses, square_of, strangers
 from identification.gap.words import NAMELESS
 from rig.diagnose_text import LOOKS_LIKE, looks_like, render
 from rig.gap_data import gap_data

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from drivers.errors import CannotConnect
+from identification.gap.answer.discriminate import NextMeasurement, Option
+from identification.gap.answer.locate import Where
+from identification.gap.answer.notes import ASIDE, UNDECIDED, Note
 from identification.gap.diagnose import Effect, GapResult
-from identification.gap.discriminate import NextMeasurement, Option
-from identification.gap.explanation import Likeness
-from identification.gap.heldout import HeldOut
-from identification.gap.interval import Parameter
-from identification.gap.locate import Where
-from identification.gap.notes import ASIDE, UNDECIDED, Note
+from identification.gap.explanations.explanation import Likeness
+from identification.gap.judging.heldout import HeldOut
+from identification.gap.laws.interval import Parameter
 from identification.joints import JointFit, Observation, Prior
 from identification.maps import Need, Placement, Stance, Task
 from identification.next_poses import Proposal

@@ -114,10 +114,20 @@ def test_the_architecture_names_modules_that_exist() -> None:
                 and re.search(rf"^(?:class|def) {last}\b", inside.read_text(), re.M)
             )
         ), name
-    listing = text.split("```\nrows ")[1].split("```")[0]
-    modules = ["rows", *re.findall(r"^(\w+)/?\s{2,}\S|^(discriminate) ", listing, re.M)]
-    names = {m if isinstance(m, str) else m[0] or m[1] for m in modules}
+
+
+def test_the_architecture_lists_the_rooms_of_the_diagnosis_and_what_stands_in_them() -> None:
+    text = (HOME / "docs" / "architecture.md").read_text("utf-8")
+    listing = text.split("```\ndata, words ")[1].split("```")[0]
     gap = HOME / "identification" / "gap"
-    for name in names:
-        assert (gap / name).is_dir() or (gap / f"{name}.py").is_file(), name
-    assert len(names) > 12
+    rooms: dict[str, list[str]] = {}
+    for line in listing.splitlines():
+        if room := re.match(r"(\w+)/\s", line):
+            rooms[room[1]] = []
+        elif names := re.match(r"  (\w+(?:, \w+)*)(?:, \.\.\.)?  +\S", line):
+            rooms[list(rooms)[-1]] += names[1].split(", ")
+    assert set(rooms) == {p.parent.name for p in gap.glob("*/__init__.py")}
+    for room, modules in rooms.items():
+        for module in modules:
+            assert (gap / room / f"{module}.py").is_file(), f"{room}/{module}"
+    assert sum(map(len, rooms.values())) > 30

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
+from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.forms import law_of, rows_of
+from identification.gap.model.bench import make_bench
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, RUNS, HOLD = 9, 3, 6

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
+from identification.gap.model.bench import make_bench
 from tests.unit.test_gap_forms import arm_data
 
 ANGLES = np.array([[0.1, -0.08], [0.05, 0.12], [-0.13, 0.02], [0.03, -0.1]])  # tangents, by setup

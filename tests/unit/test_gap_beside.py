@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap import explanation
-from identification.gap.bench import make_bench
-from identification.gap.course import Course
-from identification.gap.explanation import _counted
-from identification.gap.parts import Sizes, needed
-from identification.gap.penalties import _apart, _on_its_own, _same_element
+from identification.gap.evidence.parts import Sizes, needed
+from identification.gap.explanations import explanation
+from identification.gap.explanations.explanation import _counted
+from identification.gap.explanations.penalties import _apart, _on_its_own, _same_element
+from identification.gap.model.bench import make_bench
+from identification.gap.recording.course import Course
 from identification.gap.words import DAMAGE, JERKS, SOFTENING, WANDERS
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_operators import bench_data

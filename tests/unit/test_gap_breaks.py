@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
-from identification.gap.breaks import _just_turned, jump_rows, strangers
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
-from identification.gap.priors import LOG_UNKNOWN, prior_of
+from identification.gap.explanations.priors import LOG_UNKNOWN, prior_of
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.search.breaks import _just_turned, jump_rows, strangers
 from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING, WANDERS, WORDS
 from rig.diagnose_text import LOOKS_LIKE, looks_like
 from tests.unit.test_gap_forms import arm_data

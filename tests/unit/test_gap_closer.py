@@ -8,24 +8,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns
-from identification.gap.bench import Bench, make_bench
-from identification.gap.closer import Word, closing_in
-from identification.gap.compare import by_word, closest, score
+from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.data import Array
-from identification.gap.effects import (
-    EFFECTS,
-    joint_backlash,
-    joint_hysteresis,
-    knees_closer,
-    library,
-)
-from identification.gap.effects.friction_law import EXPONENTIAL, SLIPPING
+from identification.gap.effects import EFFECTS, joint_backlash, joint_hysteresis, library
 from identification.gap.effects.joint_hysteresis import REACHES
-from identification.gap.evidence import Engine
-from identification.gap.forms import law_of, rows_of
-from identification.gap.refine import refine
-from identification.gap.variants import Variant, variant
+from identification.gap.evidence.compare import by_word, closest, score
+from identification.gap.evidence.engine import Engine
+from identification.gap.laws import knees_closer
+from identification.gap.laws.closer import Word, closing_in
+from identification.gap.laws.friction_law import EXPONENTIAL, SLIPPING
+from identification.gap.model.base import base_columns
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant, variant
+from identification.gap.search.refine import refine
 from tests.unit.test_gap_forms import arm_data, bench_without_arm
 
 
@@ -266,7 +261,7 @@ def test_looks_move_on_until_the_best_stays(monkeypatch: pytest.MonkeyPatch) -> 
             for v in family
         ]
 
-    monkeypatch.setattr("identification.gap.closer.scored_beside", scored)
+    monkeypatch.setattr("identification.gap.laws.closer.scored_beside", scored)
     word = SimpleNamespace(engine=SimpleNamespace(extend=lambda: None, bench=None),
                            families={}, ranked=[])  # fmt: skip
     start = SimpleNamespace(variant=variant("joint_backlash", "start", [0], (1.0,), at=0.0))

@@ -7,22 +7,22 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from identification.gap import discriminate
-from identification.gap.base import base_columns
-from identification.gap.bench import Bench, make_bench
-from identification.gap.designs import Design, candidates, present_design, reverse
-from identification.gap.discriminate import (
+from identification.gap.answer import discriminate
+from identification.gap.answer.designs import Design, candidates, present_design, reverse
+from identification.gap.answer.discriminate import (
     ENOUGH,
     _discrimination,
     _Rival,
     _told,
     next_measurement,
 )
+from identification.gap.answer.forms import Form, law_of
 from identification.gap.effects import library
-from identification.gap.evidence import Engine
-from identification.gap.forms import Form, law_of
-from identification.gap.pool import Pool
-from identification.gap.search import search
+from identification.gap.evidence.engine import Engine
+from identification.gap.model.base import base_columns
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.pool import Pool
+from identification.gap.search.search import search
 from rig.gap_data import arm_setup
 from rig.model import load_robot
 from tests.unit.test_gap_evidence import small_bench, small_engine

@@ -7,23 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap import strange
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
-from identification.gap.choice import WORTH_OF_THIRD, chosen_of
 from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.earned import _foretold, earned
-from identification.gap.effects.drift import FreePath, free_path, free_variant
-from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation, Found
-from identification.gap.faults import bursts
-from identification.gap.heldout import ALWAYS_IN, HeldOut, _stacked_keep, folds, held_out
-from identification.gap.leftover import looked_up
-from identification.gap.parts import Part, Sizes
-from identification.gap.penalties import cancelling, pettiness, trifle
-from identification.gap.variants import Variant, variant
-from identification.gap.verdict import weighed
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part, Sizes
+from identification.gap.explanations.explanation import Explanation, Found
+from identification.gap.explanations.penalties import cancelling, pettiness, trifle
+from identification.gap.explanations.verdict import weighed
+from identification.gap.judging.choice import WORTH_OF_THIRD, chosen_of
+from identification.gap.judging.earned import _foretold, earned
+from identification.gap.judging.heldout import ALWAYS_IN, HeldOut, _stacked_keep, folds, held_out
+from identification.gap.judging.leftover import looked_up
+from identification.gap.laws.drift import FreePath, free_path, free_variant
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
+from identification.gap.model.variants import Variant, variant
+from identification.gap.recording.faults import bursts
+from identification.gap.search import strange
 from identification.gap.words import DRIFTS
 from tests.conformance.effect_benches import of, quick_engine
 from tests.unit.test_gap_forms import arm_data
@@ -269,7 +269,7 @@ def test_of_two_that_foretell_alike_the_one_that_explains_more_speaks(
     both = Explanation(parts, 0.0, 0.0, (BUMP / 3, BUMP / 3), 0.0)
     after = {both.words: 2.0, one["bump"].words: bump_after, one["creep"].words: 1.0}
     monkeypatch.setattr(
-        "identification.gap.earned.held_out",
+        "identification.gap.judging.earned.held_out",
         lambda _, x, *__: HeldOut("repetition", 3.0, after[x.words], (1.0, 1.0)),
     )
     told = _foretold(found(e, both, *one.values()), "repetition", np.zeros(e.bench.rows.n, int))

@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import Scored, score
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import base_slip, flows, knees_closer, library
-from identification.gap.effects.flows import Flow
-from identification.gap.effects.knees import place_in
-from identification.gap.refine import refine
-from identification.gap.variants import Variant, place_of
+from identification.gap.effects import base_slip, library
+from identification.gap.evidence.compare import Scored, score
+from identification.gap.laws import flows, knees_closer
+from identification.gap.laws.flows import Flow
+from identification.gap.laws.knees import place_in
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant, place_of
+from identification.gap.search.refine import refine
 from tests.conformance.gap_designs import linear
 from tests.unit.test_gap_closer import assert_lawful, engine_with
 from tests.unit.test_gap_forms import arm_data

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.ends import after_break, without_ends
-from identification.gap.faults import BROKEN, found_in
-from identification.gap.parts import Part, Sizes
-from identification.gap.penalties import straight
-from identification.gap.priors import prior_of
+from identification.gap.evidence.parts import Part, Sizes
+from identification.gap.explanations.penalties import straight
+from identification.gap.explanations.priors import prior_of
+from identification.gap.model.bench import make_bench
+from identification.gap.recording.ends import after_break, without_ends
+from identification.gap.recording.faults import BROKEN, found_in
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
 

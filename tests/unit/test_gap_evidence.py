@@ -6,28 +6,29 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from identification.gap import evidence, table
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import condition, log_mean, score
 from identification.gap.effects import library
-from identification.gap.evidence import (
+from identification.gap.evidence import table
+from identification.gap.evidence.compare import condition, log_mean, score
+from identification.gap.evidence.engine import (
     HOLD_PART,
     ROW_PART,
     RUN_PART,
     Engine,
+    hold_part,
     level_columns,
     level_covariance,
     run_columns,
 )
-from identification.gap.explanation import conditioned
-from identification.gap.fit import _holds
-from identification.gap.imperfection import LOG_STEP, level_prior, log_share
-from identification.gap.parts import Part, log_joint_between, log_joints, mended
-from identification.gap.priors import prior_of
-from identification.gap.search import _as_stated, search
-from identification.gap.table import Table
-from identification.gap.variants import variant
+from identification.gap.evidence.imperfection import LOG_STEP, level_prior, log_share
+from identification.gap.evidence.parts import Part, log_joint_between, log_joints, mended
+from identification.gap.evidence.table import Table
+from identification.gap.explanations.explanation import conditioned
+from identification.gap.explanations.fit import _holds
+from identification.gap.explanations.priors import prior_of
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import variant
+from identification.gap.search.search import _as_stated, search
 from identification.gap.words import WORDS
 from tests.conformance.effect_benches import quick_engine
 from tests.conformance.gap_designs import linear
@@ -93,7 +94,7 @@ def test_evidence_is_the_dense_gaussian_marginal() -> None:
 
 def test_levels_of_imperfection_are_exact_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """But for the part of single rows, which is taken row by row; it is left out here."""
-    monkeypatch.setattr(evidence, "ROW_PART", 0.0)
+    monkeypatch.setattr("identification.gap.evidence.engine.ROW_PART", 0.0)
     engine = small_engine(small_bench())
     exact = []
     for level in engine.levels:
@@ -230,7 +231,7 @@ def test_fit_and_evidence_take_one_imperfection_of_a_hold() -> None:
     for name, part in (("bench imposed", 0.6), ("medium", HOLD_PART)):
         bench = make_bench(linear(name))
         engine = quick_engine(bench)
-        assert evidence.hold_part(bench.rows) == part
+        assert hold_part(bench.rows) == part
         _, common = _holds(engine, 2e-6)
         wanted = np.hypot(bench.noise.hold, part * 2e-6)
         np.testing.assert_allclose(common[: bench.rows.n], wanted)

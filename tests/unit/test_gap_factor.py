@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.factor import factor_of
+from identification.gap.evidence.factor import factor_of
 
 
 def test_a_sound_matrix_has_its_own_factor() -> None:

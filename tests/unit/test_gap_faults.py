@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.faults import (
+from identification.gap.model.bench import make_bench
+from identification.gap.recording.faults import (
     SIGNS,
     bursts,
     found_in,

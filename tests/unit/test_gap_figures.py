@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from identification.gap.base import prediction
+from identification.gap.model.base import prediction
 from rig import cli
 from rig.dataset import write
 from rig.diagnose import Diagnosis, diagnose
@@ -215,7 +215,7 @@ def test_imposed_displacement_is_told_in_newtons(tmp_path: Path) -> None:
 
 
 def _remainder(found: Diagnosis) -> Any:
-    from identification.gap.remainder import remainder
+    from identification.gap.answer.remainder import remainder
 
     return remainder(found.result.engine, found.result.fit)
 

@@ -9,17 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns
-from identification.gap.bench import Bench, make_bench
+from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
-from identification.gap.effects.lost_motion import PLACED
-from identification.gap.evidence import Engine
-from identification.gap.flanks import Flanks, _crossed, placed
-from identification.gap.forms import law_of, rows_of
-from identification.gap.parts import Part, part_sizes
-from identification.gap.penalties import pettiness
-from identification.gap.pool import Pool
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part, part_sizes
+from identification.gap.explanations.penalties import pettiness
+from identification.gap.laws.lost_motion import PLACED
+from identification.gap.model.base import base_columns
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.flanks import Flanks, _crossed, placed
+from identification.gap.model.pool import Pool
 from tests.unit.test_gap_operators import bench_data
 
 N, K = 480, 1e5  # samples, each a row; N/m of the simulated spring

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
+from identification.gap.answer.forms import Form, describe, law_of, lawful, realise, rows_of
+from identification.gap.answer.known import NotKnown, knowing
+from identification.gap.answer.twins import twin_of
 from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.effects.joint_hysteresis import REACHES
-from identification.gap.effects.knees_closer import refined
-from identification.gap.evidence import Engine
-from identification.gap.forms import Form, describe, law_of, lawful, realise, rows_of
-from identification.gap.known import NotKnown, knowing
-from identification.gap.law import HUNG, KEPT, Law, Term
-from identification.gap.parts import Part
-from identification.gap.pool import Pool
-from identification.gap.twins import twin_of
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.laws.knees_closer import refined
+from identification.gap.laws.law import HUNG, KEPT, Law, Term
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.pool import Pool
 from identification.gap.words import NEED_ARM, WORDS
 from tests.unit.test_gap_operators import bench_data
 

@@ -7,7 +7,7 @@ import pytest
 
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.glitches import without_glitches
+from identification.gap.recording.glitches import without_glitches
 from tests.unit.test_gap_operators import bench_data
 
 N = 300

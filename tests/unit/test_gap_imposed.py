@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.imposed import _Channel, _slides, displacement_simpler
+from identification.gap.model.bench import displacement_imposed, make_bench
+from identification.gap.recording.imposed import _Channel, _slides, displacement_simpler
 from tests.conformance.gap_designs import linear
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
@@ -211,7 +211,7 @@ def test_of_two_paths_about_as_simple_a_rig_that_slides_drove_its_stroke(
     monkeypatch.setitem(RIGS, "mine", rig)
     data = measured("mine", by_force=False, n=200)
     left = iter(costs)
-    monkeypatch.setattr("identification.gap.imposed._cost", lambda *_: next(left))
+    monkeypatch.setattr("identification.gap.recording.imposed._cost", lambda *_: next(left))
     assert displacement_simpler(data) is driven
 
 

@@ -9,13 +9,9 @@ from typing import cast
 import numpy as np
 import pytest
 
-from identification.gap import posterior
-from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation
-from identification.gap.interval import NOMINAL, Parameter
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
-from identification.gap.posterior import (
+from identification.gap.answer import posterior
+from identification.gap.answer.parameters import parameters
+from identification.gap.answer.posterior import (
     DEFINED,
     FLOWING,
     SHARING,
@@ -24,7 +20,11 @@ from identification.gap.posterior import (
     _wider,
     settled,
 )
-from identification.gap.variants import Variant
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.laws.interval import NOMINAL, Parameter
+from identification.gap.model.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_parameters import known_of, sd
 
@@ -69,7 +69,7 @@ def test_no_interval_of_a_threshold_reaches_below_zero(monkeypatch: pytest.Monke
     engine = small_engine(bench)
     info = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
     v = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**info, "joint": 0})
-    monkeypatch.setattr("identification.gap.posterior._moves", lambda *_: 100.0**2)
+    monkeypatch.setattr("identification.gap.answer.posterior._moves", lambda *_: 100.0**2)
     chosen = Explanation((Part(v, 1.0),), 0.0, 0.0, (0.0,), 0.0)
     found = known_of(engine, [v], chosen)[0].parameters
     assert found["threshold"].low == found["threshold"].ci90[0] == 0.0

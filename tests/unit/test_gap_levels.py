@@ -9,17 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import knees_closer, library
+from identification.gap.effects import library
 from identification.gap.effects.joint_creep import times
-from identification.gap.evidence import Engine
-from identification.gap.holds import hold_ids, swing_within
-from identification.gap.products import White
-from identification.gap.rows import reduce_rows
-from identification.gap.search import _hidden
-from identification.gap.variants import Variant
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.products import White
+from identification.gap.laws import knees_closer
+from identification.gap.model.bench import make_bench
+from identification.gap.model.variants import Variant
+from identification.gap.recording.holds import hold_ids, swing_within
+from identification.gap.recording.imposed import displacement_imposed
+from identification.gap.recording.rows import reduce_rows
+from identification.gap.search.search import _hidden
 from rig.dataset import load
 from rig.gap_data import gap_data
 from rig.tables import import_table

@@ -9,19 +9,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
+from identification.gap.answer.locate import _joints
 from identification.gap.data import Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
-from identification.gap.evidence import Engine
-from identification.gap.locate import _joints
-from identification.gap.parts import Part, Sizes, _beyond_springs
-from identification.gap.penalties import straight, trifle, within_stated
-from identification.gap.pool import Pool
-from identification.gap.signs import Limits, log_odds
-from identification.gap.variants import Variant
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part, Sizes, _beyond_springs
+from identification.gap.evidence.signs import Limits, log_odds
+from identification.gap.explanations.penalties import straight, trifle, within_stated
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.pool import Pool
+from identification.gap.model.variants import Variant
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 

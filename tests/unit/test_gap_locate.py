@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification.gap.bench import Bench, make_bench
+from identification.gap.answer.locate import locate
 from identification.gap.data import Array
-from identification.gap.locate import locate
+from identification.gap.model.bench import Bench, make_bench
 from tests.unit.test_gap_forms import arm_data
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.effects.flow_back import BACK_FROM
-from identification.gap.history import play
-from identification.gap.loops import lost
-from identification.gap.priors import prior_of
+from identification.gap.explanations.priors import prior_of
+from identification.gap.laws.flow_back import BACK_FROM
+from identification.gap.model.bench import make_bench
+from identification.gap.model.history import play
+from identification.gap.recording.loops import lost
 from tests.unit.test_gap_running import SPRING, running
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)

@@ -15,13 +15,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from identification.gap.bench import Bench, make_bench
-from identification.gap.effects import joint_backlash, library, lost_motion
-from identification.gap.forms import Form, describe, realise
-from identification.gap.law import Law, Term
-from identification.gap.parts import Part
-from identification.gap.pool import Pool
-from identification.gap.variants import Variant
+from identification.gap.answer.forms import Form, describe, realise
+from identification.gap.effects import joint_backlash, library
+from identification.gap.evidence.parts import Part
+from identification.gap.laws import lost_motion
+from identification.gap.laws.law import Law, Term
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.pool import Pool
+from identification.gap.model.variants import Variant
 from identification.gap.words import WORDS
 from rig.errors import InputError
 from rig.gap_forms import FormError, effects_of, from_entry, to_entry

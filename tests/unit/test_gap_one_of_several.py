@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from identification.arm import tool_offset
-from identification.gap.bench import make_bench
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import bent_column, moments
 from identification.gap.effects.force_scale import component
+from identification.gap.model.bench import make_bench
 from rig.model import load_robot
 from tests.conformance.gap_designs import TCP_MM, TRUE, Array, Q, linear
 from tests.unit.test_gap_running import SPRING, running

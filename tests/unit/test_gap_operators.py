@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.gap.data import GapData, Instruments, Setup
-from identification.gap.history import (
+from identification.gap.model.history import (
     averaged,
     bristles,
     delayed,
@@ -19,7 +19,7 @@ from identification.gap.history import (
     retarded,
     worked_in,
 )
-from identification.gap.rows import Rows, reduce_rows
+from identification.gap.recording.rows import Rows, reduce_rows
 
 
 def bench_data(force: np.ndarray, displacement: np.ndarray, **changes: object) -> GapData:

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from identification.arm import along, tool_offset
-from identification.gap.bench import make_bench
-from identification.gap.designs import planned, present_design
+from identification.gap.answer.designs import planned, present_design
+from identification.gap.model.bench import make_bench
 from rig.dataset import Dataset
 from rig.diagnose import Diagnosis, diagnose
 from rig.gap_data import gap_data

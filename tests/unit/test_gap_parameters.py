@@ -10,26 +10,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import Bench, make_bench
+from identification.gap.answer.parameters import parameters
+from identification.gap.answer.posterior import (
+    Known,
+    settled,
+)
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import run_seconds
 from identification.gap.effects.time_lag import closest_lag, late
-from identification.gap.evidence import (
+from identification.gap.evidence.engine import (
     HOLD_PART,
     ROW_PART,
     Engine,
     level_covariance,
 )
-from identification.gap.explanation import Explanation
-from identification.gap.fit import fit
-from identification.gap.interval import NOMINAL, Parameter, Softer
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
-from identification.gap.posterior import (
-    Known,
-    settled,
-)
-from identification.gap.variants import Variant
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import fit
+from identification.gap.laws.interval import NOMINAL, Parameter, Softer
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data

@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import score
 from identification.gap.data import Array
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import joint_backlash, library, lost_motion
+from identification.gap.effects import joint_backlash, library
 from identification.gap.effects.joint_backlash import TOOLS_KG
-from identification.gap.effects.lost_motion import Play
-from identification.gap.effects.lost_motion_law import describe, net_of
-from identification.gap.evidence import Engine
-from identification.gap.refine import refine
-from identification.gap.variants import Variant
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.engine import Engine
+from identification.gap.laws import lost_motion
+from identification.gap.laws.lost_motion import Play
+from identification.gap.laws.lost_motion_law import describe, net_of
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant
+from identification.gap.search.refine import refine
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running

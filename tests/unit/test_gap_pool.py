@@ -9,15 +9,15 @@ from weakref import ref
 import numpy as np
 import pytest
 
-from identification.gap import compare
-from identification.gap.bench import make_bench
-from identification.gap.compare import score
+from identification.gap.answer.discriminate import _BESIDES, _DECISIVE, ENOUGH, Option, _settled
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.discriminate import _BESIDES, _DECISIVE, ENOUGH, Option, _settled
 from identification.gap.effects import library
-from identification.gap.growing import Growing
-from identification.gap.pool import Pool
-from identification.gap.table import Table
+from identification.gap.evidence import compare
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.table import Table
+from identification.gap.model.bench import make_bench
+from identification.gap.model.growing import Growing
+from identification.gap.model.pool import Pool
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
 

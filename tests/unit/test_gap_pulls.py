@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns
-from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import contact_seating, library
 from identification.gap.effects.contact_seating import refined
-from identification.gap.evidence import Engine
-from identification.gap.parts import Part, energies
-from identification.gap.penalties import _same_element
-from identification.gap.priors import prior_of
-from identification.gap.strange import strangers
-from identification.gap.verdict import BENCH_DOUBT, trusted
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part, energies
+from identification.gap.explanations.penalties import _same_element
+from identification.gap.explanations.priors import prior_of
+from identification.gap.explanations.verdict import BENCH_DOUBT, trusted
+from identification.gap.model.base import base_columns
+from identification.gap.model.bench import make_bench
+from identification.gap.search.strange import strangers
 from identification.gap.words import WORDS
 from rig.diagnose_text import meanings, render
 from tests.unit.test_gap_linear import charged

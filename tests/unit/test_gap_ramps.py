@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
+from identification.gap.answer.designs import _levels
 from identification.gap.data import Array, GapData
-from identification.gap.designs import _levels
-from identification.gap.holds import hold_ids, is_continuous, rest_ids, scatter_within
-from identification.gap.ramps import ramps_told
-from identification.gap.rows import reduce_rows
+from identification.gap.model.bench import make_bench
+from identification.gap.recording.holds import hold_ids, is_continuous, rest_ids, scatter_within
+from identification.gap.recording.ramps import ramps_told
+from identification.gap.recording.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
 SPRING, RAMP, HOLD = 1e-5, 7, 16  # m/N; samples

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
 from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.effects.time_lag import late
-from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation
-from identification.gap.fit import fit
-from identification.gap.parts import Part
-from identification.gap.readings import reading_all
-from identification.gap.search import search
-from identification.gap.variants import Variant
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import fit
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant
+from identification.gap.search.readings import reading_all
+from identification.gap.search.search import search
 from tests.unit.test_gap_forms import arm_data
 
 GAIN = 0.75

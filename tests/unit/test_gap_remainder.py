@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
-from identification.gap.evidence import Engine, alike
-from identification.gap.explanation import Explanation
-from identification.gap.fit import Fit, fit
-from identification.gap.remainder import Remainder, _posterior, branches, remainder
+from identification.gap.answer.remainder import Remainder, _posterior, branches, remainder
+from identification.gap.evidence.engine import Engine, alike
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, REPETITIONS, SAMPLES = 10, 4, 4

@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.evidence import Engine, eta_levels
-from identification.gap.glitches import picked
-from identification.gap.parts import Part
-from identification.gap.penalties import _same_element
-from identification.gap.strange import strangers
-from identification.gap.variants import variant
+from identification.gap.evidence.engine import Engine, eta_levels
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.penalties import _same_element
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
+from identification.gap.model.variants import variant
+from identification.gap.recording.glitches import picked
+from identification.gap.search.strange import strangers
 from tests.unit.test_gap_operators import bench_data
 
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
-from identification.gap.bins import Bins
+from identification.gap.answer.parameters import parameters
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.effects.drift import _goes, own_clock
-from identification.gap.history import followed
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
+from identification.gap.evidence.parts import Part
+from identification.gap.laws.drift import _goes, own_clock
+from identification.gap.model.bench import make_bench
+from identification.gap.model.history import followed
+from identification.gap.recording.bins import Bins
 from tests.unit.test_gap_operators import bench_data
 
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects.drift import paths, rates
+from identification.gap.laws.drift import paths, rates
+from identification.gap.model.bench import make_bench
 from tests.unit.test_gap_operators import bench_data
 
 DIAL = 25.4e-6  # m, a thousandth of an inch

@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import Bench, make_bench
+from identification.gap.answer.parameters import parameters
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.effects.drift import free_paths, shares
-from identification.gap.effects.knees import grown
-from identification.gap.holds import hold_ids, is_continuous
-from identification.gap.leftover import _FALL
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
-from identification.gap.priors import prior_of
-from identification.gap.rows import reduce_rows
-from identification.gap.turns import passes, turns
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.priors import prior_of
+from identification.gap.judging.leftover import _FALL
+from identification.gap.laws.drift import free_paths, shares
+from identification.gap.laws.knees import grown
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.recording.holds import hold_ids, is_continuous
+from identification.gap.recording.rows import reduce_rows
+from identification.gap.recording.turns import passes, turns
 from identification.gap.words import STANDING
 from tests.unit.test_gap_operators import bench_data
 

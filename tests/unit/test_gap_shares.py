@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
 from identification.gap.data import Array
-from identification.gap.evidence import Engine
-from identification.gap.explanation import Explanation
-from identification.gap.fit import Fit, fit
-from identification.gap.parts import Part
-from identification.gap.shares import BOUND, measured, size_of
-from identification.gap.variants import variant
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
+from identification.gap.model.variants import variant
+from identification.gap.search.shares import BOUND, measured, size_of
 from tests.unit.test_gap_weights import UP, hanging
 
 LEAST = 0.05  # of what it moves, an effect counts at least

@@ -12,16 +12,16 @@ from scipy.special import log_ndtr
 
 from bench.dense_model import dense
 from bench.nested_cases import case_data
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
-from identification.gap.compare import score
 from identification.gap.data import Array
-from identification.gap.evidence import Engine
-from identification.gap.finer import gained
-from identification.gap.imperfection import least_size, log_share
-from identification.gap.parts import Part, log_joint_between, log_joints, signs_kept
-from identification.gap.signs import Limits, all_kept, log_odds, log_odds_together
-from identification.gap.variants import Variant, variant
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.finer import gained
+from identification.gap.evidence.imperfection import least_size, log_share
+from identification.gap.evidence.parts import Part, log_joint_between, log_joints, signs_kept
+from identification.gap.evidence.signs import Limits, all_kept, log_odds, log_odds_together
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
+from identification.gap.model.variants import Variant, variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 
 
@@ -143,7 +143,7 @@ def test_parts_are_asked_what_they_keep_together(monkeypatch: pytest.MonkeyPatch
         asked.append(limits)
         return -1e6
 
-    monkeypatch.setattr("identification.gap.parts.all_kept", kept)
+    monkeypatch.setattr("identification.gap.evidence.parts.all_kept", kept)
     engine = small_engine(small_bench())
     parts = [Part(variant("joint_creep", "v", [k], (1.0,), least=k + 0.5), 1.0) for k in (0, 1)]
     free = Part(variant("joint_creep", "free", [1], (1.0,), positive=False), 1.0)

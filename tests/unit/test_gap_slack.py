@@ -7,7 +7,7 @@ import pytest
 
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.slack import without_slack
+from identification.gap.recording.slack import without_slack
 from tests.unit.test_gap_running import SPRING, running, triangle
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)

@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
+from identification.gap.answer.parameters import parameters
 from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.effects.friction_law import BY_LOAD
-from identification.gap.interval import NOMINAL
-from identification.gap.leftover import COMES_BACK, _judged
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
-from identification.gap.snaps import TOGETHER, let_go
-from identification.gap.wandering import wanders
+from identification.gap.evidence.parts import Part
+from identification.gap.judging.leftover import COMES_BACK, _judged
+from identification.gap.laws.friction_law import BY_LOAD
+from identification.gap.laws.interval import NOMINAL
+from identification.gap.model.bench import make_bench
+from identification.gap.recording.snaps import TOGETHER, let_go
+from identification.gap.recording.wandering import wanders
 from tests.unit.test_gap_running import SPRING, running, triangle
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import knees_closer, library
-from identification.gap.effects.knees import is_sharp
-from identification.gap.effects.specimens import PLATEAU, off, own_stiffness, plateaus
-from identification.gap.pool import Pool
+from identification.gap.effects import library
+from identification.gap.laws import knees_closer
+from identification.gap.laws.knees import is_sharp
+from identification.gap.laws.specimens import PLATEAU, off, own_stiffness, plateaus
+from identification.gap.model.bench import make_bench
+from identification.gap.model.pool import Pool
 from tests.unit.test_gap_model import survive
 from tests.unit.test_gap_running import SPRING, running
 

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench, make_bench
-from identification.gap.compare import score
+from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import EFFECTS, library
-from identification.gap.evidence import Engine
-from identification.gap.forms import law_of, rows_of
-from identification.gap.pool import Pool
-from identification.gap.refine import refine
-from identification.gap.variants import Variant
+from identification.gap.evidence.compare import score
+from identification.gap.evidence.engine import Engine
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.pool import Pool
+from identification.gap.model.variants import Variant
+from identification.gap.search.refine import refine
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING

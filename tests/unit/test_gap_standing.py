@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.bench import make_bench
 from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.history import sampling_time
-from identification.gap.noise import driven, standing
-from identification.gap.rows import reduce_rows
-from identification.gap.white import white_noise
+from identification.gap.model.bench import make_bench
+from identification.gap.model.history import sampling_time
+from identification.gap.model.noise import driven, standing
+from identification.gap.recording.rows import reduce_rows
+from identification.gap.recording.white import white_noise
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running, triangle
 

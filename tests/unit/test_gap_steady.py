@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.data import Array, GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
-from identification.gap.effects.drift import FreePath
-from identification.gap.evidence import Engine
-from identification.gap.parts import Part, _beyond_scatter, part_sizes
-from identification.gap.strain import JUMP, _jumps
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part, _beyond_scatter, part_sizes
+from identification.gap.judging.strain import JUMP, _jumps
+from identification.gap.laws.drift import FreePath
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import displacement_imposed, make_bench
 from tests.unit.test_gap_operators import bench_data
 
 RUNS, LENGTH, GAP = 7, 500, 400.0  # samples at 10 Hz; s between starts

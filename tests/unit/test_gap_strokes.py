@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import make_bench
-from identification.gap.compare import by_word, closest, marginal, score
 from identification.gap.data import Array
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library, time_lag
 from identification.gap.effects.joint_backlash import variants as plays
 from identification.gap.effects.time_lag import late
-from identification.gap.evidence import Engine, eta_levels
-from identification.gap.refine import refine
-from identification.gap.search import search
+from identification.gap.evidence.compare import by_word, closest, marginal, score
+from identification.gap.evidence.engine import Engine, eta_levels
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import make_bench
+from identification.gap.search.refine import refine
+from identification.gap.search.search import search
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running, triangle, words_with
 from tests.unit.test_gap_weights import hanging

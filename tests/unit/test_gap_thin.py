@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from identification.gap import diagnose as module
-from identification.gap.bench import displacement_imposed, make_bench
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.explanation import Explanation, Found
+from identification.gap.explanations.explanation import Explanation, Found
+from identification.gap.model.bench import make_bench
+from identification.gap.recording.imposed import displacement_imposed
 from rig.dataset import Origin, load
 from rig.diagnose import diagnose
 from rig.gap_data import gap_data

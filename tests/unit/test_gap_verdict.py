@@ -8,29 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import Bench
-from identification.gap.choice import chosen_of, foresees
-from identification.gap.compare import Scored, log_mean
 from identification.gap.effects import library
-from identification.gap.evidence import Engine
-from identification.gap.explanation import (
+from identification.gap.evidence.compare import Scored, log_mean
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part, log_joints
+from identification.gap.explanations.explanation import (
     LAW_REMAINDER,
     Explanation,
     up_to_likeliest,
 )
-from identification.gap.leftover import looked_up
-from identification.gap.parts import Part, log_joints
-from identification.gap.search import (
-    SPRINGS,
-    _elsewhere,
-    _seeds,
-    _sharpened,
-    _with_one_more,
-    search,
-)
-from identification.gap.variants import variant
-from identification.gap.verdict import (
+from identification.gap.explanations.verdict import (
     BENCH_DOUBT,
     DOUBT,
     EXPLAINED,
@@ -42,6 +29,19 @@ from identification.gap.verdict import (
     _main,
     _tells_of_three,
     weighed,
+)
+from identification.gap.judging.choice import chosen_of, foresees
+from identification.gap.judging.leftover import looked_up
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import variant
+from identification.gap.search.search import (
+    SPRINGS,
+    _elsewhere,
+    _seeds,
+    _sharpened,
+    _with_one_more,
+    search,
 )
 from identification.gap.words import JERKS
 from tests.unit.test_gap_evidence import small_bench, small_engine
@@ -202,9 +202,9 @@ def test_of_springs_beside_a_mechanism_the_better_ones_are_taken(
         shared = parts[0].variant.info["joints"][0] in parts[1].variant.info["joints"]
         return said(parts, (1e-5, 1e-5), evidence - wall * shared)
 
-    monkeypatch.setattr("identification.gap.search.score", lambda *_: springs)
-    monkeypatch.setattr("identification.gap.search.up_to_likeliest", lambda *_: ([], 0.0))
-    monkeypatch.setattr("identification.gap.search.explain", explained)
+    monkeypatch.setattr("identification.gap.search.search.score", lambda *_: springs)
+    monkeypatch.setattr("identification.gap.search.search.up_to_likeliest", lambda *_: ([], 0.0))
+    monkeypatch.setattr("identification.gap.search.search.explain", explained)
     start = said((part("joint_backlash", [0], joints=[0]),), (1e-5,))
     (found,) = _with_one_more(small_engine(small_bench()), [], start, {}).values()
     assert found.parts[1].variant is springs[taken].variant
@@ -318,7 +318,7 @@ def test_pairs_are_looked_for_around_the_best_words(
         asked.append(most)
         return []
 
-    monkeypatch.setattr("identification.gap.search._seeds", spy)
+    monkeypatch.setattr("identification.gap.search.search._seeds", spy)
     variants = library(bench, words)
     engine.extend()
     search(engine, variants)
@@ -386,7 +386,7 @@ def test_explanations_that_matter_are_taken_between_the_levels(
         asked.append(parts[0].word)
         return more[parts[0].word]
 
-    monkeypatch.setattr("identification.gap.search.gained", gains)
+    monkeypatch.setattr("identification.gap.search.search.gained", gains)
     words = ("joint_creep", "joint_yield", "joint_hysteresis")
     ranked = [said((part(w, [0]),), (1e-6,), g) for w, g in zip(words, (0, -4, -50), strict=True)]
     found = _sharpened(engine, [*ranked, said((), (), -60.0)])

@@ -7,29 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.base import base_columns, prediction
-from identification.gap.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
-from identification.gap.closer import places
-from identification.gap.compare import Scored, score
+from identification.gap.answer.forms import law_of, rows_of
+from identification.gap.answer.parameters import parameters
 from identification.gap.data import Array, Setup
-from identification.gap.effects import (
-    joint_hysteresis,
-    joint_nonlinear_stiffness,
-    knees_closer,
-    library,
-)
-from identification.gap.effects.curves import above, beyond, hinge
-from identification.gap.effects.knees import is_sharp
-from identification.gap.evidence import Engine
-from identification.gap.forms import law_of, rows_of
-from identification.gap.history import bristles, flowing_play, play
-from identification.gap.interval import TWO_SIDED, Softer
-from identification.gap.parameters import parameters
-from identification.gap.parts import Part
-from identification.gap.refine import refine
-from identification.gap.rows import reduce_rows
-from identification.gap.several import family_of
-from identification.gap.variants import variant
+from identification.gap.effects import joint_hysteresis, joint_nonlinear_stiffness, library
+from identification.gap.evidence.compare import Scored, score
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.several import family_of
+from identification.gap.laws import knees_closer
+from identification.gap.laws.closer import places
+from identification.gap.laws.curves import above, beyond, hinge
+from identification.gap.laws.interval import TWO_SIDED, Softer
+from identification.gap.laws.knees import is_sharp
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
+from identification.gap.model.history import bristles, flowing_play, play
+from identification.gap.model.variants import variant
+from identification.gap.recording.rows import reduce_rows
+from identification.gap.search.refine import refine
 from rig.gap_data import _joint_to_joint, arm_setup
 from rig.model import load_robot
 from tests.unit.test_gap_closer import assert_lawful

@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from identification.gap.bench import Bench, make_bench
 from identification.gap.data import Array
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.holds import steadied
-from identification.gap.ramps import ramps_told
-from identification.gap.rows import reduce_rows
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.recording.holds import steadied
+from identification.gap.recording.ramps import ramps_told
+from identification.gap.recording.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
 SPRING, HOLD, LEVELS = 1e-5, 16, 12

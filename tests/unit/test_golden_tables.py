@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from identification.gap.explanation import Likeness
-from identification.gap.heldout import HeldOut
-from identification.gap.interval import Parameter
-from identification.gap.notes import KINDS, Note, ordered
+from identification.gap.answer.notes import KINDS, Note, ordered
+from identification.gap.explanations.explanation import Likeness
+from identification.gap.judging.heldout import HeldOut
+from identification.gap.laws.interval import Parameter
 from rig import cli, diagnose_text
 from rig.blind import text
 from rig.blind.score import report

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from identification.gap.bench import Bench
-from identification.gap.effect import Effect
 from identification.gap.effects import (
     base_compliance,
     base_slip,
@@ -26,7 +24,9 @@ from identification.gap.effects import (
     time_lag,
     zero_shift,
 )
-from identification.gap.variants import Variant
+from identification.gap.laws.effect import Effect
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant
 from identification.gap.words import NEED_ARM, STANDING, WORDS
 
 _ALL = (

@@ -16,17 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.effects import knees_closer
 from identification.gap.effects.base_compliance import moments
-from identification.gap.effects.knees import knee_at, knee_variants
-from identification.gap.effects.knees_law import law_of_knee, states_of
-from identification.gap.effects.thresholds import moved, of_knee, over
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws
-from identification.gap.variants import Variant
+from identification.gap.laws import knees_closer
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.knees import knee_at, knee_variants
+from identification.gap.laws.knees_law import law_of_knee, states_of
+from identification.gap.laws.law import Law, Laws
+from identification.gap.laws.thresholds import moved, of_knee, over
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant
 from identification.uncertainty import TWO_SIDED
 
 WORD = "base_slip"

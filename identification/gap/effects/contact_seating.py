@@ -17,13 +17,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from identification.gap.bench import Bench
-from identification.gap.closer import Word, closing_in
 from identification.gap.data import Array, Flags
-from identification.gap.effect import Effect
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws, Term
-from identification.gap.variants import Variant, variant
+from identification.gap.laws.closer import Word, closing_in
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.law import Law, Laws, Term
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant, variant
 
 WORD = "contact_seating"
 FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.effects.curves import hinge
-from identification.gap.effects.gains import BENDS, SCALES, bent, factor, law_of_gain, scales
-from identification.gap.law import Law, Laws
-from identification.gap.variants import Variant, variant
+from identification.gap.laws.curves import hinge
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.gains import BENDS, SCALES, bent, factor, law_of_gain, scales
+from identification.gap.laws.law import Law, Laws
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant, variant
 
 WORD = "displacement_scale"
 # Of the largest reading; what changes earlier is a seat.

@@ -17,11 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
-from identification.gap.closer import about_springs
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.effects.drift import (
+from identification.gap.laws.closer import about_springs
+from identification.gap.laws.drift import (
     FreePath,
     changes,
     free_path,
@@ -33,10 +31,12 @@ from identification.gap.effects.drift import (
     shares,
     waited,
 )
-from identification.gap.effects.drift_law import OF_SESSION, law_of_path, path_of
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws, Term
-from identification.gap.variants import Variant, variant
+from identification.gap.laws.drift_law import OF_SESSION, law_of_path, path_of
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.law import Law, Laws, Term
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant, variant
 
 WORD = "force_drift"
 SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force

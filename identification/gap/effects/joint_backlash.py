@@ -29,12 +29,13 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import TOOL_KG, Bench
-from identification.gap.closer import Word, closing_in, nearly_leads, places, seen
 from identification.gap.data import Array, Flags
-from identification.gap.effect import Effect
-from identification.gap.effects import lost_motion_law
-from identification.gap.effects.lost_motion import (
+from identification.gap.laws import lost_motion_law
+from identification.gap.laws.closer import Word, closing_in, nearly_leads, places, seen
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter, normal
+from identification.gap.laws.law import Laws
+from identification.gap.laws.lost_motion import (
     HELD,
     KEPT,
     KINDS,
@@ -45,10 +46,9 @@ from identification.gap.effects.lost_motion import (
     net,
     resting_columns,
 )
-from identification.gap.flanks import Flanks, placed, shapes
-from identification.gap.interval import Found, Parameter, normal
-from identification.gap.law import Laws
-from identification.gap.variants import Variant, variant
+from identification.gap.model.bench import TOOL_KG, Bench
+from identification.gap.model.flanks import Flanks, placed, shapes
+from identification.gap.model.variants import Variant, variant
 
 WORD = "joint_backlash"
 # Of those that are refined beside what was found; on a bench as far as anything was won by it.

@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
 from identification.gap.data import Array, Flags
-from identification.gap.effect import Effect
-from identification.gap.effects.curves import BENT_SLOPE
-from identification.gap.history import half_sample, retarded, row_time
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import ANEW, Law, Laws, Term
-from identification.gap.variants import SET_UP_ANEW, Variant, smooth_root, variant
+from identification.gap.laws.curves import BENT_SLOPE
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.law import ANEW, Law, Laws, Term
+from identification.gap.model.bench import Bench
+from identification.gap.model.history import half_sample, retarded, row_time
+from identification.gap.model.variants import SET_UP_ANEW, Variant, smooth_root, variant
 
 WORD = "joint_creep"
 SCALES = (0.02, 0.06, 0.2, 0.6)

@@ -27,12 +27,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.bench import Bench
-from identification.gap.closer import Word, places
 from identification.gap.data import Array, Flags
-from identification.gap.effect import Effect
-from identification.gap.effects import friction_law
-from identification.gap.effects.friction_law import (
+from identification.gap.laws import friction_law
+from identification.gap.laws.closer import Word, places
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.friction_law import (
     BY_LOAD,
     EXPONENTIAL,
     LAWS,
@@ -40,11 +39,12 @@ from identification.gap.effects.friction_law import (
     SLIPPING,
     by_ratio,
 )
-from identification.gap.effects.specimens import with_other_springs
-from identification.gap.history import Path, bristles, play, worked_in
-from identification.gap.interval import Found, Parameter, from_zero
-from identification.gap.law import Laws
-from identification.gap.variants import (
+from identification.gap.laws.interval import Found, Parameter, from_zero
+from identification.gap.laws.law import Laws
+from identification.gap.laws.specimens import with_other_springs
+from identification.gap.model.bench import Bench
+from identification.gap.model.history import Path, bristles, play, worked_in
+from identification.gap.model.variants import (
     LASTING,
     SET_UP_ANEW,
     UNDER_WEIGHT,

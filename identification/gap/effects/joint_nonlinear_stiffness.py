@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import TOOL_KG, Bench
-from identification.gap.closer import Word, closing_in
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.effects.curves import above, beyond, hinge
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws, Term
-from identification.gap.variants import Variant, smooth_root, variant
+from identification.gap.laws.closer import Word, closing_in
+from identification.gap.laws.curves import above, beyond, hinge
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.law import Law, Laws, Term
+from identification.gap.model.bench import TOOL_KG, Bench
+from identification.gap.model.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
 # Closer at the start: contacts are soft where they begin to bear, as `|tau|^(2/3)` (Hertz 1882).

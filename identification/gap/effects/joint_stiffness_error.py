@@ -16,12 +16,12 @@ from math import comb
 
 import numpy as np
 
-from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.interval import LEAST_FACTOR, Found, Parameter
-from identification.gap.law import Law, Laws, Term
-from identification.gap.variants import Variant, variant
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import LEAST_FACTOR, Found, Parameter
+from identification.gap.laws.law import Law, Laws, Term
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant, variant
 from identification.uncertainty import TWO_SIDED
 
 WORD = "joint_stiffness_error"

@@ -22,12 +22,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from identification.gap.bench import TOOL_SD_KG, Bench
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.effects import knees_closer
-from identification.gap.effects.flow_back import flowing_back
-from identification.gap.effects.knees import (
+from identification.gap.laws import knees_closer
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.flow_back import flowing_back
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.knees import (
     SCALES,
     THRESHOLDS,
     fresh_of,
@@ -35,12 +35,12 @@ from identification.gap.effects.knees import (
     knees,
     memories,
 )
-from identification.gap.effects.knees_law import law_of_knee, states_of
-from identification.gap.effects.specimens import OWN, off, own_stiffness, with_other_springs
-from identification.gap.effects.thresholds import moved, of_knee
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws
-from identification.gap.variants import BACK_UNDER_WEIGHT, TAKEN_BACK, UNDER_WEIGHT, Variant
+from identification.gap.laws.knees_law import law_of_knee, states_of
+from identification.gap.laws.law import Law, Laws
+from identification.gap.laws.specimens import OWN, off, own_stiffness, with_other_springs
+from identification.gap.laws.thresholds import moved, of_knee
+from identification.gap.model.bench import TOOL_SD_KG, Bench
+from identification.gap.model.variants import BACK_UNDER_WEIGHT, TAKEN_BACK, UNDER_WEIGHT, Variant
 from identification.uncertainty import TWO_SIDED
 
 WORD = "joint_yield"

@@ -16,12 +16,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws, Term
-from identification.gap.variants import Variant, variant
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.law import Law, Laws, Term
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant, variant
 
 WORD = "link_flexibility"
 SCALES = (0.15, 0.5, 1.5)

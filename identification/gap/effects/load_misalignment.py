@@ -19,14 +19,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.gap.base import MOST_CROSSTALK
-from identification.gap.bench import Bench
-from identification.gap.closer import about_springs
 from identification.gap.data import Array, Flags, Setup
-from identification.gap.effect import Effect
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws, Term, along, in_pose, triple
-from identification.gap.variants import Variant, variant
+from identification.gap.laws.closer import about_springs
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.law import Law, Laws, Term, along, in_pose, triple
+from identification.gap.model.base import MOST_CROSSTALK
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant, variant
 
 WORD = "load_misalignment"
 SCALES = (0.03, 0.1, 0.25)

@@ -22,16 +22,16 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
-from identification.gap.closer import Estimate, Word, estimate, evidence
-from identification.gap.compare import by_word, closest, marginal, score
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.explanation import conditioned
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws, Term, triple
-from identification.gap.parts import Part
-from identification.gap.variants import Variant, variant
+from identification.gap.evidence.compare import by_word, closest, marginal, score
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import conditioned
+from identification.gap.laws.closer import Estimate, Word, estimate, evidence
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.law import Law, Laws, Term, triple
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant, variant
 from identification.gap.words import LINEAR
 
 WORD = "pose_error"

@@ -14,10 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.bench import Bench
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.effects.drift import (
+from identification.gap.laws.drift import (
     MEAN,
     TEMPERATURE,
     by_direction,
@@ -30,11 +28,13 @@ from identification.gap.effects.drift import (
     shares,
     temperature_of,
 )
-from identification.gap.effects.drift_law import OF_SESSION, law_of_path, path_of
-from identification.gap.history import followed
-from identification.gap.interval import Found, Parameter
-from identification.gap.law import Law, Laws, Term, along
-from identification.gap.variants import Variant, variant
+from identification.gap.laws.drift_law import OF_SESSION, law_of_path, path_of
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.law import Law, Laws, Term, along
+from identification.gap.model.bench import Bench
+from identification.gap.model.history import followed
+from identification.gap.model.variants import Variant, variant
 
 WORD = "thermal_drift"
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the deflection

@@ -18,11 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.bench import Bench
-from identification.gap.closer import Word, closing_in, shows
 from identification.gap.data import Array
-from identification.gap.effect import Effect
-from identification.gap.history import (
+from identification.gap.laws.closer import Word, closing_in, shows
+from identification.gap.laws.effect import Effect
+from identification.gap.laws.interval import Found, Parameter, normal
+from identification.gap.laws.law import Law, Laws, Term
+from identification.gap.model.bench import Bench
+from identification.gap.model.history import (
     averaged,
     delayed,
     half_sample,
@@ -31,10 +33,8 @@ from identification.gap.history import (
     settling_share,
     standing_on,
 )
-from identification.gap.interval import Found, Parameter, normal
-from identification.gap.law import Law, Laws, Term
-from identification.gap.variants import Variant, variant
-from identification.gap.white import white_sd
+from identification.gap.model.variants import Variant, variant
+from identification.gap.recording.white import white_sd
 
 WORD = "time_lag"
 # of the time between two samples

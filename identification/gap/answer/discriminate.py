@@ -1,0 +1,337 @@
+"""What to measure next: the procedure that would tell two explanations apart, by expectation.
+
+For every procedure that could follow the present one, both explanations' fitted forms are simulated
+along its path and judged there as a measurement would be: the log odds that the right one would win
+by. The smaller of the two (either may be the true one), beyond what repeating the present procedure
+gives, per minute of measuring, decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+
+from identification.gap.answer.designs import (
+    Candidate,
+    Design,
+    Elsewhere,
+    candidates,
+    planned,
+    present_design,
+)
+from identification.gap.answer.forms import Form, describe, law_of, lawful, realise, rows_of
+from identification.gap.answer.twins import PLACE, twin_of
+from identification.gap.data import Array, GapData
+from identification.gap.evidence.compare import Scored, log_mean, score
+from identification.gap.evidence.engine import Engine, Level, eta_levels
+from identification.gap.explanations.explanation import Explanation, Found
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.laws.law import Law
+from identification.gap.model.base import base_columns
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.variants import Variant
+
+ENOUGH = 3.0  # nats: odds of 20 to 1
+_DECISIVE = 10.0  # more certainty than this is worth no further minute
+_BESIDES = 2  # further procedures that would do, for who can't do the best
+_REPETITIONS = 2  # simulated
+_SHAPES = 8  # of each word, the best on the present data
+_WITHIN = 12.0  # nats below the best that a shape may lie
+_GAINS = {"force_scale": "force_gain", "displacement_scale": "displacement_gain"}
+
+
+@dataclass(frozen=True)
+class Option:
+    """A procedure with its expected discrimination (nats, the worse of the two cases) and time."""
+
+    kind: str
+    text: str
+    expected_nats: float
+    minutes: float
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """What to do, which two words it separates, what it is expected to give, and the other
+    options, best first. kind "none": nothing that was tried reaches ENOUGH; design is None then."""
+
+    text: str
+    separates: tuple[str, str]
+    kind: str
+    expected_nats: float = 0.0
+    minutes: float = 0.0
+    alternatives: tuple[Option, ...] = ()
+    design: Design | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Rival:
+    """One of the two words: the forms that were fitted with it, changes of the springs by name,
+    and shapes it may take, with their weights on the present data (log) and units."""
+
+    word: str
+    forms: tuple[Form, ...]
+    springs: dict[str, float]
+    shapes: tuple[tuple[Variant, Law, Array, float], ...]
+
+
+Others = Callable[[], Sequence[Elsewhere]]
+
+
+def next_measurement(
+    found: Found,
+    variants: Sequence[Variant],
+    chosen: Explanation,
+    pair: tuple[str, str],
+    others: Others | None = None,
+) -> NextMeasurement | None:
+    """The proposal for two words, of which the first is in the chosen explanation.
+
+    others: setups elsewhere, asked for only here. None where one of the words has no explanation,
+    or no load moves the rig.
+    """
+    engine = found.engine
+    if not engine.bench.reach > 0 or not np.ptp(engine.bench.load) > 0:
+        return None
+    first = _rival(found, variants, chosen, pair[0], pair[0])
+    if first is None:
+        return None
+    second = _same_elsewhere(found, chosen, first, pair[1]) or _rival(
+        found, variants, chosen, pair[0], pair[1]
+    )
+    if second is None:
+        return None
+    design = present_design(engine.bench)
+    known = _discrimination(engine.bench, design, (first, second))
+    rated: list[tuple[Option, Candidate]] = []
+    every = candidates(design, engine.bench.data.arm, others() if others else ())
+    for c in sorted(every, key=lambda c: c.design.minutes):
+        if _settled([o for o, _ in rated], c.design.minutes):
+            break
+        nats = _discrimination(engine.bench, c.design, (first, second)) - max(known, 0.0)
+        if c.kind == "calibrate":
+            nats += _calibrated(c.design, (first, second))
+        rated.append((Option(c.kind, c.text, max(nats, 0.0), c.design.minutes), c))
+    rated.sort(key=lambda r: -_worth(r[0]))
+    return _proposal(rated, pair)
+
+
+def _settled(options: list[Option], minutes: float) -> bool:
+    """Whether nothing that takes so long can be worth more than what was looked at, of which a few
+    would do besides."""
+    do = sorted((_worth(o) for o in options if o.expected_nats >= ENOUGH), reverse=True)
+    return len(do) > _BESIDES and do[0] > _DECISIVE / max(minutes, 1e-9)
+
+
+def _worth(option: Option) -> float:
+    """What reaches enough comes first, by certainty per minute; then whatever gives most."""
+    if option.expected_nats < ENOUGH:
+        return option.expected_nats * 1e-6
+    return min(option.expected_nats, _DECISIVE) / max(option.minutes, 1e-9)
+
+
+def _proposal(
+    rated: list[tuple[Option, Candidate]], pair: tuple[str, str]
+) -> NextMeasurement | None:
+    if not rated:
+        return None
+    best, candidate = rated[0]
+    rest = tuple(o for o, _ in rated[1:])
+    odds = f"expected: {_nats(best.expected_nats)} in about {best.minutes:.0f} min"
+    if best.expected_nats >= ENOUGH:
+        return NextMeasurement(f"{best.text} ({odds}.)", pair, best.kind, best.expected_nats,
+                               best.minutes, rest, candidate.design)  # fmt: skip
+    text = (
+        f"No procedure derived from this one is expected to tell them apart (odds of 20 to 1, "
+        f"{ENOUGH:g} nats). The best of {len(rated)}: {best.text} ({odds}.)"
+    )
+    return NextMeasurement(text, pair, "none", best.expected_nats, best.minutes,
+                           tuple(o for o, _ in rated))  # fmt: skip
+
+
+def _nats(value: float) -> str:
+    return f"{value:.1f} nats" if value < 100 else "more than 100 nats"
+
+
+# --- the two explanations ------------------------------------------------------------------------
+
+
+def _rival(
+    found: Found, variants: Sequence[Variant], chosen: Explanation, first: str, word: str
+) -> _Rival | None:
+    """The explanation with `word` in the place of `first`, else by itself."""
+    wanted = (chosen.words - {first}) | {word}
+    by_words = {e.words: e for e in found.explanations}
+    explanation = by_words.get(wanted) or by_words.get(frozenset([word]))
+    if explanation is None:
+        return None
+    engine = found.engine
+    fitted = fit(engine, explanation)
+    part = next(p for p in explanation.parts if p.word == word)
+    forms = [
+        lawful(describe(engine.bench, p, *fitted.of(i)))
+        for i, p in enumerate(explanation.parts)
+        if p.word == word
+    ]
+    shapes = _shapes(engine, [v for v in variants if v.word == word], part.variant)
+    return _Rival(word, tuple(forms), _springs(engine, fitted), shapes)
+
+
+def _same_elsewhere(found: Found, chosen: Explanation, first: _Rival, word: str) -> _Rival | None:
+    """The first explanation's law at the other word's place, where the data see no difference."""
+    part = next((p for p in chosen.parts if p.word == first.word), None)
+    if part is None or word not in ("joint_yield", "base_slip"):
+        return None
+    fitted = fit(found.engine, chosen)
+    w, _ = fitted.of(chosen.parts.index(part))
+    twin = twin_of(found.engine, part, w, chosen.eta)
+    if twin is None or twin.word != word:
+        return None
+    shapes = tuple(
+        (replace(v, word=word), twin.moved(law), unit * twin.factor**-2, weight)
+        for v, law, unit, weight in first.shapes
+        if all(law.constants.get(k) == first.forms[0].law.constants.get(k) for k in PLACE)
+    )
+    return _Rival(word, tuple(twin.form(f) for f in first.forms), first.springs, shapes)
+
+
+def _springs(engine: Engine, fitted: Fit) -> dict[str, float]:
+    names = engine.base.names
+    return {n: float(b) for n, b in zip(names, fitted.base, strict=True) if n.startswith("spring")}
+
+
+def _shapes(
+    engine: Engine, variants: list[Variant], fitted: Variant
+) -> tuple[tuple[Variant, Law, Array, float], ...]:
+    """The fitted shape, and the best others of different laws within reach of it."""
+    ranked: list[Scored] = sorted(
+        score(engine, engine.levels, variants), key=lambda s: -s.log_evidence
+    )
+    best = ranked[0].log_evidence
+    weight = {id(s.variant): s.log_evidence for s in ranked}
+    near = [
+        s.variant for s in ranked if s.log_evidence > best - _WITHIN and s.variant is not fitted
+    ]
+    # shapes that look alike to these data may differ elsewhere: joints and axes first, then laws
+    kinds: dict[object, Variant] = {}
+    for v in near:
+        info = v.info
+        kinds.setdefault((info.get("joint"), info.get("axis"), info.get("memory")), v)
+    order = [fitted, *kinds.values(), *(v for v in near if v not in kinds.values())][:_SHAPES]
+    return tuple((v, *law_of(engine.bench, v), weight.get(id(v), best)) for v in order)
+
+
+# --- expectation ---------------------------------------------------------------------------------
+
+
+def _discrimination(bench: Bench, design: Design, rivals: tuple[_Rival, _Rival]) -> float:
+    """Log odds (nats) by which the true one is expected to win, whichever of the two it is.
+
+    At most two repetitions are simulated: more of them say little that these do not.
+    """
+    brief = replace(design, repetitions=min(design.repetitions, _REPETITIONS))
+    truths, there = _simulated(bench, brief, rivals)
+    variants, weights = _carried(there, rivals)
+    places = [there.add(truth) for truth in truths]
+    base = base_columns(there)
+    # every other size of imperfection: to rank procedures, that is fine enough
+    etas = eta_levels(there, base, max(truths, key=lambda t: float(np.abs(t).max())))[::2]
+    engine = Engine(there, base, np.zeros(there.layout.size), etas)
+    words = np.array([v.word for v in variants])
+    won = []
+    for k, place in enumerate(places):
+        engine.beside((place,), len(engine.levels))  # of all levels at once, for `_told`
+        levels = [_told(level, place) for level in engine.levels]
+        found = {id(s.variant): s.log_evidence for s in score(engine, levels, variants)}
+        logs = np.array([found[id(v)] - log(v.prior) for v in variants])
+        marginal = [
+            log_mean(list(logs[words == r.word]), list(weights[words == r.word])) for r in rivals
+        ]
+        won.append(marginal[k] - marginal[1 - k])
+    return float(min(won))
+
+
+def _told(level: Level, place: int) -> Level:
+    """The level of a bench on which nothing was observed, had the pool's column been observed."""
+    moment = level.beside([place])[0]
+    misfit = float(moment[place])
+    return replace(level, moment=moment, misfit=misfit, log_base=level.log_base - 0.5 * misfit)
+
+
+def _simulated(
+    bench: Bench, design: Design, rivals: tuple[_Rival, _Rival]
+) -> tuple[list[Array], Bench]:
+    """What each of the two would add to the simulation along the design, and the bench there."""
+    data = planned(design, bench)
+    plain = make_bench(data)
+    moved = [sum((realise(plain, f) for f in r.forms), _spring_changes(plain, r)) for r in rivals]
+    # the noise of a force counts by the slope of the curve: knees belong into it
+    middle = (moved[0][: plain.rows.n] + moved[1][: plain.rows.n]) / 2
+    count = plain.rows.weight.astype(np.int64)
+    there = make_bench(_with_response(plain, data, np.repeat(middle, count)))
+    there = replace(_with_noise(bench, there), flows=plain.flows)  # the load is the same
+    return [
+        sum((realise(there, f) for f in r.forms), _spring_changes(there, r)) for r in rivals
+    ], there
+
+
+def _with_response(bench: Bench, data: GapData, added: Array) -> GapData:
+    if bench.imposed:
+        return data
+    return replace(data, displacement=data.displacement + added)
+
+
+def _with_noise(bench: Bench, there: Bench) -> Bench:
+    """Noise is what the present samples have, which a simulation can't tell."""
+    now = bench.noise
+    count = np.ones(bench.rows.n) if bench.rows.continuous else bench.rows.weight
+    sample = float(np.median(now.response * np.sqrt(count)))
+    root = np.sqrt(there.rows.weight) if not there.rows.continuous else 1.0
+    noise = replace(
+        there.noise, response=np.maximum(there.noise.response, sample / root), q=now.q,
+        force=now.force, run=now.run, stated=now.stated,
+        hold=np.maximum(there.noise.hold, float(now.hold.min())),
+    )  # fmt: skip
+    return replace(there, noise=noise)
+
+
+def _spring_changes(there: Bench, rival: _Rival) -> Array:
+    out = np.zeros(there.layout.size)
+    for name, change in rival.springs.items():
+        j = int(name.removeprefix("spring")) - 1
+        out += change * there.joint_column(j, there.elastic[:, j])
+    return out
+
+
+def _carried(there: Bench, rivals: tuple[_Rival, _Rival]) -> tuple[list[Variant], Array]:
+    """The shapes of both words on another bench, and their weights."""
+    variants, weights = [], []
+    for r in rivals:
+        top = max(w for *_, w in r.shapes)
+        for v, law, unit, weight in r.shapes:
+            columns = rows_of(there, r.word, law) * unit
+            places = tuple(there.add(c) for c in columns.T)
+            variants.append(replace(v, columns=places))
+            weights.append(float(np.exp(weight - top)))
+    return variants, np.array(weights)
+
+
+def _calibrated(design: Design, rivals: tuple[_Rival, _Rival]) -> float:
+    """What the calibration itself says: the gain is known to u, of a prior of `s`."""
+    gained = []
+    for k, r in enumerate(rivals):
+        if r.word not in _GAINS:
+            continue
+        u = float(getattr(design.instruments, _GAINS[r.word]))
+        s = max(abs(float(r.forms[0].values[0])), u)
+        occam = 0.5 * log(1 + (s / u) ** 2)
+        won = [occam, occam]  # right to have left the gain out
+        won[k] = 0.5 * (s / u) ** 2 - occam
+        gained.append(min(won))
+    return max(0.0, sum(gained))
+
+
+__all__ = ["ENOUGH", "Design", "Elsewhere", "NextMeasurement", "Option", "next_measurement"]

@@ -1,0 +1,135 @@
+"""Where the gap lies: directions, poses, forces, branches, repetitions, joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.data import BRANCH_NAMES, Array, Flags
+from identification.gap.evidence.engine import Engine
+from identification.gap.explanations.fit import Fit
+from identification.gap.model.variants import Variant
+from identification.gap.words import INSTRUMENTS, LINEAR
+
+_SHOWS = 0.15  # an effect shows where it reaches this share of its largest part
+
+
+@dataclass(frozen=True, eq=False)
+class Where:
+    """Names, force ranges (N) of directions, joints from 1, share of the gap: `where` in JSON."""
+
+    directions: tuple[str, ...]
+    poses: tuple[str, ...]
+    force: dict[str, tuple[float, float]]
+    branches: tuple[str, ...]
+    repetitions: tuple[int, ...]
+    joints: tuple[int, ...]
+    seen_by_encoders: bool | None
+    share: float
+
+
+NOWHERE = Where((), (), {}, (), (), (), None, 0.0)
+
+
+def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Where:
+    """From the main effect's contribution; without one, from the gap (n,) that springs leave.
+    sizes: of the effects, rms m."""
+    bench, n = engine.bench, engine.bench.rows.n
+    main = fit.contribution(engine, 0)[:n] if fit.parts else gap
+    per_setup = _size_per_setup(engine, _visible(engine, fit, main))
+    top = per_setup.max()
+    if not top > 0:
+        return NOWHERE
+    shows = per_setup >= _SHOWS * top
+    setups = [s for s, yes in zip(bench.data.setups, shows, strict=True) if yes]
+    rows = shows[bench.rows.setup] & (np.abs(main) >= _SHOWS * np.abs(main).max())
+    square = bench.rows.weight * gap**2  # every sample counts, not every row
+    total, inside = float(square.sum()), float(square[shows[bench.rows.setup]].sum())
+    word = fit.parts[0].word if fit.parts else ""
+    return Where(
+        directions=tuple(dict.fromkeys(s.direction for s in setups)),
+        poses=tuple(dict.fromkeys(s.pose for s in setups if s.pose)),
+        force=_ranges(engine, rows),
+        branches=tuple(BRANCH_NAMES[b] for b in np.unique(bench.rows.branch[rows])),
+        repetitions=tuple(int(r) for r in np.unique(bench.rows.repetition[rows])),
+        joints=_joints(engine, fit, sizes),
+        seen_by_encoders=_seen(engine, word),
+        share=inside / total if total > 0 else 0.0,
+    )  # fmt: skip
+
+
+def _seen(engine: Engine, word: str) -> bool | None:
+    """Whether readings of the joints show an effect; None where they can't tell. What no joint does
+    none of them shows, whichever side of the gear they are on."""
+    if engine.bench.data.q is None or not word or word in INSTRUMENTS:
+        return None
+    if not word.startswith("joint_"):
+        return False
+    return True if engine.bench.has_q else None
+
+
+def _visible(engine: Engine, fit: Fit, main: Array) -> Array:
+    """The main effect less what the springs would take over per setup, unless it is linear."""
+    moved = engine.bench.rows.moved(main[:, None])[:, 0]
+    if not fit.parts or fit.parts[0].word in LINEAR:
+        return moved
+    out, bench = moved.copy(), engine.bench
+    load = bench.rows.moved(bench.load[:, None])[:, 0]
+    for s in range(len(bench.data.setups)):
+        mine = bench.rows.setup == s
+        weight, x = bench.rows.weight[mine], load[mine]
+        power = float(weight @ x**2)
+        if power > 0:
+            out[mine] -= x * float(weight @ (x * moved[mine])) / power
+    return out
+
+
+def _size_per_setup(engine: Engine, values: Array) -> Array:
+    """(s,) rms of values (n,) in every setup, each sample counted."""
+    rows, count = engine.bench.rows, len(engine.bench.data.setups)
+    squares = np.bincount(rows.setup, weights=rows.weight * values**2, minlength=count)
+    samples = np.bincount(rows.setup, weights=rows.weight, minlength=count)
+    return np.asarray(np.sqrt(squares / np.maximum(samples, 1)))
+
+
+def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
+    bench = engine.bench
+    out: dict[str, tuple[float, float]] = {}
+    for s, setup in enumerate(bench.data.setups):
+        force = bench.rows.force[rows & (bench.rows.setup == s)]
+        if force.size:
+            old = out.get(setup.direction, (np.inf, -np.inf))
+            out[setup.direction] = (
+                min(old[0], float(force.min())), max(old[1], float(force.max()))
+            )  # fmt: skip
+    return out
+
+
+def _joints(engine: Engine, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]:
+    """Joints (from 1) in which those joint effects of the explanation sit that matter beside its
+    largest effect, by their sizes (rms m); of a bench, none."""
+    if not engine.bench.data.arm:
+        return ()
+    out: list[int] = []
+    for i, p in enumerate(fit.parts):
+        if sizes[i] < _COUNTS * max(sizes):
+            continue
+        if "joint" in p.variant.info:
+            out.append(int(p.variant.info["joint"]) + 1)
+        elif "joints" in p.variant.info and p.word == "joint_stiffness_error":
+            w, cov = fit.of(i)
+            part = np.abs(w) * _size_of_each(engine, p.variant)
+            shows = (np.abs(w) > 2 * np.sqrt(np.diag(cov))) & (part >= _SHOWS * part.max())
+            out += [j + 1 for j, s in zip(p.variant.info["joints"], shows, strict=True) if s]
+    return tuple(dict.fromkeys(out))
+
+
+_COUNTS = 0.1  # of the largest effect, a hundredth of its square: there the gap does not lie
+
+
+def _size_of_each(engine: Engine, variant: Variant) -> Array:
+    """(k,) rms of what unit coefficients do to the response, without the datum of each setup."""
+    rows = engine.bench.rows
+    return np.array([rows.rms(v) for v in rows.moved(engine.responses(variant.columns)).T])

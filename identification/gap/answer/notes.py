@@ -1,0 +1,87 @@
+"""What is to be known beside a verdict: faults, what was set aside, what data can't decide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.gap.model.bench import Bench
+from identification.gap.model.noise import NOISY
+from identification.gap.recording.snaps import Snaps
+
+FAULT, ASIDE, UNDECIDED, REMARK = KINDS = ("fault", "set aside", "undecided", "remark")
+
+
+@dataclass(frozen=True)
+class Note:
+    """A sentence or two; kind: one of KINDS."""
+
+    kind: str
+    text: str
+
+
+def ordered(notes: Iterable[Note]) -> tuple[Note, ...]:
+    """By kind, what is to be seen to first."""
+    return tuple(sorted(notes, key=lambda n: KINDS.index(n.kind)))
+
+
+def notes_of(bench: Bench) -> Iterator[Note]:
+    """What is said whatever the verdict."""
+    yield from (Note(FAULT, text) for text in _faults(bench))
+    yield from (Note(ASIDE, text) for text in bench.data.aside)
+    yield from (Note(UNDECIDED, text) for text in _undecided(bench))
+    yield from (Note(REMARK, text) for text in (*bench.data.notes, *_remarks(bench)))
+
+
+def _faults(bench: Bench) -> Iterator[str]:
+    yield from (f.text for f in bench.course.faults)
+    if bench.noise.raised > NOISY:
+        yield (
+            f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "
+            "uncertainty that was judged too small. They were taken as uncertain as they are."
+        )
+
+
+def _undecided(bench: Bench) -> Iterator[str]:
+    data, rows = bench.data, bench.rows
+    if not np.ptp(bench.load) > 0:
+        yield "The load does not change: nothing can be said of stiffness or of joints."
+    if not bench.course.unloads:
+        yield "Nothing was unloaded: lasting and elastic deflection look alike."
+    if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
+        yield "One repetition: what repeats and what does not can't be told apart."
+    if data.arm and not bench.has_q:
+        reason = "not recorded" if data.q is None else "taken before the gear"
+        yield f"Joint readings are {reason}: joints, links and base look alike."
+    if data.session is None and data.arm:
+        yield "No session clock: drifts are seen only within runs and from run to run."
+    if bench.course.timeless:
+        yield "No time was recorded: lags, creep and how fast it flowed are left out."
+
+
+def _remarks(bench: Bench) -> Iterator[str]:
+    if bench.known is not None and bench.known.left >= bench.noise.stated:
+        yield (
+            f"Up to {1e3 * bench.known.left:.3g} mm rms of what the simulation's effects do are no "
+            "gap: no law is met better than that."
+        )
+    if bench.course.let_go:
+        yield _let_go(bench.course.let_go, float(np.ptp(bench.data.force)))
+    if bench.imposed:
+        yield "The displacement is imposed: force is predicted from it."
+    elif bench.data.imposed == "displacement":
+        yield (
+            "The displacement is imposed; at rest the joints bear the force that was read: "
+            "displacement is predicted from it."
+        )
+
+
+def _let_go(snaps: Snaps, span: float) -> str:
+    times = "once" if snaps.count == 1 else f"{snaps.count} times"
+    return (
+        f"The force falls at once while the stroke goes on, {times}, by up to "
+        f"{snaps.largest * span:.3g} N (first at {snaps.first:.4g} s): it sticks and slips, snaps, "
+        "cracks or is torn off, as no effect of the library does."
+    )

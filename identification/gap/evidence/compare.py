@@ -1,0 +1,178 @@
+"""Evidence of all variants over all levels, and what follows for the words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import log
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.gap.data import Array, Ints
+from identification.gap.evidence.engine import Engine, Level
+from identification.gap.evidence.factor import factor_of
+from identification.gap.evidence.imperfection import IMPERFECTION, LAW_IMPERFECTION
+from identification.gap.evidence.products import squares_of
+from identification.gap.evidence.signs import Limits
+from identification.gap.evidence.table import Stack, Table
+from identification.gap.model.variants import Variant
+from identification.gap.words import LINEAR
+
+
+class Scored(NamedTuple):
+    """log evidence of a variant, with the scale and level that contribute most. A plain tuple: a
+    diagnosis makes 100 000 of them."""
+
+    variant: Variant
+    log_evidence: float
+    scale: float
+    level: int
+
+
+def score(
+    engine: Engine, levels: list[Level], variants: list[Variant], already: float = 0.0
+) -> list[Scored]:
+    """Evidence of every variant on top of `levels` (base, or base and an effect already chosen).
+
+    already: mean square (m^2) of that effect: it brings imperfection of its own.
+    """
+    out: dict[Variant, tuple[float, float, int]] = {}
+    by_size: dict[int, dict[str, list[Variant]]] = {}
+    first: dict[object, Variant] = {}
+    shapes = [first.setdefault(v.shape, v) for v in variants]
+    for v in first.values():
+        words = by_size.setdefault(_size(len(v.columns)), {})
+        words.setdefault(v.word, []).append(v)
+    for k, words in by_size.items():
+        out |= _score_batch(engine, levels, list(words.values()), k, already)
+    return [
+        Scored(v, out[s][0] + log(v.prior), *out[s][1:])
+        for v, s in zip(variants, shapes, strict=True)
+    ]
+
+
+# Variants of nearby sizes are padded to the same: a few large batches take less time than many.
+_SIZES = (1, 2, 3, 5, 7, 8, 11, 13)
+
+
+@cache
+def _size(k: int) -> int:
+    return next((s for s in _SIZES if s >= k), k)
+
+
+def _score_batch(
+    engine: Engine, levels: list[Level], families: list[list[Variant]], k: int, already: float
+) -> dict[Variant, tuple[float, float, int]]:
+    """Of variants with up to k coefficients each, word by word: log evidence, scale and level that
+    contribute most."""
+    table = Table(engine, levels, [_stack(engine, tuple(f), k) for f in families], already)
+    table.look()
+    table.limit()
+    batch = [v for family in families for v in family]
+    flat = table.logs.transpose(1, 0, 2).reshape(len(batch), -1)
+    number = table.logs.shape[2]
+    total = (logsumexp(flat) - np.log([len(v.scales) for v in batch])).tolist()
+    return {
+        v: (t, v.scales[b % number], b // number)
+        for v, t, b in zip(batch, total, flat.argmax(axis=1).tolist(), strict=True)
+    }
+
+
+def _stack(engine: Engine, family: tuple[Variant, ...], k: int) -> Stack:
+    """Of a word's variants, padded to k coefficients. Made once: families come again with every
+    effect that is added."""
+    if family not in engine.stacks:
+        columns = np.array([v.columns + v.columns[:1] * (k - len(v.columns)) for v in family])
+        root, share = np.zeros((*columns.shape, k)), np.zeros(columns.shape)
+        scales = np.zeros((len(family), max(len(v.scales) for v in family)))
+        for i, v in enumerate(family):
+            own = len(v.columns)
+            root[i, :own, :own], share[i, :own] = v.root, imperfect(v)
+            scales[i, : len(v.scales)] = v.scales
+        plain = np.swapaxes(root, 1, 2) @ mean_squares(engine, columns, share) @ root
+        limits = Limits.of(family, k)
+        engine.stacks[family] = Stack(columns, root, scales, plain, limits, engine.alike(columns))
+    found: Stack = engine.stacks[family]
+    return found
+
+
+def mean_squares(engine: Engine, columns: Ints, share: Array) -> Array:
+    """(v, k, k): mean square response (m^2) of the coefficients of variants with the columns
+    (v, k), without the datum of each setup; of what is linear only the part that counts as
+    imperfect, share (v, k)."""
+    weight = engine.bench.rows.weight
+    used, place = np.unique(columns, return_inverse=True)
+    moved = engine.bench.rows.moved(engine.responses(used))
+    moved *= np.sqrt(weight / weight.sum())[:, None]
+    squares = squares_of(moved.T, place.reshape(columns.shape))
+    return np.asarray(squares * share[:, :, None] * share[:, None, :])
+
+
+def imperfect(variant: Variant) -> Array:
+    """(k,) how imperfect what each coefficient does is, against the laws of mechanisms: what is
+    linear is exact, a spring beside friction as well."""
+    exact = LAW_IMPERFECTION / IMPERFECTION
+    share = np.full(len(variant.columns), exact if variant.word in LINEAR else 1.0)
+    if variant.info.get("other_springs"):
+        share[-1] = exact
+    return share
+
+
+def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float) -> Level:
+    """The level with an effect of fixed scale integrated out as well."""
+    c = np.array(columns)
+    T = scale * root
+    beside = level.beside(columns) - level.taken[:, c].T @ level.taken
+    factor = factor_of(np.eye(len(c)) + T.T @ beside[:, c] @ T)
+    turn = np.linalg.solve(factor, T.T)
+    cross, left = turn @ beside, turn @ level.moment[c]
+    return replace(
+        level,
+        moment=level.moment - cross.T @ left,
+        log_base=level.log_base + 0.5 * float(left @ left) - float(np.log(np.diag(factor)).sum()),
+        misfit=level.misfit - float(left @ left),
+        taken=np.vstack([level.taken, cross]),
+    )
+
+
+def logsumexp(values: Array) -> Array:
+    """log of the sum of exp(values) along the last axis. That of scipy.special (1.17) takes four
+    times as long for tables as small as these, and a diagnosis asks 500 times."""
+    top = values.max(axis=-1, keepdims=True)
+    return np.asarray(top[..., 0] + np.log(np.exp(values - top).sum(axis=-1)))
+
+
+def log_mean(values: list[float], weights: list[float] | None = None) -> float:
+    """log of the (weighted) mean of exp(values)."""
+    v = np.array(values)
+    w = np.ones(len(v)) if weights is None else np.array(weights)
+    top = v[w > 0].max()
+    v = np.minimum(v, top)  # what weighs nothing decides nothing
+    return float(top + np.log(np.sum(w * np.exp(v - top)) / w.sum()))
+
+
+def by_word(scored: list[Scored]) -> dict[str, list[Scored]]:
+    """Word -> its variants."""
+    out: dict[str, list[Scored]] = {}
+    for s in scored:
+        out.setdefault(s.variant.word, []).append(s)
+    return out
+
+
+def marginal(scored: list[Scored]) -> float:
+    """log evidence of a word: mean over its variants, weighted by their prior."""
+    weights = [s.variant.prior for s in scored]
+    values = [s.log_evidence - log(s.variant.prior) for s in scored]
+    return log_mean(values, weights)
+
+
+def closest(scored: list[Scored]) -> Scored:
+    """Of the shapes of a word that are about equally likely, the one that needs least
+    imperfection: a word is judged by how well it can explain, not by its crudest shape."""
+    best = max(s.log_evidence for s in scored)
+    near = [s for s in scored if s.log_evidence > best - _ABOUT_EQUAL]
+    return min(near, key=lambda s: (s.level, -s.log_evidence))
+
+
+_ABOUT_EQUAL = 3.0  # nats

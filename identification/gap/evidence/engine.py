@@ -1,0 +1,367 @@
+"""Exact evidence of linear Gaussian models, for a whole library at once.
+
+Data whitened by their noise, `y = B beta + E w + imperfection + noise`, all Gaussian. The
+imperfection of a model (no formula is the rig) has a size eta on a grid of levels:
+- repeatable: an unknown smooth function of setup, branch and force step, standard deviation eta;
+- per run: a smooth function of branch and force of each run's own, 0.6 eta (memory makes a law's
+  mistakes differ from run to run, but alike along one);
+- per hold: each hold off by 0.3 eta; within holds: every row off by 0.3 eta more than its noise;
+- joint readings: each hold off by eta over the joint's lever.
+For every level the base (with the repeatable part) is integrated out of the products of the pool
+(`products`); then the evidence of any set of columns with prior covariance `s^2 T T^T` costs one
+small eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.data import UNLOADING, Array, Flags, Ints
+from identification.gap.evidence.factor import factor_of
+from identification.gap.evidence.imperfection import LOG_STEP, STEP
+from identification.gap.evidence.products import Gathered, Some, Weights, White
+from identification.gap.model.base import Base
+from identification.gap.model.bench import Bench
+from identification.gap.model.growing import Growing
+from identification.gap.recording.rows import Rows
+from identification.gap.recording.turns import rises
+
+RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
+_CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
+_NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
+_AT_ONCE = 500_000  # numbers: what they take stays near the processor
+LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Pool and data with the base integrated out, for one size of imperfection eta (m), the
+    `number`th of its engine.
+
+    moment (p,): of the pool; log_base: evidence of the base alone, nats; misfit: square of what is
+    left of the target, in units of the noise. taken (r, p): what effects that were integrated out
+    as well take from the Gram matrix, `gram - taken' taken`; no full matrix is ever made.
+    """
+
+    engine: Engine
+    number: int
+    eta: float
+    moment: Array
+    log_base: float
+    misfit: float
+    taken: Array
+
+    def square(self, columns: Sequence[int]) -> Array:
+        """(k, k) part of the pool's Gram matrix of columns (k,), but for what was taken."""
+        return np.asarray(self.engine.square(tuple(columns))[self.number])
+
+    def beside(self, columns: Sequence[int]) -> Array:
+        """(k, p) rows of the pool's Gram matrix of columns (k,), but for what was taken."""
+        return self.engine.beside(tuple(columns), self.number + 1)[self.number]
+
+
+class Engine:
+    """Evidence for the pool of one bench; `levels[i].eta` ascending, the first is 0."""
+
+    def __init__(self, bench: Bench, base: Base, target: Array, etas: Array) -> None:
+        """target: stacked observation minus the simulation's prediction."""
+        self.bench, self.base, self.target, self.etas = bench, base, target, etas
+        self.sigma = bench.sigma
+        self.cache: dict[object, Array] = {}
+        self.stacks: dict[object, Any] = {}  # of variants that are compared again and again
+        self.limits: dict[object, Any] = {}
+        self.structural = structural_rms(bench, base, target)
+        self.most = _variance(bench)
+        n = bench.rows.n
+        self._edges = bench.rows.edges
+        self._inverse = 1 / self.sigma[:n]
+        self._length_u = np.sqrt(np.add.reduceat(self._inverse**2, self._edges))
+        self._length_q = 1 / self.sigma[bench.layout.q]
+        counts = np.diff(np.append(self._edges, n))
+        self._hold = np.repeat(np.arange(len(self._edges)), counts)
+        self._alone = counts[self._hold] == 1
+        inside = np.flatnonzero(~self._alone)
+        self._inside = inside[np.argsort(self.sigma[inside], kind="stable")]
+        self._groups = _groups(self.sigma[self._inside])
+        self._freedom = n - len(self._edges)
+        self._squares: dict[tuple[int, ...], Array] = {}
+        self._rows: dict[tuple[int, ...], list[Array]] = {}
+        self._weights = [self._left(float(eta)) for eta in etas]
+        self._first = self._whiten(np.column_stack([target, base.columns]))
+        self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
+        self._bases = self._integrated(etas, self._weights)
+        self._finer: dict[float, tuple[Weights, _Integrated]] = {}
+        self._gathered = Gathered(self._whiten(self.columns([])))
+        none = np.zeros(0)
+        self.levels = [
+            Level(self, i, float(eta), none, b.log_base, b.misfit, np.zeros((0, 0)))
+            for i, (eta, b) in enumerate(zip(etas, self._bases, strict=True))
+        ]
+        self.extend()
+
+    def extend(self) -> None:
+        """Takes in the columns that were put into the bench's pool since."""
+        added = range(len(self._gathered.white), len(self.bench.columns))
+        if not added:
+            return
+        step = max(1, _AT_ONCE // self.bench.layout.size)
+        blocks = [added[i : i + step] for i in range(0, len(added), step)]
+        parts = [self._whiten(self.columns(block)) for block in blocks]
+        beside = [
+            np.hstack(b) for b in zip(*(self._common(p, self._weights) for p in parts), strict=True)
+        ]
+        self.levels = [self._grown(*each) for each in zip(self.levels, beside, strict=True)]
+        self._gathered.put(parts)
+
+    def columns(self, numbers: Iterable[int]) -> Array:
+        """(size, k) stacked columns of the pool."""
+        wanted = [self.bench.columns[i] for i in numbers]
+        return np.array(wanted).reshape(len(wanted), self.bench.layout.size).T
+
+    def responses(self, numbers: Iterable[int]) -> Array:
+        """(n, k) what columns of the pool do to the response."""
+        n, wanted = self.bench.rows.n, [self.bench.columns[i] for i in numbers]
+        return np.array([column[:n] for column in wanted]).reshape(len(wanted), n).T
+
+    def alike(self, columns: NDArray[np.intp]) -> Array:
+        """(g, v, k, k): what `squares` of the columns (v, k) has in common at all levels."""
+        return self._gathered.white.alike(columns)
+
+    def squares(self, columns: NDArray[np.intp], number: int, alike: Array) -> Array:
+        """(v, k, k): parts of a level's Gram matrix of the columns (v, k) of every variant."""
+        shared = self._bases[number].pool.values[columns]
+        made = self._gathered.white.squares(columns, self._weights[number], alike)
+        return np.asarray(made - shared @ np.swapaxes(shared, 1, 2))
+
+    def square(self, columns: tuple[int, ...]) -> Array:
+        """(l, k, k): per level the part of the Gram matrix of some columns, kept for the next
+        time."""
+        if columns not in self._squares:
+            at = np.array(columns, dtype=np.intp)
+            white = self._gathered.white.picked(at)
+            made = np.array(white.between(white, self._weights))
+            for k, base in enumerate(self._bases):
+                shared = base.pool.values[at]
+                made[k] -= shared @ shared.T
+            self._squares[columns] = made
+        return self._squares[columns]
+
+    def beside(self, columns: tuple[int, ...], number: int) -> list[Array]:
+        """Per level, of the first `number` at least, (k, p): rows of the Gram matrix, kept for the
+        next time; of a pool that has grown only what is new. Those of many levels at once take
+        little longer than of one."""
+        known = self._rows.setdefault(columns, [])
+        if known and len(known[0].T) < len(self._gathered.white):
+            fresh = self._products(columns, slice(len(known)), len(known[0].T))
+            known[:] = [np.hstack(both) for both in zip(known, fresh, strict=True)]
+        if len(known) < number:
+            known += self._products(columns, slice(len(known), number), 0)
+        return known
+
+    def _products(self, columns: tuple[int, ...], levels: slice, start: int) -> list[Array]:
+        """Per level (k, p - start): products of columns (k,) with those of the pool from one on."""
+        at, white = np.array(columns, dtype=np.intp), self._gathered.white
+        others = white.picked(np.arange(start, len(white))) if start else white
+        made = white.picked(at).between(others, self._weights[levels])
+        for base, rows in zip(self._bases[levels], made, strict=True):
+            np.subtract(rows, base.pool.values[at] @ base.pool.values[start:].T, out=rows)
+        return made
+
+    def between(self, eta: float, columns: Sequence[int]) -> tuple[Array, Array, float]:
+        """For an imperfection that is none of the levels: Gram matrix (k, k) and moment (k,) of
+        columns of the pool, and the evidence of the base alone."""
+        if eta not in self._finer:
+            w = self._left(eta)
+            self._finer[eta] = w, self._integrated([eta], [w])[0]
+        w, base = self._finer[eta]
+        if not columns:
+            return np.zeros((0, 0)), np.zeros(0), base.log_base
+        white = self._gathered.white.picked(np.array(columns, dtype=np.intp))
+        (beside,) = self._common(white, [w])
+        shared = base.turn @ beside[1 : 1 + base.turn.shape[1]]
+        square = white.between(white, [w])[0] - shared.T @ shared
+        return square, beside[0] - shared.T @ base.left, base.log_base
+
+    def _whiten(self, columns: Array) -> White:
+        n, q = self.bench.rows.n, self.bench.layout.q
+        white = np.ascontiguousarray(columns.T) / self.sigma
+        response, inverse = white[:, :n], self._inverse
+        means = np.add.reduceat(response * inverse, self._edges, axis=1) / self._length_u
+        direction = inverse / self._length_u[self._hold]
+        contrast = (response - direction * means[:, self._hold])[:, self._inside]
+        # most columns stand still within a hold
+        size = np.abs(contrast).max(axis=1, initial=0.0)
+        top = np.abs(response).max(axis=1, initial=0.0)
+        contrast[size <= 1e-9 * (1 + top)] = 0.0
+        holds = len(self._edges)
+        readings = tuple(
+            Some.of(white[:, start : start + holds]) for start in range(q.start, q.stop, holds)
+        )
+        even = np.hstack([means, white[:, q.stop :]])
+        return White(even, readings, Some.of(contrast), holds, self._groups)
+
+    def _left(self, eta: float) -> Weights:
+        """What an imperfection leaves of the precision."""
+        hold = self.bench.noise.hold[self._edges] ** 2 + (hold_part(self.bench.rows) * eta) ** 2
+        lever = (eta / LEVER_M) ** 2 if self.bench.data.arm else 0.0
+        return Weights(
+            1 / (1 + hold * self._length_u**2),
+            1 / (1 + lever * self._length_q**2),
+            1 / (1 + (ROW_PART * eta / self.sigma[self._inside]) ** 2),
+        )
+
+    def _common(self, white: White, weights: list[Weights]) -> list[Array]:
+        """Per set of weights (c, p): products with target, base and repeatable imperfection."""
+        first, second = self._first.between(white, weights), self._second.sparsely(white, weights)
+        return [np.vstack(both) for both in zip(first, second, strict=True)]
+
+    def _integrated(self, etas: Iterable[float], weights: list[Weights]) -> list[_Integrated]:
+        """Base and repeatable imperfection, integrated out of target and, later, of the pool."""
+        first, second = (self._common(white, weights) for white in (self._first, self._second))
+        return [
+            self._integrate(eta, w, np.hstack(both))
+            for eta, w, *both in zip(etas, weights, first, second, strict=True)
+        ]
+
+    def _integrate(self, eta: float, w: Weights, gram: Array) -> _Integrated:
+        """gram: products of target, base and imperfection with each other."""
+        from scipy.linalg import solve_triangular
+
+        kb = self.base.columns.shape[1]
+        covariance = level_covariance(self.bench)
+        levels = covariance.shape[0]
+        count = gram.shape[0] - 1 - kb if eta > 0 else 0
+        root = np.zeros((kb + count, kb + count))
+        root[:kb, :kb] = np.diag(self.base.sd)
+        if count:
+            root[kb : kb + levels, kb : kb + levels] = eta * np.linalg.cholesky(covariance)
+            root[kb + levels :, kb + levels :] = RUN_PART * eta * np.eye(count - levels)
+        b = slice(1, 1 + kb + count)
+        factor = factor_of(np.eye(kb + count) + root.T @ gram[b, b] @ root)
+        turn = np.asarray(solve_triangular(factor, root.T, lower=True, check_finite=False))
+        left = turn @ gram[b, 0]
+        share = self._freedom / max(len(w.contrast), 1)
+        log_noise = -0.5 * (np.log(w.hold).sum() + np.log(w.q).sum())
+        log_noise -= 0.5 * share * np.log(w.contrast).sum()
+        misfit = float(gram[0, 0] - left @ left)
+        log_base = float(-0.5 * misfit - np.log(np.diag(factor)).sum() - log_noise)
+        none = Growing(np.zeros((0, kb + count)))
+        return _Integrated(turn, left, log_base, misfit, none)
+
+    def _grown(self, level: Level, beside: Array) -> Level:
+        """A level with further columns, of which the products (c, p) with its base are known."""
+        i = level.number
+        base = self._bases[i]
+        fresh = base.turn @ beside[1 : 1 + base.turn.shape[1]]
+        moment = beside[0] - fresh.T @ base.left
+        base.pool.put([fresh.T])
+        both = np.concatenate([level.moment, moment])
+        return replace(level, moment=both, taken=np.zeros((0, len(both))))
+
+
+_FEW = 8  # kinds of rows
+
+
+def hold_part(rows: Rows) -> float:
+    """Share of an imperfection that a hold, or a stretch of a running recording, has to itself."""
+    return _CONTINUOUS_HOLD_PART if rows.continuous else HOLD_PART
+
+
+def _groups(noise: Array) -> tuple[slice, ...]:
+    """Rows in ascending order of their noise whose noise is the same; none where hardly any is."""
+    edges = np.flatnonzero(np.diff(noise) > 1e-12 * noise[1:]) + 1
+    if len(edges) >= _FEW:
+        return ()
+    return tuple(slice(a, b) for a, b in pairwise([0, *edges.tolist(), len(noise)]) if a < b)
+
+
+@dataclass(frozen=True, eq=False)
+class _Integrated:
+    """Turn (k, k): the prior root of base and imperfection over the Cholesky factor of their
+    precision, `L^-1 root^T`; what the target (k,) and the pool (p, k) share with them, evidence of
+    the base alone, and its misfit (as of a `Level`)."""
+
+    turn: Array
+    left: Array
+    log_base: float
+    misfit: float
+    pool: Growing
+
+
+def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
+    """0, then sizes of imperfection by factors of `STEP`, from half the stated uncertainty to the
+    size of what the base leaves."""
+    start = 0.5 * bench.noise.stated
+    left = structural_rms(bench, base, target)
+    count = max(3, int(np.ceil(np.log(max(1.5 * left / start, 1.0)) / LOG_STEP)) + 1)
+    return np.concatenate([[0.0], start * STEP ** np.arange(count)])
+
+
+def structural_rms(bench: Bench, base: Base, target: Array) -> float:
+    """rms (m) of the response that the base alone leaves at its best."""
+    n, sigma = bench.rows.n, bench.sigma
+    A = base.columns * base.sd / sigma[:, None]
+    beta = base.sd * np.linalg.solve(A.T @ A + np.eye(len(base.sd)), A.T @ (target / sigma))
+    return bench.rows.rms((target - base.columns @ beta)[:n])
+
+
+def _variance(bench: Bench) -> float:
+    """Mean square (m^2) of the response about its mean per setup: a law that does more, as what
+    yields far beyond its threshold on an imposed path, is no further off for that."""
+    return bench.rows.rms(bench.rows.moved(bench.response[:, None])[:, 0]) ** 2
+
+
+def level_columns(bench: Bench) -> Array:
+    """Indicator of every level, response only, (size, levels)."""
+    rows = bench.rows
+    out = np.zeros((bench.layout.size, int(rows.level.max()) + 1))
+    out[np.arange(rows.n), rows.level] = 1.0
+    return out
+
+
+_HATS = 4  # of a run's own imperfection, over its range of load
+
+
+def run_columns(bench: Bench) -> Array:
+    """Hat functions of the load for every run and sense of loading, response only, (size, k);
+    none where no run is there twice, or the rig runs on and on."""
+    rows = bench.rows
+    runs = np.unique(rows.run)
+    if rows.continuous or len(runs) <= len(bench.data.setups):
+        return np.zeros((bench.layout.size, 0))
+    out = []
+    for run in runs:
+        mine = rows.run == run
+        low, high = float(bench.load[mine].min()), float(bench.load[mine].max())
+        at = (bench.load - low) / ((high - low) or 1.0) * (_HATS - 1)
+        for back in (False, True):
+            here = mine & ((rows.branch == UNLOADING) == back)
+            for k in range(_HATS) if here.any() else ():
+                out.append(bench.stacked(np.where(here, np.maximum(0.0, 1 - np.abs(at - k)), 0.0)))
+    return np.column_stack(out)
+
+
+def level_covariance(bench: Bench) -> Array:
+    """(levels, levels) of the imperfection at the levels of a bench, of unit variance."""
+    rows = bench.rows
+    count = int(rows.level.max()) + 1
+    sums = np.bincount(rows.level, minlength=count)
+    load = np.bincount(rows.level, weights=bench.load, minlength=count) / sums
+    first = np.unique(rows.level, return_index=True)[1]
+    setup = rows.setup[first]
+    branch = (rises(bench.load) if rows.continuous else rows.branch)[first]
+    return alike(setup, branch, load, float(np.ptp(bench.load)))
+
+
+def alike(setup: Ints, branch: Ints | Flags, load: Array, span: float) -> Array:
+    """(k, k) covariance of what goes wrong at levels: unit variance, `exp(-|dF| / a quarter of the
+    range)`, a path that may have corners; half so between branches, none between setups."""
+    near = np.exp(-np.abs(load[:, None] - load) / (_NEIGHBOUR * (span or 1.0)))
+    branches = np.where(branch[:, None] == branch, 1.0, 0.5)
+    return np.asarray(near * branches * (setup[:, None] == setup) + 1e-9 * np.eye(len(load)))

@@ -1,0 +1,80 @@
+"""How well laws meet real mechanisms: the prior of the size of an explanation's imperfection.
+
+A family of shapes meets a mechanism to a few percent of its size (`IMPERFECTION`, log-normal, by a
+factor of 2.5 from case to case), none closer than a hundredth. In the evidence the size eta is on a
+grid of levels (`identification.gap.evidence.engine.eta_levels`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.data import Array
+
+IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a real mechanism
+# Elasticity, gains and leverage are laws, not families, and as exact as the springs of the base,
+# which count as exact: to a thousandth of their size.
+LAW_IMPERFECTION = 0.002
+LEAST_IMPERFECTION = 0.01
+# Of what a lag does at a reading of a hold: it repeats a path between levels that hands took and
+# nobody saw. Who turns a third of a step in a fifth of the time, in several strokes, is so far off.
+PATH = 0.4
+STEP = 2.5  # of the grid: from one level to the next
+LOG_STEP = float(np.log(STEP))
+_SPREAD = np.log(2.5)  # by which factor that varies from case to case (one sd)
+
+
+def level_prior(etas: Array, i: int, energy: float) -> float:
+    """log prior of level i for an explanation of that mean square (m^2)."""
+    return float(log_level(etas, i, np.array(energy)))
+
+
+def level_priors(etas: Array, energy: Array) -> Array:
+    """(l,) the same of every level; energy (l,): mean square (m^2) of the explanation at each."""
+    return np.array([level_prior(etas, i, float(e)) for i, e in enumerate(energy)])
+
+
+def log_level(etas: Array, i: int, energy: Array) -> Array:
+    """The same for many. Levels are bins of log eta; the lowest takes all below."""
+    from scipy.special import ndtr
+
+    centre = _centre(energy)
+    lower, upper = _edge(etas, i - 1), _edge(etas, i)
+    p = ndtr((upper - centre) / _SPREAD) - ndtr((lower - centre) / _SPREAD)
+    # no mechanism of a real rig follows a formula closer than that
+    short = centre + _FLOOR - (upper if upper < np.inf else 1e9)
+    return np.asarray(np.log(np.maximum(p, _LEAST_SHARE)) - 300.0 * np.maximum(short, 0.0))
+
+
+def log_share(etas: Array, edges: Array, energy: float) -> Array:
+    """log prior (n,) of sizes between neighbouring edges (n + 1,) of log eta, for an explanation of
+    that mean square (m^2)."""
+    from scipy.special import ndtr
+
+    centre, least = _centre(np.array(energy)), least_size(etas, energy)
+    p = np.diff(ndtr((np.maximum(edges, least) - centre) / _SPREAD))
+    return np.asarray(np.log(np.maximum(p, np.where(edges[1:] > least, 1e-15, 1e-300))))
+
+
+def least_size(etas: Array, energy: float) -> float:
+    """log of the least size that counts: the lower edge of the level that has the least
+    imperfection in it. Explanations of about the same size are held to the same."""
+    floor = float(_centre(np.array(energy))) + _FLOOR
+    return next(_edge(etas, i - 1) for i in range(len(etas)) if floor <= _edge(etas, i))
+
+
+def _centre(energy: Array) -> Array:
+    return np.asarray(0.5 * np.log(IMPERFECTION**2 * np.maximum(energy, 0.0) + 1e-300))
+
+
+_LEAST_SHARE = 1e-12
+_FLOOR = float(np.log(LEAST_IMPERFECTION / IMPERFECTION))
+
+
+def _edge(etas: Array, i: int) -> float:
+    """log of the edge between level i and the next: midway. Below the least size, which follows 0,
+    half a step of the grid, which may be of every other level only."""
+    if i < 0 or i >= len(etas) - 1:
+        return -np.inf if i < 0 else np.inf
+    step = etas[2] / etas[1] if len(etas) > 2 else STEP
+    return float(0.5 * np.log((etas[i] if i else etas[1] / step) * etas[i + 1]))

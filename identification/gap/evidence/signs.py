@@ -1,0 +1,154 @@
+"""What it costs that coefficients keep the limits physics sets: log of the share of the posterior
+that does, over that of the prior.
+
+The first limit, on a sum of coefficients, has its exact share of the normal distribution. Further
+ones (single coefficients above zero, a place within its play) count as independent, but together
+with the first never for more than the half-space nearest to the mean that holds both: a convex set
+at Mahalanobis distance d has at most the share Phi(-d). Where only the sum of two is known, one may
+not turn negative to pay for the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.gap.data import Array, Flags, Ints
+from identification.gap.model.variants import Variant
+
+_TINY, _LOG_2 = 1e-300, log(2)
+_NEAR = 1 - 1e-9  # as correlated as two may be
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Of v variants with k coefficients w: rows (v, m, k), `rows w > 0` where asked (v, m), but for
+    the first, `rows[0] w > least` (v,)."""
+
+    rows: Array
+    least: Array
+    asked: Flags
+
+    @classmethod
+    def of(cls, variants: Sequence[Variant], k: int | None = None) -> Limits:
+        """k: coefficients, where that is more than any of them has."""
+        k = k or max(len(v.columns) for v in variants)
+        most = max(0 if v.positive is None else sum(v.each) + len(v.within) for v in variants)
+        rows = np.zeros((len(variants), 1 + most, k))
+        asked = np.zeros(rows.shape[:2], dtype=bool)
+        for v, mine, mine_asked in zip(variants, rows, asked, strict=True):
+            if v.positive is None:
+                continue
+            own, alone = len(v.columns), np.flatnonzero(v.each)
+            mine[0, :own] = v.positive
+            mine[1 + np.arange(len(alone)), alone] = 1.0
+            mine[1 + len(alone) : 1 + len(alone) + len(v.within), :own] = v.within
+            mine_asked[: 1 + len(alone) + len(v.within)] = True
+        return cls(rows, np.array([v.least for v in variants]), asked)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Limits]) -> Limits:
+        """The variants of all parts, one after the other."""
+        return cls(
+            padded([part.rows for part in parts]),
+            np.concatenate([part.least for part in parts]),
+            padded([part.asked for part in parts]),
+        )
+
+
+def padded(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """(v, m, ...) of all parts (v_i, m_i, ...), one after the other; zero where a part is narrower
+    than the widest. np.pad would take five times as long."""
+    most = max(part.shape[1] for part in parts)
+    first = parts[0]
+    out = np.zeros((sum(map(len, parts)), most, *first.shape[2:]), dtype=first.dtype)
+    at = 0
+    for part in parts:
+        out[at : at + len(part), : part.shape[1]] = part
+        at += len(part)
+    return out
+
+
+def log_odds(limits: Limits, which: Ints, before: Array, sums: Array, roots: Array) -> Array:
+    """(n,) for variants which (n,): sums (n, m), what `rows w` is at the mean of the coefficients,
+    of covariance `roots roots'`, roots (n, m, r); before (n,): standard deviation of the first sum
+    in the prior."""
+    from scipy.special import log_ndtr
+
+    asked, centre = limits.asked[which], sums.copy()
+    centre[:, 0] -= limits.least[which]
+    variance = np.where(asked, np.einsum("nmr,nmr->nm", roots, roots) + _TINY, 1.0)
+    z = centre / np.sqrt(variance)
+    share = log_ndtr(-limits.least[which] / (before + _TINY))
+    out = np.where(asked[:, 0], log_ndtr(z[:, 0]) - share, 0.0)
+    wrong = (z[:, 1:] < 0) & asked[:, 1:]  # the right side of a limit costs nothing
+    alone = np.zeros(wrong.shape)
+    alone[wrong] = log_ndtr(z[:, 1:][wrong]) - np.log(0.5)
+    out += alone.sum(axis=1)
+    far = np.flatnonzero((wrong.any(axis=1) | (z[:, 0] < 0)) & asked[:, 0])
+    if far.size and wrong.shape[1]:
+        first, more = (centre[far, :1], variance[far, :1]), (centre[far, 1:], variance[far, 1:])
+        common = np.einsum("nr,nmr->nm", roots[far, 0], roots[far, 1:])
+        apart = np.where(asked[far, 1:], _distance(*more, *first, common), 0.0).max(axis=1)
+        bound = np.where(apart > 0, log_ndtr(-apart) - share[far], np.inf)
+        out[far] = np.minimum(out[far], bound)
+    return np.asarray(out)
+
+
+def log_odds_together(limits: Limits, which: Ints, sums: Array, roots: Array) -> Array:
+    """(n,) what the same can't exceed by all limits at once; inf where it is not worth a look: one
+    that is wrong may be set right by others that are then far off."""
+    asked, centre = limits.asked[which], sums.copy()
+    centre[:, 0] -= limits.least[which]
+    size = np.where(asked, np.linalg.norm(roots, axis=2) + _TINY, 1.0)
+    z, unit = centre / size, roots / size[:, :, None]
+    out = np.full(len(z), np.inf)
+    wrong = np.any((z < 0) & asked, axis=1)
+    for i in np.flatnonzero(wrong & (asked.sum(axis=1) > 1)):
+        out[i] = _largest(z[i, asked[i]], unit[i, asked[i]])
+    return out
+
+
+def all_kept(limits: Sequence[tuple[Array, Array]]) -> float:
+    """log of the largest share that several limits may have together, over the least that they had
+    in the prior, where all were independent: sums (m,) to be positive, and their roots (m, r)."""
+    sums, roots = (np.concatenate(each) for each in zip(*limits, strict=True))
+    size = np.linalg.norm(roots, axis=1) + _TINY
+    return _largest(sums / size, roots / size[:, None])
+
+
+def _largest(z: Array, unit: Array) -> float:
+    """The same of sums (m,) in standard deviations, with roots (m, r) of their correlations."""
+    from scipy.special import log_ndtr
+
+    return float(log_ndtr(-distance(z, unit))) + len(z) * _LOG_2
+
+
+def distance(z: Array, unit: Array) -> float:
+    """Mahalanobis distance of a mean from where all its sums z (m,) are positive. The
+    least-distance problem of Lawson and Hanson (Solving Least Squares Problems, 1974, chapter
+    23)."""
+    from scipy.optimize import nnls
+
+    m, r = unit.shape
+    both, last = np.empty((r + 1, m)), np.zeros(r + 1)
+    both[:-1], both[-1], last[-1] = unit.T, -z, 1.0
+    left = both @ nnls(both, last)[0] - last
+    return float(np.sqrt(left[:-1] @ left[:-1])) / max(float(-left[-1]), _TINY)
+
+
+def _distance(a: Array, aa: Array, b: Array, bb: Array, ab: Array) -> Array:
+    """Mahalanobis distance of means a, b with variances aa, bb and covariance ab from where both
+    are positive."""
+    most = _NEAR * np.sqrt(aa * bb)
+    ab = np.clip(ab, -most, most)
+    corner = (a**2 * bb - 2 * a * b * ab + b**2 * aa) / (aa * bb - ab**2)
+    square = np.where((a < 0) & (b - ab / aa * a >= 0), a**2 / aa, corner)
+    square = np.where((b < 0) & (a - ab / bb * b >= 0), b**2 / bb, square)
+    square = np.where((a >= 0) & (b >= 0), 0.0, square)
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))

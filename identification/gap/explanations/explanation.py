@@ -1,0 +1,232 @@
+"""An explanation: effects with what they leave of the gap, its evidence and its prior."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import log
+
+import numpy as np
+
+from identification.gap.data import Array
+from identification.gap.evidence.compare import condition
+from identification.gap.evidence.engine import Engine, Level
+from identification.gap.evidence.imperfection import level_prior, level_priors
+from identification.gap.evidence.parts import (
+    Part,
+    Sizes,
+    energies,
+    log_joints,
+    mended,
+    needed,
+    part_sizes,
+    signs_kept,
+)
+from identification.gap.explanations.penalties import (
+    TOE_AND_KNEE,
+    cancelling,
+    pettiness,
+    straight,
+    trifle,
+    within_stated,
+)
+from identification.gap.explanations.priors import prior_of
+from identification.gap.words import CURVES, FRICTION, LINEAR
+
+# An explanation must leave less than this share of the gap (rms), with two effects half of it and
+# so on: the more words are spent, the better they have to explain.
+REMAINDER = 0.25
+SOFT = 8.0  # how fast, per factor e beyond that, it loses what it explains to `unknown`
+# Nor can a law be met better than to a few percent of what it does, where that is no more than such
+# a share of the gap: effects that cancel each other explain nothing.
+LAW_REMAINDER = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """Effects (largest first, none for the base alone), posterior weight as log, imperfection eta
+    m, sizes (rms m) of the effects, and log share of the posterior with little remainder."""
+
+    parts: tuple[Part, ...]
+    log_weight: float
+    eta: float
+    sizes: tuple[float, ...]
+    log_good: float
+
+    def sized(self, sizes: Iterable[float]) -> Explanation:
+        """With other sizes (rms m) of its effects, the largest first."""
+        each = list(sizes)
+        order = _order(self.parts, each)
+        return replace(self, parts=tuple(self.parts[i] for i in order),
+                       sizes=tuple(float(each[i]) for i in order))  # fmt: skip
+
+    @property
+    def good(self) -> bool:
+        """It leaves little enough."""
+        return self.log_good > self.log_weight - log(2)
+
+    @cached_property
+    def words(self) -> frozenset[str]:
+        """Names of its effects."""
+        return frozenset(p.word for p in self.parts)
+
+    @cached_property
+    def troubles(self) -> dict[str, float]:
+        """Word -> rms m of what it does in all its joints together, the largest first."""
+        return _together(self.parts, self.sizes)
+
+
+def _order(parts: tuple[Part, ...], sizes: Sequence[float] | Array) -> list[int]:
+    """The effects that do most in all their joints together first."""
+    whole = _together(parts, sizes)
+    return sorted(range(len(parts)), key=lambda i: (-whole[parts[i].word], -sizes[i]))
+
+
+def _together(parts: tuple[Part, ...], sizes: Iterable[float]) -> dict[str, float]:
+    squares: dict[str, float] = {}
+    for p, size in zip(parts, sizes, strict=True):
+        squares[p.word] = squares.get(p.word, 0.0) + float(size) ** 2
+    return {w: s**0.5 for w, s in sorted(squares.items(), key=lambda i: -i[1])}
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """What an unknown gap looks like. kind: slopes, swings, waves, rough or jumps; of a recording
+    that runs on jerks, damage, softening or wanders; period: s of a swing, m of a wave, None of
+    others; log_evidence: of the kind, nats; wanders: slopes that change within runs too."""
+
+    kind: str
+    period: float | None
+    log_evidence: float
+    wanders: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the search found: explanations (best first), evidence of the words alone (nats, against
+    none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
+    gap that no law explains, what share of its weight withheld data leave an explanation, and what
+    a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
+    that no word names, best first. foretold: words of an explanation -> one with fewer of its
+    effects that foretells withheld data better, and speaks for it."""
+
+    engine: Engine
+    explanations: tuple[Explanation, ...]
+    alone: dict[str, float]
+    probabilities: dict[str, float]
+    best: Explanation
+    unknown: float
+    unknown_eta: float
+    kept: Mapping[frozenset[str], float] = field(default_factory=dict)
+    looks_like: Likeness | None = None
+    nameless: tuple[Explanation, ...] = ()
+    foretold: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
+
+
+def explain(
+    engine: Engine, parts: tuple[Part, ...], log_evidence: float, taken: float | None = None
+) -> Explanation:
+    """The explanation with its prior; too small a part is charged as what it is: freedom of the
+    larger one's law. taken: mean square (m^2) that the evidence of the last part took all others to
+    have; left out: there are none."""
+    levels = engine.levels
+    bases = log_joints(engine, parts)
+    likeliest = int(bases.argmax())
+    sizes = part_sizes(engine, parts, likeliest)
+    each, energy = _counted(engine, parts, sizes, likeliest), sizes.energy
+    together = _together(parts, each)
+    logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
+    best = int(logs.argmax())
+    least = max(
+        0.6 * engine.bench.noise.stated,
+        REMAINDER * engine.structural / max(len(together), 1),
+        min(LAW_REMAINDER * float(each.max(initial=0.0)), REMAINDER * engine.structural),
+    )
+    good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
+    share = np.exp(logs - logs.max())
+    fraction = float(share @ good / share.sum())
+    order = _order(parts, each)
+    if taken is not None:
+        log_evidence += mended(engine, parts, taken, bases)
+    weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
+    weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
+    weight -= within_stated(engine, parts, sizes)
+    if len(parts) > 1:
+        weight -= pettiness(engine, parts, sizes) + cancelling(engine, parts, sizes, each)
+        weight += signs_kept(levels[best], parts)
+    return Explanation(
+        tuple(parts[i] for i in order),
+        weight,
+        levels[best].eta,
+        tuple(float(each[i]) for i in order),
+        weight + log(max(fraction, 1e-300)),
+    )
+
+
+def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) -> Array:
+    """Sizes of the parts. Without an arm friction brings its own mean stiffness, and what was
+    simulated may be its first slope: a spring that is off beside it counts by what the friction
+    leaves of the gap, and for less than the friction where it would move more than was measured
+    and the friction takes it back. A toe and a knee count as they move: what a spring would hide of
+    either, the other shows; but a ball on a plate is no toe, and goes on like a spring. Of an
+    imposed stroke creep, too, brings a mean stiffness, and what a spring leaves of either says
+    little: the larger is the one that the other can do less without; at one rate the friction, from
+    which creep differs in details only. Where most of the way is left when the load is gone, what
+    gives way is larger than any curve."""
+    if engine.bench.data.arm:
+        return sizes.gap
+    rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
+    curves = np.array([p.word in CURVES for p in parts], dtype=bool)
+    creeps = np.array([p.word == "joint_creep" for p in parts], dtype=bool)
+    if len(parts) == _PAIR and rubs.any():
+        if curves.any() and engine.bench.course.stays > _STAYS:
+            return _led(sizes.gap, int(rubs.argmax()))
+        if creeps.any() and engine.bench.course.one_rate:
+            return _led(sizes.gap, int(rubs.argmax()))
+        if creeps.any() and engine.bench.imposed:
+            return _led(sizes.gap, int(needed(engine, parts, level).argmax()))
+    goes_on = any(p.variant.info.get("goes_on") for p in parts)
+    if frozenset(p.word for p in parts) == TOE_AND_KNEE and not goes_on:
+        return sizes.moved
+    if not rubs.any():
+        return sizes.gap
+    linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
+    mine = float(sizes.gap[rubs].max())
+    rest = max(engine.structural**2 - mine**2, 0.0) ** 0.5
+    rest = np.where(sizes.moved**2 > engine.most, min(rest, _LESS * mine), rest)
+    return np.where(linear, np.minimum(sizes.gap, rest), sizes.gap)
+
+
+_LESS = 0.99
+_PAIR, _STAYS = 2, 0.5  # effects; of the way
+
+
+def _led(sizes: Array, first: int) -> Array:
+    """Sizes of two, of which the first one is the larger."""
+    return sizes if sizes.argmax() == first else sizes[::-1]
+
+
+def conditioned(
+    engine: Engine, parts: tuple[Part, ...], among: list[Level] | None = None
+) -> tuple[list[Level], float]:
+    """Levels (all of them, or some) with the parts integrated out, and the mean square (m^2) of
+    the parts at the likeliest of these."""
+    levels = engine.levels if among is None else among
+    for p in parts:
+        engine.beside(p.variant.columns, 1 + max(lv.number for lv in levels))  # all at once
+        levels = [condition(lv, p.variant.columns, p.variant.root, p.scale) for lv in levels]
+    if not parts:
+        return levels, 0.0
+    weights = np.array([lv.log_base for lv in levels])
+    return levels, part_sizes(engine, parts, int(weights.argmax())).energy
+
+
+def up_to_likeliest(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
+    """The same as `conditioned`, at levels up to the likeliest: with an effect more, no more
+    imperfection is needed. All levels where there are no parts."""
+    if not parts:
+        return conditioned(engine, parts)
+    energy = energies(engine, parts)
+    likeliest = int(np.argmax(log_joints(engine, parts) + level_priors(engine.etas, energy)))
+    return conditioned(engine, parts, engine.levels[: likeliest + 1])

@@ -1,0 +1,81 @@
+"""The same trouble in several joints: all gears of an arm rub, creep and bend, some more.
+
+A joint mechanism sits in one joint of a variant. Where that leaves what the same mechanism in
+another joint would do, the explanation takes both, as one word: one trouble, seen twice. Only the
+joint readings can tell that from a second mechanism, so nothing is looked for without them; but
+nothing else goes on as creep does while the load stands.
+"""
+
+from __future__ import annotations
+
+from identification.gap.evidence.compare import closest, marginal, score
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation, explain, up_to_likeliest
+from identification.gap.model.variants import Variant
+from identification.gap.words import IN_JOINTS
+
+MOST = 3  # joints of one word
+_BY_ITSELF = frozenset({"joint_creep"})
+# Nats that a joint more has to bring: the choice among the first one's shapes is not counted again.
+WORTH = 6.0
+_HOPELESS = 2000.0  # nats below, from which no other choice of shapes has been seen to come back
+
+
+def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> list[Variant]:
+    """Variants of a word that may stand beside other parts: not in a joint where it is already; and
+    what creeps more than in proportion in one joint does so in all."""
+    same = [p.variant.info for p in beside if p.word == word]
+    taken, bent = {i.get("joint") for i in same}, {bool(i.get("bent")) for i in same}
+    mine = (v for v in variants if v.word == word and v.info.get("joint", -1) not in taken)
+    return [v for v in mine if not bent or bool(v.info.get("bent")) in bent]
+
+
+def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+    """With its joint mechanisms in further joints, as far as that is worth it."""
+    bench = engine.bench
+    if not bench.data.arm:
+        return start
+    best = start
+    for word in sorted(start.words & (IN_JOINTS if bench.has_q else _BY_ITSELF)):
+        for _ in range(MOST - 1):
+            if best.eta <= bench.noise.stated:
+                break  # there is nothing left for another joint to do
+            found = _in_one_more(engine, variants, best, word)
+            if found is None or found.log_weight < best.log_weight:
+                break
+            best = found
+    return best
+
+
+def _in_one_more(
+    engine: Engine, variants: list[Variant], start: Explanation, word: str
+) -> Explanation | None:
+    others = [v for v in family_of(variants, word, start.parts) if "joint" in v.info]
+    if not others or any(p.word == word and "joint" not in p.variant.info for p in start.parts):
+        return None
+    levels, energy = up_to_likeliest(engine, start.parts)
+    scored = score(engine, levels, others, energy)
+    top = closest(scored)
+    parts = (*start.parts, Part(top.variant, top.scale))
+    found = explain(engine, parts, marginal(scored) - WORTH, energy)
+    if found.log_weight < start.log_weight - _HOPELESS:
+        return None
+    return polished(engine, variants, found)
+
+
+def polished(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+    """Lets every part choose its variant anew, the others given."""
+    best = start
+    for index in range(len(start.parts)):
+        rest = tuple(p for i, p in enumerate(best.parts) if i != index)
+        word = best.parts[index].word
+        levels, energy = up_to_likeliest(engine, rest)
+        scored = score(engine, levels, family_of(variants, word, rest), energy)
+        top = closest(scored)
+        again = WORTH * sum(p.word == word for p in rest)
+        parts = (*rest, Part(top.variant, top.scale))
+        found = explain(engine, parts, marginal(scored) - again, energy if rest else None)
+        if found.log_weight > best.log_weight:
+            best = found
+    return best

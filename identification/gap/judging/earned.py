@@ -1,0 +1,144 @@
+"""Whether explanations earn their weight on withheld data.
+
+An explanation is fitted without a repetition and judged on it. One that is far off there has fitted
+this session and nothing that repeats: it loses weight, softly about the limit, to one with fewer of
+the same effects, or to `unknown`.
+
+Of a rig without an arm, one of two effects may foretell what was withheld better than both do: then
+the other one is freedom of its law, and it speaks for both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.gap.data import Array, Ints
+from identification.gap.evidence.engine import Engine
+from identification.gap.explanations.explanation import Explanation, Found
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.verdict import weighed
+from identification.gap.judging.hands import open_to_hands
+from identification.gap.judging.heldout import folds, held_out
+from identification.gap.model.bench import Bench
+from identification.gap.words import DRIFTS, FRICTION, LATE, LINEAR
+
+FAILS = 1.9  # times the noise: then a repetition was not foreseen
+CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
+SHARP = 8.0  # how fast weight is lost about the limit, per factor e
+# What drifts do in one run no other run foretells; nor a jump of the datum beside them.
+FREE = DRIFTS | {"zero_shift"}
+_LOOKED_AT, _WITHIN = 6, 9.0  # explanations, and nats below the best, that are looked at
+
+
+def earned(found: Found) -> Found:
+    """The posterior after a look at withheld data; as it was where there are none."""
+    ways = folds(found.engine)
+    if ways and _comes_again(found.engine.bench):
+        simpler = _foretold(found, *next(iter(ways.items())))
+        found = weighed(replace(found, foretold=simpler), found.kept) if simpler else found
+    fold = ways.get("repetition")
+    if fold is None:
+        return found
+    kept: dict[frozenset[str], float] = {}
+    for _ in range(_LOOKED_AT):
+        todo = [e for e in _weighty(found, kept) if e.words not in kept]
+        if not todo:
+            break
+        kept[todo[0].words] = _kept(found, todo[0], fold)
+    return weighed(found, kept)
+
+
+def _comes_again(bench: Bench) -> bool:
+    """Of a rig without an arm, whether what is withheld is met elsewhere too: the end of one pull
+    nothing foretells."""
+    return not bench.data.arm and bench.course.passes > _PASSES
+
+
+_PASSES = 2
+
+
+def _foretold(found: Found, name: str, fold: Ints) -> dict[frozenset[str], Explanation]:
+    """Of explanations with two effects that matter, the one effect that foretells withheld data
+    better than both: words that stand for each other foretell the same; of two that do, alike, the
+    one that explains more. What comes late speaks for no friction at one rate, at which they do the
+    same. What a drift does nothing foretells: where it is the larger one, another has to be plainly
+    better to speak for both."""
+    first, out = found.explanations[0].log_weight, {}
+    pairs = [e for e in found.explanations[:_PAIRS] if e.log_weight > first - _NEAR]
+    for both in (e for e in pairs if len(e.words) == _TWO):
+        drifts = both.parts[0].word in FREE
+        most = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
+        rubs = found.engine.bench.course.one_rate and both.words & FRICTION
+        mute = FREE | LATE if rubs else FREE
+        each = [e for e in found.explanations if e.words < both.words and e.words - mute]
+        after = [held_out(found.engine, e, name, fold).after for e in each]
+        best = min(after, default=most)
+        limit = min(_ALIKE * best, most)
+        speaker = next((e for e, a in zip(each, after, strict=True) if a < limit), None)
+        if speaker is not None:
+            out[both.words] = speaker
+    return out
+
+
+_TWO, _PAIRS, _NEAR = 2, 3, 25.0  # so many of the best, and nats below the first, are looked at
+_BETTER, _PLAINLY, _ALIKE = 0.98, 0.5, 1.1
+
+
+def _weighty(found: Found, kept: dict[frozenset[str], float]) -> list[Explanation]:
+    """Explanations with effects that matter, the heaviest (with what it keeps) first."""
+    weight = {
+        e.words: e.log_weight + float(np.log(kept.get(e.words, 1.0) + 1e-300))
+        for e in found.explanations
+        if e.parts
+    }
+    if not weight:
+        return []
+    best = max(weight.values())
+    matter = [e for e in found.explanations if e.parts and weight[e.words] > best - _WITHIN]
+    heavy = [e for e in matter if e.words in kept]
+    fewer = [
+        e
+        for e in found.explanations
+        if e.parts and e.good and any(e.words < h.words for h in heavy if kept[h.words] < 0.5)
+    ]
+    return [*matter, *[e for e in fewer if e not in matter]]
+
+
+def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
+    """Share of the weight that is kept after a look at withheld repetitions."""
+    if explanation.words & DRIFTS and explanation.words <= FREE:
+        return 1.0
+    engine = found.engine
+    loose = DRIFTS if len(explanation.words) <= 2 else frozenset[str]()  # three have to earn it all
+    after = held_out(engine, explanation, "repetition", fold, loose).after
+    fitted = fit(engine, explanation)
+    seen = CLOSED * _moved(engine, fitted)
+    unseen = engine.bench.rows.rms(open_to_hands(engine, fitted))
+    limit = max(FAILS * noise_of(engine.bench), float(np.hypot(seen, unseen)))
+    return float(1 / (1 + (after / limit) ** SHARP))
+
+
+def _moved(engine: Engine, fitted: Fit) -> float:
+    """rms (m) of what the effects that are no linear laws move, at least the gap's structure."""
+    n = engine.bench.rows.n
+    bent = [i for i, p in enumerate(fitted.parts) if p.word not in LINEAR]
+    moved = sum((fitted.contribution(engine, i)[:n] for i in bent), np.zeros(n))
+    rows = engine.bench.rows
+    return max(engine.structural, rows.rms(rows.moved(moved[:, None])[:, 0]))
+
+
+def noise_of(bench: Bench) -> float:
+    """rms that the instruments alone would leave in single samples, m."""
+    noise, weight = bench.noise, bench.rows.weight
+    count = np.ones(bench.rows.n) if bench.rows.continuous else weight
+    square = noise.response**2 * count + noise.hold**2 + noise.run**2
+    return float(np.sqrt(weight @ square / weight.sum()))
+
+
+def sample_rms(bench: Bench, predicted: Array) -> float:
+    """rms (m) over samples by which the response misses what was predicted of the rows (n,): that
+    of the rows, and of the samples within them."""
+    weight, left = bench.rows.weight, bench.response - predicted
+    return float(np.sqrt(weight @ (left**2 + bench.scatter_about(predicted)) / weight.sum()))

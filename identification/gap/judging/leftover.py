@@ -1,0 +1,192 @@
+"""What explanations leave, looked at row by row.
+
+The levels of imperfection are a coarse grid, of what may repeat from run to run as of what a row
+has to itself: they rank explanations, but they don't say how much of the gap is left. For those
+that matter that is looked up in the data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import log
+
+import numpy as np
+
+from identification.gap.data import Array
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.imperfection import STEP
+from identification.gap.explanations.explanation import (
+    LAW_REMAINDER,
+    REMAINDER,
+    SOFT,
+    Explanation,
+    Found,
+)
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.verdict import weighed
+from identification.gap.judging.hands import open_to_hands
+from identification.gap.judging.strain import LIMIT, strain
+from identification.gap.model.noise import UNSURE
+from identification.gap.words import CURVES, DRIFTS, FRICTION
+
+# An elastic curve that falls while it is pushed on, or a force that is nearly lost, as none is that
+# has made something yield or slide: a snap, a slip, a crack are likelier.
+SNAPS, _FALL, _LOST = 0.1, 0.15, 0.6  # share that is kept; falls, of the range: beyond noise, most
+LET_GO = 1e-8  # share that is kept where forces let go at once: no law does that
+COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whenever it is let go
+_WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
+FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
+SWINGS = 0.03  # share that is kept by a drift that comes and goes, or hurries,
+_SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
+_LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
+
+
+def looked_up(found: Found) -> Found:
+    """The posterior with what the best explanations really leave; of levels that rest, after a look
+    for readings that nothing on a rig makes."""
+    engine = found.engine
+    if engine.bench.course.faults:
+        doubted = [replace(e, log_good=e.log_good + log(FAULTY)) for e in found.explanations]
+        return weighed(replace(found, explanations=tuple(doubted)), found.kept)
+    judge = _still_good if engine.bench.data.arm else _judged
+    first = _near(found.explanations)
+    done = {e.words: judge(engine, e) for e in first if e.parts}
+    for none in (e for e in first if not e.parts):
+        fitted = fit(engine, none)
+        if engine.bench.data.arm:
+            done[none.words] = _unstrained(none, strain(engine, fitted, none.eta))
+        else:
+            done[none.words] = _as_simulated(engine, none, fitted)
+    if engine.bench.data.arm:  # what these lose goes to those with fewer of their effects
+        lost = [e.words for e in done.values() if not e.good]
+        heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
+        done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
+    done |= {e.words: judge(engine, e) for e in _near(found.nameless)}
+    out, nameless = (
+        tuple(sorted((done.get(e.words, e) for e in each), key=lambda e: -e.log_weight))
+        for each in (found.explanations, found.nameless)
+    )
+    return weighed(replace(found, explanations=out, nameless=nameless), found.kept)
+
+
+def _near(ranked: tuple[Explanation, ...]) -> list[Explanation]:
+    """Explanations that matter, of some that are ranked."""
+    return [e for e in ranked[:_LOOKED_AT] if e.log_weight > ranked[0].log_weight - _WITHIN]
+
+
+def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
+    """Of an arm: with as much of its weight as what it leaves allows it, the less the more words
+    are spent; with no more than what the sizes of the imperfection allow where these are far
+    beyond: another channel, which the rows of the response do not show, asks for them."""
+    allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.words))
+    fitted = fit(engine, explanation)
+    share = _share(_left(engine, fitted), allowed)
+    if _swings(fitted) or _hurries(engine, fitted):
+        share *= SWINGS
+    good = explanation.log_weight + float(np.log(max(share, 1e-300)))
+    if explanation.eta > STEP * allowed:  # so much the grid may be off
+        good = min(good, explanation.log_good)
+    asked = strain(engine, fitted, explanation.eta)
+    return _unstrained(replace(explanation, log_good=good), asked)
+
+
+def _unstrained(explanation: Explanation, asked: float) -> Explanation:
+    """With as much of its weight as what it asks of its priors allows it."""
+    kept = float(np.log(max(_share(asked, LIMIT), 1e-300)))
+    return replace(explanation, log_good=explanation.log_good + kept)
+
+
+def _as_simulated(engine: Engine, none: Explanation, fitted: Fit) -> Explanation:
+    """Of a rig without an arm: nothing is wrong while springs and gains are as stated. What is
+    normal in the compliance is not in the stiffness, nor what is normal in a gain in the share of
+    its readings that is too much: by both."""
+    base, off = engine.base, 0.0
+    for name, change, sd in zip(base.names, fitted.base.tolist(), base.sd.tolist(), strict=True):
+        if not name.startswith(("spring", "gain")) or not sd > 0:
+            continue
+        whole = 1 + change if name.startswith("spring") else 1 - change
+        off = max(off, abs(change) / sd, abs(change / max(whole, _TINY)) / sd)
+    lost = float(np.log(max(_share(off, AS_STATED), 1e-300)))
+    return replace(none, log_weight=none.log_weight + lost, log_good=none.log_good + lost)
+
+
+_TINY = 1e-6
+AS_STATED = 3.0  # standard deviations
+
+
+def _swings(fitted: Fit) -> bool:
+    """Whether a drift comes and goes again and again: warming rigs and leaking charges do not,
+    however they wander; air conditioning does, machines next door, and what a law leaves of every
+    run."""
+    for path in _free_paths(fitted, DRIFTS):
+        about = path - path.mean(axis=0)
+        slow = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, len(path)), _SLOW)
+        rest = about - slow @ np.linalg.lstsq(slow, about, rcond=None)[0]
+        if np.sum(rest**2) > _MOSTLY * np.sum(about**2):
+            return True
+    return False
+
+
+def _hurries(engine: Engine, fitted: Fit) -> bool:
+    """Whether a displacement is said to drift faster than anything warms up: somebody leans on the
+    stand, something is moved."""
+    span = engine.bench.course.session_span
+    return engine.bench.rows.clock and any(
+        np.abs(np.diff(path, axis=0)).max() > FASTEST * span / (len(path) - 1)
+        for path in _free_paths(fitted, frozenset({"thermal_drift"}))
+    )
+
+
+# Warm robots move by up to 400 um over hours, lasers by 1 um/K: some hundred times as fast is
+# no heat.
+FASTEST = 400e-6 / 60  # m/s
+
+
+def _free_paths(fitted: Fit, words: frozenset[str]) -> Iterator[Array]:
+    """(pieces, paths) of every part of these words that takes any path."""
+    for i, part in enumerate(fitted.parts):
+        if part.word in words and part.variant.info.get("path") == "free":
+            yield fitted.of(i)[0].reshape(-1, int(part.variant.info["pieces"])).T
+
+
+def _left(engine: Engine, fitted: Fit) -> float:
+    """rms (m) of rows beyond their noise."""
+    bench, n = engine.bench, engine.bench.rows.n
+    weight, noise = bench.rows.weight / bench.rows.weight.sum(), bench.noise
+    left = engine.target[:n] - fitted.response
+    known = noise.response**2 + noise.hold**2 + noise.run**2 + open_to_hands(engine, fitted) ** 2
+    square = weight @ (left**2 - known)
+    return float(np.sqrt(max(float(square), 0.0)))
+
+
+def _allowed(engine: Engine, explanation: Explanation, unseen: float, words: int = 1) -> float:
+    """What an explanation may leave, m. unseen: what noise hides."""
+    law = min(LAW_REMAINDER * max(explanation.sizes), REMAINDER * engine.structural)
+    return float(max(REMAINDER * engine.structural / words**0.5, law, unseen))
+
+
+def _share(left: float, allowed: float) -> float:
+    """Of the weight that is kept by what is left, or asked for, against what is allowed."""
+    return float(1 / (1 + (left / allowed) ** SOFT))
+
+
+def _judged(engine: Engine, explanation: Explanation) -> Explanation:
+    """With the share of its weight that it keeps by what it leaves beyond the noise."""
+    course = engine.bench.course
+    if explanation.parts[0].word == _WANDERING[course.wanders]:
+        e = explanation
+        return replace(e, log_weight=e.log_weight - COMES_BACK, log_good=e.log_good - COMES_BACK)
+    left = _left(engine, fit(engine, explanation))
+    share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
+    fall = course.fall
+    gives = (fall > _FALL and explanation.words & CURVES) or (
+        fall > _LOST and explanation.words & FRICTION
+    )
+    if course.let_go:
+        share *= LET_GO
+    elif gives:
+        share *= SNAPS
+    else:
+        share = max(share, float(np.exp(explanation.log_good - explanation.log_weight)))
+    return replace(explanation, log_good=explanation.log_weight + float(np.log(max(share, 1e-300))))

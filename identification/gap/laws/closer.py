@@ -1,0 +1,156 @@
+"""A closer look at a word that stands out among single effects: what the effects' own ways of it
+have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.gap.data import Array
+from identification.gap.evidence.compare import Scored, closest, marginal, score
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation, conditioned
+from identification.gap.explanations.fit import fit
+from identification.gap.laws.law import Laws
+from identification.gap.model.variants import Variant, place_of
+
+_REFINED = 2  # joints, or axes, at which it is refined
+_STEPS = 2  # to the springs beside what goes through them
+_CLOSE = 0.2  # of the first look's steps
+_LOOKS = 6  # at most, at one share of the steps
+_FAR = 60.0  # nats below the best of them
+WINDOW = 12.0  # nats above `none` that a word must have to be refined
+
+
+@dataclass(frozen=True, eq=False)
+class Word:
+    """A word that stands out: its variants alone, and beside the leading word, best first; ranked:
+    the leading words, whose scores are families."""
+
+    engine: Engine
+    families: dict[str, list[Scored]]
+    ranked: list[str]
+    alone: list[Scored]
+    beside: list[Scored]
+
+    @property
+    def name(self) -> str:
+        """What it is."""
+        return self.alone[0].variant.word
+
+
+def shows(word: Word) -> bool:
+    """Whether it is worth closer looks."""
+    return seen(word) or nearly_leads(word)
+
+
+def seen(word: Word) -> bool:
+    """Whether it explains something beside the leading word, or is that."""
+    return not word.beside or word.beside[0].log_evidence > _lead(word) + WINDOW
+
+
+def nearly_leads(word: Word) -> bool:
+    """Whether it explains alone nearly as much as the leading word does."""
+    none = max(level.log_base for level in word.engine.levels)
+    mine, first = (marginal(word.families[n]) - none for n in (word.name, word.ranked[0]))
+    return mine > _NEARLY * first
+
+
+_NEARLY = 0.7  # of what the leading word brings, nats above `none`
+
+
+def _lead(word: Word) -> float:
+    return closest(word.families[word.ranked[0]]).log_evidence
+
+
+def closing_in(
+    word: Word, refined: Callable[..., list[Variant]], starts: list[Scored],
+    closer: tuple[float, ...] = (_CLOSE,),
+) -> list[Variant]:  # fmt: skip
+    """Finer shapes about those that were found, and finer ones still about the best of these. What
+    is best moves along narrow valleys (a zone is as wide as the crossing is far): every look but
+    the closest is moved after it until it stays, and the last one is kept. What was seen to be far
+    worse is left out."""
+    engine = word.engine
+    fresh = [v for s in starts for v in refined(engine.bench, s.variant)]
+    finer, found = list(fresh), list[Scored]()
+    for share in closer if fresh else ():
+        best: Variant | None = None
+        for _ in range(_LOOKS if share > closer[-1] else 1):
+            engine.extend()
+            found += scored_beside(engine, word.families, word.ranked, fresh)
+            last, best = best, max(found, key=evidence).variant
+            if best is last:
+                break
+            fresh = refined(engine.bench, best, share)
+        finer += fresh
+    best_of = max(map(evidence, found), default=0.0)
+    far = {s.variant for s in found if s.log_evidence < best_of - _FAR}
+    return [v for v in finer if v not in far]
+
+
+def scored_beside(
+    engine: Engine, families: dict[str, list[Scored]], ranked: list[str], family: list[Variant]
+) -> list[Scored]:
+    """Scores of a word's variants beside the leading word; alone, where it leads itself."""
+    first = closest(families[ranked[0]])
+    if not family or family[0].word == ranked[0]:
+        return score(engine, engine.levels, family)
+    levels, energy = conditioned(engine, (Part(first.variant, first.scale),))
+    return score(engine, levels, family, energy)
+
+
+def evidence(scored: Scored) -> float:
+    """By which scores are sorted."""
+    return scored.log_evidence
+
+
+class Estimate(NamedTuple):
+    """Most probable coefficients (k,) of a variant, relative changes (m,) of the springs'
+    compliance, and what the displacement reads, over what it is."""
+
+    coefficients: Array
+    softer: Array
+    reads: float
+
+
+def estimate(engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()) -> Estimate:
+    """What is most probable with a variant whose columns the engine may not know yet, beside other
+    parts."""
+    engine.extend()
+    levels, energy = conditioned(engine, beside)
+    eta = engine.levels[score(engine, levels, [variant], energy)[0].level].eta
+    fitted = fit(engine, Explanation((Part(variant, 1.0), *beside), 0.0, eta, (0.0,), 0.0))
+    found = dict(zip(engine.base.names, fitted.base.tolist(), strict=True))
+    softer = np.array([found.get(f"spring{j + 1}", 0.0) for j in range(engine.bench.data.joints)])
+    reads = 1 + found.get("gain displacement", 0.0)
+    return Estimate(fitted.of(0)[0], softer, reads)
+
+
+def places(
+    alone: list[Scored], beside: list[Scored], able: Callable[[Variant], bool] = lambda _: True
+) -> list[Scored]:
+    """The best of the _REFINED best joints, or axes, beside the leading word, and the best alone:
+    of two words that explain the same neither has a place beside the other. able: of those."""
+    by_place: dict[object, Scored] = {}
+    first = [s for s in alone if able(s.variant)][:1]
+    for s in (s for s in beside or alone if able(s.variant)):
+        by_place.setdefault(place_of(s.variant), s)
+    found = [*first, *list(by_place.values())[:_REFINED]]
+    return [s for i, s in enumerate(found) if s.variant not in [f.variant for f in found[:i]]]
+
+
+def about_springs(laws: Laws, word: Word) -> list[Variant]:
+    """What goes through the springs, with the springs as they are found to be beside it."""
+    bench, out = word.engine.bench, []
+    for found in dict.fromkeys(s[0].variant for s in (word.alone, word.beside) if s):
+        v = found
+        for _ in range(_STEPS):
+            softer = estimate(word.engine, v).softer
+            v = laws.about_springs(bench, found, bench.compliance * np.maximum(1 + softer, 0.1))
+        out.append(v)
+    return out

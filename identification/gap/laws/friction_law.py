@@ -1,0 +1,103 @@
+"""Friction beside a joint's spring in absolute torques, and what its laws are called."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.data import Array
+from identification.gap.laws.law import (
+    ACROSS,
+    ANEW,
+    HUNG,
+    KEPT,
+    LOST,
+    WORKED,
+    Law,
+    Term,
+    fresh_after,
+)
+from identification.gap.model.bench import TOOL_KG, Bench
+from identification.gap.model.history import bristles, play, worked_in
+from identification.gap.model.variants import LASTING, SET_UP_ANEW, UNDER_WEIGHT, Variant
+
+SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
+EXPONENTIAL = ("Dahl", "Bouc-Wen")
+# Leaves, belts, cables and wedges are pressed by what they carry: friction in proportion to that.
+BY_LOAD = tuple(f"{law} by load" for law in EXPONENTIAL)
+# Where the stated spring is that of small loads, what slips comes on top.
+SLIPPING = tuple(f"{law} that slips" for law in EXPONENTIAL)
+LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
+ON_TOP = ("Prandtl", *SLIPPING)
+FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)
+_MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
+           SET_UP_ANEW.strip(): ANEW, LASTING.strip(): ACROSS}  # fmt: skip
+
+
+def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
+    """Terms: friction elements; with their strength where the law has one, else with a reach."""
+    joint, law = int(v.info["joint"]), str(v.info["law"])
+    key = "strength" if law in SLIP_AT_A_STRENGTH else "reach"
+    constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
+    if "tool_kg" in v.info:
+        constants["tool"] = float(v.info["tool_kg"])
+    if law in BY_LOAD:
+        constants["measured_to"] = bench.reach_of(bench.true_torque[:, joint])
+    terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
+    if "grows_to" in v.info:
+        terms = terms[0], Term("compliance", {**terms[1].shape, "grows_to": v.info["grows_to"]})
+    terms += (Term("compliance"),) if v.info.get("other_springs") else ()
+    return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
+
+
+def columns(bench: Bench, law: Law) -> list[Array]:
+    """Column of every term, in their order: what the friction holds back, `S_r(tau)` (stop
+    operator), or reach, or load, times bristle state; of laws that slip what that leaves of the
+    load, as `P_r(tau)` does of Prandtl's; of a term without a strength its own spring's line."""
+    c = law.constants
+    joint, at_strength = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
+    torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
+    size = np.array([t.shape["strength" if at_strength else "reach"] for t in law.terms if t.shape])
+    load, kept = torque, np.ones(len(torque), dtype=bool)
+    rest, weight = bench.rest, None
+    if c["memory"] == HUNG:
+        weight = bench.weight(joint, c.get("tool", TOOL_KG))
+    if c["memory"] == WORKED:
+        path = worked_in(torque, fresh)
+        load, fresh, kept, rest = path.load, path.fresh, path.kept, path.fresh
+    if at_strength:
+        tiled = np.tile(load[:, None], (1, len(size)))
+        state = play(tiled, size, rest, fresh, 0.0 if weight is None else weight[:, None])
+        held = (-state if c["law"] == "Prandtl" else load[:, None] - state)[kept]
+    else:
+        by_load = c["law"] in BY_LOAD
+        span = c.get("measured_to", bench.reach_of(torque))  # a file may lack it
+        way = by_ratio(load, span) if by_load else load
+        z = bristles(way, size, fresh, c["law"].startswith("Bouc-Wen"), weight)
+        held = (z * (np.abs(load)[:, None] if by_load else size))[kept]
+        grown = np.array([_grown(bench, law, t) for t in law.terms if t.shape])
+        held = held * grown.reshape(len(size), bench.rows.n).T
+        held -= load[kept][:, None] if c["law"] in SLIPPING else 0.0
+    each = iter(held.T)
+    return [
+        bench.joint_column(joint, -bench.sense * next(each) if t.shape else torque)
+        for t in law.terms
+    ]
+
+
+def _grown(bench: Bench, law: Law, term: Term) -> Array:
+    """(n,) 1, or the net torque that a joint carries over that to which the friction grows."""
+    if "grows_to" not in term.shape:
+        return np.ones(bench.rows.n)
+    joint = law.constants["joint"]
+    net = bench.true_torque[:, joint] + bench.weight(joint)
+    return np.asarray(np.abs(net) / term.shape["grows_to"])
+
+
+def by_ratio(load: Array, span: float) -> Array:
+    """Loads (n,) stretched so that a friction in proportion to them turns over a share of them: as
+    they are at the span, ever longer towards none."""
+    whole = (1 + _NONE) * span * np.log1p(np.abs(load) / (_NONE * span))
+    return np.asarray(np.sign(load) * whole)
+
+
+_NONE = 0.05  # of the range: loads below that are as good as none

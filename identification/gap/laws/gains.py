@@ -1,0 +1,56 @@
+"""Gains that are off: what the effects of force and displacement share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.data import Array
+from identification.gap.laws.curves import BENT_SLOPE, hinge
+from identification.gap.laws.interval import LEAST_FACTOR, Found, Parameter
+from identification.gap.laws.law import Law, Term
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant
+
+SCALES = (0.03, 0.08, 0.2)
+BENCH_SCALE = 0.6  # excitations and ranges are set wrong on rigs without an arm
+BENDS = np.diag([1.0, 0.08])  # at full range, of what the gain is off
+
+
+def scales(bench: Bench) -> tuple[float, ...]:
+    """Of a gain that is the same all over the range."""
+    return SCALES if bench.data.arm else (*SCALES, BENCH_SCALE)
+
+
+def factor(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+    """Read over true. The columns are shares of what was read, but for an imposed displacement.
+    Of a gain that bends or changes, the straight line of least squares; of one component's gain,
+    with its name."""
+    share = v.info.get("share")
+    more = BENT_SLOPE if share is None else 1 - 1.5 * share + 0.5 * share**3
+    g = found.linear(np.array([1.0, more])[: len(found.w)], "1")
+    ends = [
+        1 + off if bench.imposed else 1 / max(1 - off, LEAST_FACTOR)
+        for off in (g.value, g.low, g.high)
+    ]
+    of = v.info.get("component")
+    return {f"factor_{of}" if of else "factor": Parameter(ends[0], ends[1], ends[2], "1")}
+
+
+def law_of_gain(v: Variant, of: str) -> tuple[Law, Array]:
+    """Terms: the share of what is shown that is too much, `1 - 1 / gain`; where it bends, that
+    which comes on top in proportion to the reading, or to what of it lies above a range. of:
+    what the reading at full range is called."""
+    if "component" in v.info:
+        return Law({}, (Term("gain", {"axis": str(v.info["component"])}),)), np.ones(1)
+    if len(v.columns) == 1:
+        return Law({}, (Term("gain"),)), np.ones(1)
+    if "above" in v.info:
+        return Law({}, (Term("gain"), Term("gain", {"above": float(v.info["above"])}))), np.ones(2)
+    return Law({}, (Term("gain"), Term("gain", {of: float(v.info["full"])}))), np.ones(2)
+
+
+def bent(read: Array, term: Term, of: str) -> Array:
+    """(n,) readings (n,) as a term weighs them."""
+    if "above" in term.shape:
+        return hinge(read, term.shape["above"])
+    return read * np.abs(read) / term.shape[of] if of in term.shape else read

@@ -1,0 +1,215 @@
+"""Knees: shapes of what gives way above a threshold of any load: a joint's torque, or a mounting's
+moment about an axis. `knees_closer` looks closer at those that are found."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from identification.gap.data import Array, Flags
+from identification.gap.laws.flow_back import flowing_back, yielded_from
+from identification.gap.laws.specimens import softening
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import (
+    BACK_UNDER_WEIGHT,
+    LASTING,
+    SET_UP_ANEW,
+    TAKEN_BACK,
+    UNDER_WEIGHT,
+    Variant,
+    block,
+    smooth_root,
+    variant,
+)
+from identification.gap.recording.turns import way_back
+
+THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
+# A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
+_LIKELY = {"": 1.0, LASTING: 0.5, SET_UP_ANEW: 0.5, TAKEN_BACK: 0.3, UNDER_WEIGHT: 1.0,
+           BACK_UNDER_WEIGHT: 0.3}  # fmt: skip
+_HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
+_FIRST = 2  # lower ones only round off the knees above them
+# Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
+# Bauschinger's effect: after a reversal metal yields earlier than at first.
+_SHARP = {0: 1.0, 1: 0.5}
+_ROUND = {-6: 0.1, -4: 0.15, -2: 0.25, -1: 0.5, 0: 1.0, 1: 0.5, 2: 0.25}
+_SLOW = 0.25  # prior of what gives way more and more, of no one knee
+SCALES = (0.07, 0.25, 0.9, 3.5, 14.0, 56.0)
+
+
+def knee_variants(
+    bench: Bench,
+    load: Array,
+    column: Callable[[Array], int],
+    word: str,
+    name: str,
+    info: dict[str, Any],
+    top: float | None = None,
+) -> list[Variant]:
+    """Variants of a threshold on `load` (n,); `column` turns a state (n,) into a pool index. top:
+    what the thresholds are shares of; left out: the largest load."""
+    top = _range(bench, load) if top is None else top
+    if not top > 0:
+        return []
+    radius = bench.radii(load, top * np.array(THRESHOLDS))
+    out = _hardened(bench, load, radius, column, word, name, info)
+    for memory, fresh in memories(bench).items():
+        columns = [column(s) for s in bench.plays(load, radius, fresh).T]
+        exact = {**info, **knee_at(bench, load, column, memory, top), "flow_s": 0.0}
+        out += knees(bench, word, f"{name}{memory}", columns, radius, exact)
+    return out
+
+
+def knee_at(
+    bench: Bench, load: Array, column: Callable[[Array], int], memory: str, top: float | None = None
+) -> dict[str, Any]:
+    """What knees on a load (n,) have in common at a place: memory, load, column, `top` of what
+    flows back, and `back`, its columns by the share of `top` beyond which it has yielded."""
+    top = _range(bench, load) if top is None else top
+    # what a controller takes back it had clamped: no metal that flows back
+    metal = memory != TAKEN_BACK
+    back = flowing_back(bench, load, column, top, fresh_of(bench, memory)) if metal else {}
+    return {"memory": memory, "load": load, "column": column, "top": top, "back": back}
+
+
+def _range(bench: Bench, load: Array) -> float:
+    """Largest size of a load (n,), as far as data reach."""
+    top = float(np.abs(load).max())
+    return top * bench.reach_of(load) / float(np.ptp(np.append(load, 0.0))) if top > 0 else 0.0
+
+
+def knees(
+    bench: Bench, word: str, label: str, columns: list[int], radius: Array, info: dict[str, Any]
+) -> list[Variant]:
+    """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them. What
+    begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`; what
+    holds small loads firmly, and then more and more gives way, is not (Ramberg and Osgood 1943).
+    What is pulled once, without an arm, may soften."""
+    arm, share = bench.data.arm, 0.7 / len(radius) * _LIKELY[info["memory"]]
+    softens = not arm and not bench.course.unloads
+    extra, out = list(range(len(THRESHOLDS), len(radius))), []
+    for k in range(_FIRST, len(THRESHOLDS)):
+        for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
+            inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
+            place = [*inside, *extra]
+            kept = [*inside.values(), *[_HARDENS] * len(extra)]
+            exact = {**info, "radius": radius[place], "centre": radius[k],
+                     "back": {} if knee == "round" and arm else info["back"], "knee": knee,
+                     "softens": softens}  # fmt: skip
+            at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
+            out += with_back(word, at, chosen, np.diag(kept), share / 4, exact)
+    if arm and bench.course.unloads:
+        exact = {**info, "radius": radius, "centre": radius[0], "back": {},
+                 "knee": "slow", "softens": False}  # fmt: skip
+        at, likely = f"{label} at {THRESHOLDS[0]:g} and on", _SLOW * _LIKELY[info["memory"]]
+        root = smooth_root(len(radius), 0.6, 0.3)
+        out += with_back(word, at, columns, root, likely, exact)
+    return out
+
+
+HARDENED = " hardened"
+UNDER_A_TIP, _CAME_BACK = (0.01, 0.04, 0.1), 0.2  # of the range
+_LEFT = 0.2  # of the largest response: as much as friction seldom holds
+
+
+def _hardened(
+    bench: Bench, load: Array, radius: Array, column: Callable[[Array], int], word: str, name: str,
+    info: dict[str, Any],
+) -> list[Variant]:  # fmt: skip
+    """What hardens alike in both senses (Voce 1948) and is loaded again and again: it yields on
+    only beyond the largest load it has borne. Specimens from one side, under a tip from the first
+    load on (said of loads that come back before they grow, and of what is not taken back by a long
+    way: a single loop may be friction); joints of an arm, whichever way they are pushed next."""
+    top = float(np.abs(load).max())
+    course, arm = bench.course, bench.data.arm
+    told = "joint" in info and course.unloads if arm else course.lets_go and course.one_sided
+    if not told:
+        return []
+    size = np.abs(load)
+    if not arm and (
+        way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top
+        or bench.course.left_behind > _LEFT
+    ):
+        radius = np.concatenate([top * np.array(UNDER_A_TIP), radius])
+    columns = [column(s) for s in grown(load, radius, bench.moved).T]
+    out = []
+    for k in range(len(radius)):
+        root = np.diag([1.0, *[_HARDENS] * (len(radius) - k - 1)])
+        exact = {**info, "memory": HARDENED, "flow_s": 0.0, "radius": radius[k:],
+                 "centre": radius[k], "load": load, "column": column, "back": {},
+                 "knee": "hardened"}  # fmt: skip
+        label = f"{name}{HARDENED} beyond {radius[k] / top:.3g}"
+        out.append(
+            variant(word, label, columns[k:], SCALES, root, np.ones(len(root)),
+                    0.7 / len(radius), LEAST, **exact)
+        )  # fmt: skip
+    return out
+
+
+def grown(load: Array, radius: Array, fresh: Flags) -> Array:
+    """(n, k): by how much the size of the load (n,) has ever been beyond the radii (k,) since the
+    memory was fresh; each time with the sign that the load then had."""
+    out = np.empty((len(load), len(radius)))
+    edges = np.append(np.flatnonzero(fresh | (np.arange(len(load)) == 0)), len(load))
+    for a, b in pairwise(edges):
+        largest = np.maximum.accumulate(np.abs(load[a:b]))
+        beyond = np.maximum(largest[:, None] - radius, 0.0)
+        grows = np.diff(beyond, axis=0, prepend=0.0)
+        out[a:b] = np.cumsum(np.sign(load[a:b])[:, None] * grows, axis=0)
+    return out
+
+
+def with_back(
+    word: str, label: str, columns: list[int], root: Array, prior: float, info: dict[str, Any]
+) -> list[Variant]:
+    """A knee as it is, and with Bauschinger's effect: once it has yielded, metal flows back early
+    when unloaded."""
+    out, share = [], yielded_from(info)
+    back, info = info["back"].get(share, []), {**info, "back_from": share}
+    for more, name in ([], ""), *([(back, ", flows back")] if back else []):
+        k, n = len(columns), len(columns) + len(more)
+        each, within = softening(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
+        out.append(
+            variant(word, label + name, [*columns, *more], SCALES,
+                    block([root, _RETURNS * np.eye(len(more))]), np.repeat([1.0, 0.0], [k, n - k]),
+                    prior, LEAST, each, within, **info)
+        )  # fmt: skip
+    return out
+
+
+LEAST = 0.15  # of the elastic compliance: what bends less does not give way
+_RETURNS = 0.4  # coefficients of what flows back, against those of the knee
+
+
+def is_sharp(v: Variant) -> bool:
+    """Whether the threshold is one of the grid, without rounding: about such it is refined."""
+    return bool(v.info["knee"] == "sharp")
+
+
+def place_in(label: str) -> str:
+    """Joint or axis, and memory, with which a knee's label begins."""
+    return re.split(" at | flow", label, maxsplit=1)[0]
+
+
+def memories(bench: Bench) -> dict[str, Flags]:
+    """When the joint gets back to where it was: never, when the arm moves, when the rig is turned
+    to another direction (the arm may be sent away meanwhile), before every run."""
+    moved, first = bench.moved, np.zeros(bench.rows.n, dtype=bool)
+    out = {"": moved}
+    if np.sum(moved) > 1:
+        out[LASTING] = first
+    if np.sum(bench.rebuilt) > np.sum(moved):
+        out[SET_UP_ANEW] = bench.rebuilt
+    if np.sum(bench.rest) > np.sum(moved):
+        out[TAKEN_BACK] = moved | bench.rest
+    return out
+
+
+def fresh_of(bench: Bench, memory: str) -> Flags:
+    """(n,) rows before which a joint of that memory is where it was."""
+    lost = TAKEN_BACK if memory == BACK_UNDER_WEIGHT else memory
+    return memories(bench).get(lost, bench.moved)

@@ -1,0 +1,93 @@
+"""Knees in absolute units: plays beyond thresholds, in newton metres and compliances."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from identification.gap.data import Array, Flags
+from identification.gap.laws import flow_back
+from identification.gap.laws.flows import Flow, states
+from identification.gap.laws.knees import HARDENED, grown
+from identification.gap.laws.law import (
+    ACROSS,
+    ANEW,
+    HUNG,
+    HUNG_LOST,
+    KEPT,
+    LOST,
+    Law,
+    Term,
+    fresh_after,
+)
+from identification.gap.model.bench import Bench
+from identification.gap.model.variants import (
+    BACK_UNDER_WEIGHT,
+    LASTING,
+    SET_UP_ANEW,
+    TAKEN_BACK,
+    UNDER_WEIGHT,
+    Variant,
+)
+
+_MEMORY = {"": KEPT, LASTING: ACROSS, TAKEN_BACK: LOST, HARDENED: KEPT,
+           UNDER_WEIGHT: HUNG, BACK_UNDER_WEIGHT: HUNG_LOST, SET_UP_ANEW: ANEW}  # fmt: skip
+_SQUARE = 2.0  # of the overstress; without a word it flows in proportion
+
+
+def law_of_knee(v: Variant, place: dict[str, Any], unit: float) -> tuple[Law, Array]:
+    """Terms: plays (threshold), what flows back once the threshold `after` was passed, and a spring
+    of its own. place: constants that say where it is; unit: of all coefficients."""
+    info = v.info
+    constants = {"memory": _MEMORY[info["memory"]], "flow_time": float(info["flow_s"])}
+    if info.get("square"):
+        constants["flow_exponent"] = _SQUARE
+    radius = [float(r) for r in info["radius"]]
+    begins = "grows_beyond" if info["memory"] == HARDENED else "threshold"
+    terms = [Term("compliance", {begins: r}) for r in radius]
+    own = bool(info.get("other_springs"))
+    if len(v.columns) > len(radius) + own:
+        top = float(info["top"])
+        after = {"after": info["back_from"] * top}
+        terms += [Term("compliance", {"returns_beyond": f * top} | after) for f in flow_back.BACK]
+        ratchet = {"ratchets_beyond": flow_back.RATCHET_FROM * top}
+        terms.append(Term("compliance", ratchet | after))
+    terms += [Term("compliance")] * own
+    return Law(constants | place, tuple(terms)), np.full(len(terms), unit)
+
+
+def states_of(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
+    """Number of the term -> its state (n,); those of a kind are made in one go. None of a spring of
+    its own."""
+    fresh = fresh_after(bench, law.constants["memory"])
+    weight = None
+    hung = law.constants["memory"] in (HUNG, HUNG_LOST)
+    if hung and "joint" in law.constants:  # its twin may sit elsewhere
+        weight = bench.weight(law.constants["joint"])
+    flow, square = law.constants["flow_time"], law.constants.get("flow_exponent") == _SQUARE
+    plays, radius = _with(law, "threshold")
+    made = states(bench, Flow(load, radius, flow, fresh, weight, square))
+    out = dict(zip(plays, made.T, strict=True))
+    growing, beyond = _with(law, "grows_beyond")
+    out |= zip(growing, grown(load, beyond, fresh).T, strict=True)
+    for i in _with(law, "after")[0]:
+        out[i] = _back(bench, law.terms[i], load, fresh)
+    return out
+
+
+def _with(law: Law, shape: str) -> tuple[list[int], Array]:
+    """Numbers of the terms with that key, and its values (k,)."""
+    mine = [i for i, t in enumerate(law.terms) if shape in t.shape]
+    return mine, np.array([law.terms[i].shape[shape] for i in mine])
+
+
+def _back(bench: Bench, term: Term, load: Array, fresh: Flags) -> Array:
+    """(n,) state of what flows back, or ratchets, once `after` was passed."""
+    peak = flow_back.peaks(load, term.shape["after"], fresh)
+    if "ratchets_beyond" in term.shape:
+        state = flow_back.RATCHETS * flow_back.ratchet(load, term.shape["ratchets_beyond"], fresh)
+    else:
+        state = bench.plays(load, np.array([term.shape["returns_beyond"]]), fresh)[:, 0]
+        state = state - state[peak]
+    return np.where(peak >= 0, state, 0.0)

@@ -1,0 +1,395 @@
+"""The observation model of one data set: stacked channels, their noise, and a pool of columns.
+
+Channels, one below the other: response (displacement along the direction; where the displacement
+is imposed, force over simulated stiffness) row by row, joint readings and tangential force hold by
+hold, force at zero load row by row.
+Every effect adds columns: what one unit of a coefficient does to all channels at once. The
+observation is `y = prior simulation + base columns + effect columns + imperfection + noise`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from identification.gap.data import Array, Flags, GapData
+from identification.gap.model.history import moves, play, rests
+from identification.gap.model.noise import Noise, driven, estimate_noise
+from identification.gap.model.pool import Pool
+from identification.gap.recording.course import Course
+from identification.gap.recording.imposed import displacement_imposed
+from identification.gap.recording.rows import Rows, reduce_rows
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where the channels lie in a stacked vector of `size`; empty slices for what is missing."""
+
+    n: int
+    joints: int
+    q: slice
+    tangential: slice
+    zero_force: slice
+    size: int
+
+
+@dataclass(frozen=True, eq=False)
+class KnownEffects:
+    """Stacked: what effects do that the simulation has, does (size,), and what is not known of
+    them, free (size, k), of independent unit coefficients called names (k); left m: what may stay
+    of them, rms."""
+
+    does: Array
+    free: Array
+    names: tuple[str, ...]
+    left: float
+
+
+_FURTHER, _ONE_WAY = 6, 0.9  # radii; of the range
+TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
+_BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
+_FELT = 0.03  # of the range of the load's torque
+_DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """Rows, layout, noise, and what effects are built from.
+
+    load (n,) N: what drives the rig, as a force. torque (n, m): torque of each joint under it.
+    lever (n, m). elastic (n, m) rad: deflection of each simulated joint. slope (n,) m/N: simulated
+    compliance along the direction, of springs and what is simulated beside them. sense: +1 where
+    the force is imposed and the effect adds displacement; -1 where the displacement is imposed and
+    the same effect takes force away.
+    reach m: largest simulated or measured response, the natural unit of what has no other.
+    scatter (n,) m^2: mean square of the samples about their row; trend (n,) m s: mean product of
+    time and response about it.
+    columns: the pool, filled by the effects. moves (n,) m: what instruments of the response read,
+    where more is known of it than a straight line.
+    """
+
+    data: GapData
+    rows: Rows
+    layout: Layout
+    noise: Noise
+    imposed: bool
+    sense: float
+    compliance: Array
+    load: Array
+    response: Array
+    torque: Array
+    lever: Array
+    elastic: Array
+    slope: Array
+    reach: float
+    scatter: Array
+    trend: Array
+    observed: Array
+    columns: Pool = field(default_factory=Pool)
+    flows: dict[bytes, Array] = field(default_factory=dict)  # states that take a loop over rows
+    moves: Array | None = None
+    known: KnownEffects | None = None
+    # (channel, kind) -> lags (k,) s and what each does (k, n): of this bench alone, no copy's
+    lags: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict, init=False)
+
+    @property
+    def has_q(self) -> bool:
+        """Joint readings are there and contain the joints' deflection."""
+        q = self.layout.q
+        return bool(q.stop > q.start)
+
+    @property
+    def torque_unit(self) -> str:
+        """Of thresholds and friction."""
+        return "Nm" if self.data.arm else "N"
+
+    @property
+    def has_zero_force(self) -> bool:
+        """Force at zero load is a channel; where the displacement is imposed, there is no such."""
+        zero = self.layout.zero_force
+        return bool(zero.stop > zero.start)
+
+    @cached_property
+    def course(self) -> Course:
+        """How the load went."""
+        return Course(self.data, self.rows, self.imposed, self.load, self.response, self.slope,
+                      self.stated_slope)  # fmt: skip
+
+    @cached_property
+    def line_slope(self) -> Array:
+        """(n,) slope of the response over the load, m/N, as measured in each setup; what a gain or
+        a lag acts on, however wrong the simulated springs are."""
+        out = np.zeros(self.rows.n)
+        for s in range(len(self.data.setups)):
+            mine = self.rows.setup == s
+            weight = self.rows.weight[mine]
+            x = self.load[mine] - np.average(self.load[mine], weights=weight)
+            power = float(weight @ x**2)
+            if power > 0:
+                out[mine] = max(float(weight @ (x * self.response[mine])) / power, 0.0)
+        return out
+
+    @cached_property
+    def line(self) -> Array:
+        """(n,) response that the slope measured in each setup gives for the load, m; or what is
+        known of it."""
+        return self.line_slope * self.load if self.moves is None else self.moves
+
+    @cached_property
+    def zero_line(self) -> Array:
+        """(n,) N: what the force shows at zero load before and after a run, straight in between; 0
+        where it stands still within its noise, or was not read at both ends. A threshold is met
+        by the force less this; springs alone would not mind."""
+        rows, out = self.rows, np.zeros(self.rows.n)
+        if self.imposed:
+            return out
+        for run in np.unique(rows.run):
+            mine = np.flatnonzero(rows.run == run)
+            pushed = mine[~rows.zero[mine]]
+            if not pushed.size:
+                continue
+            ends = [mine[rows.zero[mine] & (mine < pushed[0])],
+                    mine[rows.zero[mine] & (mine > pushed[-1])]]  # fmt: skip
+            if not all(e.size for e in ends):
+                continue
+            weight = [rows.weight[e] for e in ends]
+            force = [np.average(rows.measured_force[e], weights=w)
+                     for e, w in zip(ends, weight, strict=True)]  # fmt: skip
+            time = [np.average(rows.session[e], weights=w)
+                    for e, w in zip(ends, weight, strict=True)]  # fmt: skip
+            sd = self.noise.force * float(np.sqrt(sum(1 / w.sum() for w in weight)))
+            if abs(force[1] - force[0]) > _DRIFTS * sd:
+                out[mine] = np.interp(rows.session[mine], time, force)
+        return out
+
+    @cached_property
+    def true_load(self) -> Array:
+        """(n,) N: the load without the drift of its reading."""
+        return np.asarray(self.load - self.zero_line)
+
+    @cached_property
+    def true_torque(self) -> Array:
+        """(n, m) Nm on the joints without it: what thresholds, plays and friction answer to."""
+        return np.asarray(self.lever * self.true_load[:, None])
+
+    def reach_of(self, load: Array) -> float:
+        """Range of a load with zero in it. Where the displacement is imposed: of what the rig
+        really carried, not of what the simulated spring would have."""
+        span = float(np.ptp(np.append(load, 0.0)))
+        if not self.imposed or not span > 0:
+            return span
+        carried = float(np.ptp(np.append(self.rows.measured_force, 0.0)))
+        return min(span, span * carried / max(float(np.ptp(np.append(self.load, 0.0))), 1e-300))
+
+    def radii(self, load: Array, inner: Array) -> Array:
+        """Radii of plays: `inner`, and on an imposed path, which runs far beyond what yields,
+        _FURTHER more: what has yielded hardens over all of it, or softens. Up to half of its
+        range, since it is gone both ways; a single pull goes but one."""
+        full, last = float(np.ptp(np.append(load, 0.0))), float(inner[-1])
+        far = (_ONE_WAY if self.course.once else 0.5) * full
+        if not self.imposed or far < last:
+            return inner
+        start = min(1.4, (far / last) ** (1 / _FURTHER)) if self.course.once else 1.4
+        return np.concatenate([inner, np.geomspace(start * last, far, _FURTHER)])
+
+    def add(self, column: Array) -> int:
+        """Puts a stacked column into the pool; its index."""
+        return self.columns.add(column)
+
+    def stacked(
+        self,
+        response: Array | None = None,
+        q: Array | None = None,
+        tangential: Array | None = None,
+        zero_force: Array | None = None,
+    ) -> Array:
+        """A stacked column of response (n,), q (n, m), tangential (n, 2), zero_force (n,): joint
+        readings and force across the direction are too coarse to tell more of a hold than where it
+        lies."""
+        out = np.zeros(self.layout.size)
+        if response is not None:
+            out[: self.layout.n] = response
+        if q is not None and self.has_q:
+            out[self.layout.q] = self.rows.hold_means(q).T.reshape(-1)
+        if tangential is not None and self.rows.tangential is not None:
+            out[self.layout.tangential] = self.rows.hold_means(tangential).T.reshape(-1)
+        if zero_force is not None and self.has_zero_force:
+            out[self.layout.zero_force] = zero_force[self.rows.zero]
+        return out
+
+    def joint_column(self, joint: int, deflection: Array) -> Array:
+        """What a deflection (n,) rad of one joint does to the laser and to that joint's reading;
+        where the displacement is imposed it is negative for a joint that gives way (`sense`)."""
+        response, turned = self.lever[:, joint] * deflection, self.sense * deflection
+        if self.imposed:  # what one joint gives way, force and all other joints lose
+            q = self._follow(response)
+            q[:, joint] += turned
+            return self.stacked(response, q)
+        out = self.stacked(response)
+        if self.has_q:
+            readings = out[self.layout.q].reshape(self.data.joints, -1)
+            readings[joint] = self.rows.hold_means(turned)
+        return out
+
+    def outside_column(self, motion: Array) -> Array:
+        """What a motion (n,) m of the target does that does not come from the joints: the laser
+        sees it; where the displacement is imposed, the joints are spared it, and force falls."""
+        if not self.imposed:
+            return self.stacked(motion)
+        return self.stacked(-motion, self._follow(-motion))
+
+    @cached_property
+    def sigma(self) -> Array:
+        """(size,) standard deviation of every stacked row."""
+        noise, rows, layout = self.noise, self.rows, self.layout
+        out = np.empty(layout.size)
+        root = np.sqrt(rows.weight) if not rows.continuous else np.ones(rows.n)
+        out[: layout.n] = noise.response
+        total = np.sqrt(rows.hold_weight[rows.edges])
+        if layout.q.stop > layout.q.start:
+            out[layout.q] = np.concatenate([s / total for s in noise.q])
+        if rows.tangential is not None:
+            out[layout.tangential] = np.tile(noise.force / total, 2)
+        if self.has_zero_force:
+            out[layout.zero_force] = noise.force / root[rows.zero]
+        return out
+
+    @cached_property
+    def stated_slope(self) -> Array:
+        """(n,) m/N: compliance along the direction as simulated, by which a response is a force."""
+        return self.slope_of(self.data.compliance)
+
+    def slope_of(self, compliance: Array) -> Array:
+        """(n,) m/N: compliance along the direction with springs of that compliance (m,)."""
+        return np.asarray(self.lever**2 @ compliance + _outside(self.data, self.rows))
+
+    def _follow(self, response: Array) -> Array:
+        """Deflections (n, m) of the joints under the force behind a response (n,) m."""
+        per_newton = self.stated_slope
+        force = np.divide(response, per_newton, out=np.zeros_like(response), where=per_newton > 0)
+        return np.asarray(self._unit_elastic() * force[:, None])
+
+    def add_joint(self, joint: int, deflection: Array) -> int:
+        """Puts the column of a joint's deflection (n,) rad into the pool; its index."""
+        return self.add(self.joint_column(joint, deflection))
+
+    def force_column(self, force: Array) -> Array:
+        """What an additional force (n,) N along the direction does."""
+        return self.stacked(self.slope * force, self._unit_elastic() * force[:, None])
+
+    def _unit_elastic(self) -> Array:
+        return self.lever * self.compliance
+
+    def plays(
+        self, load: Array, radius: Array, fresh: Flags | None = None, weight: Array | None = None
+    ) -> Array:
+        """Play states (n, k) of a load (n,) for radii (k,); fresh: where the memory is lost, by
+        default where the arm goes to another pose. weight (n,): that acts beside the load."""
+        tiled = np.tile(load[:, None], (1, len(radius)))
+        lost = self.moved if fresh is None else fresh
+        return play(tiled, radius, self.rest, lost, 0.0 if weight is None else weight[:, None])
+
+    def weight(self, joint: int, tool_kg: float = TOOL_KG) -> Array:
+        """(n,) Nm: what the weights of arm and tool do to a joint."""
+        each = [s.gravity + tool_kg * s.tool_gravity for s in self.data.setups]
+        return np.asarray(np.stack(each)[self.rows.setup, joint])
+
+    def weight_per_kg(self, joint: int) -> Array:
+        """(n,) Nm/kg: what a tool does to a joint."""
+        return self.weight(joint, 1.0) - self.weight(joint, 0.0)
+
+    def meets_weight_unlike(self, joint: int) -> bool:
+        """Whether pushes go both with the weights and against them, or weights differ between
+        poses: else a law of the net torque is one of the push, shifted."""
+        top = float(np.abs(self.true_torque[:, joint]).max())
+        unlike = float(np.ptp(self.weight(joint))) > _UNLIKE * top
+        return self.pushed_both_ways(joint) or unlike
+
+    def pushed_both_ways(self, joint: int) -> bool:
+        """Whether a joint is pushed to either side, by a good part of the most."""
+        push = self.true_torque[:, joint]
+        return min(float(push.max()), -float(push.min())) > _BOTH * float(np.abs(push).max())
+
+    def feels_weight(self, joint: int) -> bool:
+        """Whether weights make a difference to a joint, beside the torques of the load."""
+        span = float(np.ptp(np.append(self.torque[:, joint], 0.0)))
+        return bool(np.abs(self.weight(joint)).max() > _FELT * span)
+
+    def scatter_about(self, predicted: Array) -> Array:
+        """(n,) m^2: mean square of the samples about what was predicted of their row (n,), which
+        goes on in time within it."""
+        speed = self.rows.speed(predicted)
+        square = self.scatter - 2 * speed * self.trend + speed**2 * self.rows.spread
+        return np.asarray(np.maximum(square, 0.0))
+
+    @cached_property
+    def rest(self) -> Flags:
+        """(n,) rows before which the load went back to zero."""
+        return rests(self.rows)
+
+    @cached_property
+    def moved(self) -> Flags:
+        """(n,) first rows after the arm went to another pose."""
+        return moves(self.rows, [s.pose for s in self.data.setups])
+
+    @cached_property
+    def rebuilt(self) -> Flags:
+        """(n,) first rows after the arm went to another pose, or the rig to another direction."""
+        return moves(self.rows, [f"{i}" for i in range(len(self.data.setups))])
+
+    def moving_joints(self) -> list[int]:
+        """Joints whose compliance carries at least a hundredth of the deflection in some setup."""
+        part = np.abs(self.lever * self.elastic)
+        total = part.sum(axis=1).max() or 1.0
+        return [j for j in range(self.data.joints) if part[:, j].max() > 0.01 * total]
+
+
+def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None = None) -> Bench:
+    """The bench of a data set. compliance (m,): point about which springs are linearised."""
+    rows = rows or reduce_rows(data)
+    c = data.compliance if compliance is None else compliance
+    lever = np.stack([s.lever for s in data.setups])[rows.setup]
+    outside = _outside(data, rows)
+    slope, stated = (lever**2 @ springs + outside for springs in (c, data.compliance))
+    imposed = displacement_imposed(data)
+    load = driven(data, rows, imposed)
+    if imposed:
+        load, response = load / stated, rows.measured_force * stated
+        scatter, trend = rows.force_scatter * stated**2, rows.force_trend * stated
+    else:
+        response = rows.displacement
+        scatter, trend = rows.displacement_scatter, rows.displacement_trend
+    torque = lever * load[:, None]
+    layout = _layout(data, rows, imposed)
+    observed = np.zeros(layout.size)
+    observed[: rows.n] = response
+    if layout.q.stop > layout.q.start and rows.q is not None:
+        observed[layout.q] = rows.hold_means(rows.q).T.reshape(-1)
+    if rows.tangential is not None:
+        observed[layout.tangential] = rows.hold_means(rows.tangential).T.reshape(-1)
+    if layout.zero_force.stop > layout.zero_force.start:
+        observed[layout.zero_force] = rows.measured_force[rows.zero]
+    reach = max(float(np.ptp(slope * load)), float(np.ptp(response)), 1e-15)
+    return Bench(
+        data=data, rows=rows, layout=layout, noise=estimate_noise(data, rows, stated, imposed),
+        imposed=imposed, sense=-1.0 if imposed else 1.0, compliance=c, load=load, response=response,
+        torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, scatter=scatter,
+        trend=trend, observed=observed,
+    )  # fmt: skip
+
+
+def _outside(data: GapData, rows: Rows) -> Array:
+    """(n,) m/N: of the setup of every row."""
+    return np.array([s.outside for s in data.setups])[rows.setup]
+
+
+def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:
+    n, m, h = rows.n, data.joints, len(rows.edges)
+    q = h * m if data.q is not None and data.output_encoder else 0
+    t = 0 if rows.tangential is None else 2 * h
+    # what is held at no displacement may still be pressed, or pulled
+    z = 0 if imposed or data.imposed == "displacement" else int(rows.zero.sum())
+    return Layout(n, m, slice(n, n + q), slice(n + q, n + q + t),
+                  slice(n + q + t, n + q + t + z), n + q + t + z)  # fmt: skip

@@ -1,0 +1,356 @@
+"""Operators with memory, on rows in their order: what friction, creep and lag make of a load.
+
+All run over the load path of the whole session. Between two runs the load returns to zero, unless
+both neighbours stay far from it (one continuous recording cut into runs).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from math import exp
+
+import numpy as np
+
+from identification.gap.data import Array, Flags
+from identification.gap.recording.rows import Rows
+
+_FAR = 0.2  # share of the load's range: a run that starts and ends beyond it was not unloaded
+
+
+def rests(rows: Rows) -> Flags:
+    """(n,): rows before which the load went back to zero (first rows of runs)."""
+    out = rows.starts.copy()
+    span = float(np.ptp(np.append(rows.force, 0.0)))
+    for i in np.flatnonzero(out)[1:]:
+        if min(abs(rows.force[i - 1]), abs(rows.force[i])) > _FAR * span:
+            out[i] = False
+    return out
+
+
+def moves(rows: Rows, poses: list[str]) -> Flags:
+    """(n,): first rows after the arm went to another pose. poses: of every setup."""
+    number = np.array([poses.index(p) for p in poses])[rows.setup]
+    return np.concatenate([[True], np.diff(number) != 0])
+
+
+def play(
+    load: Array, radius: Array, rest: Flags, fresh: Flags, weight: Array | float = 0.0
+) -> Array:
+    """Play operator (backlash of half width `radius`), (n, k) for load (n, k), radius (k,).
+
+    `p_i = max(x_i - r, min(x_i + r, p_{i-1}))`, p = 0 in the beginning (Krasnosel'skii, Pokrovskii
+    1989). rest: rows before which the load was zero. fresh: rows before which the state went back
+    to zero (the arm moved to another pose, or a controller took the joint back). weight (n, 1):
+    what came on beside the load then, and stays; states count from where it left them.
+    """
+    # Every row clips the state before it to [x - r, x + r]; clips of clips are clips, so that all
+    # prefixes are found in log2(n) passes over the rows.
+    least, most = weight - radius, weight + radius
+    hung = _clipped(0.0, least, most)
+    low, high = load + least, load + most
+    back = (_clipped(least, low, high), _clipped(most, low, high))  # from anywhere without load
+    still = _clipped(hung, low, high)
+    low = np.where(fresh[:, None], still, np.where(rest[:, None], back[0], low))
+    high = np.where(fresh[:, None], still, np.where(rest[:, None], back[1], high))
+    step = 1
+    while step < len(load):
+        lower = _clipped(low[:-step], low[step:], high[step:])
+        upper = _clipped(high[:-step], low[step:], high[step:])
+        low[step:], high[step:] = lower, upper
+        step *= 2
+    return np.asarray(_clipped(np.atleast_2d(hung)[:1], low, high) - hung)
+
+
+def _clipped(values: Array | float, low: Array, high: Array) -> Array:
+    """np.clip, which takes three times as long for arrays as small as these."""
+    return np.asarray(np.minimum(np.maximum(values, low), high))
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A load path with a cycle put before every fresh start; kept: the rows that were there."""
+
+    load: Array
+    fresh: Flags
+    kept: Flags
+
+
+def worked_in(load: Array, fresh: Flags) -> Path:
+    """The path (n,) with a cycle to its largest load and back before every fresh start."""
+    starts = np.flatnonzero(fresh)
+    parts, begins, kept = [], [], []
+    for a, b in zip(starts, np.append(starts[1:], len(load)), strict=True):
+        top = load[a + int(np.abs(load[a:b]).argmax())]
+        parts.append(np.concatenate([[top, 0.0], load[a:b]]))
+        begins.append(np.concatenate([[True], np.zeros(b - a + 1, dtype=bool)]))
+        kept.append(np.concatenate([[False, False], np.ones(b - a, dtype=bool)]))
+    return Path(np.concatenate(parts), np.concatenate(begins), np.concatenate(kept))
+
+
+def bristles(
+    load: Array, reach: Array, fresh: Flags, elastic: bool, weight: Array | None = None
+) -> Array:
+    """State z in [-1, 1] of a friction whose bristles bend over `reach` (k,), (n, k); with a
+    weight (n,) that came on when it was fresh, against where that left it.
+
+    `dz = (s - z) s dx / r` with s the sense of motion (Dahl); elastic: while z opposes the motion
+    it falls linearly, `dz = dx / r` (Bouc-Wen with beta = gamma). Exact between rows.
+    """
+    hung = np.zeros((len(load), len(reach)))
+    if weight is not None:
+        hung = -np.sign(weight)[:, None] * np.expm1(-np.abs(weight)[:, None] / reach)
+    begins = fresh | (np.arange(len(load)) == 0)
+    step = load - np.where(begins, 0.0, np.concatenate([[0.0], load[:-1]]))
+    sense, way = np.sign(step)[:, None], np.abs(step)[:, None] / reach
+    if not elastic:
+        from_before = np.where(begins[:, None], hung, 0.0)
+        still = np.exp(-way)
+        gain = still * from_before - sense * np.expm1(-way)
+        return np.asarray(_prefix(np.where(begins[:, None], 0.0, still), gain) - hung)
+    changes = begins | (step != 0)
+    at = np.flatnonzero(changes)
+    senses, fresh_at = sense[at, 0].tolist(), begins[at].tolist()
+    each = zip(way[at].T.tolist(), hung[at].T.tolist(), strict=True)
+    states = np.array([_let_go(senses, fresh_at, *one) for one in each]).T
+    return np.asarray(states[np.cumsum(changes) - 1] - hung)
+
+
+def _let_go(
+    sense: list[float], begins: list[bool], way: list[float], hung: list[float]
+) -> list[float]:
+    """States of bristles of one reach that let go elastically; numbers of Python, of which numpy
+    would make a third as many in the time."""
+    out, z = [], hung[0]
+    for s, new, w, start in zip(sense, begins, way, hung, strict=True):
+        z = start if new else z
+        back = min(max(-s * z, 0.0), w)
+        z = s - (s * (1 - back) - z) * exp(back - w)
+        out.append(z)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Phases:
+    """Seconds (n,) since the row before, in all, and of these: the old load stands on, the load
+    ramps, it stands. After a rest only the last of it is ramp."""
+
+    step: Array
+    pause: Array
+    ramp: Array
+    stands: Array
+
+
+def _phases(rows: Rows, rest: Flags) -> _Phases:
+    step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
+    ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
+    stands = np.minimum(settling_share(rows), ease)
+    pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
+    return _Phases(step, pause, np.maximum(ease - stands - pause, 0.0), stands)
+
+
+def retarded(
+    load: Array, times: Array, rows: Rows, rest: Flags, fresh: Flags | None = None
+) -> Array:
+    """First-order lag `T z' = x - z` of a load (n, k) with times (k,), or one (1,) for all:
+    deflection of a Kelvin-Voigt element per unit of its compliance. Exact for a load that ramps
+    between rows and then stands. fresh: rows (n,), after a rest, before which it is forgotten."""
+    before = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
+    before[rest] = 0.0
+    phases = _phases(rows, rest)
+    # z_i = keep_i z_{i-1} + gain_i: decay in a rest, or the old load standing on; a ramp to the new
+    # load, then standing there
+    paused = np.exp(-phases.pause[:, None] / times)
+    ramp = phases.ramp[:, None] / times
+    held = np.exp(-phases.stands[:, None] / times)
+    during = np.exp(-ramp)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(ramp > 0, -np.expm1(-ramp) / ramp, 1.0)
+    ramped = load * (1 - share) + before * (share - during)  # of a ramp, z = 0 before it
+    decayed = np.exp(-phases.step[:, None] / times)
+    keep = held * during * np.where(rest[:, None], decayed, paused)
+    if fresh is not None:
+        keep[fresh] = 0.0
+    stood = during * before * (1 - paused)
+    return _prefix(keep, held * (ramped + stood) + load * (1 - held))
+
+
+def followed(values: Array, clock: Array, times: Array) -> Array:
+    """First-order lags (n, k) with times (k,) s behind values (n,) that were read at clock (n,) s,
+    from where they began on: exact for values that go straight from reading to reading."""
+    rise = (values - values[0])[:, None]
+    before = np.vstack([np.zeros((1, 1)), rise[:-1]])
+    step = np.diff(clock, prepend=clock[0])[:, None] / times
+    keep = np.exp(-step)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(step > 0, -np.expm1(-step) / step, 1.0)
+    return _prefix(keep, rise * (1 - share) + before * (share - keep))
+
+
+_REST_RAMP_S = 5.0  # the last of a rest: the screw comes to the load
+
+
+def _prefix(keep: Array, gain: Array) -> Array:
+    """z (n, k) of `z_i = keep_i z_{i-1} + gain_i`, z = 0 before: steps of steps are steps, so all
+    prefixes are found in log2(n) passes."""
+    keep, gain = keep.copy(), gain.copy()
+    step = 1
+    while step < len(keep):
+        further = gain[step:] + keep[step:] * gain[:-step]
+        keep[step:] = keep[step:] * keep[:-step]
+        gain[step:] = further
+        step *= 2
+    return gain
+
+
+def flowing_play(
+    load: Array, radius: Array, times: Array, rows: Rows, fresh: Flags, weight: Array | None = None,
+    square: Flags | bool = False,
+) -> Array:  # fmt: skip
+    """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
+
+    `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
+    falls below it, wherever it has come to. load (n,), or (n, k): of each. square (k,): it
+    flows with the square of the overstress, `T p' = o |o| / r`, and slows down as it comes near.
+    Ramps between holds in _PARTS parts, then standing; within a hold the load hardly moves, and one
+    part will do. weight (n,): as in `play`.
+    """
+    load = load.reshape(len(load), -1)
+    out = np.empty((len(load), len(radius)))
+    centre = np.zeros((len(load), 1)) if weight is None else weight[:, None]
+    below, above = centre - radius, centre + radius
+    hung = _clipped(0.0, below, above)
+    low, high = load + below, load + above
+    rest = rests(rows)
+    phases = _phases(rows, rest)
+    parts = np.where(rows.hold_starts | rest | rows.continuous, _PARTS, 1)
+    share = {m: ((np.arange(m) + 0.5) / m)[:, None] for m in (1, _PARTS)}
+    # (n, k): before the load moves, in every part of its way, after it
+    paused, during, stood = (
+        _flowing(seconds[:, None] / times, square)
+        for seconds in (phases.pause, phases.ramp / parts, phases.stands)
+    )
+    flown = partial(_flown, radius=radius, square=square, some=bool(np.any(square)))
+    state, before = hung[0], np.zeros(load.shape[1])
+    for i, x in enumerate(load):
+        if fresh[i]:
+            state, before = hung[i], 0.0 * x
+        elif rest[i]:  # minutes without load
+            state, before = _clipped(state, below[i], above[i]), 0.0 * x
+        if phases.pause[i] > 0:
+            state = flown(state, paused[i], before + below[i], before + above[i])
+        if phases.ramp[i] > 0:
+            at = before + share[parts[i]] * (x - before)
+            for least, most in zip(at + below[i], at + above[i], strict=True):
+                state = flown(state, during[i], least, most)
+        if phases.stands[i] > 0:
+            state = flown(state, stood[i], low[i], high[i])
+        out[i], before = state, x
+    return out - hung
+
+
+def _flowing(over: Array, square: Flags | bool) -> Array:
+    """Share of what is beyond that flows off in times over its time constant (n, k); of what flows
+    with the square, that ratio itself."""
+    return np.where(square, over, -np.expm1(-over))
+
+
+def _flown(
+    state: Array, share: Array, least: Array, most: Array,
+    radius: Array, square: Flags | bool, some: bool,
+) -> Array:  # fmt: skip
+    """States (k,) after a while in which [least, most] held still. some: any flows with the
+    square."""
+    over = _clipped(state, least, most) - state
+    if not some:
+        return state + share * over
+    way = share * np.abs(over) / radius
+    return state + np.where(square, way / (1 + way), share) * over
+
+
+_PARTS = 4
+
+
+def settling_share(rows: Rows) -> Array:
+    """(n,) s: how long the load has stood before a row: half a sample at the start of a hold."""
+    if rows.continuous:
+        return np.zeros(rows.n)
+    return np.where(rows.hold_starts, half_sample(rows), 0.0)
+
+
+def standing_on(rows: Rows) -> Array:
+    """(n,) s: how long the old load still stood after the time of the row before, 0 within holds:
+    the time of a row is the middle of its samples, the load moves half a sample after the last."""
+    if rows.continuous:
+        return np.zeros(rows.n)
+    last = half_sample(rows) * np.concatenate([[0.0], rows.weight[:-1]])
+    return np.where(rows.hold_starts, last, 0.0)
+
+
+def half_sample(rows: Rows) -> float:
+    """Half of the time between two samples of a hold, s."""
+    step = np.diff(rows.time)
+    inner = step[~rows.hold_starts[1:] & (step > 0)]
+    return float(np.min(inner)) / 2 if inner.size else 0.5
+
+
+def sampling_time(rows: Rows) -> float:
+    """Time between two samples of a hold; of a running recording, between most of its rows, s."""
+    return (row_time(rows) or 1.0) if rows.continuous else 2 * half_sample(rows)
+
+
+def row_time(rows: Rows) -> float:
+    """Time between most neighbouring rows, s; 0 where no time goes by."""
+    step: Array = np.diff(rows.time)
+    return float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+
+
+def delayed(values: Array, delay: float, rows: Rows) -> Array:
+    """`values(t - delay)` of values (n,) or (n, k), within every run, the path between rows being
+    straight ramps."""
+    out = np.empty_like(values)
+    for a, b, t, v in _ramps(values, rows):
+        place = np.interp(rows.time[a:b] - delay, t, np.arange(len(t), dtype=float))
+        low = place.astype(np.intp)
+        share = (place - low).reshape(-1, *[1] * (v.ndim - 1))
+        out[a:b] = v[low] + share * (v[np.minimum(low + 1, len(v) - 1)] - v[low])
+    return out
+
+
+def averaged(values: Array, window: float, rows: Rows) -> Array:
+    """Means of values (n,) or (n, k) over the last `window` s, along the same ramps; before a run
+    they are what they are at its first row."""
+    out = np.empty_like(values)
+    for a, b, t, v in _ramps(values, rows):
+        step = np.diff(t).reshape(-1, *[1] * (v.ndim - 1))
+        area = np.concatenate([0.0 * v[:1], np.cumsum(step * (v[1:] + v[:-1]) / 2, axis=0)])
+
+        def until(at: Array, t: Array = t, v: Array = v, area: Array = area) -> Array:
+            k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 1)
+            after = (at - t[k]).reshape(-1, *[1] * (v.ndim - 1))
+            high = np.minimum(k + 1, len(t) - 1)
+            length = np.maximum(t[high] - t[k], 1e-300).reshape(after.shape)
+            rise = np.where(after > 0, (v[high] - v[k]) / length, 0.0)
+            return np.asarray(area[k] + after * (v[k] + 0.5 * after * rise))
+
+        now = rows.time[a:b]
+        out[a:b] = (until(now) - until(now - window)) / window
+    return out
+
+
+def _ramps(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]:
+    """Of every run its first row and the one after its last, and corners of its path: times (m,)
+    and values (m,) or (m, k)."""
+    half = half_sample(rows)
+    for a, b in pairwise(rows.run_edges.tolist()):
+        t, v = rows.time[a:b], values[a:b]
+        if not rows.continuous:
+            new = rows.hold_starts[a:b]
+            last = half * rows.weight[a:b][:-1]
+            t = np.concatenate([t, t[new] - half, (t[:-1] + last)[new[1:]]])
+            v = np.concatenate([v, v[new], v[:-1][new[1:]]])
+            order = np.argsort(t, kind="stable")
+            t, v = t[order], v[order]
+        yield a, b, t, v

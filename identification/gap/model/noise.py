@@ -1,0 +1,393 @@
+"""Noise of the channels: measured within holds where there are enough samples, stated elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from identification.gap.data import Array, Flags, GapData, Ints
+from identification.gap.model.history import half_sample
+from identification.gap.recording.holds import (
+    ENOUGH,
+    hold_ids,
+    rest_ids,
+    scatter_of_three,
+    scatter_within,
+    swing_within,
+)
+from identification.gap.recording.rows import Rows
+from identification.gap.recording.turns import turns
+from identification.gap.recording.white import LEAST_SAMPLES, white_noise, white_sd
+
+ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
+ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
+# The stated uncertainty of one sample includes what is common to a hold (vibration, linearity) and
+# to a run (datum); a third of it each leaves nine tenths for the single sample.
+HOLD_SHARE = 0.2
+RUN_SHARE = 0.33
+# What is stated of a bench's instruments is known to a factor of two (GUM G.4.2: a type B estimate
+# is worth few degrees of freedom): what is left below twice that is no structure.
+UNSURE = 3**0.5  # of it, beyond it in quadrature
+# Readings that scatter so many times more than stated are not explained by what was stated, nor
+# such that swing by more than that at rest.
+NOISY, SWINGS = 3.0, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Standard deviations. response (n,) m and q (m,), of a row of weight w divided by sqrt(w)
+    already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
+    one sample. raised: how many times what is stated readings scatter, of a running recording or
+    within holds, at least 1.
+    sure: of an arm's instruments, or measured; what else is stated is known to a factor UNSURE.
+    swings: how many times what is stated an arm goes to and fro while nothing changes. slow: by
+    which share of what is stated it may differ from hold to hold. seen: of one
+    sample, m, as far as a rig without an arm showed it: 0 where it read every level but once."""
+
+    response: Array
+    q: Array
+    force: float
+    hold: Array
+    run: float
+    stated: float
+    raised: float = 1.0
+    sure: bool = True
+    swings: float = 0.0
+    slow: float = 0.0
+    seen: float = 0.0
+
+    @property
+    def misjudged(self) -> bool:
+        """Whether what was stated does not explain what the readings do while nothing changes."""
+        known = 1.0 if self.sure else float(np.hypot(1.0, UNSURE))
+        return self.raised > NOISY * known or self.swings > SWINGS
+
+
+def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Noise:
+    """Noise of the rows; slope (n,) m/N turns noise of the force into that of the response."""
+    meter = data.instruments
+    fallback = np.hypot(meter.displacement, slope * meter.force)
+    hold = rest_ids(data, hold_ids(data))
+    steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
+    common = np.where(rows.steady, steep * meter.force / np.sqrt(rows.hold_weight), 0.0)
+    if rows.continuous:
+        per_sample, common = _running(data, rows, slope, imposed), np.zeros(rows.n)
+    elif imposed:  # the force answers
+        answer = _scatter(data, data.force, hold) or meter.force
+        per_sample = np.hypot(slope * max(answer, 0.33 * meter.force),
+                              np.where(rows.rests, 0.0, meter.displacement))  # fmt: skip
+        common = np.where(rows.rests, meter.displacement / np.sqrt(rows.hold_weight), 0.0)
+    else:
+        alone = np.where(rows.steady, meter.displacement, fallback)
+        per_sample = _white(data, rows, alone, slope, hold)
+    if not rows.continuous:
+        moving = np.hypot(np.maximum(per_sample, fallback), _apart(rows))
+        per_sample = np.where(rows.on_the_way, moving, per_sample)
+    weight = np.ones(rows.n) if rows.continuous else rows.weight
+    stated = meter.displacement
+    if rows.continuous or imposed:
+        stated = float(np.median(per_sample if rows.continuous else fallback))
+    white = stated if rows.continuous else _scatter(data, data.displacement, hold) or 0.0
+    raised = 1.0
+    if rows.continuous:
+        raised = _raised(data)
+    elif not imposed:
+        less = data.displacement - float(np.median(slope)) * data.force
+        follows = _scatter(data, less, hold)
+        raised = max(1.0, min(white, follows or 0.0) / meter.displacement)
+    rounded = 0.0 if rows.continuous or imposed else _rounded(data, hold)
+    per_sample = np.maximum(per_sample, rounded)  # next to an edge, one is a whole step off
+    return Noise(
+        response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
+        hold=np.hypot(max(HOLD_SHARE * stated, rounded), common), run=RUN_SHARE * stated,
+        stated=stated,
+        raised=raised,
+        swings=_swings(data, rows, hold),
+        slow=_slow(data, rows, float(np.median(slope)), hold),
+        sure=data.arm or (rows.continuous and len(data.force) >= LEAST_SAMPLES),
+        seen=0.0 if data.arm and not rows.continuous else min(white, stated),
+    )  # fmt: skip
+
+
+def _apart(rows: Rows) -> Array:
+    """(n,) m that the arm moves while one channel was read and the other not yet: channels of their
+    own clocks are together to a share of the time between two samples."""
+    time, way = np.diff(rows.time), np.abs(np.diff(rows.displacement))
+    speed = np.divide(way, time, out=np.zeros(len(way)), where=(time > 0) & ~rows.hold_starts[1:])
+    either_side = np.maximum(np.append(speed, 0.0), np.append(0.0, speed))
+    return np.asarray(_TOGETHER * 2 * half_sample(rows) * either_side)
+
+
+_TOGETHER = 0.02
+
+
+_ONE_NUMBER = 0.7  # of successive readings of a hold: they scatter by a quarter of the step
+
+
+def _rounded(data: GapData, hold: Ints) -> float:
+    """What all readings of a hold are off by together (m) because the sensor rounds them, and
+    scatters by less than its step: taking more of them tells no more (GUM F.2.2.1). No more than is
+    stated of one; 0 where they scatter."""
+    u, again = data.displacement, np.diff(hold) == 0
+    if again.sum() < ENOUGH or np.mean(np.diff(u)[again] == 0) < _ONE_NUMBER:
+        return 0.0
+    steps = np.diff(np.unique(u))
+    real = steps[steps > _SAME * float(np.ptp(u))]
+    return min(float(real.min(initial=np.inf)) / 12**0.5, data.instruments.displacement)
+
+
+_SAME = 1e-9  # of the range: digits that a conversion of units leaves
+
+
+def _swings(data: GapData, rows: Rows, hold: Ints) -> float:
+    """What an arm's displacement swings about its holds, over what is stated; 0 where it runs."""
+    if rows.continuous or not data.arm:
+        return 0.0
+    return swing_within(data.displacement, hold) / data.instruments.displacement
+
+
+def _slow(data: GapData, rows: Rows, slope: float, hold: Ints) -> float:
+    """Share of what is stated by which an arm's readings may differ from hold to hold: by what is
+    stated of both channels and their holds don't show. 0 where these can't tell."""
+    meter, slow = data.instruments, []
+    for values, stated in ((data.displacement, meter.displacement), (data.force, meter.force)):
+        white = scatter_within(values, hold)
+        if rows.continuous or not data.arm or white is None:
+            return 0.0
+        slow.append(max(stated**2 - white**2, 0.0) ** 0.5)
+    return min(float(np.hypot(slow[0], slope * slow[1])) / meter.displacement, 1.0)
+
+
+def _encoders(data: GapData, rows: Rows, hold: Ints) -> Array:
+    """Noise of one joint reading (m,), rad: within holds, or between repetitions where holds are
+    too short; what is usual where neither tells."""
+    q = np.full(data.joints, ENCODER_RAD)
+    if data.q is None or rows.continuous:
+        return q
+    each = [scatter_within(data.q[:, j], hold) for j in range(data.joints)]
+    if any(found is None for found in each):
+        q[:] = _between_repetitions(data, rows) or ENCODER_RAD
+    for j, found in enumerate(each):
+        q[j] = max(found or q[j], 1e-7)
+    return q
+
+
+def _between_repetitions(data: GapData, rows: Rows) -> float | None:
+    """Noise of one joint reading from how levels repeat, rad: that of the middle joint, as one may
+    have a trouble of its own. Forces that differ a little are allowed for as simulated."""
+    assert rows.q is not None
+    lever = np.stack([s.lever for s in data.setups])[rows.setup]
+    left = rows.q - lever * data.compliance * rows.force[:, None]
+    free = rows.n
+    for group in (rows.level, rows.run):
+        size = np.bincount(group)
+        left = left - np.stack([np.bincount(group, w) / size for w in left.T], axis=1)[group]
+        free -= len(size)
+    free += len(np.unique(rows.setup))
+    if free < ENOUGH:
+        return None
+    spread = np.median(np.abs(left) * np.sqrt(rows.weight)[:, None], axis=0) / 0.6745
+    return float(np.median(spread) * (rows.n / free) ** 0.5)
+
+
+def _raised(data: GapData) -> float:
+    """The larger ratio of what a channel scatters to what is stated of it, at least 1."""
+    force, displacement = _whites(data)
+    return max(1.0, force / data.instruments.force, displacement / data.instruments.displacement)
+
+
+def _whites(data: GapData) -> tuple[float, float]:
+    """Noise of one sample of force (N) and displacement (m) in a running recording."""
+    force, displacement = data.force, data.displacement
+    return white_noise(force, displacement), white_noise(displacement, force)
+
+
+def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:
+    """Noise of one sample's response (n,) in a running recording, m: that of what answers, and
+    that of what is driven times how steeply the answer follows it there. On a plateau of friction,
+    or of a metal that flows, a displacement that is driven adds nothing."""
+    meter = data.instruments
+    force, displacement = _whites(data)
+    force, displacement = max(meter.force, force), max(meter.displacement, displacement)
+    if imposed:
+        stiff = _steepness(rows, rows.displacement, rows.measured_force, displacement, 1 / slope)
+        return np.asarray(slope * np.hypot(force, stiff * displacement))
+    soft = _steepness(rows, rows.measured_force, rows.displacement, force, slope)
+    return np.hypot(displacement, soft * force)
+
+
+_REACH = 3  # rows to either side, over which a local slope is taken,
+# or more, where hardly a tenth of them move by so many standard deviations; up to an eighth of all
+_TOLD, _MOVING, _FARTHEST = 5.0, 0.9, 8
+
+
+def _steepness(rows: Rows, driven: Array, answer: Array, sd: float, simulated: Array) -> Array:
+    """(n,) how much the answer changes per unit of what is driven, about a row within its run, over
+    as many rows as tell its motion from its noise; changes of what is driven below three standard
+    deviations count as that much. Where its motion drowns, at least what is simulated (n,); where
+    it stands, no more than that: what goes on meanwhile is no answer."""
+    reach = _reach(rows, driven, sd)
+    a, b = _about(rows, reach or _REACH)
+    way = np.maximum(np.abs(driven[b] - driven[a]), max(3 * sd, 1e-300))
+    steep = np.abs(answer[b] - answer[a]) / way
+    steep = steep if reach else np.maximum(steep, simulated)
+    return np.where(_stands(rows, driven, sd), np.minimum(steep, simulated), steep)
+
+
+def _reach(rows: Rows, driven: Array, sd: float) -> int:
+    """How many rows to either side tell the motion of what is driven from its noise: a few where it
+    moves plainly over them or stands, more where it does most of the time over more; 0 where it
+    goes one way, but never plainly."""
+    a, b = _about(rows, reach := _REACH)
+    if np.quantile(np.abs(driven[b] - driven[a]), _MOVING) >= _TOLD * sd:
+        return _REACH
+    while 2 * reach * _FARTHEST <= rows.n:
+        a, b = _about(rows, reach := 2 * reach)
+        if np.median(np.abs(driven[b] - driven[a])) >= _TOLD * sd:
+            return reach
+    return _REACH if np.ptp(driven) > _GOES * sd or _run(driven) <= _TREND * sd else 0
+
+
+def _about(rows: Rows, reach: int) -> tuple[Ints, Ints]:
+    """(n,) the rows that lie `reach` before and after every row, within its run."""
+    number, run, edges = np.arange(rows.n), np.cumsum(rows.starts) - 1, rows.run_edges
+    return np.maximum(number - reach, edges[run]), np.minimum(number + reach, edges[run + 1] - 1)
+
+
+_LONG = 8  # rows of a stretch in which a channel stands
+_BAND, _TREND = 3.0, 1.5  # of the rows' noise: how far it strays there, and runs
+_GOES, _SLOWLY = 20.0, 10.0  # of that: in all, and over _REACH rows to either side at the most;
+_BENDS = 12.0  # it bends over these: five times what the noise alone does
+
+
+def driven(data: GapData, rows: Rows, imposed: bool) -> Array:
+    """(n,) the displacement (m) if that is imposed, or the force (N), with its mean wherever it
+    stands still within its noise: a model that is driven by noise answers with noise that the rig
+    never showed."""
+    meter = data.instruments
+    if rows.continuous:
+        if imposed:
+            return standing(rows, rows.displacement, meter.displacement)
+        return standing(rows, rows.force, meter.force)
+    return rows.rested if imposed else rows.force
+
+
+def standing(rows: Rows, driven: Array, stated: float) -> Array:
+    """What is driven (n,) with the mean of every stretch of a running recording in which it stands.
+    Of what goes so slowly all the time that a few rows hardly tell it from standing, or goes
+    straight on, the mean about every row."""
+    if rows.n <= _LONG:
+        return driven
+    sd = _jitter(driven, stated)
+    before, after = _about(rows, _REACH)
+    way = np.abs(driven[after] - driven[before])
+    bend = np.abs(driven[after] - 2 * driven + driven[before])
+    slow_or_straight = way.max() < _SLOWLY * sd or bend.max() < _BENDS * sd
+    if np.ptp(driven) > _GOES * sd and slow_or_straight:
+        return _means(rows, driven, _reach(rows, driven, sd))
+    out = driven.copy()
+    for mine in _stretches(rows, driven, sd):
+        out[mine] = driven[mine].mean()
+    return out
+
+
+def _stands(rows: Rows, driven: Array, stated: float) -> Flags:
+    """(n,) whether what is driven is in a stretch in which it stands."""
+    out = np.zeros(rows.n, dtype=bool)
+    for mine in _stretches(rows, driven, _jitter(driven, stated)):
+        out[mine] = True
+    return out
+
+
+def _stretches(rows: Rows, driven: Array, sd: float) -> Iterator[slice]:
+    """Rows over which what is driven stands still within its noise."""
+    for a, b in pairwise(rows.run_edges.tolist()):
+        first = a
+        while first < b:
+            last = _stretch(driven[first:b], _BAND * sd) + first
+            mine = slice(first, last)
+            if last - first >= _LONG and _run(driven[mine]) <= _TREND * sd:
+                yield mine
+            first = last
+
+
+def _jitter(driven: Array, stated: float) -> float:
+    """Noise of the rows of what is driven: as they scatter, no more than is stated by far, and no
+    less than steps of the reading make, if what is stated has room for them."""
+    steps = np.abs(np.diff(driven))
+    if len(steps) < 2:
+        return 0.0
+    scatter = white_sd(np.diff(driven, 2))
+    coarse = float(np.mean(steps == 0)) > _REPEATED
+    step = float(steps[steps > 0].min(initial=np.inf)) / 12**0.5
+    return max(min(scatter, 3 * stated), step if coarse and step <= stated else 0.0)
+
+
+_REPEATED = 0.3  # of the readings are the one before again
+
+
+def _means(rows: Rows, values: Array, reach: int) -> Array:
+    """(n,) means over up to `reach` rows to either side, as many to both, and none beyond where a
+    path turns: of straight ones they lie on it."""
+    a, b = _about(rows, reach)
+    number = np.arange(rows.n)
+    side = np.minimum(number - a, b - number)
+    for start, end in pairwise(rows.run_edges):
+        for turn in turns(values[start:end]):
+            side = np.minimum(side, np.abs(number - (start + turn)))
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray((total[number + side + 1] - total[number - side]) / (2 * side + 1))
+
+
+def _stretch(values: Array, band: float) -> int:
+    """How many values stay within `band` of the mean of those before them, at least one."""
+    mean = np.cumsum(values) / np.arange(1, len(values) + 1)
+    away = np.abs(values[1:] - mean[:-1]) > band
+    return int(away.argmax()) + 1 if away.any() else len(values)
+
+
+def _run(values: Array) -> float:
+    """By how much a straight line through the values changes along them."""
+    at = np.linspace(-0.5, 0.5, len(values))
+    return abs(float(at @ values) / float(at @ at))
+
+
+def tangent(rows: Rows, force_sd: float) -> Array:
+    """(n,) m/N: how steep the measured curve is at a row's hold, the steeper side counting.
+
+    Where a joint yields, the force hardly rises while the displacement runs: there an error of the
+    force, multiplied by this slope, is an error of the displacement. Steps of force below three
+    standard deviations count as that much.
+    """
+    f, u = rows.hold_means(rows.measured_force), rows.hold_means(rows.displacement)
+    run = rows.run[rows.edges]
+    least = 3 * force_sd
+    step = np.abs(np.diff(u)) / np.maximum(np.abs(np.diff(f)), least)
+    step[(run[1:] != run[:-1]) | (np.abs(np.diff(f)) < least)] = 0.0
+    sides = np.concatenate([[0.0], step]), np.concatenate([step, [0.0]])
+    return np.asarray(np.maximum(*sides)[rows.hold])
+
+
+def _scatter(data: GapData, values: Array, hold: Ints) -> float | None:
+    """What values (n,) scatter in holds. Of an arm, whose instruments are known, by holds that are
+    long enough."""
+    found = scatter_within(values, hold)
+    return scatter_of_three(values, hold) if found is None and not data.arm else found
+
+
+def _white(data: GapData, rows: Rows, alone: Array, slope: Array, hold: Ints) -> Array:
+    """Noise of one sample in every row (n,): measured where holds are long enough, else `alone`."""
+    if float(rows.weight @ rows.steady) < 0.5 * float(rows.weight.sum()):
+        less = data.displacement - float(np.median(slope)) * data.force
+        measured = _scatter(data, less, hold)
+        least = 0.0 if data.arm else 0.33 * data.instruments.displacement
+        return alone if measured is None else np.full(rows.n, max(measured, least))
+    measured = _scatter(data, data.displacement, hold)
+    if measured is None:
+        return alone
+    # never less than a third of what is stated: second differences can't see everything
+    white = max(measured, 0.33 * data.instruments.displacement)
+    return np.where(rows.steady, white, np.hypot(white, slope * data.instruments.force))

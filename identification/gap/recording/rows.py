@@ -1,0 +1,237 @@
+"""Rows that the diagnosis works on, each the mean of a bin of samples (`bins`),
+with the holds and levels that they belong to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from identification.gap.data import CYCLE, ZERO, Array, Flags, GapData, Ints
+from identification.gap.recording.bins import Bins
+from identification.gap.recording.holds import (
+    hold_ids,
+    is_continuous,
+    noise_in_holds,
+    rest_ids,
+    side_of,
+    steadied,
+)
+from identification.gap.recording.ramps import much_to_go
+from identification.gap.recording.turns import rises
+
+_LEVELS = 12  # force classes of a continuous recording, per sense of motion
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """n rows. weight (n,): samples behind a row; hold, level, run, setup (n,): consecutive ids.
+
+    level: same setup, branch and step (or class of force and sense of motion): what repeats from
+    repetition to repetition shares a level. on_the_way (n,): rows of ramps that were recorded
+    before holds. session (n,) s is always there: `clock` says whether
+    it was recorded. force: of a hold whose samples scatter by no more than their noise, the mean
+    of the hold in all its rows (its noise would else pass for a small friction or a lag);
+    measured_force: as it is. steady (n,): such holds. rested (n,) m: the displacement with its
+    mean likewise; rests (n,): such holds. hold_weight (n,): samples of the row's hold;
+    force_scatter, displacement_scatter (n,): mean squares of the samples about their row, N^2 and
+    m^2; of rows of holds also spread (n,) s^2: of their times; force_trend,
+    displacement_trend (n,): mean products of time and channel about the row, N s and m s.
+    """
+
+    time: Array
+    session: Array
+    clock: bool
+    run: Ints
+    setup: Ints
+    repetition: Ints
+    branch: Ints
+    step: Ints
+    hold: Ints
+    level: Ints
+    weight: Array
+    force: Array
+    measured_force: Array
+    displacement: Array
+    rested: Array
+    tangential: Array | None
+    q: Array | None
+    temperature: Array | None
+    simulated: Array | None
+    zero: Flags
+    on_the_way: Flags
+    steady: Flags
+    rests: Flags
+    hold_weight: Array
+    force_scatter: Array
+    displacement_scatter: Array
+    spread: Array
+    force_trend: Array
+    displacement_trend: Array
+    continuous: bool
+    starts: Flags  # first row of a run
+    hold_starts: Flags
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return len(self.force)
+
+    @cached_property
+    def edges(self) -> Ints:
+        """(holds,) first row of every hold."""
+        return np.flatnonzero(self.hold_starts)
+
+    @cached_property
+    def run_edges(self) -> Ints:
+        """(runs + 1,) first row of every run, and the one after the last."""
+        return np.append(np.flatnonzero(self.starts), self.n)
+
+    @cached_property
+    def _share_of_setup(self) -> Array:
+        """(n, s) what each row weighs in the mean of its setup."""
+        weight = (
+            np.equal.outer(self.setup, np.arange(int(self.setup.max()) + 1)) * self.weight[:, None]
+        )
+        return np.asarray(weight / np.maximum(weight.sum(axis=0), 1e-300))
+
+    def speed(self, values: Array) -> Array:
+        """(n,) by how much values (n,) change per second at every row: between the slopes before
+        and after it, and beyond the last of a hold, as an exponential goes on; 0 where there are no
+        two slopes of one sense, as after a step."""
+        first = self.edges[self.hold]
+        last = np.append(self.edges[1:], self.n)[self.hold] - 1
+        b = np.clip(np.arange(self.n), first + 1, np.maximum(last - 1, first + 1))
+        a, b, c = b - 1, np.minimum(b, last), np.minimum(b + 1, last)
+        t, v = self.time, values
+        with np.errstate(divide="ignore", invalid="ignore"):
+            before = (v[b] - v[a]) / (t[b] - t[a])
+            after = (v[c] - v[b]) / (t[c] - t[b])
+            ratio, way = after / before, (2 * t - t[a] - t[b]) / (t[c] - t[a])
+            out = before * ratio ** np.where(ratio > 1, np.clip(way, 0.0, 1.0), way)
+        return np.where(np.isfinite(out), out, 0.0)  # no power of what is below zero
+
+    def moved(self, values: Array) -> Array:
+        """Values (n, k) less their mean per setup: the datum says nothing."""
+        means = values.T @ self._share_of_setup
+        return np.asarray(values - means[:, self.setup].T)
+
+    def hold_means(self, values: Array) -> Array:
+        """(holds, ...) means of values (n, ...) over every hold, each sample counted."""
+        weight = self.weight.reshape(-1, *(1,) * (values.ndim - 1))
+        total = self.hold_weight[self.edges].reshape(-1, *(1,) * (values.ndim - 1))
+        return np.asarray(np.add.reduceat(values * weight, self.edges, axis=0) / total)
+
+    def rms(self, values: Array) -> float:
+        """Of values (n,), every sample counted."""
+        return float(np.sqrt(self.weight @ values**2 / self.weight.sum()))
+
+
+def reduce_rows(data: GapData) -> Rows:
+    """Rows of the data, in their order."""
+    hold = hold_ids(data)
+    bins = Bins.of(data, hold, is_continuous(data, hold))
+    mean, first, weight = bins.mean, bins.first, bins.count.astype(float)
+    run, setup, branch, step = map(first, (data.run, data.setup, data.branch, data.step))
+    force, displacement = mean(data.force), mean(data.displacement)
+    holds = _blocks(run) if bins.running else _consecutive(first(hold))
+    ramp = first(data.ways)
+    if bins.running:
+        level = _continuous_levels(setup, force)
+    else:
+        came = _approach(run, branch, holds, force)
+        level = _ids(np.column_stack([setup, branch, step, ramp, *came]))
+    meter, at_zero = data.instruments, (branch == ZERO) & (step <= 0)
+    # of what runs, holds are but stretches; a run that begins unloaded comes from nowhere
+    stay = _consecutive(_ids(np.column_stack([run, branch, step]))) if bins.running else holds
+    begins = (stay == stay[_changes(run)][_consecutive(run)]) & at_zero
+    coming = ramp | (much_to_go(displacement, stay, meter.displacement) & ~begins)
+    still = partial(_still, bins, rest_ids(data, hold), holds, ~coming)
+    steadied, steady = still(data.force, meter.force)
+    rested, rests = still(data.displacement, meter.displacement)
+    return Rows(
+        time=mean(data.time), session=mean(_session(data)), clock=data.session is not None, run=run,
+        setup=setup, repetition=first(data.repetition), branch=branch, step=step, hold=holds,
+        level=level, weight=weight, force=steadied, measured_force=force, steady=steady,
+        displacement=displacement, rested=rested, rests=rests,
+        hold_weight=np.bincount(holds, weights=weight)[holds].astype(float),
+        force_scatter=bins.scatter(data.force, data.displacement),
+        displacement_scatter=bins.scatter(data.displacement, data.force),
+        spread=bins.trend(data.time, data.time), force_trend=bins.trend(data.time, data.force),
+        displacement_trend=bins.trend(data.time, data.displacement),
+        tangential=bins.mean_of(data.tangential), q=bins.mean_of(data.q),
+        temperature=bins.mean_of(data.temperature), simulated=bins.mean_of(data.simulated),
+        zero=at_zero & ~coming,
+        on_the_way=ramp,
+        continuous=bins.running, starts=_changes(run), hold_starts=_changes(holds),
+    )  # fmt: skip
+
+
+def _still(
+    bins: Bins, hold: Ints, holds: Ints, there: Flags, values: Array, stated: float
+) -> tuple[Array, Flags]:
+    """A channel (k,) with its mean in holds in which it stands still within its noise, once it is
+    there (k,); these. What runs has none: a slow pull would be read as stairs."""
+    if bins.running:
+        return bins.mean(values), np.zeros(len(bins.edges), dtype=bool)
+    sd = noise_in_holds(values, hold, stated)
+    weight, mean = bins.count * there, bins.mean(values)
+    still, steady = steadied(holds, mean, weight.astype(float), sd)
+    return np.where(there, still, mean), steady & there
+
+
+def _blocks(run: Ints) -> Ints:
+    """Stretches of a continuous recording over which a model's imperfection stays alike:
+    fifty, since a smooth curve makes no more independent mistakes than that."""
+    length = max(1, -(-len(run) // _STRETCHES))
+    new = (np.arange(len(run)) % length == 0) | _changes(run)
+    return (np.cumsum(new) - 1).astype(np.int64)
+
+
+_STRETCHES = 50
+
+
+def _continuous_levels(setup: Ints, force: Array) -> Ints:
+    rising = rises(force)
+    span = np.ptp(force) or 1.0
+    number = np.minimum((force - force.min()) / span * _LEVELS, _LEVELS - 1).astype(np.int64)
+    return _ids(np.column_stack([setup, rising.astype(np.int64), number]))
+
+
+def _approach(run: Ints, branch: Ints, hold: Ints, force: Array) -> tuple[Ints, Ints]:
+    """(n,), (n,): to which side the force of a hold pushes, and, of a cycle, which way it came
+    there: one number may stand for steps of the same size to and fro."""
+    mean = np.bincount(hold, weights=force) / np.bincount(hold)
+    first = np.flatnonzero(_changes(hold))
+    came = np.where(_changes(run[first]), 0.0, np.sign(np.diff(mean, prepend=0.0)))
+    way = np.where(branch[first] == CYCLE, came, 0.0)
+    return side_of(mean)[hold].astype(np.int64), way[hold].astype(np.int64)
+
+
+def _ids(keys: Ints) -> Ints:
+    return np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+
+def _consecutive(ids: Ints) -> Ints:
+    return (np.cumsum(_changes(ids)) - 1).astype(np.int64)
+
+
+def _session(data: GapData) -> Array:
+    """The session clock, or the runs one after the other with minutes of rest between them."""
+    if data.session is not None:
+        return data.session
+    out = np.empty_like(data.time)
+    offset = 0.0
+    for run in np.unique(data.run):
+        rows = data.run == run
+        out[rows] = data.time[rows] - data.time[rows][0] + offset
+        offset = out[rows][-1] + REST_S
+    return out
+
+
+REST_S = 180.0  # between two runs the arm stands unloaded for minutes
+
+
+def _changes(ids: Ints) -> Flags:
+    return np.concatenate([[True], np.diff(ids) != 0])

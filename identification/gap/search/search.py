@@ -1,0 +1,258 @@
+"""The search for explanations: none, single effects, pairs, more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.gap.evidence.compare import Scored, by_word, closest, log_mean, marginal, score
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.finer import PARTS, gained
+from identification.gap.evidence.imperfection import LOG_STEP
+from identification.gap.evidence.parts import Part, log_joint_between, part_sizes
+from identification.gap.explanations.explanation import (
+    Explanation,
+    Found,
+    explain,
+    up_to_likeliest,
+)
+from identification.gap.explanations.penalties import joints_of
+from identification.gap.explanations.priors import LOG_NONE, LOG_UNKNOWN
+from identification.gap.explanations.several import in_more_joints, polished
+from identification.gap.explanations.verdict import weighed
+from identification.gap.model.noise import UNSURE
+from identification.gap.model.variants import Variant
+from identification.gap.search.readings import reading_all
+from identification.gap.search.shares import measured
+from identification.gap.words import MECHANISMS, NAMELESS
+
+# Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
+# factor of two.
+_SURE_SHARE, _UNSURE_SHARE = 0.05, 0.2
+_STEP = 0.6  # of the noise: between the least size of an imperfection and the next
+_SHARPENED = 8  # explanations at the most
+_PROMISING = 7  # further words of an explanation that are looked at closely
+# Explanations around which another effect is looked for. Of an arm, further ones cost a fifth of
+# the time and change no verdict in 300 cases; on a bench the two that belong together may both look
+# poor alone, where the spring is wrong as well.
+_SEEDS, _BENCH_SEEDS = 4, 6
+_READING = 6  # explanations whose instruments are looked at beside what else moves
+SPRINGS = "joint_stiffness_error"
+_WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
+
+
+def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None = None) -> Found:
+    """All single effects, then sets around the best ones, each re-fitted jointly. Where no levels
+    repeat from run to run, a third effect is but freedom of the other two's laws. variants: grow by
+    what is looked at beside others; singles: their scores one by one, where they are known."""
+    deepest = 2 if engine.bench.rows.continuous else 3
+    levels = engine.levels
+    families = by_word(singles or score(engine, levels, variants))
+    alone = {w: marginal(s) for w, s in families.items()}
+    pool: dict[frozenset[str], Explanation] = {}
+    for word, scored in families.items():
+        top = closest(scored)
+        part = Part(top.variant, top.scale)
+        pool[frozenset([word])] = explain(engine, (part,), alone[word])
+    none = _as_stated(engine)
+    empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
+    pool[frozenset()] = empty
+    seeds = _SEEDS if engine.bench.data.arm else _BENCH_SEEDS
+    front = _in_more_joints(engine, variants, pool, _seeds(pool, seeds))
+    for depth in range(2, deepest + 1):
+        front = _deepen(engine, variants, pool, front, depth, max(2, seeds // depth))
+        if not front:
+            break
+    ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
+    ranked = measured(engine, ranked)
+    named = tuple(e for e in ranked if not e.words & frozenset(NAMELESS))
+    strange = [lv for lv in engine.levels if lv.eta > _hidden(engine)]
+    found = Found(
+        engine=engine,
+        explanations=named,
+        nameless=tuple(e for e in ranked if e not in named),
+        alone={w: v - none for w, v in alone.items() if w not in NAMELESS},
+        probabilities={},
+        best=named[0],
+        unknown=log_mean([lv.log_base for lv in strange]) + LOG_UNKNOWN,
+        unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
+    )
+    return weighed(found, {})
+
+
+def _as_stated(engine: Engine) -> float:
+    """log evidence of what was stated: the noise, and a little more of it than that, as finely as
+    it is looked at beside an effect."""
+    least, hidden = float(engine.etas[1]), _hidden(engine)
+    above = np.floor(PARTS * np.log(max(hidden / least, 1.0)) / LOG_STEP)
+    etas = least * np.exp(np.arange(-PARTS, above + 1) / PARTS * LOG_STEP)
+    more = [log_joint_between(engine, (), float(eta)) for eta in etas]
+    less = float(np.interp(hidden / engine.bench.noise.stated, [_STEP, 1.0],
+                           [_SURE_SHARE, _UNSURE_SHARE]))  # fmt: skip
+    return log_mean(
+        [engine.levels[0].log_base, *more], [1 - less, *(less / len(more) for _ in more)]
+    )
+
+
+# What readings have in common with the next ones of their hold, they have with all of it, and more:
+# noise of many colours (1/f) is as large from hold to hold.
+_IN_HOLDS = 4.0
+# What differs from hold to hold may wander over many of them, and does not average out.
+_FROM_HOLD = 1.5
+
+
+def _hidden(engine: Engine) -> float:
+    """Imperfection (m) that passes for noise."""
+    noise = engine.bench.noise
+    swings = min(max(_STEP, _IN_HOLDS * noise.swings), 1.0)
+    return (max(swings, _FROM_HOLD * noise.slow) if noise.sure else UNSURE) * noise.stated
+
+
+def force(
+    engine: Engine,
+    variants: list[Variant],
+    pool: tuple[Explanation, ...],
+    start: Explanation,
+    words: frozenset[str],
+) -> Explanation:
+    """`start` with all `words` beside its own effects: the best that the search found, else with
+    one after the other fitted to what the others leave. None of them takes another's place."""
+    left = set(words - start.words)
+    if not left:
+        return start
+    with_all = [e for e in pool if words | start.words <= e.words]
+    if with_all:
+        return with_all[0]
+    parts, evidence, energy = start.parts, 0.0, 0.0
+    while left:
+        levels, energy = up_to_likeliest(engine, parts)
+        scored = score(engine, levels, [v for v in variants if v.word in left], energy)
+        top = max(scored, key=lambda s: s.log_evidence)
+        parts = (*parts, Part(top.variant, top.scale))
+        left.discard(top.variant.word)
+        evidence = marginal([s for s in scored if s.variant.word == top.variant.word])
+    taken = energy if len(parts) > 1 else None
+    return polished(engine, variants, explain(engine, parts, evidence, taken))
+
+
+def _seeds(pool: dict[frozenset[str], Explanation], most: int) -> list[Explanation]:
+    """Around which explanations another effect is looked for: the `most` best; where the best of
+    all leaves no more than the noise, those of them within half a window of it."""
+    ranked = sorted((e for e in pool.values() if e.parts), key=lambda e: -e.log_weight)
+    best = max(e.log_weight for e in pool.values())
+    clean = [e for e in pool.values() if e.log_weight == best and e.eta == 0]
+    reach = _WINDOW / 2 if clean else np.inf
+    return [e for e in ranked[:most] if e.log_weight > best - reach]
+
+
+def _deepen(
+    engine: Engine,
+    variants: list[Variant],
+    pool: dict[frozenset[str], Explanation],
+    front: list[Explanation],
+    depth: int,
+    kept: int,
+) -> list[Explanation]:
+    """Adds one more effect to each explanation of the front; those that gain, up to `kept`, are the
+    next front."""
+    best = max(e.log_weight for e in pool.values())
+    grown: dict[frozenset[str], Explanation] = {}
+    for start in front:
+        if len(start.words) != depth - 1:
+            continue
+        if depth > 2 and start.log_weight < best - _WINDOW:
+            continue
+        grown |= _with_one_more(engine, variants, start, grown)
+    for words, explanation in grown.items():
+        if words not in pool or pool[words].log_weight < explanation.log_weight:
+            pool[words] = explanation
+    ranked = sorted(grown.values(), key=lambda e: -e.log_weight)
+    first = [_reading_all(engine, variants, polished(engine, variants, e)) for e in ranked[:kept]]
+    others = [_reading_all(engine, variants, e) for e in ranked[kept:_READING]]
+    for explanation in [*first, *others]:
+        if pool[explanation.words].log_weight < explanation.log_weight:
+            pool[explanation.words] = explanation
+    good = _in_more_joints(engine, variants, pool, first)
+    return [e for e in good if e.log_weight > best - 2.0]
+
+
+def _in_more_joints(
+    engine: Engine,
+    variants: list[Variant],
+    pool: dict[frozenset[str], Explanation],
+    front: list[Explanation],
+) -> list[Explanation]:
+    """The front, and what of it is better with its mechanisms in more joints, as the pool then
+    holds it: beside a second effect one joint may do."""
+    more = [in_more_joints(engine, variants, e) for e in front]
+    better = [m for m, e in zip(more, front, strict=True) if m is not e]
+    for e in better:
+        if pool[e.words].log_weight < e.log_weight:
+            pool[e.words] = e
+    return [*front, *better]
+
+
+def _with_one_more(
+    engine: Engine,
+    variants: list[Variant],
+    start: Explanation,
+    known: dict[frozenset[str], Explanation],
+) -> dict[frozenset[str], Explanation]:
+    others = [v for v in variants if v.word not in start.words]
+    levels, energy = up_to_likeliest(engine, start.parts)
+    out: dict[frozenset[str], Explanation] = {}
+    found_words = by_word(score(engine, levels, others, energy))
+    promising = sorted(found_words, key=lambda w: -marginal(found_words[w]))[:_PROMISING]
+    for word in promising:
+        words = start.words | {word}
+        for scored in (found_words[word], _elsewhere(start, found_words[word])):
+            if not scored:
+                continue
+            top = closest(scored)
+            parts = (*start.parts, Part(top.variant, top.scale))
+            found = explain(engine, parts, marginal(scored), energy)
+            better = out.get(words, known.get(words))
+            if better is None or better.log_weight < found.log_weight:
+                out[words] = found
+    return out
+
+
+def _elsewhere(start: Explanation, scored: list[Scored]) -> list[Scored]:
+    """Of springs beside a mechanism, or a mechanism beside springs, those in other joints: a law
+    brings the mean stiffness of its own joint, which is no second trouble."""
+    words = start.words | {scored[0].variant.word}
+    if not (SPRINGS in words and words & MECHANISMS):
+        return []
+    taken = {j for p in start.parts for j in joints_of(p)}
+    apart = [s for s in scored if not taken & joints_of(Part(s.variant, s.scale))]
+    return apart if len(apart) < len(scored) else []
+
+
+def _reading_all(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+    """With instruments that read what its other effects do, if that is better; the variants then
+    hold these as well."""
+    fresh = reading_all(engine, start)
+    if not fresh:
+        return start
+    variants += fresh
+    engine.extend()
+    return polished(engine, variants, start)
+
+
+def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
+    """With the evidence of those that matter between the levels of imperfection, best first."""
+    done: dict[frozenset[str], Explanation] = {}
+    first = ranked[0].log_weight
+    for _ in range(_SHARPENED):
+        ranked = sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)
+        least = min(first, ranked[0].log_weight) - _WINDOW / 2  # what is not done yet may gain, too
+        near = [e for e in ranked if e.log_weight > least]
+        todo = [e for e in near if e.parts and e.words not in done]
+        if not todo:
+            break
+        e = todo[0]
+        level = int(np.argmin(np.abs(engine.etas - e.eta)))
+        more = gained(engine, e.parts, part_sizes(engine, e.parts, level).energy)
+        done[e.words] = replace(e, log_weight=e.log_weight + more, log_good=e.log_good + more)
+    return sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)
