@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from identification.gap.answer.designs import _levels
 from identification.gap.data import Array, GapData
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.holds import hold_ids, is_continuous, rest_ids, scatter_within
-from identification.gap.recording.ramps import ramps_told
+from identification.gap.recording.ramps import _leading_on, ramps_told
 from identification.gap.recording.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
@@ -126,3 +127,64 @@ def test_levels_are_levels_though_a_lag_hides_the_way_there() -> None:
     twice = np.concatenate([once, 100 - once])
     ramp = bench_data(twice, SPRING * twice, step=np.repeat([1, 2], 40))
     assert is_continuous(ramp, hold_ids(ramp))
+
+
+def named_late(hardens: bool = False) -> tuple[GapData, Array, Array]:
+    """Levels and none between, with gentle ramps whose first samples bear the name of the level
+    they leave, on a part that creeps; the level that a sample rests at or goes to, and which rest.
+    """
+    path = [0.0, 20.0, 40.0, 60.0, 0.0, 60.0, 0.0, 0.0]
+    step = [0, 1, 2, 3, 0, 3, 0, 0]
+    x = np.arange(1, 11) / 10
+    eases = (1 - np.cos(np.pi * x)) / 2
+    load, leads_to, named = [], [], []
+    for k, (a, b) in enumerate(pairwise(path)):
+        load += [np.full(40, a), a + (b - a) * eases]
+        leads_to += [np.full(40, a), np.full(10, b)]
+        named += [np.full(47, step[k]), np.full(3, step[k + 1])]
+    force, to, steps = (np.concatenate(each) for each in (load, leads_to, named))
+    u = SPRING * 60.0 * (force / 60.0) ** (0.7 if hardens else 1.0)  # soft at first
+    late = np.zeros(len(u))
+    for i in range(1, len(u)):
+        late[i] = late[i - 1] + (0.05 * u[i] - late[i - 1]) / 15.0
+    rng = np.random.default_rng(4)
+    data = bench_data(
+        force + rng.normal(0, 0.02, len(u)), u + late + rng.normal(0, 1e-6, len(u)),
+        step=steps, branch=np.where(steps == 0, 0, 1), imposed="force",
+    )  # fmt: skip
+    at_rest = np.abs(force - to) < 1e-9
+    return replace(data, instruments=replace(data.instruments, force=0.02)), to, at_rest
+
+
+@pytest.mark.parametrize("hardens", [False, True])
+def test_a_ramp_named_after_the_level_it_leaves_belongs_to_the_next(hardens: bool) -> None:
+    data, leads_to, at_rest = named_late(hardens)
+    assert is_continuous(data, hold_ids(data))  # half of every way is in its hold
+    told = ramps_told(data)
+    assert not is_continuous(told, hold_ids(told))
+    rows = reduce_rows(told)
+    assert not rows.continuous
+    still = ~rows.on_the_way & (rows.weight > 1)
+    where = np.searchsorted(data.time, rows.time[still])
+    assert np.abs(rows.force[still] - leads_to[where]).max() < 2.0
+    assert np.sum(told.ways & at_rest) <= 1
+    assert np.sum(~told.ways & ~at_rest) <= 6  # the first, gentle, sample of a ramp
+    # nor does what is still loaded show the force at no load
+    assert np.abs(rows.force[rows.zero]).max() < 0.5
+
+
+def test_only_what_rested_leaves() -> None:
+    """Neither a triangle cut into steps nor a part that creeps on at its level changes names."""
+    load = np.concatenate([np.linspace(0, 60, 90), np.linspace(60, 0, 90)])
+    cut = bench_data(load, SPRING * load, step=(load // 10).astype(int), imposed="force")
+    np.testing.assert_array_equal(_leading_on(cut).step, cut.step)
+    level = np.repeat([0.0, 20.0, 40.0, 20.0, 0.0], 40)
+    u = SPRING * level * (1 + 0.2 * (np.arange(200) % 40) / 40)
+    held = bench_data(level, u, step=(level / 20).astype(int), imposed="force")
+    np.testing.assert_array_equal(_leading_on(held).step, held.step)
+    away = np.concatenate([np.full(40, 20.0), np.linspace(18, 2, 5), np.zeros(40)])
+    runs = np.repeat([0, 1], [45, 40])  # a run that ends on its way belongs to no other one
+    two = bench_data(away, SPRING * away, step=1 - runs, run=runs, imposed="force")
+    np.testing.assert_array_equal(_leading_on(two).step, two.step)
+    one = replace(two, run=0 * runs)
+    assert np.sum(_leading_on(one).step != one.step) == 5

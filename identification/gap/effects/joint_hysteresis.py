@@ -250,15 +250,33 @@ def _spectra(
     laws = [("Iwan", radius, slips - torque[:, None])]
     if bench.data.arm:
         laws.append(("Prandtl", radius[:-1], slips[:, :-1]))
+    turns = 1.0 if path is None else 2.0  # what was cycled before goes all the way back first
     out = []
     for law, radii, states in laws:
         columns = [bench.add_joint(joint, unit * state) for state in states.T]
         label = f"{name} spectrum{' that slips' if law == 'Prandtl' else ''}"
         out.append(
             variant(WORD, label, columns, SCALES, smooth_root(len(columns), 0.6, 0.3), prior=0.25,
-                    each=True, joint=joint, radius=radii, law=law)
+                    each=True, within=_no_knee(bench, torque, turns * radii), joint=joint,
+                    radius=radii, law=law)
         )  # fmt: skip
     return out
+
+
+def _no_knee(bench: Bench, torque: Array, slips: Array) -> Array | None:
+    """(1, k): that what slips at torques (k,) has slipped by a good part where the force is first
+    half of its largest, of what it has at the largest torque (n,). Friction acts from the first
+    load on; what holds half the load and then gives way has yielded. Of a specimen that is loaded
+    from one side: to and fro, strokes far beyond the first slip show friction of one strength."""
+    if bench.data.arm or not bench.course.one_sided:
+        return None
+    size, force = np.abs(torque), np.abs(bench.rows.measured_force)
+    half = float(size[int(np.argmax(force >= 0.5 * force.max()))])
+    early, late = (np.maximum(top - slips, 0.0) for top in (half, float(size.max())))
+    return np.asarray(early - _AT_HALF * late)[None, :] / max(float(late.max()), _TINY)
+
+
+_AT_HALF = 0.18  # a spectrum as strong everywhere slips a quarter
 
 
 def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) -> list[Variant]:
@@ -270,7 +288,8 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
     for k in range(alone):
         out.append(
             variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES,
-                    smooth_root(2, 0.7), each=True, prior=0.25 / alone, joint=joint,
+                    smooth_root(2, 0.7), each=True, within=spectrum.within[:, k : k + 2],
+                    prior=0.25 / alone, joint=joint,
                     radius=radius[k : k + 2], law="Iwan")
         )  # fmt: skip
     return out

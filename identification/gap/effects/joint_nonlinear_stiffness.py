@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.data import Array
+from identification.gap.evidence.engine import NEIGHBOUR
 from identification.gap.laws.closer import Word, closing_in
 from identification.gap.laws.curves import above, beyond, hinge
 from identification.gap.laws.effect import Effect
@@ -74,7 +75,7 @@ def variants(bench: Bench) -> list[Variant]:
                         kinds=("line", *hinges[k : k + 2]), **info)
             )  # fmt: skip
         if not bench.data.arm and bench.course.once and not bench.course.rests:
-            out += _locks(bench, j, line, top)
+            out += _locks(bench, j, line, top) + _level_by_level(bench, j, line, top)
         elif not bench.data.arm and bench.rows.continuous and _came_back(bench):
             out.append(_fine(bench, j, line, top))
         if _both_ways(bench, j):
@@ -194,6 +195,30 @@ def _both_ways(bench: Bench, j: int) -> bool:
     if not bench.rows.continuous:
         return len(np.unique(bench.rows.run)) > 1
     return course.crosses_its_zero or (course.unloads and course.passes > 2)
+
+
+def _level_by_level(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
+    """A curve of no simple form, of a table that shows nothing else."""
+    x, c = np.abs(bench.true_torque[:, j]) / top, bench.compliance[j] * top
+    if not bench.course.only_a_curve:
+        return []
+    places = np.unique(np.append(x, 0.0))
+    columns = [bench.add_joint(j, c * hinge(bench.true_torque[:, j] / top, b))
+               for b in places[1:-1]]  # fmt: skip
+    return [variant(WORD, f"joint {j + 1} curve from level to level", [line, *columns], SCALES,
+                    _from_level_to_level(places), positive=False, prior=0.5,
+                    kinds=("line", *places[1:-1].tolist()), joint=j, torque=top)]  # fmt: skip
+
+
+def _from_level_to_level(places: Array) -> Array:
+    """Root of the prior of a line and hinges between places (k + 1,), so that the curve at these
+    is as rough as the imperfection of laws is (`engine.alike`), none at the first of them."""
+    near = np.exp(-np.abs(places[:, None] - places) / NEIGHBOUR)
+    from_first = near - near[:1] - near[:, :1] + 1.0
+    covariance = from_first[1:, 1:] + 1e-9 * np.eye(len(places) - 1)
+    slopes = np.diff(np.eye(len(places)), axis=0)[:, 1:] / np.diff(places)[:, None]
+    bends = np.diff(slopes, axis=0, prepend=0.0)
+    return np.asarray(bends @ np.linalg.cholesky(covariance))
 
 
 def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:

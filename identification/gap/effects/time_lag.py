@@ -50,6 +50,7 @@ def variants(bench: Bench) -> list[Variant]:
     if bench.course.timeless or bench.data.lets_go or _like_a_soft_start(bench):
         return []  # a channel that is late would let go at another place than it touches, too
     sample = sampling_time(bench.rows)
+    channels = [c for c in CHANNELS if c != _driven(bench) or not _ripples(bench)]
     out = []
     for multiple in LAGS:
         lag = multiple * sample
@@ -57,11 +58,12 @@ def variants(bench: Bench) -> list[Variant]:
             break  # the load would have come before anybody turned a screw
         if not bench.data.arm and bench.rows.hold_starts.all() and multiple > _USUAL:
             break  # one reading a step, and that of a step long past
-        for channel in ("displacement", "force"):
+        for channel in channels:
             out += _of(bench, channel, lag, _likely(multiple))
     return out
 
 
+CHANNELS = ("displacement", "force")
 KINDS = ("delay", "filter", "average", "delayed filter", "two filters")
 _STEP = 1.13
 _STEPS = np.array([-3, -2, -1, 0, 1, 2, 3])
@@ -127,6 +129,22 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
         return bench.stacked(bench.line_slope * ahead)
     # unloaded, a force that lags still shows what is over
     return bench.force_column(ahead) + bench.stacked(zero_force=-ahead)
+
+
+def _ripples(bench: Bench) -> bool:
+    """Whether the force changes in its holds as no lag makes of a load that stands still there."""
+    rows, meter = bench.rows, bench.data.instruments
+    if bench.imposed or _way_shown(bench):
+        return False
+    moves = rows.rms(bench.load - rows.hold_means(bench.load)[rows.hold])
+    if moves <= _MOVES * rows.rms(meter.force / np.sqrt(rows.weight)):
+        return False
+    lags = np.array(LAGS) * sampling_time(rows)
+    missed = (_still(bench, kind, lag)[1] for kind in KINDS[:2] for lag in lags)
+    return min(map(rows.rms, missed)) > _UNLIKE * moves
+
+
+_MOVES, _UNLIKE = 5.0, 0.8  # times its noise; share of what it does within holds
 
 
 def _way_shown(bench: Bench) -> bool:
@@ -195,11 +213,17 @@ def _ahead(bench: Bench, load: Array, kind: str, lag: float) -> Array:
 def _true_force(bench: Bench, kind: str, lag: float) -> Array:
     """(n,) force that stands still in every hold and that, read with the lag, gives the readings
     best (least squares in every run; a hold that the readings hardly see keeps what was read)."""
+    return _still(bench, kind, lag)[0]
+
+
+def _still(bench: Bench, kind: str, lag: float) -> tuple[Array, Array]:
+    """That force (n,), and what its readings with the lag leave (n,) of those that there are."""
     rows = bench.rows
     first = rows.hold[rows.starts][np.cumsum(rows.starts) - 1]
     within = rows.hold - first  # number of the hold in its run
     holds = np.eye(int(within.max()) + 1)[within]
     shown, out = _behind(bench, holds, kind, lag), bench.load.copy()
+    missed = np.zeros(rows.n)
     for run in np.unique(rows.run):
         mine = rows.run == run
         used, number = np.unique(within[mine], return_inverse=True)
@@ -210,7 +234,8 @@ def _true_force(bench: Bench, kind: str, lag: float) -> Array:
         seen = A.T * (rows.weight[mine] * np.where(settled, 1.0, _ON_THE_WAY))
         change = np.linalg.solve(seen @ A + _HOLDS_BACK**2 * np.eye(len(used)), seen @ left)
         out[mine] = (mean + change)[number]
-    return out
+        missed[mine] = left - A @ change
+    return out, missed
 
 
 # Of a sample's weight: what is read while the load is still seen coming depends on a hand's path.

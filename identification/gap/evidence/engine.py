@@ -34,7 +34,7 @@ from identification.gap.recording.turns import rises
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 _CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
-_NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
+NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
 _AT_ONCE = 500_000  # numbers: what they take stays near the processor
 LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
@@ -362,6 +362,6 @@ def level_covariance(bench: Bench) -> Array:
 def alike(setup: Ints, branch: Ints | Flags, load: Array, span: float) -> Array:
     """(k, k) covariance of what goes wrong at levels: unit variance, `exp(-|dF| / a quarter of the
     range)`, a path that may have corners; half so between branches, none between setups."""
-    near = np.exp(-np.abs(load[:, None] - load) / (_NEIGHBOUR * (span or 1.0)))
+    near = np.exp(-np.abs(load[:, None] - load) / (NEIGHBOUR * (span or 1.0)))
     branches = np.where(branch[:, None] == branch, 1.0, 0.5)
     return np.asarray(near * branches * (setup[:, None] == setup) + 1e-9 * np.eye(len(load)))

@@ -16,11 +16,18 @@ from identification.gap.recording.course import Course
 from identification.gap.words import CURVES, NAMELESS, WORDS
 
 LOG_NONE, LOG_UNKNOWN = log(0.5), log(0.05)
+# Of a table that shows a curve of the load, and nothing else: that has a word, whatever its form.
+LOG_UNKNOWN_CURVE = log(0.002)
 LOG_ONE = log(0.37)
 LOG_SHAPED = log(0.5)  # share of what is unknown whose shapes are known
 LOG_MORE = log(0.05)
 # A bolted stand slips less often than a joint or its controller gives way.
 LOG_RARE = {"base_slip": log(0.5)}
+
+
+def log_unknown(course: Course) -> float:
+    """Of what no word names, whatever its shape."""
+    return LOG_UNKNOWN_CURVE if course.only_a_curve else LOG_UNKNOWN
 
 
 class Rarer(NamedTuple):

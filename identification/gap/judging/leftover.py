@@ -178,6 +178,8 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
         e = explanation
         return replace(e, log_weight=e.log_weight - COMES_BACK, log_good=e.log_good - COMES_BACK)
     left = _left(engine, fit(engine, explanation))
+    if course.only_a_curve and explanation.words <= CURVES:
+        left = 0.0  # it is a curve as well
     share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
     fall = course.fall
     gives = (fall > _FALL and explanation.words & CURVES) or (

@@ -38,6 +38,7 @@ _MET_AGAIN = 0.2  # of the smaller one's range of load
 _RUNS_ON = 2.0  # times its mean speed: faster than anything creeps at rest
 _STANDS = 0.1  # of the mean speed, and of the time
 _HELD, _MANY_A_LEVEL = 2, 8  # samples
+_FEW_LEVELS, _MANY_LEVELS, _BACK = 5, 40, 2.0  # standard uncertainties of a displacement
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,18 @@ class Course:
         if self.imposed:
             return meter.displacement / float(self.stated_slope.min())
         return meter.force
+
+    @cached_property
+    def only_a_curve(self) -> bool:
+        """A table of loads that were read once, one after the other, each of which moved a rig
+        without an arm further: whatever it does from one to the next is a curve of the load, and
+        there is nothing else in it."""
+        n, one = self.rows.n, self.one_sided and len(self.data.setups) == 1 and not self.data.arm
+        if not (one and self.once) or self.rows.continuous or not _FEW_LEVELS <= n <= _MANY_LEVELS:
+            return False
+        far = np.abs(self.load), self.response * np.sign(self.load[np.abs(self.load).argmax()])
+        least = _BACK * self.data.instruments.displacement
+        return bool(np.all(np.diff(far[0]) > 0) and np.all(np.diff(far[1]) > -least))
 
     @property
     def one_sided(self) -> bool:

@@ -50,6 +50,7 @@ def is_continuous(data: GapData, hold: Ints) -> bool:
     whole = float(np.ptp(data.force))
     side = max(float(np.ptp(np.clip(data.force * sign, 0.0, None))) for sign in (1.0, -1.0))
     span = np.where(data.step[first] > 0, side, whole)  # where holds end with their side
+    span[data.ways[first]] = np.inf  # what is on its way to a level comes to rest there
     return runs_through(data.force, data.displacement, first, span)
 
 

@@ -18,7 +18,7 @@ from identification.gap.explanations.explanation import (
     up_to_likeliest,
 )
 from identification.gap.explanations.penalties import joints_of
-from identification.gap.explanations.priors import LOG_NONE, LOG_UNKNOWN
+from identification.gap.explanations.priors import LOG_NONE, log_unknown
 from identification.gap.explanations.several import in_more_joints, polished
 from identification.gap.explanations.verdict import weighed
 from identification.gap.model.noise import UNSURE
@@ -75,7 +75,7 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
         alone={w: v - none for w, v in alone.items() if w not in NAMELESS},
         probabilities={},
         best=named[0],
-        unknown=log_mean([lv.log_base for lv in strange]) + LOG_UNKNOWN,
+        unknown=log_mean([lv.log_base for lv in strange]) + log_unknown(engine.bench.course),
         unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
     )
     return weighed(found, {})

@@ -23,7 +23,7 @@ from identification.gap.evidence.compare import by_word, log_mean, marginal, sco
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, part_sizes
 from identification.gap.explanations.explanation import Found, Likeness
-from identification.gap.explanations.priors import LOG_UNKNOWN
+from identification.gap.explanations.priors import log_unknown
 from identification.gap.explanations.verdict import TAKES_TWO, weighed
 from identification.gap.laws.drift import by_direction, free_path, path_root, waited
 from identification.gap.model.base import Base
@@ -55,11 +55,12 @@ def with_strangers(found: Found) -> Found:
     engine.extend()
     alike = likenesses(engine, variants)
     alike = tuple(a for a in alike if a.kind != SETTLES or not _creeps(found, a.log_evidence))
-    none = found.unknown - LOG_UNKNOWN
+    prior = log_unknown(engine.bench.course)
+    none = found.unknown - prior
     shares = [1.0, *(1.0 / KINDS for _ in alike)]
     unknown = log_mean([none, *(a.log_evidence for a in alike)], shares)
     plain = next((a for a in alike if a.log_evidence > none + PLAIN), None)
-    return weighed(replace(found, unknown=unknown + LOG_UNKNOWN, looks_like=plain), found.kept)
+    return weighed(replace(found, unknown=unknown + prior, looks_like=plain), found.kept)
 
 
 def _creeps(found: Found, settles: float) -> bool:
