@@ -20,7 +20,7 @@ DEFAULT = Path(__file__).parents[1] / "../shared/gap-cases"
 
 
 def run(folder: Path, case: str, withhold: tuple[str, ...] = ()) -> dict[str, Any]:
-    from rig.diagnose import diagnose
+    from rig.diagnosis.diagnose import diagnose
     from rig.tables import import_table
 
     dataset = import_table(folder / case / "samples.csv", folder / case / "meta.yaml")

@@ -22,7 +22,7 @@ from identification.gap.judging.heldout import HeldOut, folds, held_out
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from identification.gap.search.search import search
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import Design, imported, meta, noisy
 
 Array = NDArray[np.float64]

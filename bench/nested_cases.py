@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from identification.gap.data import GapData
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import TRUE, Design, Law, imported, meta, noisy
 
 Array = NDArray[np.float64]

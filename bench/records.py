@@ -22,7 +22,7 @@ SURE = 0.85  # a wrong verdict above that is a confident error
 
 
 def run(folder: Path) -> dict[str, Any]:
-    from rig.diagnose import diagnose
+    from rig.diagnosis.diagnose import diagnose
     from rig.tables import import_table
 
     names = {p.name.lower(): p for p in folder.iterdir()}

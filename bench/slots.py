@@ -76,7 +76,7 @@ class Meter:
 
     def _members(self) -> list[psutil.Process]:
         family = [self.process, *self.process.children(recursive=True)]
-        return [p for p in family if not any("rig.emulation" in w for w in p.cmdline())]
+        return [p for p in family if not any("rig.emulation.emulated" in w for w in p.cmdline())]
 
     def _loop(self) -> None:
         while not self._stop.wait(0.5):
@@ -131,7 +131,7 @@ def plain_loop(seconds: int, folder: Path) -> int:
     from nidaqmx.grpc_session_options import GrpcSessionOptions
     from rtde_receive import RTDEReceiveInterface
 
-    from rig.emulation import EmulatedRig
+    from rig.emulation.emulated import EmulatedRig
     from rig.station import load_station
 
     station = load_station(str(folder / "stations" / "bench.yaml"), None)

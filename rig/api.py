@@ -155,9 +155,9 @@ class Run:
     ) -> Answer:
         """As `rig analyze`; tables: stiffness, curves, pointwise, uncertainty. InputError for a
         weighting that is not known."""
-        from rig import analyze as analysis
-        from rig.analyze_text import answer
-        from rig.figures import draw
+        from rig.analysis import analyze as analysis
+        from rig.analysis.analyze_text import answer
+        from rig.analysis.figures import draw
 
         options = analysis.Options(
             analysis.weighting(weighting), intercept, errors_in_variables, keep_after_knee
@@ -171,7 +171,7 @@ class Run:
 
     def identify(self, *others: Run | str | Path, proposals: int = 6) -> Answer:
         """As `rig identify`, from this and other data sets together; tables: joints, next_poses."""
-        from rig.identify import identify
+        from rig.analysis.identify import identify
 
         paths = [self._path(), *(o._path() if isinstance(o, Run) else Path(o) for o in others)]
         result = identify(paths, proposals=proposals)
@@ -188,8 +188,8 @@ class Run:
         withhold: Iterable[str] = (),
     ) -> Answer:
         """As `rig diagnose`; tables: probabilities, effects, gap, remainder."""
-        from rig.diagnose import diagnose
-        from rig.gap_figures import draw
+        from rig.diagnosis.diagnose import diagnose
+        from rig.diagnosis.gap_figures import draw
 
         add, withhold = tuple(add), tuple(withhold)
         result = diagnose(
@@ -281,7 +281,7 @@ def _joint_tables(out: Answer) -> None:
 
 def _gap_tables(out: Answer) -> None:
     from identification.gap.answer.remainder import remainder
-    from rig.gap_points import held_table, remainder_table, shown
+    from rig.diagnosis.gap_points import held_table, remainder_table, shown
 
     found, r = out.json, out.result.result
     ranked = sorted(found["probabilities"].items(), key=lambda item: -item[1])

@@ -14,7 +14,7 @@ from rig.journal import Record, journal_path, replay
 from rig.meta import Meta
 from rig.software import software_version
 from rig.storage.columns import Values
-from rig.yamlfile import load_yaml_text
+from rig.yaml.yamlfile import load_yaml_text
 
 Origin = Literal["measured", "emulated", "imported"]
 ORIGINS: tuple[Origin, ...] = ("measured", "emulated", "imported")

@@ -175,7 +175,7 @@ def _analyzed(
     progress: Progress | None,
 ) -> list[Entry]:
     """The entries with k, also of open ones; what can't be analysed is left out with its reason."""
-    from rig.analyze import analyze
+    from rig.analysis.analyze import analyze
     from rig.dataset import load
 
     out = []

@@ -18,7 +18,7 @@ from drivers.errors import DeviceError
 from drivers.interfaces import Loader
 from rig import dataset as datasets
 from rig.digits import counted
-from rig.emulation import EmulatedRig
+from rig.emulation.emulated import EmulatedRig
 from rig.errors import InputError, MeasurementStopped
 from rig.journal import Journal, JournalError, journal_path, replay
 from rig.measured_meta import measured_meta

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identification.arm import Arm, along, tool_offset
 from identification.times import MOUNT_S, SCREW_S, UNLOAD_S
 from rig.digits import counted
-from rig.model import load_robot
+from rig.models.model import load_robot
 from rig.plan_margins import (
     MARGIN,
     beyond_joints,
@@ -32,8 +32,8 @@ from rig.protocol import MeasurementProtocol, Run
 from rig.protocolfile import ProtocolFile
 from rig.station import Station
 from rig.units import MM_PER_M, N_PER_MM
-from rig.yamlfile import read_document_text
-from rig.yamlnodes import Key, Problem, refuse
+from rig.yaml.yamlfile import read_document_text
+from rig.yaml.yamlnodes import Key, Problem, refuse
 
 Array = NDArray[np.float64]
 

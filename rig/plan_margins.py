@@ -10,7 +10,7 @@ import numpy as np
 from identification.arm import Arm
 from rig.protocol import MeasurementProtocol
 from rig.station import Station
-from rig.yamlnodes import Key
+from rig.yaml.yamlnodes import Key
 
 if TYPE_CHECKING:
     from rig.plan import PlannedRun

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from drivers.interfaces import Branch
-from rig.model import robot_names
+from rig.models.model import robot_names
 from rig.protocolfile import (
     ForceBand,
     Limit,
@@ -23,8 +23,8 @@ from rig.protocolfile import (
     Zero,
     check,
 )
-from rig.yamlfile import Document, read_document, read_document_text
-from rig.yamlnodes import Key
+from rig.yaml.yamlfile import Document, read_document, read_document_text
+from rig.yaml.yamlnodes import Key
 
 __all__ = [
     "ForceBand",

@@ -1,6 +1,6 @@
 """Shape of a protocol file (schema rig.protocol/1), and the checks that reach across its keys.
 
-The shape is validated value by value by `rig.yamlfile`; `check` adds what depends on several
+The shape is validated value by value by `rig.yaml.yamlfile`; `check` adds what depends on several
 values at once. Units are those of the keys.
 """
 
@@ -15,7 +15,7 @@ from typing import Annotated, ClassVar, Literal
 from annotated_types import Gt, Interval, Le, MinLen
 
 from rig.errors import did_you_mean
-from rig.yamlnodes import Key
+from rig.yaml.yamlnodes import Key
 
 Triple = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]

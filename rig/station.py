@@ -15,8 +15,8 @@ from drivers.kistler.settings import KistlerSettings
 from drivers.operator.settings import OperatorSettings
 from drivers.ur10e.settings import Ur10eSettings
 from rig.errors import InputError, did_you_mean
-from rig.yamlfile import Document, read_document, read_document_text
-from rig.yamlnodes import Key
+from rig.yaml.yamlfile import Document, read_document, read_document_text
+from rig.yaml.yamlnodes import Key
 
 STATIONS = Path(rig.__file__).resolve().parent.parent / "protocols" / "stations"
 EMULATED = "emulated"

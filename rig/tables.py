@@ -32,7 +32,7 @@ from rig.storage.columns import (
 from rig.storage.csvblocks import Block, CsvFile, close_match
 from rig.storage.files import check_ending, in_place_of
 from rig.terminal import Progress, silent
-from rig.yamlfile import read_document
+from rig.yaml.yamlfile import read_document
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,7 +19,7 @@ from typing import Any, TextIO
 def answer(path: Path, withhold: Iterable[str]) -> dict[str, Any]:
     """What the diagnosis says of one HDF5 file, and the wall-clock seconds it took."""
     from rig.dataset import load
-    from rig.diagnose import diagnose
+    from rig.diagnosis.diagnose import diagnose
     from rig.errors import InputError
 
     start = time.perf_counter()
@@ -32,7 +32,7 @@ def answer(path: Path, withhold: Iterable[str]) -> dict[str, Any]:
 
 def serve(questions: Iterable[str], replies: TextIO) -> None:
     """Answers line by line until the questions end."""
-    import rig.diagnose  # noqa: F401  # loading the libraries is no part of a case's time
+    import rig.diagnosis.diagnose  # noqa: F401  # loading the libraries is no part of a case's time
 
     _send({"ready": True}, replies)
     for line in questions:

@@ -11,7 +11,7 @@ from rig.cli.options import DatasetArgument, FiguresOption, JsonOption, give, li
 
 if TYPE_CHECKING:
     from rig.dataset import Dataset
-    from rig.diagnose import Diagnosis
+    from rig.diagnosis.diagnose import Diagnosis
 
 _Model = Annotated[
     Path | None,
@@ -82,8 +82,8 @@ def diagnose(
 ) -> None:
     """The sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
     from rig.dataset import load
-    from rig.diagnose import diagnose as run_diagnose
-    from rig.gap_model import check_writable
+    from rig.diagnosis.diagnose import diagnose as run_diagnose
+    from rig.diagnosis.gap_model import check_writable
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
@@ -91,7 +91,7 @@ def diagnose(
         if write_model is not None:
             check_writable(measured, others=simulation is not None)
         if next_file is not None:
-            from rig.next_protocol import check_arm
+            from rig.diagnosis.next_protocol import check_arm
 
             check_arm(measured)
         result = run_diagnose(
@@ -105,7 +105,7 @@ def diagnose(
         remember_result(dataset, result.to_json())
     _write(result, measured, write_model, next_file)
     if figures is not None:
-        from rig.gap_figures import draw
+        from rig.diagnosis.gap_figures import draw
 
         list_written(draw(result, figures, dataset.name))
 
@@ -113,15 +113,15 @@ def diagnose(
 def _write(result: Diagnosis, measured: Dataset, model: Path | None, protocol: Path | None) -> None:
     """The model with its effects and the next protocol, where asked for."""
     if model is not None:
-        from rig.gap_forms import left_behind
-        from rig.gap_model import OF_THIS_SESSION, forms, write_model
+        from rig.diagnosis.gap_forms import left_behind
+        from rig.diagnosis.gap_model import OF_THIS_SESSION, forms, write_model
 
         write_model(result, measured, model)
         for word in left_behind(forms(result.result)):
             say(f"{model}: {word} is {OF_THIS_SESSION}")
         say(f"{model}: written. Next: rig simulate {model} PROTOCOL.yaml")
     if protocol is not None:
-        from rig.next_protocol import write_next
+        from rig.diagnosis.next_protocol import write_next
 
         say(write_next(result, measured, protocol))
 

@@ -82,7 +82,7 @@ def check(
 
 def emulate(station: Annotated[str, typer.Argument(metavar="STATION.yaml")] = "emulated") -> None:
     """Start the emulators of a station by hand, until Ctrl-C."""
-    from rig.emulation import serve_by_hand
+    from rig.emulation.emulated import serve_by_hand
     from rig.station import load_station
 
     serve_by_hand(load_station(station))

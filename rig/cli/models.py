@@ -48,10 +48,10 @@ def couple(
     json_file: JsonOption = None,
 ) -> None:
     """Coupled state of two arms: workspace, compound stiffness, when to couple."""
-    from rig import model_export
-    from rig.couple import couple as run_couple
-    from rig.coupling_task import best_for
-    from rig.model import load_model
+    from rig.coupling.couple import couple as run_couple
+    from rig.coupling.coupling_task import best_for
+    from rig.models import model_export
+    from rig.models.model import load_model
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
@@ -62,7 +62,7 @@ def couple(
     if placement is not None and json_file != "-":
         show(placement.to_text())
     if figures is not None:
-        from rig.coupling_figures import draw
+        from rig.coupling.coupling_figures import draw
 
         list_written(draw(result, figures, placement))
     written = model_export.write(load_model(model), mujoco=export_mujoco, urdf_file=export_urdf)
@@ -76,8 +76,8 @@ def simulate(
     json_file: JsonOption = None,
 ) -> None:
     """The curves that a model predicts for a procedure."""
-    from rig.simulate import simulate as run_simulate
-    from rig.simulate import write_csv
+    from rig.models.simulate import simulate as run_simulate
+    from rig.models.simulate import write_csv
 
     result = run_simulate(model, protocol)
     give(result, json_file)

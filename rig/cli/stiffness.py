@@ -67,7 +67,7 @@ def analyze(
     json_file: JsonOption = None,
 ) -> None:
     """Curve, stiffness k, pointwise k and anisotropy, with uncertainties."""
-    from rig import analyze as analysis
+    from rig.analysis import analyze as analysis
     from rig.dataset import load
 
     options = analysis.Options(
@@ -83,7 +83,7 @@ def analyze(
 
         remember_result(dataset, result.to_json())
     if figures is not None:
-        from rig.figures import draw
+        from rig.analysis.figures import draw
 
         list_written(draw(result, figures))
 
@@ -101,9 +101,10 @@ def identify(
     json_file: JsonOption = None,
 ) -> None:
     """Joint torsional stiffnesses, and what the data can and cannot tell about them."""
-    from rig import identify_text, model_export
-    from rig.identify import identify as run_identify
-    from rig.identify import prior_of
+    from rig.analysis import identify_text
+    from rig.analysis.identify import identify as run_identify
+    from rig.analysis.identify import prior_of
+    from rig.models import model_export
 
     if write_protocol is not None and not proposals:
         raise InputError(

@@ -18,7 +18,7 @@ from typing import Any
 
 from identification.stiffness import Stiffness
 from identification.uncertainty import Contribution, Quantity, combined
-from rig.analyze import Analysis, Direction, quantity
+from rig.analysis.analyze import Analysis, Direction, quantity
 from rig.dataset import Dataset
 from rig.units import N_PER_MM
 

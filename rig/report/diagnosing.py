@@ -61,7 +61,7 @@ def look(job: Job) -> tuple[Found, Whole]:
     """Diagnoses one data set but for what to measure next, which no figure shows, and what makes it
     whole; a data set that can't be diagnosed says why."""
     from rig.dataset import load
-    from rig.diagnose import explain
+    from rig.diagnosis.diagnose import explain
     from rig.report.gap_view import view_of
 
     try:

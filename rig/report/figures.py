@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.uncertainty import TWO_SIDED
-from rig.analyze import Analysis
+from rig.analysis.analyze import Analysis
 from rig.canvas import blank
 from rig.dataset import Dataset
 from rig.plotting import COLOURS, MARKERS

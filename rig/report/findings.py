@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rig.identify_text import data_say
+from rig.analysis.identify_text import data_say
 from rig.report.document import (
     Block,
     Bullets,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from rig.gap_figures import curve, remaining, withheld
-from rig.gap_map import gap_map
-from rig.gap_points import held_table, point_table, remainder_table
+from rig.diagnosis.gap_figures import curve, remaining, withheld
+from rig.diagnosis.gap_map import gap_map
+from rig.diagnosis.gap_points import held_table, point_table, remainder_table
 from rig.report.document import Figure
 from rig.report.drawing import draw
 from rig.report.figures import watermark
@@ -16,7 +16,7 @@ from rig.report.gap_view import GapView
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Plot
 
-    from rig.gap_points import Table
+    from rig.diagnosis.gap_points import Table
 
 Rows = tuple[tuple[object, ...], ...]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rig.diagnose_text import EACH, LEAST_PROBABILITY, NOTED, OTHERWISE, answer, families
+from rig.diagnosis.diagnose_text import EACH, LEAST_PROBABILITY, NOTED, OTHERWISE, answer, families
 from rig.report.document import (
     Block,
     Bullets,

@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from identification.gap.answer.remainder import Remainder, remainder
-from rig.diagnose import Diagnosis
-from rig.gap_points import Points, Shown, points, shown
+from rig.diagnosis.diagnose import Diagnosis
+from rig.diagnosis.gap_points import Points, Shown, points, shown
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.analyze import Analysis, analyze
+from rig.analysis.analyze import Analysis, analyze
+from rig.analysis.identify import IdentifyResult, identify
 from rig.dataset import Dataset, load_each
 from rig.errors import InputError
-from rig.identify import IdentifyResult, identify
 from rig.journal import journal_path
 from rig.protocol import parse_protocol
 from rig.report.compare import Pair, compare, same_instruments
@@ -22,7 +22,7 @@ from rig.software import software_version
 from rig.terminal import Progress, silent
 
 if TYPE_CHECKING:
-    from rig.couple import CouplingResult
+    from rig.coupling.couple import CouplingResult
 
 SCHEMA = "rig.report/1"
 
@@ -213,7 +213,7 @@ def _sha256(path: Path) -> str:
 def _coupling(model: Path | None) -> CouplingResult | None:
     if model is None:
         return None
-    from rig.couple import couple
+    from rig.coupling.couple import couple
 
     return couple(model)
 
@@ -222,6 +222,6 @@ def _coupling_marks(coupling: CouplingResult | None) -> tuple[str, ...]:
     """Banners of the data that a model was identified from."""
     if coupling is None:
         return ()
-    from rig.coupling_figures import marks
+    from rig.coupling.coupling_figures import marks
 
     return tuple(marks([coupling.model.note]))

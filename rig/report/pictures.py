@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rig import figures as analysis_figures
-from rig.analyze import Analysis
+from rig.analysis import figures as analysis_figures
+from rig.analysis.analyze import Analysis
 from rig.report import figures, setup_drawing
 from rig.report.compare import aligned
 from rig.report.document import Figure
@@ -127,7 +127,7 @@ class Pictures:
 
     def coupling(self, gathered: Gathered) -> Figure:
         """Single and coupled stiffness, as the published Figure 9."""
-        from rig.coupling_figures import stiffness
+        from rig.coupling.coupling_figures import stiffness
 
         result = gathered.coupling
         assert result is not None

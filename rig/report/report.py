@@ -90,7 +90,7 @@ def make(
 
 def summary(gathered: Gathered) -> str:
     """One sentence a data set: banners, every k."""
-    from rig.analyze_text import answer
+    from rig.analysis.analyze_text import answer
 
     lines = [*gathered.banners]
     lines += [f"{s.label}: {answer(s.analysis)}" for s in gathered.sessions]

@@ -17,7 +17,7 @@ from rig.meta import Meta
 from rig.storage.columns import Values
 from rig.storage.hdf5 import MANIFEST, SAMPLES, SCHEMA_VERSION, content_of, digest_of
 from rig.storage.seal import BROKEN, SCHEMA, check_bytes, damaged
-from rig.yamlfile import load_yaml_text
+from rig.yaml.yamlfile import load_yaml_text
 
 
 def read_uuid(path: Path) -> str:

@@ -135,7 +135,7 @@ def _of_meta(text: str, name: str) -> tuple[str, tuple[str, ...]]:
     if robot and line and (names := _names(line.group(1))):
         return robot.group(1), names
     from rig.meta import Meta
-    from rig.yamlfile import load_yaml_text
+    from rig.yaml.yamlfile import load_yaml_text
 
     meta = load_yaml_text(text, name, Meta)
     return meta.robot, tuple(meta.directions)

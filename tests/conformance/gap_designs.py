@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from identification.arm import tool_offset
 from identification.gap.data import GapData
 from rig.dataset import Dataset
-from rig.gap_data import gap_data
-from rig.model import load_robot
+from rig.diagnosis.gap_data import gap_data
+from rig.models.model import load_robot
 from rig.tables import import_table
 
 Array = NDArray[np.float64]

@@ -18,8 +18,8 @@ from identification.gap.effects import load_misalignment
 from identification.gap.effects.load_misalignment import Shape
 from identification.gap.effects.pose_error import turned
 from identification.gap.model.bench import make_bench
-from rig.gap_data import gap_data
-from rig.model import load_robot
+from rig.diagnosis.gap_data import gap_data
+from rig.models.model import load_robot
 from tests.conformance.gap_designs import (
     DESIGNS,
     TCP_MM,

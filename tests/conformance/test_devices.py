@@ -16,7 +16,7 @@ import pytest
 
 from drivers.clock import Clock
 from drivers.interfaces import Device, Dynamometer, Robot
-from rig.emulation import EmulatedRig
+from rig.emulation.emulated import EmulatedRig
 from rig.procedure.devices import Devices, make_devices
 from rig.station import Station, load_station, parse_station
 from tests.wire.short import station as emulated_station

@@ -16,7 +16,7 @@ from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.model.bench import make_bench
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from tests.conformance.effect_benches import of, quick_engine
 from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, meta, noisy
 from tests.conformance.test_effect_recovery import typical

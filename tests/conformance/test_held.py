@@ -9,7 +9,7 @@ import pytest
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.stiffness import analyze_curve
 from rig.dataset import Dataset
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from rig.passes import is_held
 from rig.reduce import curves
 from tests.conformance.gap_designs import DESIGNS, imported, meta, noisy

@@ -9,7 +9,7 @@ import pytest
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.laws.lost_motion import _side
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from rig.worlds.arm import place
 from tests.conformance.gap_designs import DESIGNS, TCP_MM, TRUE, Array, Q, imported, meta, noisy
 

@@ -19,7 +19,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.laws.interval import Parameter
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from rig.worlds.arm import place
 from rig.worlds.hidden.memory import play
 from tests.conformance.gap_designs import DESIGNS, Array, Design, Q, imported, linear, meta, noisy

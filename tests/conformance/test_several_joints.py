@@ -16,8 +16,8 @@ from identification.gap.explanations.explanation import Explanation, explain
 from identification.gap.explanations.penalties import pettiness
 from identification.gap.explanations.several import family_of, in_more_joints
 from identification.gap.model.bench import make_bench
-from rig.diagnose_text import render
-from rig.gap_data import gap_data
+from rig.diagnosis.diagnose_text import render
+from rig.diagnosis.gap_data import gap_data
 from tests.conformance.effect_benches import quick_engine
 from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, meta, noisy
 

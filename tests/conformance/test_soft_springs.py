@@ -17,7 +17,7 @@ from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.model.base import HALF
 from identification.gap.model.bench import make_bench
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from rig.worlds.arm import place
 from tests.conformance.effect_benches import quick_engine
 from tests.conformance.gap_designs import DESIGNS, TCP_MM, TRUE, Array, Q, imported, meta, noisy

@@ -16,8 +16,8 @@ from identification.gap.answer.parameters import parameters
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
 from identification.gap.words import IN_JOINTS, KINDS, NEED_ARM, WORDS
-from rig import diagnose_text, gap_keys, gap_path
 from rig.blind import judge, mujoco_effects
+from rig.diagnosis import diagnose_text, gap_keys, gap_path
 from rig.worlds.benches import draw as benches
 from rig.worlds.hidden import draw as hidden
 from rig.worlds.hidden import textbook

@@ -21,7 +21,7 @@ from rig.blind.case import generator, plain, write_dataset
 from rig.blind.diagnosers import Diagnoser, Reply
 from rig.blind.score import report
 from rig.dataset import load
-from rig.diagnose import diagnose
+from rig.diagnosis.diagnose import diagnose
 from rig.errors import InputError
 from tests.unit.blind_cases import EFFECTS, FakeCase, draw
 
@@ -186,7 +186,7 @@ def test_the_data_set_is_marked_and_keeps_every_digit(tmp_path: Path) -> None:
 
 def test_the_worker_knows_no_world_and_no_generator() -> None:
     code = (
-        "import sys, rig.blind.worker, rig.diagnose, rig.dataset\n"
+        "import sys, rig.blind.worker, rig.diagnosis.diagnose, rig.dataset\n"
         "print([m for m in sys.modules if m.startswith(('rig.worlds', 'rig.blind.'))])"
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rig.diagnose import diagnose
+from rig.diagnosis.diagnose import diagnose
 from rig.tables import import_table
 
 SHARED = Path(__file__).parents[2] / "../shared"

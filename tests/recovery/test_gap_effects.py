@@ -21,11 +21,11 @@ from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
-from rig.diagnose import diagnose
+from rig.diagnosis.diagnose import diagnose
+from rig.diagnosis.gap_data import gap_data
+from rig.diagnosis.gap_model import write_model
 from rig.errors import InputError
-from rig.gap_data import gap_data
-from rig.gap_model import write_model
-from rig.model import load_robot
+from rig.models.model import load_robot
 from rig.tables import import_table
 from tests.conformance.gap_designs import linear
 

@@ -20,10 +20,9 @@ from identification.gap.model.pool import Pool
 from identification.gap.model.variants import Variant
 from identification.gap.words import WORDS
 from rig.dataset import Dataset, write
-from rig.diagnose import Diagnosis, diagnose
-from rig.errors import InputError
-from rig.gap_forms import left_behind
-from rig.gap_model import (
+from rig.diagnosis.diagnose import Diagnosis, diagnose
+from rig.diagnosis.gap_forms import left_behind
+from rig.diagnosis.gap_model import (
     OF_THIS_SESSION,
     check_writable,
     forms,
@@ -31,13 +30,14 @@ from rig.gap_model import (
     springs,
     write_model,
 )
-from rig.gap_path import planned_data
+from rig.diagnosis.gap_path import planned_data
+from rig.diagnosis.next_protocol import next_text, write_next
+from rig.errors import InputError
 from rig.measured_meta import measured_meta
-from rig.model import MODELS, load_model
-from rig.next_protocol import next_text, write_next
+from rig.models.model import MODELS, load_model
+from rig.models.simulate import simulate
 from rig.plan import plan
 from rig.protocol import load_protocol, parse_protocol
-from rig.simulate import simulate
 from rig.station import load_station
 from rig.worlds import make_world
 from rig.worlds.direct import sample_protocol
@@ -311,7 +311,7 @@ def test_the_next_procedure_can_be_checked(
 def test_every_proposal_is_a_procedure(paper: tuple[Dataset, Diagnosis]) -> None:
     """Each of the candidates, whichever wins, becomes a protocol that the plan accepts."""
     from identification.gap.answer.designs import candidates, present_design
-    from rig.other_setups import elsewhere
+    from rig.diagnosis.other_setups import elsewhere
 
     dataset, diagnosis = paper
     design = present_design(diagnosis.result.bench)
@@ -347,8 +347,8 @@ def test_without_a_pair_nothing_is_written(
 def test_other_places_are_where_they_say(paper: tuple[Dataset, Diagnosis]) -> None:
     """Nearer by 200 mm with the same tool; turned at the same point with the other elbow."""
     from identification.arm import tool_offset
-    from rig.model import load_robot
-    from rig.other_setups import other_poses
+    from rig.diagnosis.other_setups import other_poses
+    from rig.models.model import load_robot
 
     meta = paper[0].meta
     arm, q = load_robot("ur10e"), np.array(meta.poses["P1"].q_rad)

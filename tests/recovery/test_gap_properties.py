@@ -21,7 +21,7 @@ from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.explanations.verdict import BENCH_DOUBT
 from rig import cli
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import DESIGNS, STATED, Design, imported, meta, noisy
 
 Array = NDArray[np.float64]

@@ -19,8 +19,8 @@ from identification.gap.model.bench import make_bench
 from identification.gap.search.strange import KINDS as KINDS_OF_STRANGERS
 from identification.gap.search.strange import likenesses, square_of, strangers
 from identification.gap.words import NAMELESS
-from rig.diagnose_text import LOOKS_LIKE, looks_like, render
-from rig.gap_data import gap_data
+from rig.diagnosis.diagnose_text import LOOKS_LIKE, looks_like, render
+from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import (
     DESIGNS,
     TRUE,

@@ -12,16 +12,16 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.joints import JointFit
-from rig.couple import couple
+from rig.analysis.identify import IdentifyResult, identify, prior_of
+from rig.analysis.identify_text import model_text, protocol_text, write_model, write_protocol
+from rig.coupling.couple import couple
 from rig.dataset import load, write
 from rig.errors import InputError
-from rig.identify import IdentifyResult, identify, prior_of
-from rig.identify_text import model_text, protocol_text, write_model, write_protocol
-from rig.model import MODELS, load_model, load_robot
-from rig.model_export import write as write_export
+from rig.models.model import MODELS, load_model, load_robot
+from rig.models.model_export import write as write_export
+from rig.models.simulate import simulate
 from rig.plan import plan
 from rig.protocol import load_protocol
-from rig.simulate import simulate
 from rig.station import load_station
 from tests.recovery.emulated_sets import (
     AXES,

@@ -16,7 +16,7 @@ from identification.next_poses import (
     expected_after,
     propose,
 )
-from rig.model import load_robot
+from rig.models.model import load_robot
 from tests.recovery.joint_world import deflect, place
 
 Array = NDArray[np.float64]

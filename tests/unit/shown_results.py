@@ -22,14 +22,14 @@ from identification.maps import Need, Placement, Stance, Task
 from identification.next_poses import Proposal
 from identification.when import Schedule
 from identification.workspace import Workspace
+from rig.analysis.identify import IdentifyResult
 from rig.check import Check, DeviceState
-from rig.couple import CouplingResult, Decision
-from rig.coupling_task import TaskResult
-from rig.diagnose import Diagnosis
-from rig.identify import IdentifyResult
-from rig.model import ArmModel, CouplingSpec, Requirement, load_robot
+from rig.coupling.couple import CouplingResult, Decision
+from rig.coupling.coupling_task import TaskResult
+from rig.diagnosis.diagnose import Diagnosis
+from rig.models.model import ArmModel, CouplingSpec, Requirement, load_robot
+from rig.models.simulate import CurvePath, PredictedCurve, Simulation
 from rig.plan import Plan, PlannedRun
-from rig.simulate import CurvePath, PredictedCurve, Simulation
 
 EMULATED = "EMULATED: these values come from simulated devices; nothing was measured."
 NOWHERE: Any = None  # what the text does not look at

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analyze import Analysis, Options, analyze, weighting
+from rig.analysis.analyze import Analysis, Options, analyze, weighting
+from rig.analysis.figures import curve, draw, pointwise
 from rig.digits import brief, number
 from rig.errors import InputError
-from rig.figures import curve, draw, pointwise
 from rig.terminal import folded
 from tests.unit.stiffness_tables import Table, run, table
 

@@ -17,7 +17,7 @@ from identification.arm import (
 )
 from identification.elastic import ALUMINIUM, STEEL, Beam, cantilever, transport, tube
 from identification.inverse import BRANCHES, nearest, solutions
-from rig.model import load_robot, robot_names
+from rig.models.model import load_robot, robot_names
 
 Array = NDArray[np.float64]
 ROBOTS = robot_names()

@@ -25,9 +25,9 @@ from identification.coupling import (
 )
 from identification.elastic import STEEL, Material, cantilever, tube
 from identification.when import CouplingRule, schedule
-from rig.couple import couple
+from rig.coupling.couple import couple
 from rig.errors import InputError
-from rig.model import MODELS, ArmModel, load_model, load_robot
+from rig.models.model import MODELS, ArmModel, load_model, load_robot
 
 Array = NDArray[np.float64]
 BETA = np.deg2rad(36.5)

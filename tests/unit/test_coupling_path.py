@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.couple import couple
+from rig.coupling.couple import couple
 from rig.errors import InputError
-from rig.model import MODELS, load_model
+from rig.models.model import MODELS, load_model
 
 
 def test_path_file(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.search.breaks import _just_turned, jump_rows, strangers
 from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING, WANDERS, WORDS
-from rig.diagnose_text import LOOKS_LIKE, looks_like
+from rig.diagnosis.diagnose_text import LOOKS_LIKE, looks_like
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running, triangle

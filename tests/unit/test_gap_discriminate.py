@@ -23,8 +23,8 @@ from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
 from identification.gap.search.search import search
-from rig.gap_data import arm_setup
-from rig.model import load_robot
+from rig.diagnosis.gap_data import arm_setup
+from rig.models.model import load_robot
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
 

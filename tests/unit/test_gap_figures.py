@@ -18,12 +18,12 @@ from typer.testing import CliRunner
 from identification.gap.model.base import prediction
 from rig import cli
 from rig.dataset import write
-from rig.diagnose import Diagnosis, diagnose
-from rig.diagnose_text import _share
-from rig.gap_figures import change, curve, draw, legs, residual, withheld
-from rig.gap_layout import blank, noise_axis
-from rig.gap_map import _cells, _lines
-from rig.gap_points import (
+from rig.diagnosis.diagnose import Diagnosis, diagnose
+from rig.diagnosis.diagnose_text import _share
+from rig.diagnosis.gap_figures import change, curve, draw, legs, residual, withheld
+from rig.diagnosis.gap_layout import blank, noise_axis
+from rig.diagnosis.gap_map import _cells, _lines
+from rig.diagnosis.gap_points import (
     FALLING,
     RISING,
     held_table,

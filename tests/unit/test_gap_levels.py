@@ -23,7 +23,7 @@ from identification.gap.recording.imposed import displacement_imposed
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.search.search import _hidden
 from rig.dataset import load
-from rig.gap_data import gap_data
+from rig.diagnosis.gap_data import gap_data
 from rig.tables import import_table
 from tests.conformance.gap_designs import linear
 from tests.unit.test_gap_evidence import small_bench, small_engine

@@ -24,13 +24,13 @@ from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
 from identification.gap.model.variants import Variant
 from identification.gap.words import WORDS
+from rig.diagnosis.gap_forms import FormError, effects_of, from_entry, to_entry
+from rig.diagnosis.gap_model import _comment
+from rig.diagnosis.gap_path import planned_data
 from rig.errors import InputError
-from rig.gap_forms import FormError, effects_of, from_entry, to_entry
-from rig.gap_model import _comment
-from rig.gap_path import planned_data
-from rig.model import MODELS, load_model
+from rig.models.model import MODELS, load_model
+from rig.models.simulate import Simulation, simulate
 from rig.protocol import load_protocol
-from rig.simulate import Simulation, simulate
 from tests.unit.shown_results import explained
 from tests.unit.test_gap_forms import arm_data, pulled
 

@@ -13,12 +13,12 @@ from identification.arm import along, tool_offset
 from identification.gap.answer.designs import planned, present_design
 from identification.gap.model.bench import make_bench
 from rig.dataset import Dataset
-from rig.diagnose import Diagnosis, diagnose
-from rig.gap_data import gap_data
-from rig.gap_model import write_model
-from rig.model import load_model
-from rig.other_setups import elsewhere
-from rig.simulate import simulate, write_csv
+from rig.diagnosis.diagnose import Diagnosis, diagnose
+from rig.diagnosis.gap_data import gap_data
+from rig.diagnosis.gap_model import write_model
+from rig.diagnosis.other_setups import elsewhere
+from rig.models.model import load_model
+from rig.models.simulate import simulate, write_csv
 from tests.conformance.gap_designs import DESIGNS, STATED, TCP_MM, Array, Q, imported, meta, noisy
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"

@@ -21,7 +21,7 @@ from identification.gap.model.base import base_columns
 from identification.gap.model.bench import make_bench
 from identification.gap.search.strange import strangers
 from identification.gap.words import WORDS
-from rig.diagnose_text import meanings, render
+from rig.diagnosis.diagnose_text import meanings, render
 from tests.unit.test_gap_linear import charged
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running

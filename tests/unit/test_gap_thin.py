@@ -16,8 +16,8 @@ from identification.gap.explanations.explanation import Explanation, Found
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.imposed import displacement_imposed
 from rig.dataset import Origin, load
-from rig.diagnose import diagnose
-from rig.gap_data import gap_data
+from rig.diagnosis.diagnose import diagnose
+from rig.diagnosis.gap_data import gap_data
 from rig.tables import import_table
 from tests.conformance.effect_benches import quick_engine
 from tests.conformance.gap_designs import DESIGNS, imported, linear, meta, noisy

@@ -26,8 +26,8 @@ from identification.gap.model.history import bristles, flowing_play, play
 from identification.gap.model.variants import variant
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.search.refine import refine
-from rig.gap_data import _joint_to_joint, arm_setup
-from rig.model import load_robot
+from rig.diagnosis.gap_data import _joint_to_joint, arm_setup
+from rig.models.model import load_robot
 from tests.unit.test_gap_closer import assert_lawful
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data, fresh

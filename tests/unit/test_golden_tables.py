@@ -17,9 +17,10 @@ from identification.gap.answer.notes import KINDS, Note, ordered
 from identification.gap.explanations.explanation import Likeness
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter
-from rig import cli, diagnose_text
+from rig import cli
 from rig.blind import text
 from rig.blind.score import report
+from rig.diagnosis import diagnose_text
 from tests.unit import shown_results as shown
 from tests.unit.test_blind_judge import campaign
 

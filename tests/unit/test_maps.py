@@ -22,11 +22,11 @@ from identification.maps import (
     branches_at,
     stiffness_map,
 )
-from rig.couple import couple
-from rig.coupling_figures import draw, marks, stiffness
-from rig.coupling_task import best_for, between_arms_deg
+from rig.coupling.couple import couple
+from rig.coupling.coupling_figures import draw, marks, stiffness
+from rig.coupling.coupling_task import best_for, between_arms_deg
 from rig.errors import InputError
-from rig.model import MODELS, ArmModel, load_model
+from rig.models.model import MODELS, ArmModel, load_model
 
 DOWN = np.array([0.0, 0.0, -1.0])
 

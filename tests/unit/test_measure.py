@@ -13,7 +13,7 @@ import pytest
 from drivers.interfaces import LiveView
 from rig import measure
 from rig.dataset import journal_path, load
-from rig.emulation_host import EmulationHost
+from rig.emulation.host import EmulationHost
 from rig.errors import InputError
 from rig.journal import Journal
 from rig.panel.onlooker import Onlooker

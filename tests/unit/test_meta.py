@@ -6,7 +6,7 @@ import pytest
 
 from rig.errors import InputError
 from rig.meta import Meta
-from rig.yamlfile import load_yaml_text
+from rig.yaml.yamlfile import load_yaml_text
 from tests.unit.example_data import META, META_SPECIMEN
 
 

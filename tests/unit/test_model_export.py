@@ -11,8 +11,8 @@ import pytest
 
 from identification.arm import Arm
 from rig.errors import InputError
-from rig.model import MODELS, ArmModel, load_model
-from rig.model_export import mujoco_xml, urdf, write
+from rig.models.model import MODELS, ArmModel, load_model
+from rig.models.model_export import mujoco_xml, urdf, write
 
 # beside the flange, and turned about all axes
 TOOL = np.array(

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from rig.couple import couple
+from rig.coupling.couple import couple
 from rig.errors import InputError
-from rig.model import MODELS
-from rig.simulate import simulate
+from rig.models.model import MODELS
+from rig.models.simulate import simulate
 
 PAPER_XY = Path(__file__).parents[2] / "protocols" / "paper_xy.yaml"
 F1 = (MODELS / "F1.yaml").read_text() + (

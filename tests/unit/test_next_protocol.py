@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rig.next_protocol import _rate_Hz, _seconds
+from rig.diagnosis.next_protocol import _rate_Hz, _seconds
 from rig.protocol_write import limit_lines
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from identification.gap.data import GapData
 from rig.dataset import load
+from rig.diagnosis.gap_data import gap_data
+from rig.diagnosis.other_simulator import with_curves
 from rig.errors import InputError
-from rig.gap_data import gap_data
-from rig.other_simulator import with_curves
 from rig.tables import import_table
 from tests.unit.cli_bench import META, TABLE
 

@@ -132,7 +132,7 @@ def test_the_end_stands_over_everything() -> None:
 
 
 def test_the_prediction_is_that_of_rig_simulate(tmp_path: Path) -> None:
-    from rig.simulate import simulate
+    from rig.models.simulate import simulate
 
     curves = prediction_of(PROTOCOL)
     model = tmp_path / "arm.yaml"

@@ -15,7 +15,7 @@ from scipy import stats
 from identification.estimate import Choice
 from identification.stiffness import Stiffness
 from identification.uncertainty import Contribution, Quantity, combined
-from rig.analyze import analyze
+from rig.analysis.analyze import analyze
 from rig.dataset import Dataset, load
 from rig.report.compare import Pair, adjusted, aligned, paired, probability, same_instruments
 from rig.report.figures import compared_curves

@@ -110,8 +110,8 @@ def test_figures_keep_their_order_however_many_there_are(
     ("work", "other"),
     [
         ("rig.report.compose, rig.report.gather, rig.report.pictures", "identification.gap"),
-        ("rig.dataset, rig.diagnose, rig.report.gap_view", "rig.report.figures"),
-        ("rig.dataset, rig.diagnose, rig.report.gap_view", "matplotlib"),
+        ("rig.dataset, rig.diagnosis.diagnose, rig.report.gap_view", "rig.report.figures"),
+        ("rig.dataset, rig.diagnosis.diagnose, rig.report.gap_view", "matplotlib"),
     ],
     ids=["who composes", "who diagnoses", "nothing that draws"],
 )

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analyze import analyze
-from rig.couple import couple
+from rig.analysis.analyze import analyze
+from rig.analysis.identify import identify
+from rig.coupling.couple import couple
 from rig.dataset import load
-from rig.diagnose import diagnose
+from rig.diagnosis.diagnose import diagnose
 from rig.digits import likely
-from rig.identify import identify
 from rig.report.document import Block, Number, Section, Table, rich
 from rig.report.report import Report, make
 from rig.report.results import Node, look_up

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from rig.errors import InputError
-from rig.model import MODELS
+from rig.models.model import MODELS
+from rig.models.simulate import Simulation, simulate, write_csv
 from rig.protocol import load_protocol
-from rig.simulate import Simulation, simulate, write_csv
 from rig.worlds import make_world
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"

@@ -10,10 +10,10 @@ import pytest
 
 from rig.errors import InputError
 from rig.meta import Meta
-from rig.model import load_model
+from rig.models.model import load_model
 from rig.protocol import load_protocol
 from rig.station import STATIONS, load_station, parse_station, station_for
-from rig.yamlfile import load_yaml
+from rig.yaml.yamlfile import load_yaml
 
 EMULATED = (STATIONS / "emulated.yaml").read_text("utf-8")
 LAB = (STATIONS / "ur10e_lab.yaml").read_text("utf-8")

@@ -13,7 +13,7 @@ import pytest
 from identification.curve import Curve, Point
 from identification.cut_short import cut_short
 from identification.stiffness import analyze_curve
-from rig.analyze import analyze
+from rig.analysis.analyze import analyze
 from rig.dataset import load
 from rig.report.report import make
 from rig.report.wishes import Wishes

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict, field_validator
 
 from rig.errors import InputError
-from rig.yamlfile import MAX_BYTES, load_yaml, load_yaml_text, read_document_text
-from rig.yamlwords import place, unit_of
+from rig.yaml.yamlfile import MAX_BYTES, load_yaml, load_yaml_text, read_document_text
+from rig.yaml.yamlwords import place, unit_of
 
 
 @dataclass(frozen=True, kw_only=True)

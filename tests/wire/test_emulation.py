@@ -22,8 +22,8 @@ from drivers.ild2200.client import Ild2200
 from drivers.kistler.client import Kistler9257B
 from drivers.operator.screw import ScrewClient
 from drivers.ur10e.client import Ur10e
-from rig import emulation
-from rig.emulation import EmulatedRig, serve_by_hand
+from rig.emulation import emulated
+from rig.emulation.emulated import EmulatedRig, serve_by_hand
 from rig.errors import InputError
 from rig.station import Emulation, FaultPlan, Station, load_station
 from rig.worlds import make_world
@@ -80,7 +80,7 @@ def test_a_person_at_the_console_gets_no_screw() -> None:
     given = station()
     console = replace(given, operator=replace(given.operator, driver="console", screw=None))
     endpoints = {"robot": "127.1.2.3", "dynamometer": "127.0.0.1:1", "laser": "/dev/pts/0"}
-    filled = emulation._with_endpoints(console, {**endpoints, "operator": "127.0.0.1:2"})
+    filled = emulated._with_endpoints(console, {**endpoints, "operator": "127.0.0.1:2"})
     assert filled.operator.screw is None
 
 
@@ -245,7 +245,7 @@ def test_stop_leaves_no_process(rig: EmulatedRig) -> None:
 def test_it_ends_when_the_measuring_process_is_killed() -> None:
     code = (
         "import time\n"
-        "from rig.emulation import EmulatedRig\n"
+        "from rig.emulation.emulated import EmulatedRig\n"
         "from rig.station import load_station\n"
         "rig = EmulatedRig(load_station('emulated')); rig.start()\n"
         "print(rig.pid, flush=True); time.sleep(60)"
@@ -299,7 +299,7 @@ def test_a_child_that_stays_mute_is_given_up_and_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "executable", _stand_in(tmp_path, "import time; time.sleep(100)"))
-    monkeypatch.setattr(emulation, "ENDING_S", 0.1)
+    monkeypatch.setattr(emulated, "ENDING_S", 0.1)
     rig, spawned = EmulatedRig(station()), []
     stop = rig.stop
     monkeypatch.setattr(rig, "stop", lambda: (spawned.append(rig.pid), stop()))
@@ -315,7 +315,7 @@ def test_a_child_that_stays_mute_is_given_up_and_ended(
 def test_the_child_by_hand_prints_its_addresses_and_ends_with_its_input() -> None:
     files = ["protocols/stations/emulated.yaml", "protocols/load_unload_hold.yaml"]
     child = subprocess.Popen(
-        [sys.executable, "-m", "rig.emulation", *files],
+        [sys.executable, "-m", "rig.emulation.emulated", *files],
         cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     assert child.stdin
@@ -329,7 +329,7 @@ def test_the_child_by_hand_prints_its_addresses_and_ends_with_its_input() -> Non
 
 def test_the_child_by_hand_with_a_wrong_file() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "rig.emulation", "nowhere.yaml"],
+        [sys.executable, "-m", "rig.emulation.emulated", "nowhere.yaml"],
         cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
         timeout=60,
     )  # fmt: skip
@@ -341,7 +341,7 @@ def test_the_child_by_hand_with_a_wrong_file() -> None:
 def test_rig_emulate_shows_all_and_ends_by_ctrl_c() -> None:
     code = (
         "import signal\n"
-        "from rig.emulation import serve_by_hand\n"
+        "from rig.emulation.emulated import serve_by_hand\n"
         "from rig.station import load_station\n"
         # a test run in the background of a shell hands down that Ctrl-C is ignored
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from identification.inverse import tool_pose
 from identification.maps import Need, Placement, Stance, Task, best_placement
 from rig.errors import InputError
-from rig.model import ArmModel, CouplingSpec, load_model
+from rig.models.model import ArmModel, CouplingSpec, load_model
 from rig.units import MM_PER_M, N_PER_MM
 
 Array = NDArray[np.float64]

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
 from rig.canvas import blank
-from rig.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
+from rig.coupling.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
 from rig.plotting import COLOURS, write_figures
 from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rig.couple import CouplingResult
-    from rig.coupling_task import TaskResult
-    from rig.model import ArmModel
+    from rig.coupling.couple import CouplingResult
+    from rig.coupling.coupling_task import TaskResult
+    from rig.models.model import ArmModel
 
 Array = NDArray[np.float64]
 _MAP_CELLS = 81

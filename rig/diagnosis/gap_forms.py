@@ -15,8 +15,7 @@ import numpy as np
 from identification.gap.answer.forms import Form, lasting
 from identification.gap.laws.law import Law, Term
 from identification.gap.words import WORDS
-from rig.errors import close_to, did_you_mean
-from rig.gap_keys import (
+from rig.diagnosis.gap_keys import (
     ABOUT,
     CONSTANTS,
     CONTAINED,
@@ -30,9 +29,10 @@ from rig.gap_keys import (
     keys_of,
     kinds,
 )
-from rig.model import ArmModel
-from rig.model_schema import ModelFile
-from rig.yamlfile import read_document
+from rig.errors import close_to, did_you_mean
+from rig.models.model import ArmModel
+from rig.models.model_schema import ModelFile
+from rig.yaml.yamlfile import read_document
 
 _MOST = 1e12
 

@@ -21,7 +21,7 @@ from identification.stiffness import Stiffness, analyze_curve
 from rig.dataset import Dataset, load_each
 from rig.digits import counted
 from rig.errors import InputError
-from rig.model import load_model, load_robot
+from rig.models.model import load_model, load_robot
 from rig.reduce import curves
 from rig.units import MM_PER_M
 
@@ -94,7 +94,7 @@ class IdentifyResult:
 
     def to_text(self) -> str:
         """Tables for a terminal."""
-        from rig.identify_text import text
+        from rig.analysis.identify_text import text
 
         return text(self)
 

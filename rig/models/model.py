@@ -15,7 +15,7 @@ from identification.arm import Arm, tool_offset, tool_transform, unit_vector
 from identification.elastic import MATERIALS, Beam, Section, cantilever, tube
 from identification.inverse import BRANCHES, solutions, tool_pose
 from rig.errors import InputError, did_you_mean
-from rig.model_schema import (
+from rig.models.model_schema import (
     BeamFile,
     BeamKind,
     ComplianceKind,
@@ -26,13 +26,13 @@ from rig.model_schema import (
     TubeFile,
 )
 from rig.units import MM_PER_M, N_PER_MM
-from rig.yamlfile import Document, read_document
-from rig.yamlnodes import Problem
+from rig.yaml.yamlfile import Document, read_document
+from rig.yaml.yamlnodes import Problem
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-MODELS = Path(__file__).resolve().parents[1] / "data" / "models"
+MODELS = Path(__file__).resolve().parents[2] / "data" / "models"
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import InputError
 
 if TYPE_CHECKING:
-    from rig.emulation_host import EmulationHost
+    from rig.emulation.host import EmulationHost
     from rig.station import Station
 
 ENDING_S = 5.0  # for emulators to stop before the process ends all the same
@@ -54,7 +54,7 @@ class Child:
         return 0
 
     def _begin(self, settings: Mapping[str, Any]) -> bool:
-        from rig.emulation_host import EmulationHost
+        from rig.emulation.host import EmulationHost
 
         try:
             station = _station(settings)

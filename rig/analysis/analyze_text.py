@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from identification.stiffness import Exclusion, Stiffness
 from identification.uncertainty import Quantity
-from rig.analyze import Analysis, Direction
+from rig.analysis.analyze import Analysis, Direction
 from rig.digits import number
 from rig.units import MM_PER_M, N_PER_MM
 

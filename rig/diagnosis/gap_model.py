@@ -13,13 +13,13 @@ from identification.gap.answer.forms import Form, describe, lasting
 from identification.gap.data import Array
 from identification.gap.diagnose import Effect, GapResult
 from rig.dataset import Dataset
-from rig.diagnose import Diagnosis
-from rig.diagnose_text import meanings
+from rig.diagnosis.diagnose import Diagnosis
+from rig.diagnosis.diagnose_text import meanings
+from rig.diagnosis.gap_forms import to_entry
+from rig.diagnosis.gap_keys import CONTAINED, SPRINGS
 from rig.digits import likely
 from rig.errors import InputError
-from rig.gap_forms import to_entry
-from rig.gap_keys import CONTAINED, SPRINGS
-from rig.model_write import arm_lines, coupling_lines, flow
+from rig.models.model_write import arm_lines, coupling_lines, flow
 from rig.storage.files import in_place_of
 
 OF_THIS_SESSION = "of the measured session: rig simulate and rig diagnose --model leave it out"

@@ -23,13 +23,13 @@ from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
+from rig.diagnosis.gap_data import gap_data
+from rig.diagnosis.gap_forms import effects_of
+from rig.diagnosis.other_setups import elsewhere
+from rig.diagnosis.other_simulator import with_curves
 from rig.errors import InputError, did_you_mean
-from rig.gap_data import gap_data
-from rig.gap_forms import effects_of
 from rig.meta import Simulation
-from rig.model import ArmModel, load_model
-from rig.other_setups import elsewhere
-from rig.other_simulator import with_curves
+from rig.models.model import ArmModel, load_model
 from rig.units import MM_PER_M
 
 # As shapes are labelled, whatever their springs are called: joint 1, joints 1 and 2, joints but 3.
@@ -52,7 +52,7 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """The diagnosis as plain values."""
-        from rig.diagnose_text import meanings
+        from rig.diagnosis.diagnose_text import meanings
 
         r = self.result
         return {
@@ -88,7 +88,7 @@ class Diagnosis:
 
     def to_text(self) -> str:
         """What the terminal shows."""
-        from rig.diagnose_text import render
+        from rig.diagnosis.diagnose_text import render
 
         names = ", ".join(dict.fromkeys(str(e["name"]) for e in self.known_effects))
         known = [f"The simulation has these effects already: {names}."] if names else []
@@ -189,7 +189,7 @@ def _believing(dataset: Dataset, read: ArmModel) -> _Believed:
 
 def _looks_like(r: GapResult) -> dict[str, Any] | None:
     """What an unknown gap looks like; None where nothing is plain."""
-    from rig.diagnose_text import looks_like
+    from rig.diagnosis.diagnose_text import looks_like
 
     like = r.looks_like
     if like is None:

@@ -13,8 +13,8 @@ from identification.gap.effects import EFFECTS
 from identification.gap.laws.law import along, in_pose
 from identification.gap.model.bench import Bench, make_bench
 from identification.times import MOUNT_S, SCREW_S, UNLOAD_S
-from rig.gap_data import arm_setup
-from rig.model import ArmModel
+from rig.diagnosis.gap_data import arm_setup
+from rig.models.model import ArmModel
 from rig.plan import AMPLIFIER_S, TARE_S
 from rig.protocol import MeasurementProtocol, Run
 from rig.units import MM_PER_M

@@ -15,11 +15,11 @@ import numpy as np
 from identification.gap.answer.designs import Design
 from identification.gap.answer.discriminate import NextMeasurement
 from rig.dataset import Dataset
-from rig.diagnose import Diagnosis
+from rig.diagnosis.diagnose import Diagnosis
+from rig.diagnosis.other_setups import other_poses
 from rig.errors import InputError
 from rig.meta import Meta
-from rig.model import load_robot
-from rig.other_setups import other_poses
+from rig.models.model import load_robot
 from rig.plan import plan
 from rig.protocol import MeasurementProtocol, parse_protocol
 from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from identification.arm import Arm
 from identification.when import Schedule, schedule
 from rig.errors import InputError, did_you_mean
-from rig.model import ArmModel, CouplingSpec
+from rig.models.model import ArmModel, CouplingSpec
 from rig.units import N_PER_MM
 
 Array = NDArray[np.float64]

@@ -115,7 +115,7 @@ class Analysis:
 
     def to_text(self) -> str:
         """Banners, the answer in one sentence, then tables."""
-        from rig.analyze_text import text
+        from rig.analysis.analyze_text import text
 
         return text(self)
 

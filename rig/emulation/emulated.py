@@ -2,8 +2,8 @@
 
 The measuring process and the emulators share nothing but sockets and a pseudo terminal, as with
 hardware. The child ends when told to, on SIGTERM, and when its standard input closes: also when
-the measuring process was killed. `python -m rig.emulation` is that child; by hand it takes
-`STATION.yaml [PROTOCOL.yaml]`.
+the measuring process was killed. `python -m rig.emulation.emulated` is that child; by hand it
+takes `STATION.yaml [PROTOCOL.yaml]`.
 
 Messages are one JSON object a line. In: the rig to emulate, then {"fault": {"device", "kind"}} or
 {"quit": true}. Out: {"endpoints": {device: address}}, then {"ok": true}; or {"error": text,
@@ -28,12 +28,12 @@ from typing import TYPE_CHECKING, Any
 
 from drivers.errors import CannotConnect, DeviceError
 from rig.child_process import ChildProcess
-from rig.emulation_child import ENDING_S, Child
+from rig.emulation.child import ENDING_S, Child
 from rig.errors import InputError
 from rig.units import M_PER_MM
 
 if TYPE_CHECKING:
-    from rig.emulation_host import EmulationHost
+    from rig.emulation.host import EmulationHost
     from rig.station import Station
 
 Poses = Mapping[str, Sequence[float]]
@@ -128,7 +128,7 @@ class EmulatedRig:
     def _spawn(self) -> None:
         if self._child is not None:
             raise RuntimeError("the emulated rig is running already")
-        self._child = ChildProcess("rig.emulation")
+        self._child = ChildProcess("rig.emulation.emulated")
         self._lines = _Lines(self._child.output.fileno())
 
     def _ask(self, message: Mapping[str, Any], deadline_s: float) -> dict[str, Any]:
@@ -193,7 +193,7 @@ def _with_endpoints(station: Station, endpoints: Mapping[str, str]) -> Station:
 def serve_by_hand(station: Station) -> None:
     """Runs a station's emulators in the foreground until Ctrl-C, SIGTERM or a "quit" at the
     screw's port; faults are typed as `DEVICE FAULT` or sent there."""
-    from rig.emulation_host import EmulationHost
+    from rig.emulation.host import EmulationHost
 
     host = EmulationHost(station)
     over = threading.Event()

@@ -9,9 +9,9 @@ from identification.gap.answer.designs import Elsewhere
 from identification.gap.data import Array
 from identification.inverse import solutions
 from rig.dataset import Dataset
-from rig.gap_data import arm_setup
+from rig.diagnosis.gap_data import arm_setup
 from rig.meta import Meta
-from rig.model import AXES, ArmModel, load_robot
+from rig.models.model import AXES, ArmModel, load_robot
 from rig.units import MM_PER_M
 
 _NEARER_M = 0.2  # of the point of load towards the base's axis: levers about a quarter shorter

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.gap.data import Array, Flags
 from rig.canvas import blank
-from rig.gap_points import FALLING, RISING, Points, Shown, session_clock
+from rig.diagnosis.gap_points import FALLING, RISING, Points, Shown, session_clock
 from rig.units import MM_PER_M
 
 if TYPE_CHECKING:

@@ -10,13 +10,13 @@ import numpy as np
 
 from rig.digits import number
 from rig.errors import InputError
-from rig.model_write import arm_lines, coupling_lines
+from rig.models.model_write import arm_lines, coupling_lines
 from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
 from rig.storage.files import in_place_of
 from rig.units import KNM
 
 if TYPE_CHECKING:
-    from rig.identify import IdentifyResult
+    from rig.analysis.identify import IdentifyResult
 
 
 def text(result: IdentifyResult) -> str:

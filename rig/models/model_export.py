@@ -17,8 +17,8 @@ from identification.arm import JOINTS, STANDARD_GRAVITY, Arm, joint_positions, t
 from rig.storage.files import in_place_of
 
 if TYPE_CHECKING:
-    from rig.identify import IdentifyResult
-    from rig.model import ArmModel
+    from rig.analysis.identify import IdentifyResult
+    from rig.models.model import ArmModel
 
 Array = NDArray[np.float64]
 
@@ -128,7 +128,7 @@ _SAYS = (
 
 
 def _stance(source: ArmModel | IdentifyResult) -> tuple[Array, Array | None]:
-    from rig.model import ArmModel
+    from rig.models.model import ArmModel
 
     if isinstance(source, ArmModel):
         return source.q, source.tool

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.model import told_first
+from rig.models.model import told_first
 from rig.units import N_PER_MM
 
 if TYPE_CHECKING:
-    from rig.couple import CouplingResult
+    from rig.coupling.couple import CouplingResult
 
 # J. Manuf. Mater. Process. 2026, 10(2), 54: N/mm along x and y, and what the text derives.
 PUBLISHED_SINGLE = (95.94, 57.42)

@@ -13,8 +13,8 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
-from rig import yamlwords as words
 from rig.errors import InputError
+from rig.yaml import yamlwords as words
 
 Key = words.Path
 Place = tuple[int, int]  # line and column, from 1

@@ -17,9 +17,9 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from rig import yamlwords as words
 from rig.errors import InputError, close_to, closest, did_you_mean
-from rig.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, refuse
+from rig.yaml import yamlwords as words
+from rig.yaml.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, refuse
 
 T = TypeVar("T")
 _UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")

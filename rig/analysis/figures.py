@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analyze import Analysis, Direction
+from rig.analysis.analyze import Analysis, Direction
 from rig.canvas import blank
 from rig.digits import number
 from rig.plotting import COLOURS, MARKERS, write_figures

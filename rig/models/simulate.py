@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from identification.arm import along, tool_offset
 from identification.gap.answer.forms import Form
 from identification.uncertainty import TWO_SIDED
+from rig.diagnosis.gap_forms import effects_of
+from rig.diagnosis.gap_path import left_out, predict
 from rig.digits import number
 from rig.errors import InputError
-from rig.gap_forms import effects_of
-from rig.gap_path import left_out, predict
-from rig.model import ArmModel, load_model, told_first
+from rig.models.model import ArmModel, load_model, told_first
 from rig.protocol import MeasurementProtocol, Run, load_protocol
 from rig.units import MM_PER_M, N_PER_MM
 

@@ -11,11 +11,9 @@ import numpy as np
 from identification.gap.answer.remainder import Remainder, remainder
 from identification.gap.data import BRANCH_NAMES
 from rig.canvas import blank
-from rig.diagnose import Diagnosis
-from rig.diagnose_text import LEAST_PROBABILITY
-from rig.digits import likely
-from rig.errors import InputError
-from rig.gap_layout import (
+from rig.diagnosis.diagnose import Diagnosis
+from rig.diagnosis.diagnose_text import LEAST_PROBABILITY
+from rig.diagnosis.gap_layout import (
     first_column,
     label_below,
     log_axis,
@@ -24,8 +22,8 @@ from rig.gap_layout import (
     set_title,
     shared_legend,
 )
-from rig.gap_map import gap_map
-from rig.gap_points import (
+from rig.diagnosis.gap_map import gap_map
+from rig.diagnosis.gap_points import (
     FALLING,
     RISING,
     Points,
@@ -39,6 +37,8 @@ from rig.gap_points import (
     shown,
     write_table,
 )
+from rig.digits import likely
+from rig.errors import InputError
 from rig.plotting import COLOURS, write_figures
 from rig.units import MM_PER_M
 

@@ -16,9 +16,9 @@ from identification.coupling import Kind, State, coupled, decide, load_axes
 from identification.coupling import base_distance as distance_of
 from identification.when import Schedule
 from identification.workspace import Workspace
-from rig.coupling_path import read_path, run_path
+from rig.coupling.coupling_path import read_path, run_path
 from rig.errors import InputError
-from rig.model import ArmModel, CouplingSpec, load_model
+from rig.models.model import ArmModel, CouplingSpec, load_model
 from rig.units import MM_PER_M, N_PER_MM
 
 Array = NDArray[np.float64]
@@ -92,7 +92,7 @@ class CouplingResult:
 
     def to_text(self) -> str:
         """Tables for a terminal."""
-        from rig.couple_text import text
+        from rig.coupling.couple_text import text
 
         return text(self)
 
@@ -243,7 +243,7 @@ def _notes(model: ArmModel, spec: CouplingSpec) -> list[str]:
 
 
 def _published(result: CouplingResult) -> list[dict[str, Any]]:
-    from rig.couple_text import compare, is_published_setup
+    from rig.coupling.couple_text import compare, is_published_setup
 
     if not is_published_setup(result):
         return []

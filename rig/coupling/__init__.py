@@ -1,0 +1,1 @@
+"""`rig couple`: the single arm and the coupled pair, in words and figures."""

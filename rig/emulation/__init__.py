@@ -1,0 +1,1 @@
+"""The emulated rig: a child process with a simulated world behind all emulators of a station."""

@@ -1,0 +1,1 @@
+"""Robot and model files: read, checked, written, exported, predicted with."""

@@ -1,0 +1,1 @@
+"""YAML files into typed values, with every problem in plain words."""
