@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.effects import base_slip, library
+from identification.gap.effects import EFFECTS, base_slip, library
 from identification.gap.evidence.compare import Scored, score
 from identification.gap.laws import flows, knees_closer
 from identification.gap.laws.flows import Flow
@@ -52,6 +52,26 @@ def test_a_knee_elsewhere_begins_at_the_same_load_of_the_rig(word: str, flow_s: 
         assert v.info["radius"] == pytest.approx(ratio * np.asarray(found.info["radius"]))
         assert len(v.columns) == len(found.columns)
     assert_lawful(bench, list(made.values()))
+
+
+@pytest.mark.parametrize("word", ["joint_yield", "base_slip"])
+def test_flows_of_many_laws_are_made_in_one_loop(
+    word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, laws = make_bench(arm_data()), EFFECTS[word].laws
+    sharp = [v for v in library(bench, [word]) if v.info["knee"] == "sharp" and v.label[-1] == "k"]
+    sharp = [v for v in sharp if "weight" not in v.info and v.info["memory"] == ""]
+    found = [v for s in sharp[:2] for v in knees_closer.refined(bench, s) if v.info["flow_s"] > 0]
+    every = [laws.of(bench, v)[0] for v in found]
+    assert len(every) > 10
+    fresh, loops = make_bench(arm_data()), []
+    real = flows.flowing_play
+    monkeypatch.setattr(flows, "flowing_play", lambda *a: loops.append(1) or real(*a))
+    assert laws.flow is not None
+    flows.make(fresh, [laws.flow(fresh, law) for law in every])
+    for law in every:
+        laws.rows(fresh, law)
+    assert len(loops) == 1
 
 
 def test_the_axis_of_a_slip_is_looked_for_between_the_depths_of_the_grid() -> None:

@@ -25,10 +25,12 @@ from identification.gap.answer.designs import (
 from identification.gap.answer.forms import Form, describe, law_of, lawful, realise, rows_of
 from identification.gap.answer.twins import PLACE, twin_of
 from identification.gap.data import Array, GapData
+from identification.gap.effects import EFFECTS
 from identification.gap.evidence.compare import Scored, log_mean, score
 from identification.gap.evidence.engine import Engine, Level, eta_levels
 from identification.gap.explanations.explanation import Explanation, Found
 from identification.gap.explanations.fit import Fit, fit
+from identification.gap.laws.flows import make
 from identification.gap.laws.law import Law
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
@@ -267,6 +269,7 @@ def _simulated(
     """What each of the two would add to the simulation along the design, and the bench there."""
     data = planned(design, bench)
     plain = make_bench(data)
+    _ahead(plain, rivals)
     moved = [sum((realise(plain, f) for f in r.forms), _spring_changes(plain, r)) for r in rivals]
     # the noise of a force counts by the slope of the curve: knees belong into it
     middle = (moved[0][: plain.rows.n] + moved[1][: plain.rows.n]) / 2
@@ -276,6 +279,16 @@ def _simulated(
     return [
         sum((realise(there, f) for f in r.forms), _spring_changes(there, r)) for r in rivals
     ], there
+
+
+def _ahead(there: Bench, rivals: tuple[_Rival, _Rival]) -> None:
+    """Makes all at once, for a bench, what takes a loop over its rows."""
+    flows = []
+    for r in rivals:
+        flow = EFFECTS[r.word].laws.flow
+        laws = [*(f.law for f in r.forms), *(law for _, law, *_ in r.shapes)]
+        flows += [flow(there, law) for law in laws] if flow is not None else []
+    make(there, flows)
 
 
 def _with_response(bench: Bench, data: GapData, added: Array) -> GapData:

@@ -20,9 +20,10 @@ from identification.gap.data import Array
 from identification.gap.effects.base_compliance import moments
 from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect
+from identification.gap.laws.flows import Flow
 from identification.gap.laws.interval import Found, Parameter
 from identification.gap.laws.knees import knee_at, knee_variants
-from identification.gap.laws.knees_law import law_of_knee, states_of
+from identification.gap.laws.knees_law import flow_of, law_of_knee, states_of
 from identification.gap.laws.law import Law, Laws
 from identification.gap.laws.thresholds import moved, of_knee, over
 from identification.gap.model.bench import Bench
@@ -149,11 +150,16 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     return [bench.outside_column(lever * states[i]) for i in range(len(law.terms))]
 
 
+def _flow(bench: Bench, law: Law) -> Flow:
+    lever = lever_of(bench, law.constants["axis"], law.constants["depth"])
+    return flow_of(bench, law, lever * bench.true_load)
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
-    laws=Laws(_describe, _columns),
+    laws=Laws(_describe, _columns, flow=_flow),
     lengths=("slope_beyond_over_elastic",),
     finer=partial(knees_closer.finer, between=between),
     beside=True,

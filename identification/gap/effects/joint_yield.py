@@ -26,6 +26,7 @@ from identification.gap.data import Array
 from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.flow_back import flowing_back
+from identification.gap.laws.flows import Flow
 from identification.gap.laws.interval import Found, Parameter
 from identification.gap.laws.knees import (
     SCALES,
@@ -35,7 +36,7 @@ from identification.gap.laws.knees import (
     knees,
     memories,
 )
-from identification.gap.laws.knees_law import law_of_knee, states_of
+from identification.gap.laws.knees_law import flow_of, law_of_knee, states_of
 from identification.gap.laws.law import Law, Laws
 from identification.gap.laws.specimens import OWN, off, own_stiffness, with_other_springs
 from identification.gap.laws.thresholds import moved, of_knee
@@ -148,11 +149,15 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     ]
 
 
+def _flow(bench: Bench, law: Law) -> Flow:
+    return flow_of(bench, law, bench.true_torque[:, law.constants["joint"]])
+
+
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
-    laws=Laws(_describe, _columns),
+    laws=Laws(_describe, _columns, flow=_flow),
     lengths=("slope_beyond_over_elastic",),
     finer=knees_closer.finer,
     beside=True,

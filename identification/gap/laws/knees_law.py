@@ -60,20 +60,23 @@ def law_of_knee(v: Variant, place: dict[str, Any], unit: float) -> tuple[Law, Ar
 def states_of(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
     """Number of the term -> its state (n,); those of a kind are made in one go. None of a spring of
     its own."""
-    fresh = fresh_after(bench, law.constants["memory"])
-    weight = None
-    hung = law.constants["memory"] in (HUNG, HUNG_LOST)
-    if hung and "joint" in law.constants:  # its twin may sit elsewhere
-        weight = bench.weight(law.constants["joint"])
-    flow, square = law.constants["flow_time"], law.constants.get("flow_exponent") == _SQUARE
-    plays, radius = _with(law, "threshold")
-    made = states(bench, Flow(load, radius, flow, fresh, weight, square))
-    out = dict(zip(plays, made.T, strict=True))
+    flow, fresh = flow_of(bench, law, load), fresh_after(bench, law.constants["memory"])
+    out = dict(zip(_with(law, "threshold")[0], states(bench, flow).T, strict=True))
     growing, beyond = _with(law, "grows_beyond")
     out |= zip(growing, grown(load, beyond, fresh).T, strict=True)
     for i in _with(law, "after")[0]:
         out[i] = _back(bench, law.terms[i], load, fresh)
     return out
+
+
+def flow_of(bench: Bench, law: Law, load: Array) -> Flow:
+    """The plays of a law on a load (n,)."""
+    constants, weight = law.constants, None
+    if constants["memory"] in (HUNG, HUNG_LOST) and "joint" in constants:  # a twin is elsewhere
+        weight = bench.weight(constants["joint"])
+    return Flow(load, _with(law, "threshold")[1], constants["flow_time"],
+                fresh_after(bench, constants["memory"]), weight,
+                constants.get("flow_exponent") == _SQUARE)  # fmt: skip
 
 
 def _with(law: Law, shape: str) -> tuple[list[int], Array]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.data import Array, Flags
+from identification.gap.laws.flows import Flow
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 
@@ -51,6 +52,7 @@ class Laws:
     lasts: whether there is anything of it in another session. What does not last has a law for its
         own course (what to do next is planned with it), and another day the amplifier drifts
         otherwise, the room warms otherwise, the laser is zeroed anew.
+    flow: what of a law on a bench takes a loop over the rows: that of many laws can be made in one.
     """
 
     describe: Callable[[Bench, Variant], tuple[Law, Array]]
@@ -58,6 +60,7 @@ class Laws:
     through_springs: bool = False
     of_session: tuple[str, ...] = ()
     lasts: bool = True
+    flow: Callable[[Bench, Law], Flow] | None = None
 
     def of(self, bench: Bench, variant: Variant) -> tuple[Law, Array]:
         """The law of a variant on its bench, and (k,) its units in those of the law.
