@@ -2,7 +2,8 @@
 
 1. Discarded samples do not count. A sample that the procedure marked as unsettled counts only
    where its level has no settled one. A table that does not say what is settled: the first half of
-   every hold is left out, because the arm creeps on after the screw has stopped.
+   every hold is left out, because the arm creeps on after the screw has stopped; and samples that
+   it has under the name of the level they leave count to the next one, where they lead.
 2. Zero lines. An amplifier drifts: between neighbouring zero-load plateaus of a run its zero is
    taken as a straight line over time and subtracted; before the first and after the last plateau
    it keeps its value. With a plateau on one side only, that one counts. Of a plateau that the load
@@ -36,6 +37,7 @@ from numpy.typing import NDArray
 from identification.curve import Array, Curve, Point
 from identification.running import first_rows
 from identification.turns import turning_points
+from identification.ways import leading_on
 from rig.digits import counted
 from rig.passes import TURN, binned, is_held
 from rig.units import M_PER_MM
@@ -124,7 +126,8 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
         dataset.meta.instruments.displacement.standard_uncertainty_mm * M_PER_MM,
     )
     result: dict[tuple[str, str], Curve] = {}
-    for (pose, direction), runs in _setups(dataset.columns):
+    for (pose, direction), taken in _setups(dataset.columns):
+        runs = [_leading_on(run, stated) for run in taken]
         points: list[Point] = []
         notes: list[str] = []
         held = is_held([(r.branch, r.step, r.force, r.displacement) for r in runs])
@@ -190,6 +193,21 @@ def _run(columns: dict[str, NDArray[Any]], repetition: int, rows: NDArray[np.int
         np.asarray(columns["displacement_mm"][rows], dtype=np.float64) * M_PER_MM,
         settled,
     )
+
+
+def _leading_on(run: _Run, stated: _Stated) -> _Run:
+    """The run with samples that a table has under the name of the level they leave, on their way to
+    the next one, under the name of that. The procedure marks what is settled, and names no way."""
+    branch, step = run.branch.copy(), run.step.copy()
+    read = np.isfinite(run.force) & np.isfinite(run.displacement)
+    if run.settled is not None or not read.all():
+        return run
+    first = first_rows(branch, step)
+    hold = np.repeat(np.arange(first.size), np.diff(np.append(first, branch.size)))
+    sd = stated.force, stated.displacement
+    for leaves, b in leading_on(run.force, run.displacement, sd, hold):
+        branch[leaves:b], step[leaves:b] = branch[b], step[b]
+    return replace(run, branch=branch, step=step)
 
 
 def _blocks(run: _Run) -> Iterator[slice]:

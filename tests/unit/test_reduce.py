@@ -1,6 +1,7 @@
 """Second values to curves: every assumption that `rig.reduce` states."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -183,6 +184,29 @@ def test_a_ramp_within_one_step_is_continuous() -> None:
     result = analyze_curve(curve)
     assert result.k is not None
     assert result.k.value == pytest.approx(25e3, rel=1e-9)
+
+
+def named_late() -> Table:
+    """Levels of 30 s, with ramps of 10 s whose first 7 samples bear the name of the level they
+    leave."""
+    ends, rows = [0.0, 10.0, 20.0, 30.0, 60.0, 0.0, 0.0], []
+    for a, b in pairwise(ends):
+        force = [*[a] * 30, *(a + (b - a) * k / 10 for k in range(1, 11))]
+        for k, f in enumerate(force):
+            name = a if k < 37 else b
+            branch = "loading" if name else "zero"
+            rows.append((float(len(rows)), "", "x", 1, branch, int(name), f, f / 100))
+    return table(rows)
+
+
+def test_a_way_under_the_name_of_the_level_it_leaves_counts_to_the_next() -> None:
+    curve = only(named_late())
+    assert curve.held
+    assert [p.force for p in loading(curve)] == pytest.approx([10.0, 20.0, 30.0, 60.0])
+    assert [p.displacement for p in loading(curve)] == pytest.approx([1e-4, 2e-4, 3e-4, 6e-4])
+    data = named_late()  # what the procedure recorded stands where it says
+    data.columns["settled"] = np.ones(len(data.columns["step"]))
+    assert not only(data).held
 
 
 def test_held_cycles_are_sorted_by_whether_the_load_grows() -> None:
