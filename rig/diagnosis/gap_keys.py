@@ -219,7 +219,7 @@ GRAMMAR: dict[str, Grammar] = {
         ("about",),
         tuple(("tangent", ("along", "across", *more)) for more in (*_GOES, ("run",)))
         + tuple(("tangent", ("along", "across", *more, "pose")) for more in _GOES[:3])
-        + tuple(("gives", ("along", *more)) for more in _GOES),
+        + tuple(("gives", ("along", *more)) for more in (*_GOES, ("across",))),
     ),
     "pose_error": Grammar(
         ("about", "about_offset", "about_angles", "about_turn", "reads", "only_in", "unread"),

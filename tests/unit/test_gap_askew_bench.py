@@ -67,6 +67,31 @@ def test_a_block_that_gives_nothing_across_shows_a_slant_by_its_force(
     assert not any("acts askew" in n for n in diagnose_gap(pressed(0.15)).notes)
 
 
+def test_a_hook_that_is_hung_anew_for_every_run_moves_the_target_as_it_pulls_across() -> None:
+    """Other tangents in each run; what is given along goes with what was read across, another share
+    of it along either tangent."""
+    rng, straight = np.random.default_rng(7), pressed(0.0, turns=False)
+    across = np.array([[0.06, 0.02], [0.25, -0.12], [0.12, 0.2]])[straight.run]
+    across = across * straight.force[:, None]
+    data = replace(
+        straight,
+        displacement=straight.displacement + 1e-5 * across @ np.array([0.4, -0.2]),
+        tangential=across + rng.normal(0, 0.1, across.shape),
+    )
+    found = diagnose_gap(data)
+    assert found.verdict == "load_misalignment"
+    assert found.after < 1.2 * found.noise
+    bench = make_bench(data)
+    hung = next(v for v in library(bench, ["load_misalignment"]) if v.label == "each run")
+    law, units = law_of(bench, hung)
+    columns = np.column_stack([bench.columns[c] for c in hung.columns])
+    np.testing.assert_allclose(rows_of(bench, hung.word, law) * units, columns, atol=1e-15)
+    plain = make_bench(replace(data, tangential=None))  # of another session nothing is known
+    given = [k for k, t in enumerate(law.terms) if t.coefficient == "gives"]
+    assert len(given) == 2
+    assert not np.any(rows_of(plain, hung.word, law)[:, given])
+
+
 def test_without_components_nobody_speaks_of_a_slant() -> None:
     mute = replace(pressed(0.15), tangential=None)
     assert library(make_bench(mute), ["load_misalignment"]) == []

@@ -109,10 +109,21 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
     common = [c for k in straight.values() for c in k.columns]
     shapes = [k.shapes for k in straight.values()]
     own = [c for r in runs for c in _in_pool(bench, shapes[0], bench.rows.run == r)]
-    root = np.diag([1.0] * len(common) + [_BETWEEN_RUNS] * len(own))
-    return [variant(WORD, "each run", [*common, *own], SCALES, root, positive=False,
+    given = (
+        [] if bench.data.arm else [bench.add(c) for name in straight for c in _as_read(bench, name)]
+    )
+    sd = [1.0] * len(common) + [_BETWEEN_RUNS] * len(own) + [1.0] * len(given)
+    return [variant(WORD, "each run", [*common, *own, *given], SCALES, np.diag(sd), positive=False,
                     prior=_ALL * _EACH_RUN_SHARE, directions=list(straight), shapes=shapes,
-                    read=[()] * len(shapes), runs=runs.tolist())]  # fmt: skip
+                    read=[()] * len(shapes), tips=runs.tolist())]  # fmt: skip
+
+
+def _as_read(bench: Bench, direction: str) -> list[Array]:
+    """What a rig without an arm gives way under the force along either tangent, as it was read in a
+    direction; where it is as stiff across as along, of a tangent of USUAL."""
+    mine = np.array([s.direction == direction for s in bench.data.setups])[bench.rows.setup]
+    read = np.zeros((bench.rows.n, 2)) if bench.rows.tangential is None else bench.rows.tangential
+    return [gives(bench, np.where(mine, load, 0.0)) / USUAL for load in read.T]
 
 
 class _Known(NamedTuple):
@@ -226,7 +237,8 @@ def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
 def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
     shares reached at a load, in proportion to it or to a power of it; shares that drag; what a rig
-    without an arm gives way under these; shares of single runs (numbers from 0) beyond these."""
+    without an arm gives way under these; shares of single runs (numbers from 0) beyond these, with
+    what it gives way under the force across as it was read."""
     names = v.info["directions"]
     of_pose = v.info.get("poses", [""] * len(names))
     setups = [
@@ -245,9 +257,11 @@ def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
             (Term("gives", along_it | _goes(how)), tangent / USUAL)
             for how, tangent in zip(shapes, read, strict=False)
         ]
-    for run in v.info.get("runs", ()):
+    for run in v.info.get("tips", ()):
         s = bench.data.setups[bench.rows.setup[int(np.argmax(bench.rows.run == run))]]
         terms += [Term("tangent", _sideways(s, k) | {"run": int(run)}) for k in range(2)]
+    if "tips" in v.info and not bench.data.arm:
+        given = [(Term("gives", _sideways(s, k)), 1 / USUAL) for s in setups for k in range(2)]
     units = [1.0] * len(terms) + [unit for _, unit in given]
     return Law({}, (*terms, *(term for term, _ in given))), np.array(units, dtype=float)
 
@@ -263,12 +277,22 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
         if "run" in t.shape:
             there &= bench.rows.run == t.shape["run"]
         load = np.where(there, across(bench, how), 0.0)
+        if t.coefficient == "gives" and "across" in t.shape:
+            load = np.where(there, _read_along(bench, t.shape["across"]), 0.0)
         if t.coefficient == "gives":
             out.append(gives(bench, load))
             continue
         shares = np.stack([s.tangents @ np.array(t.shape["across"]) for s in bench.data.setups])
         out.append(pulled(bench, load, shares))
     return out
+
+
+def _read_along(bench: Bench, direction: tuple[float, ...]) -> Array:
+    """(n,) N of the force across along a direction; 0 where it was not read."""
+    if bench.rows.tangential is None:
+        return np.zeros(bench.rows.n)
+    shares = np.stack([s.tangents @ np.array(direction) for s in bench.data.setups])
+    return np.asarray(np.sum(shares[bench.rows.setup] * bench.rows.tangential, axis=1))
 
 
 def _goes(how: Shape) -> dict[str, Any]:

@@ -110,6 +110,8 @@ def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
     """Share of the weight that is kept after a look at withheld repetitions."""
     if explanation.words & DRIFTS and explanation.words <= FREE:
         return 1.0
+    if all("tips" in p.variant.info for p in explanation.parts):
+        return 1.0  # what every run has of its own another channel shows, and no other run
     engine = found.engine
     loose = DRIFTS if len(explanation.words) <= 2 else frozenset[str]()  # three have to earn it all
     after = held_out(engine, explanation, "repetition", fold, loose).after
