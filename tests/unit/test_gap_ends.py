@@ -65,7 +65,7 @@ def test_a_recording_that_goes_on_long_after_a_break_is_unknown() -> None:
 
 def test_a_break_is_told_by_its_reading_where_no_clock_was_recorded() -> None:
     unclocked = [replace(recording(broken(N - left)), timed=False) for left in (6, 50)]
-    (note,) = without_ends(unclocked[0]).notes
+    (note,) = without_ends(unclocked[0]).aside
     assert "goes on (at reading 155): a break." in note
     (fault,) = [f for f in found_in(unclocked[1]) if f.kind == BROKEN]
     assert "goes on (at reading 111), and 31 % of" in fault.text
