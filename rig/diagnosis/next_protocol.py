@@ -22,8 +22,8 @@ from rig.meta import Meta
 from rig.models.model import load_robot
 from rig.plan import plan
 from rig.protocol import MeasurementProtocol, parse_protocol
-from rig.protocolfile import ForceBand
 from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
+from rig.protocolfile import ForceBand
 from rig.station import load_station
 from rig.storage.files import in_place_of
 
