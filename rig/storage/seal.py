@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rig.errors import InputError
+from rig.storage.files import ENDINGS, neighbours
 
 SCHEMA = "rig.dataset"
 SEAL = b"\n# rig.dataset sha256 "
@@ -42,8 +43,10 @@ def check_bytes(path: Path) -> str:
             if head == _MAGIC:
                 sha256, wrong = _checked_seal(file)
     except OSError as error:
-        reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
-        raise InputError(f"{path}: cannot be read: {reason}.") from error
+        missing = isinstance(error, FileNotFoundError)
+        hint = neighbours(path, *(f"*{e}" for e in ENDINGS)) if missing else ""
+        reason = "no such file" if missing else error.strerror
+        raise InputError(f"{path}: cannot be read: {reason}.{hint}") from error
     if head != _MAGIC:
         found = "an empty file" if not head else "no HDF5 file"
         hint = " A table comes in with `rig import`." if path.suffix in (".csv", ".txt") else ""

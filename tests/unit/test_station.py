@@ -81,7 +81,7 @@ def test_an_unknown_station_is_told_with_where_it_was_named(
 
 
 def test_an_empty_name_is_no_wish_for_the_protocols_station() -> None:
-    with pytest.raises(InputError, match="^--station: station '': no name of a station"):
+    with pytest.raises(InputError, match=r"^--station: station '': no name of a station"):
         station_for(Path("tests/plan.yaml"), "emulated", "")
 
 
