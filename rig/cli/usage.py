@@ -37,8 +37,8 @@ def wrong_value(error: typer.BadParameter, given: Mapping[str, Any]) -> InputErr
     own shows how the command is called."""
     param: Any = error.param
     option = param.opts[-1]
-    if param.name in given:
-        return InputError(f"{option} {given[param.name]}: {_allowed(param, error.message)}.")
+    if (value := given.get(param.name)) is not None:
+        return InputError(f"{option} {value}: {_allowed(param, error.message)}.")
     if param.param_type_name == "argument":
         return None
     return InputError(f"{option}: is missing. Give {' or '.join(param.opts)} {_wanted(param)}.")

@@ -48,6 +48,13 @@ def test_says_which_word_and_what_is_allowed(rig: Rig, files: Path, words: str, 
     assert err == f"{said}\n"
 
 
+def test_a_missing_argument_is_told_with_how_the_command_is_called(rig: Rig) -> None:
+    status, out, err = rig("simulate", "m.yaml")
+    assert (status, out) == (2, "")
+    assert "{MODEL.yaml} {PROTOCOL.yaml}" in err
+    assert "Missing argument 'PROTOCOL.yaml'" in err
+
+
 def test_options_that_may_be_repeated_still_are(rig: Rig, files: Path) -> None:
     status, _, err = rig("diagnose", "d.h5", "--add", "joint_creep", "--add", "time_lag")
     assert (status, "given before" in err) == (2, False)  # d.h5 is not there
