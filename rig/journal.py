@@ -11,6 +11,7 @@ import json
 import math
 import os
 import sys
+import time
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ SCHEMA = "rig.journal/1"
 _PREFIX = '{"crc":"'
 _CRC_DIGITS = 8
 _BODY_AT = len(_PREFIX) + _CRC_DIGITS + len('",')
+_ASKING_S = 0.2  # `is_being_written` holds the lock for far less
 
 
 class JournalError(MeasurementStopped):
@@ -273,21 +275,46 @@ def _record(line: bytes) -> Record | None:
         return None
 
 
+def is_being_written(path: Path) -> bool:
+    """Whether a measurement holds the journal now. False, too, where that can't be asked."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+    except OSError:
+        return False
+    try:
+        _take_lock(descriptor, exclusive=False)
+    except OSError:
+        return True
+    finally:
+        os.close(descriptor)  # and with it the lock
+    return False
+
+
 def _lock(descriptor: int, path: Path) -> None:
     """The operating system releases the lock when the process ends, however it ends."""
-    try:
-        if sys.platform == "win32":
-            import msvcrt
+    deadline = time.monotonic() + _ASKING_S
+    while True:
+        try:
+            return _take_lock(descriptor, exclusive=True)
+        except OSError:
+            if time.monotonic() > deadline:
+                raise InputError(
+                    f"{path}: another measurement is writing this journal. "
+                    "End it, or choose another name."
+                ) from None
+        time.sleep(_ASKING_S / 20)
 
-            # Windows locks are mandatory: one byte far beyond the end, so that reading goes on.
-            os.lseek(descriptor, 1 << 40, os.SEEK_SET)
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-            os.lseek(descriptor, 0, os.SEEK_SET)
-        else:
-            import fcntl
 
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        raise InputError(
-            f"{path}: another measurement is writing this journal. End it, or choose another name."
-        ) from None
+def _take_lock(descriptor: int, *, exclusive: bool) -> None:
+    """OSError where another process has it."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        # Windows locks are mandatory: one byte far beyond the end, so that reading goes on.
+        os.lseek(descriptor, 1 << 40, os.SEEK_SET)
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+    else:
+        import fcntl
+
+        fcntl.flock(descriptor, (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | fcntl.LOCK_NB)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,9 @@ from typing import Any
 from rig.catalogue import recall, remember, stiffness_of
 from rig.digits import likely, number
 from rig.errors import InputError
-from rig.journal import journal_path
+from rig.journal import is_being_written, journal_path, replay
 from rig.storage.files import ENDINGS
-from rig.storage.seal import seal_of
+from rig.storage.seal import check_bytes
 from rig.storage.summary import Summary, journal_summary, read_summary
 
 SCHEMA = "rig.list/1"
@@ -24,19 +24,21 @@ Progress = Callable[[str, float], None]
 @dataclass(frozen=True)
 class Entry:
     """One data set. file: relative to the folder. stiffness: per direction as in JSON, None where
-    nobody analysed it yet; verdict: word and probability, likewise. open: a journal lies beside."""
+    nobody analysed it yet; verdict: word and probability, likewise. open: a journal lies beside;
+    running: a measurement is writing it."""
 
     file: str
     summary: Summary
     stiffness: Mapping[str, Any] | None
     verdict: Mapping[str, Any] | None
     open: bool
+    running: bool = False
 
     @property
     def state(self) -> str:
         """What must not be overlooked."""
         s = self.summary
-        whole = "complete" if s.complete else "INCOMPLETE"
+        whole = "RUNNING" if self.running else "complete" if s.complete else "INCOMPLETE"
         return f"{whole}, EMULATED" if s.origin == "emulated" else f"{whole}, {s.origin}"
 
     @property
@@ -96,7 +98,10 @@ class Listing:
             yield from table
         else:
             yield from _narrow(rows)
-        begun = ", ".join(e.file for e in self.entries if e.open)
+        running = ", ".join(e.file for e in self.entries if e.running)
+        if running:
+            yield f"Being measured now: {running}."
+        begun = ", ".join(e.file for e in self.entries if e.open and not e.running)
         if begun:
             yield f"With a journal: {begun}; `rig measure --resume FILE` goes on there."
         if any(e.stiffness is None for e in self.entries):
@@ -111,24 +116,19 @@ def list_folder(
     if not folder.is_dir():
         what = "a file" if folder.exists() else "no such folder"
         raise InputError(f"{folder}: {what}; a folder with data sets is wanted.")
-    files = list(_files(folder))
-    seals = {path: _seal(path) for path in files}
+    seals, skipped = _sealed(folder, list(_files(folder)), progress)
     known = recall({s for s in seals.values() if s})
     fresh: dict[str, Any] = {}
-    entries, skipped = [], []
-    for i, path in enumerate(files):
-        name = str(path.relative_to(folder))
+    entries = []
+    for path, seal in seals.items():
         try:
-            found = known.get(seals[path], {})
-            entries.append(_entry(path, name, found, seals[path], fresh))
+            entries.append(_entry(folder, path, known.get(seal, {}), seal, fresh))
         except InputError as error:
-            skipped.append((name, str(error).removeprefix(f"{path}: ")))
-        if progress:
-            progress("reading", (i + 1) / len(files))
+            skipped.append(_left_out(folder, path, error))
     remember("summary", fresh)
     if analyze:
         entries = _analyzed(folder, entries, seals, skipped, progress)
-    return Listing(folder, tuple(entries), tuple(skipped))
+    return Listing(folder, tuple(entries), tuple(sorted(skipped)))
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -144,20 +144,35 @@ def _files(folder: Path) -> Iterator[Path]:
         yield from (Path(here) / n for n in sorted(wanted))
 
 
-def _seal(path: Path) -> str:
-    """Key of the catalogue; "" for what can't be looked up."""
-    try:
-        return "" if journal_path(path).exists() else seal_of(path)
-    except OSError:
-        return ""
+def _sealed(
+    folder: Path, files: Sequence[Path], progress: Progress | None
+) -> tuple[dict[Path, str], list[tuple[str, str]]]:
+    """Key of the catalogue per file, "" for what can't be looked up, and what is left out. Every
+    byte is read each time: the last line of a damaged file is mostly what it was."""
+    seals, skipped = {}, []
+    for i, path in enumerate(files):
+        try:
+            seals[path] = "" if journal_path(path).exists() else check_bytes(path)
+        except InputError as error:
+            skipped.append(_left_out(folder, path, error))
+        if progress:
+            progress("reading", (i + 1) / len(files))
+    return seals, skipped
+
+
+def _left_out(folder: Path, path: Path, error: InputError) -> tuple[str, str]:
+    return str(path.relative_to(folder)), str(error).removeprefix(f"{path}: ")
 
 
 def _entry(
-    path: Path, name: str, found: Mapping[str, Any], seal: str, fresh: dict[str, Any]
+    folder: Path, path: Path, found: Mapping[str, Any], seal: str, fresh: dict[str, Any]
 ) -> Entry:
-    journal = journal_path(path)
+    name, journal = str(path.relative_to(folder)), journal_path(path)
     if journal.exists():
-        return Entry(name, journal_summary(journal), None, None, open=True)
+        summary = journal_summary(journal)
+        replay(journal)  # a damaged one can't be resumed, and says so
+        running = is_being_written(journal)
+        return Entry(name, summary, None, None, open=True, running=running)
     if "summary" in found:
         kept = found["summary"]
         summary = Summary(**{**kept, "directions": tuple(kept["directions"])})
@@ -185,7 +200,7 @@ def _analyzed(
             try:
                 found = stiffness_of(analyze(load(path)).to_json())
             except InputError as error:
-                skipped.append((entry.file, str(error).removeprefix(f"{path}: ")))
+                skipped.append(_left_out(folder, path, error))
                 continue
             remember("stiffness", {seals[path]: found})
             out.append(replace(entry, stiffness=found))
@@ -206,6 +221,7 @@ def _json(e: Entry) -> dict[str, Any]:
         "origin": e.summary.origin,
         "complete": e.summary.complete,
         "journal": e.open,
+        "running": e.running,
         "stiffness_N_per_mm": None if e.stiffness is None else dict(e.stiffness),
         "verdict": None if e.verdict is None else dict(e.verdict),
     }

@@ -24,6 +24,12 @@ STYLE: Any = {
 }
 
 
+def named(figure: Figure, name: str) -> Figure:
+    """The file that a figure shows, small in a corner: it may leave its folder or page."""
+    figure.text(0.995, 0.003, name, fontsize=6, color="0.4", ha="right", va="bottom")
+    return figure
+
+
 def write_figures(folder: Path, figures: Callable[[], Iterable[tuple[str, Figure]]]) -> list[Path]:
     """Draws `figures()`, (name, figure) each, in the common style; writes PNG and SVG.
 

@@ -18,13 +18,16 @@ _SETTLE = Settle(
 )  # fmt: skip
 
 
+_ANGLE_DIGITS = 6  # of degrees: a hundredth of a micrometre at a metre
 _OVER = 1.01  # the widest band about a load that is written
 
 
 def pose_line(name: str, q: ArrayLike, tcp_mm: ArrayLike) -> str:
-    """A pose q (6,) rad with its tool tcp_mm (3,), where somebody else brings the arm."""
+    """A pose q (6,) rad with its tool tcp_mm (3,), where somebody else brings the arm. Degrees, as
+    the teach pendant and every protocol here; rounded to what no arm can tell."""
     tool = f"tcp_xyz_mm: [{numbers(tcp_mm, 6)}]"
-    return f"  {name}: {{q_rad: [{numbers(q, 9)}], {tool}, program: null}}"
+    degrees = np.round(np.rad2deg(q), _ANGLE_DIGITS) + 0.0  # no -0
+    return f"  {name}: {{q_deg: [{numbers(degrees, 9)}], {tool}, program: null}}"
 
 
 def settle_lines(settle: Settle = _SETTLE) -> list[str]:

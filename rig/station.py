@@ -83,22 +83,24 @@ class Station:
     path: Path
 
 
-def load_station(name_or_path: str | Path, beside: Path | None = None) -> Station:
+def load_station(
+    name_or_path: str | Path, beside: Path | None = None, named_in: str = ""
+) -> Station:
     """Reads and checks a station: a name of protocols/stations, or a path.
 
     A name is looked for in `stations/` below the folder `beside` first, a relative path in
     `beside` where the working folder has none. Raises InputError with all problems of the file,
-    or with the known names.
+    or with the known names; `named_in`: where the name stands, for its beginning.
     """
-    path = _find(str(name_or_path), beside)
+    path = _find(str(name_or_path), beside, named_in)
     return _built(read_document(path, StationFile, _check), path)
 
 
 def station_for(protocol_file: Path, its_own: str, other: str | None) -> Station:
     """The station that a protocol is carried out on: `other` (--station), or `its_own`."""
-    named_in = f"{protocol_file}: " if other is None else "--station: "
-    path = _find(other or its_own, protocol_file.parent, named_in)
-    return _built(read_document(path, StationFile, _check), path)
+    if other is not None:
+        return load_station(other, protocol_file.parent, "--station: ")
+    return load_station(its_own, protocol_file.parent, f"{protocol_file}: ")
 
 
 def parse_station(text: str, path: Path) -> Station:
@@ -106,7 +108,7 @@ def parse_station(text: str, path: Path) -> Station:
     return _built(read_document_text(text, str(path), StationFile, _check), path)
 
 
-def _find(name: str, beside: Path | None, named_in: str = "") -> Path:
+def _find(name: str, beside: Path | None, named_in: str) -> Path:
     if not name.isprintable() or not name.strip():
         raise InputError(f"{named_in}station {name!r}: no name of a station and no path.")
     path = Path(name)

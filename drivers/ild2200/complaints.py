@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import re
+import sys
 from collections import Counter
 
 from drivers.errors import BadReply, CannotConnect, DeviceError, OutOfRange, ReadTimeout
@@ -23,29 +25,64 @@ _REMEDIES = {
     65528: "Clean the target or give it a matt, light surface, and check the angle of the beam.",
     65530: f"{_ON}, then go on with --resume.",
 }
+# Of what pyserial raises on Linux, macOS and Windows, where a port in use is a forbidden one.
+_HIDDEN = re.compile(r"(?:\[Errno |Error\(|port: \()(\d+)")
+_BUSY = {errno.EWOULDBLOCK, errno.EBUSY} | ({errno.EACCES} if sys.platform == "win32" else set())
+_MISSING = {errno.ENOENT, errno.ENODEV, errno.ENXIO}
+_NO_PORT = {errno.ENOTTY, errno.EISDIR, errno.ENOTDIR}
+_FORBIDDEN = {errno.EACCES, errno.EPERM}
 
 
 def no_port(port: str, baud: int, error: Exception) -> CannotConnect:
-    """The serial port cannot be opened."""
-    number = getattr(error, "errno", None)
-    reason = os.strerror(number) if number else str(error)
-    remedy = (
-        "Plug the adapter in, correct `port` in the station file, and check that you may use it "
-        "(on Linux: membership of the group dialout)."
-    )
-    if number == errno.EWOULDBLOCK:
+    """The serial port cannot be opened: missing, busy, not allowed, or no port of that rate."""
+    number = _number(error)
+    if number in _BUSY:
         reason = "another program has it open"
         remedy = "End the other program, a running `rig measure` or `rig check` perhaps."
+    elif number in _MISSING:
+        reason = "there is no such port"
+        remedy = f"Plug the adapter in, or correct `port` in the station file. {_ports()}"
+    elif number in _NO_PORT:
+        reason = "that is no serial port"
+        remedy = f"Correct `port` in the station file. {_ports()}"
+    elif number in _FORBIDDEN:
+        reason = "you may not use it"
+        remedy = "Join the group that owns it (on Linux: dialout), and sign in again."
+    elif number not in (None, errno.EINVAL):
+        reason = os.strerror(number)
+        remedy = f"Check the adapter and its cable, and `port` in the station file. {_ports()}"
+    else:
+        reason = "the adapter does not take this rate"
+        remedy = (
+            f"Take an adapter that can do {baud} baud, or set another rate at the sensor and as "
+            "`baud` in the station file."
+        )
     fault = f"cannot open the serial port {port} at {baud} baud ({reason})"
     return CannotConnect(DEVICE, fault, remedy)
 
 
-def unplugged(port: str, error: Exception, *, connecting: bool) -> ReadTimeout:
+def _number(error: Exception) -> int | None:
+    """The system's number of what went wrong, which pyserial often has in its text only."""
+    number = getattr(error, "errno", None)
+    hidden = _HIDDEN.search(str(error))
+    return number or (int(hidden.group(1)) if hidden else None)
+
+
+def _ports() -> str:
+    """Those of this computer, in a sentence."""
+    from serial.tools import list_ports
+
+    names = sorted(port.device for port in list_ports.comports())
+    return f"Ports of this computer: {', '.join(names) or 'none'}."
+
+
+def unplugged(port: str, error: OSError, *, connecting: bool) -> ReadTimeout:
     """The port vanished, under way or before there was anything to resume."""
     then = "start again" if connecting else "go on with --resume"
+    reason = f" ({os.strerror(error.errno)})" if error.errno else ""
     return ReadTimeout(
         DEVICE,
-        f"the serial port {port} has gone ({error})",
+        f"the serial port {port} has gone{reason}",
         f"Plug the adapter in again, check the cable, then {then}.",
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from rig.analysis.analyze import Analysis, Direction
 from rig.canvas import blank
 from rig.digits import number
-from rig.plotting import COLOURS, MARKERS, write_figures
+from rig.plotting import COLOURS, MARKERS, named, write_figures
 from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
@@ -122,5 +122,4 @@ def _finish(figure: Figure, axes: Any, analysis: Analysis) -> Figure:
     if words:
         figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.25,
                     ha="center", va="center", rotation=25)  # fmt: skip
-    figure.text(0.995, 0.005, analysis.name, fontsize=6, color="0.4", ha="right", va="bottom")
-    return figure
+    return named(figure, analysis.name)

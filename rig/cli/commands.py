@@ -7,11 +7,12 @@ from collections.abc import Callable
 import typer
 
 from rig.cli import files, gap, measuring, models, stiffness
-from rig.cli.guard import Guarded
+from rig.cli.guard import Commands, Guarded
 from rig.cli.options import version
 
 app = typer.Typer(
     name="rig",
+    cls=Commands,
     help="How stiff is this arm, and why does the simulation disagree with it?",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

@@ -8,10 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from typer.core import TyperCommand
+import typer
+from typer.core import TyperCommand, TyperGroup
 
 from rig.cli.kinds import replacing
-from rig.errors import InputError
+from rig.cli.usage import check_given_once, check_words, wrong_value
+from rig.errors import InputError, did_you_mean
 
 _READ = {"model", "simulation", "couple", "resume", "station", "prior", "path"}
 _FOLDERS = {"figures", "keep"}
@@ -19,8 +21,32 @@ _MAKES_DATA = {"measure", "import"}  # their own rules say which data set may be
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
+class Commands(TyperGroup):
+    """All commands; one that is not there is told with those that are."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """InputError for an unknown command."""
+        if args[0] not in self.commands and not ctx.resilient_parsing:
+            raise InputError(
+                f"rig {args[0]}: no such command.{did_you_mean(args[0], self.commands)}"
+            )
+        return super().resolve_command(ctx, args)
+
+
 class Guarded(TyperCommand):
-    """A command that looks at its output paths before it begins."""
+    """A command that looks at its words and at its output paths before it begins."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """InputError for a value that is refused or missing, and for an option given twice."""
+        if ctx.resilient_parsing:  # a shell that completes half a line
+            return super().parse_args(ctx, args)
+        check_words(self.params, args)
+        given, _, order = self.make_parser(ctx).parse_args(args=list(args))
+        check_given_once(order, given)
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            raise wrong_value(error, given) or error from None
 
     def invoke(self, ctx: Any) -> Any:
         """InputError where a result would overwrite an input, a data set or another kind of file,

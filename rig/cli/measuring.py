@@ -50,7 +50,8 @@ def measure(
     from rig.panel.link import DEFAULT_HOST, PanelOptions
 
     if (protocol is None) == (resume is None):
-        raise InputError("rig measure: give a PROTOCOL.yaml, or --resume DATASET.h5.")
+        both = f"{protocol}, --resume {resume}: " if protocol else ""
+        raise InputError(f"rig measure: {both}give a PROTOCOL.yaml, or --resume DATASET.h5.")
     for option, value in (("--station", station), ("-o", output)):
         if resume is not None and value is not None:
             raise InputError(

@@ -14,7 +14,7 @@ from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
 from rig.canvas import blank
 from rig.coupling.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
-from rig.plotting import COLOURS, write_figures
+from rig.plotting import COLOURS, named, write_figures
 from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
@@ -107,14 +107,14 @@ def maps(result: CouplingResult) -> Figure:
     found = [
         stiffness_map(model.arm, points, stance, load, c).stiffness * N_PER_MM for c in (None, pair)
     ]
-    figure = blank(10.5, 4.6)
+    figure = blank(10.5, 3.9)
     titles = ("one arm", f"two arms, {spec.described}")
-    panels = figure.subplots(1, 2, sharey=True)
+    panels = figure.subplots(1, 2, sharey=True, gridspec_kw={"wspace": 0.08})
     name = f"{'xyz'[axis]} of the {spec.load_axes} axes"
     for axes, k, title in zip(panels, found, titles, strict=True):
         _map_panel(figure, axes, sideways, height, k)
         axes.plot(node[:3, 3] @ mirror[:, 1], node[2, 3], "+", color="black", markersize=11)
-        axes.set_title(f"{title}, along {name}", fontsize=10)
+        axes.set_title(f"{title}\nalong {name}", fontsize=10)
         axes.set_xlabel("Along the mirror plane in m")
     panels[0].set_ylabel("Height in m")
     return _finish(figure, model)
@@ -131,7 +131,11 @@ def _map_panel(figure: Figure, axes: Any, x: Array, y: Array, k: Array) -> None:
         x, y, k, norm=LogNorm(low, max(high, 1.01 * low)), cmap="viridis", shading="nearest",
         rasterized=True,
     )  # fmt: skip
-    _bar(figure, image, axes, _LABEL, shrink=0.75)
+    # as high as the map, whose height follows from its width, and beside it, not the next one
+    beside = axes.inset_axes((1.04, 0.0, 0.045, 1.0))
+    beside.grid(visible=False)
+    bar = figure.colorbar(image, cax=beside, label=_LABEL, extend="both", extendfrac=0.03)
+    _plain_numbers(bar.ax.yaxis)
     axes.set_aspect("equal")
     axes.grid(visible=False)
 
@@ -149,7 +153,8 @@ def place(result: TaskResult) -> Figure:
     low, high = np.quantile(known, [0.01, 0.99])
     image = axes.pcolormesh(x, y, margins, norm=LogNorm(low, max(high, 1.01 * low)),
                             cmap="viridis", shading="nearest", rasterized=True)  # fmt: skip
-    _bar(figure, image, axes, "Reached over required stiffness")
+    bar = figure.colorbar(image, ax=axes, label="Reached over required stiffness", extend="both")
+    _plain_numbers(bar.ax.yaxis)
     if known.min() < 1 < known.max():
         lines = axes.contour(x, y, margins, levels=[1.0], colors="white", linewidths=1.5)
         axes.clabel(lines, fmt={1.0: "just met"}, fontsize=8)
@@ -193,11 +198,6 @@ def schedule(result: CouplingResult) -> Figure:
     return _finish(figure, result.model)
 
 
-def _bar(figure: Figure, image: Any, axes: Any, label: str, shrink: float = 1.0) -> None:
-    bar = figure.colorbar(image, ax=axes, label=label, extend="both", shrink=shrink)
-    _plain_numbers(bar.ax.yaxis)
-
-
 def _plain_numbers(axis: Any) -> None:
     """Few ticks on a logarithmic axis, written out."""
     from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
@@ -213,9 +213,7 @@ def _finish(figure: Figure, model: ArmModel) -> Figure:
     if words:
         figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.3,
                     ha="center", va="center", rotation=25)  # fmt: skip
-    figure.text(0.995, 0.002, Path(model.name).name, fontsize=6, color="0.4", ha="right",
-                va="bottom")  # fmt: skip
-    return figure
+    return named(figure, Path(model.name).name)
 
 
 def marks(notes: Sequence[str]) -> list[str]:

@@ -52,7 +52,7 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """The diagnosis as plain values."""
-        from rig.diagnosis.diagnose_text import meanings
+        from rig.diagnosis.diagnose_text import meanings, parameter_meanings
 
         r = self.result
         return {
@@ -62,6 +62,7 @@ class Diagnosis:
             "probabilities": {w: float(p) for w, p in r.probabilities.items()},
             "meanings": meanings(arm=r.bench.data.arm),
             "effects": [_effect(e, r.bench.data) for e in r.effects],
+            "parameter_meanings": parameter_meanings(r),
             "where": _where(r),
             "gap": _gap(r),
             "next_measurement": None

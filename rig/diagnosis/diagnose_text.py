@@ -51,6 +51,20 @@ _OF_ONE_SPRING = {
 }
 
 
+_SHARE = "share_through_friction"
+# Parameters whose name alone misleads: a share of a compliance ends at 1, a stiffness does not.
+_HELD_BACK = "of the compliance, what friction holds back until it slips; 1: nothing moves before"
+_STIFFER = "how stiff the friction is until it slips, over the spring's stiffness; it may pass 1"
+
+
+def parameter_meanings(r: GapResult) -> dict[str, str]:
+    """Parameter -> what its number is, of those found that need it. Of a rig without an arm whose
+    displacement is imposed, springs and friction are stiffnesses beside each other."""
+    if not any(_SHARE in e.parameters for e in r.effects):
+        return {}
+    return {_SHARE: _STIFFER if r.bench.imposed and not r.bench.data.arm else _HELD_BACK}
+
+
 # What is said in place of a word's meaning.
 OTHERWISE = {
     "none": "noise, gains and stiffnesses within their stated uncertainty explain all",
@@ -183,6 +197,7 @@ def _effects(r: GapResult) -> str:
     lines = ["Effects"] if r.effects else []
     for e in r.effects:
         lines += _one_effect(e, _title(e, [other.name for other in r.effects]))
+    lines += [f"  {name}: {told}" for name, told in parameter_meanings(r).items()]
     ranked = sorted(r.probabilities.items(), key=lambda i: -i[1])
     shown = ", ".join(f"{w} {likely(p)}" for w, p in ranked if p >= LEAST_PROBABILITY)
     lines.append(f"Probability of being the main cause: {shown}")

@@ -39,7 +39,7 @@ from rig.diagnosis.gap_points import (
 )
 from rig.digits import likely
 from rig.errors import InputError
-from rig.plotting import COLOURS, write_figures
+from rig.plotting import COLOURS, named, write_figures
 from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
@@ -109,8 +109,7 @@ class _Drawing:
         if words:
             figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.25,
                         ha="center", va="center", rotation=25)  # fmt: skip
-        figure.text(0.995, 0.003, self.name, fontsize=6, color="0.4", ha="right", va="bottom")
-        return figure
+        return named(figure, self.name)
 
 
 def curve(r: Shown, p: Points) -> Figure:
@@ -270,8 +269,7 @@ def probabilities(r: Shown) -> Figure:
                   fontweight="bold" if chosen else "normal")  # fmt: skip
     axes.set_yticks(range(len(ranked)), list(ranked))
     axes.set_ylim(max(len(ranked), 3) - 0.4, -0.6)
-    axes.set_xlim(0, 1.28)
-    axes.set_xticks(np.linspace(0, 1, 6))
+    axes.set_xlim(0, 1)  # the labels find room beside it
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("Probability of being the main cause")
     rest = 1 - sum(ranked.values())

@@ -23,12 +23,18 @@ from rig.models.model import load_robot
 from rig.plan import plan
 from rig.protocol import MeasurementProtocol, parse_protocol
 from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
+from rig.protocolfile import ForceBand
 from rig.station import load_station
 from rig.storage.files import in_place_of
 
 _LASER_MM = 9.0  # of a range of 10 mm
 _GENTLER = 0.7  # loads times this, where arm, laser or dynamometer could not take them
 _TRIES = 4
+# No hand holds less: a screw of 0.5 mm a turn that is set to 1 deg brings an arm of 100 N/mm to
+# 0.14 N, and what the dynamometer shows is known to about 0.1 N.
+_HOLDABLE_N = 0.2
+_APART = 2.5  # half widths: the bands of two levels may not meet
+_USUAL = ForceBand(absolute_N=0.5, relative=0.01)
 
 
 def write_next(diagnosis: Diagnosis, dataset: Dataset, path: Path) -> str:
@@ -62,6 +68,7 @@ def next_text(proposal: NextMeasurement, dataset: Dataset) -> str:
     design = _as_aimed_at(proposal.design, old)
     station = "emulated" if dataset.origin == "emulated" else old.station if old else "ur10e_lab"
     for _ in range(_TRIES):
+        design = _apart(design)
         text = "\n".join(_lines(proposal, design, dataset, old, station)) + "\n"
         try:
             plan(parse_protocol(text, Path("next.yaml")), load_station(station))
@@ -89,6 +96,18 @@ def _as_aimed_at(design: Design, old: MeasurementProtocol | None) -> Design:
         near = all(abs(a - f) < 0.5 + 0.02 * a for a, f in zip(nearest, loads, strict=True))
         rising = all(b > a for a, b in pairwise(nearest))
         levels.append(tuple(nearest) if near and rising else loads)
+    return replace(design, levels=tuple(levels))
+
+
+def _apart(design: Design) -> Design:
+    """Without levels that a hand can't set apart from the next higher one, or from no load."""
+    least, levels = _APART * _HOLDABLE_N, []
+    for loads in design.levels:
+        kept = [loads[-1]]
+        for load in reversed(loads[:-1]):
+            if abs(kept[-1]) - abs(load) > least and abs(load) > least:
+                kept.append(load)
+        levels.append(tuple(reversed(kept)))
     return replace(design, levels=tuple(levels))
 
 
@@ -167,22 +186,28 @@ def _poses(design: Design, meta: Meta) -> Iterator[str]:
 
 def _timing(design: Design, old: MeasurementProtocol | None) -> Iterator[str]:
     rate = _rate_Hz(design, old)
-    gap = min(float(np.diff([0.0, *np.sort(np.abs(levels))]).min()) for levels in design.levels)
-    top = max(abs(f) for levels in design.levels for f in levels)
+    band = _force_band(design)
     samples = max(1, min(5, round(design.hold_s * rate)))
     hold = design.hold_s if design.hold_s * rate > samples else 0.0
     zero = max(design.zero_s, 6.0, 1 / rate)
     yield f"\nsampling: {{rate_Hz: {rate:g}, samples_per_step: {samples}}}"
     yield f"hold_s: {_seconds(hold)}"
-    yield (
-        f"force_band: {{absolute_N: {min(0.5, gap / 4):.3g}, "
-        f"relative: {min(0.01, gap / (4 * top)):.3g}}}"
-    )
+    yield f"force_band: {{absolute_N: {band.absolute_N:.3g}, relative: {band.relative:.3g}}}"
     yield from settle_lines(old.settle) if old else settle_lines()
     yield f"step_deadline_s: {old.step_deadline_s if old else 300:g}"
     yield f"zero: {{before_s: {_seconds(zero)}, after_s: {_seconds(zero)}}}"
     yield f"rest_s: {_seconds(min(design.rest_s, 3600))}"
     yield "rated_load_N: null"
+
+
+def _force_band(design: Design) -> ForceBand:
+    """A quarter of the smallest step at most, and no finer than a hand can hold."""
+    gap = min(float(np.diff([0.0, *np.sort(np.abs(levels))]).min()) for levels in design.levels)
+    top = max(abs(f) for levels in design.levels for f in levels)
+    return ForceBand(
+        absolute_N=max(_HOLDABLE_N, min(_USUAL.absolute_N, gap / 4)),
+        relative=min(_USUAL.relative, gap / (4 * top)),
+    )
 
 
 def _rate_Hz(design: Design, old: MeasurementProtocol | None) -> float:

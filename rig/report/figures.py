@@ -11,7 +11,7 @@ from identification.uncertainty import TWO_SIDED
 from rig.analysis.analyze import Analysis
 from rig.canvas import blank
 from rig.dataset import Dataset
-from rig.plotting import COLOURS, MARKERS
+from rig.plotting import COLOURS, MARKERS, named
 from rig.report.compare import aligned
 from rig.report.quality import RunZeros
 from rig.units import KNM, MM_PER_M, N_PER_MM
@@ -23,13 +23,14 @@ Json = dict[str, Any]
 MOST_POINTS = 4000  # of a recording that are drawn: more than a page has dots
 
 
-def watermark(figure: Figure, banners: Sequence[str]) -> Figure:
-    """What must not be overlooked, across the figure: it may leave the page without its text."""
+def watermark(figure: Figure, banners: Sequence[str], name: str = "") -> Figure:
+    """What must not be overlooked, across the figure: it may leave the page without its text. name:
+    of the data set, where the figure shows one."""
     words = [banner.split(":", maxsplit=1)[0] for banner in banners]
     if words:
         figure.text(0.5, 0.5, " · ".join(words), fontsize=34, color="0.5", alpha=0.22,
                     ha="center", va="center", rotation=18)  # fmt: skip
-    return figure
+    return named(figure, name)
 
 
 def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
@@ -63,7 +64,7 @@ def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
     axes.set_xticks(x)
     axes.grid(visible=False, axis="x")
     axes.legend(frameon=False, fontsize=8)
-    return watermark(figure, banners)
+    return watermark(figure, banners, sets[0][0] if len(sets) == 1 else "")
 
 
 def quality_recorded(dataset: Dataset, zeros: Sequence[RunZeros]) -> bool:
@@ -71,9 +72,9 @@ def quality_recorded(dataset: Dataset, zeros: Sequence[RunZeros]) -> bool:
     return bool(_panels(dataset, zeros))
 
 
-def quality(dataset: Dataset, zeros: Sequence[RunZeros]) -> Figure:
+def quality(name: str, dataset: Dataset, zeros: Sequence[RunZeros]) -> Figure:
     """Over the session: lateness, zero of force and displacement, joint temperatures, where
-    something of it was recorded."""
+    something of it was recorded. name: of the data set."""
     columns = dataset.columns
     panels = [panel for _, panel in _panels(dataset, zeros)]
     figure = blank(7.5, 1.75 * len(panels) + 0.5)
@@ -84,7 +85,7 @@ def quality(dataset: Dataset, zeros: Sequence[RunZeros]) -> Figure:
     rows[-1].set_xlabel("Time of the session in min" if "session_s" in columns else "Run")
     if "session_s" not in columns:
         rows[-1].xaxis.get_major_locator().set_params(integer=True)
-    return watermark(figure, dataset.banners())
+    return watermark(figure, dataset.banners(), name)
 
 
 Panel = Callable[[Any, Dataset, Sequence[RunZeros]], None]

@@ -93,6 +93,7 @@ def _effects(found: Node) -> list[Block]:
         others = e["indistinguishable_from"].value
         if others:
             alike.append(f"{name} can't be told apart from {', '.join(others)} in these data.")
+    alike += [f"{name}: {told.text()}." for name, told in found["parameter_meanings"].items()]
     if not rows:
         return []
     header = ("effect", "parameter", "unit", "value", "95 % from", "to", "present", "of the gap")

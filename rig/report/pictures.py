@@ -39,7 +39,7 @@ class Pictures:
     def setup(self, session: Session, pose: str, loads: Sequence[Load]) -> Figure:
         """The arm in one pose with its directions of load; a rig without an arm: its springs."""
         meta = session.dataset.meta
-        marked = partial(figures.watermark, banners=session.dataset.banners())
+        marked = partial(figures.watermark, banners=session.dataset.banners(), name=session.label)
         header: tuple[str, ...] = ("point", "x_mm", "y_mm", "z_mm")
         rows: Rows
         if meta.poses:
@@ -122,7 +122,7 @@ class Pictures:
             for p in r.plateaus
         )
         caption = figures.quality_caption(session.dataset, session.quality.zeros)
-        plot = partial(figures.quality, session.dataset, session.quality.zeros)
+        plot = partial(figures.quality, session.label, session.dataset, session.quality.zeros)
         return self._draw("quality", session, caption, caption, plot, header, rows)
 
     def coupling(self, gathered: Gathered) -> Figure:

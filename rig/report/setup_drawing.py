@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _ARM, _LASER = "0.35", "#CC3311"
+_LINE_POINTS, _LINE_MM = 13.0, 60.0  # of names above each other; about as much in the drawing
 _VIEWS = (("From above", 0, 1), ("From the side", 0, 2))
 
 
@@ -48,9 +49,12 @@ def arm_setup(meta: Meta, name: str, loads: Sequence[Load]) -> Figure:
     panels = figure.subplots(1, 2)
     for axes, (title, i, j) in zip(panels, _VIEWS, strict=True):
         _arm(axes, points[:, i], points[:, j])
+        at, taken = points[-1, [i, j]], list[tuple[float, ...]]()
         for n, load in enumerate(loads):
             colour = COLOURS[n % len(COLOURS)]
-            _load(axes, points[-1, [i, j]], np.array(load.vector), (i, j), load.name, colour)
+            spot = _load(axes, at, np.array(load.vector), (i, j), colour)
+            _label(axes, spot, taken.count(spot.key), load.name, colour)
+            taken.append(spot.key)
         axes.set_title(f"{title}, pose {name}", fontsize=10)
         axes.set_xlabel("x of the base in mm")
         axes.set_ylabel(f"{'xyz'[j]} of the base in mm")
@@ -82,9 +86,22 @@ def _arm(axes: Any, x: Array, y: Array) -> None:
     axes.plot(x[7], y[7], "o", color="white", markeredgecolor="black", markersize=8, zorder=6)
 
 
-def _load(
-    axes: Any, at: Array, vector: Array, view: tuple[int, int], name: str, colour: str
-) -> None:
+@dataclass(frozen=True)
+class _Spot:
+    """Where a load's name goes: beside a mark at `at`, mm, by `step` points and aligned so; names
+    at one spot stand above each other."""
+
+    at: tuple[float, float]
+    step: tuple[float, float]
+    align: Literal["left", "center"]
+
+    @property
+    def key(self) -> tuple[float, ...]:
+        """The same for marks that are nearer to each other than two lines of text."""
+        return tuple(round(v / _LINE_MM) for v in self.at)
+
+
+def _load(axes: Any, at: Array, vector: Array, view: tuple[int, int], colour: str) -> _Spot:
     """Screw and force on one side of the point of load, the laser's beam on the other."""
     inside = vector[list(view)]
     length = float(np.hypot(*inside))
@@ -92,18 +109,25 @@ def _load(
         towards = vector[3 - sum(view)] * (1 if view == (0, 1) else -1) > 0
         axes.plot(*at, "o", color="none", markeredgecolor=colour, markersize=16, zorder=5)
         axes.plot(*at, "." if towards else "x", color=colour, markersize=9, zorder=7)
-        axes.annotate(name, at, xytext=(12, 9), textcoords="offset points", color=colour,
-                      fontsize=10, fontweight="bold", zorder=8)  # fmt: skip
-        return
+        return _Spot((at[0], at[1]), (12.0, 12.0), "left")
     tail, laser = at - 250 * inside, at + 250 * inside
     axes.annotate("", xy=at - 18 * inside, xytext=tail, zorder=5,
                   arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.5})  # fmt: skip
     block, head = at - 290 * inside, at + 280 * inside
     axes.plot(*block, "s", color=colour, markersize=10, zorder=5)
     axes.plot([at[0], laser[0]], [at[1], laser[1]], ":", color=_LASER, linewidth=1.6, zorder=4)
-    axes.plot(*head, "D", color=_LASER, markersize=8, zorder=5)
-    axes.annotate(name, block - 55 * inside, ha="center", va="center", color=colour,
-                  fontsize=10, fontweight="bold", zorder=8)  # fmt: skip
+    axes.plot(*head, "D", color=_LASER, markersize=8, zorder=4)  # behind an opposite screw
+    upright = abs(inside[1]) > abs(inside[0])  # never on the line of its own arrow
+    return _Spot((block[0], block[1]), *(((10.0, 0.0), "left") if upright
+                                         else ((0.0, 13.0), "center")))  # fmt: skip
+
+
+def _label(axes: Any, spot: _Spot, above: int, name: str, colour: str) -> None:
+    """Above: names that stand at that spot already."""
+    right, up = spot.step
+    axes.annotate(name, spot.at, xytext=(right, up + _LINE_POINTS * above), color=colour,
+                  textcoords="offset points", ha=spot.align, va="center", fontsize=10,
+                  fontweight="bold", zorder=8)  # fmt: skip
 
 
 def _same_scale(panels: Sequence[Any]) -> None:

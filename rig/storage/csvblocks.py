@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import InputError
+from rig.storage.files import neighbours
 
 BLOCK_BYTES = 8_000_000
 MOST_COLUMNS = 2_000
@@ -58,6 +59,9 @@ class CsvFile:
         try:
             self.size = path.stat().st_size
             self._file: BinaryIO = path.open("rb")
+        except FileNotFoundError as error:
+            hint = neighbours(path, "*.csv")
+            raise InputError(f"{path}: cannot be read: no such file.{hint}") from error
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}.") from error
         if not self._file.seekable():

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rig.errors import InputError
+from rig.errors import InputError, did_you_mean
 
+_MOST_NAMED = 40
 ENDINGS = (".h5", ".hdf5")  # of data sets, in any case of letters
 
 
@@ -55,6 +56,15 @@ def check_folder(path: Path, option: str = "") -> None:
         raise InputError(
             f"{option}{path}: the folder {path.parent} does not exist. Create it first."
         )
+
+
+def neighbours(path: Path, *patterns: str) -> str:
+    """For a file that is not there: the one that may have been meant, by what stands before the
+    ending, or those that there are; nothing where there are none."""
+    there = path.parent.is_dir()
+    found = sorted(f for p in patterns for f in path.parent.glob(p)) if there else []
+    near = {p.stem: p.name for p in found[:_MOST_NAMED]}
+    return did_you_mean(path.stem, near, near.__getitem__)
 
 
 def sync_folder(folder: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rig.errors import InputError
+from rig.storage.files import ENDINGS, neighbours
 
 SCHEMA = "rig.dataset"
 SEAL = b"\n# rig.dataset sha256 "
@@ -28,24 +29,31 @@ def damaged(path: Path, what: str) -> InputError:
     )
 
 
-def check_bytes(path: Path) -> None:
-    """Magic number and seal, before the HDF5 library sees the file; InputError where they fail."""
+def check_bytes(path: Path) -> str:
+    """Magic number and seal, before the HDF5 library sees the file; InputError where they fail.
+    The SHA-256 that the seal states, "" where another program has left none."""
     if path.is_dir():
         raise InputError(
             f"{path}: a folder; a data set (.h5) is wanted. `rig list {path}` shows those in it."
         )
+    sha256, wrong = "", ""
     try:
         with path.open("rb") as file:
             head = file.read(len(_MAGIC))
-            if head == _MAGIC and (wrong := _check_seal(file)):
-                raise damaged(path, wrong)
+            if head == _MAGIC:
+                sha256, wrong = _checked_seal(file)
     except OSError as error:
-        reason = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
-        raise InputError(f"{path}: cannot be read: {reason}.") from error
+        missing = isinstance(error, FileNotFoundError)
+        hint = neighbours(path, *(f"*{e}" for e in ENDINGS)) if missing else ""
+        reason = "no such file" if missing else error.strerror
+        raise InputError(f"{path}: cannot be read: {reason}.{hint}") from error
     if head != _MAGIC:
         found = "an empty file" if not head else "no HDF5 file"
         hint = " A table comes in with `rig import`." if path.suffix in (".csv", ".txt") else ""
         raise InputError(f"{path}: {found}; a data set (.h5) is wanted.{hint}")
+    if wrong:
+        raise damaged(path, wrong)
+    return sha256
 
 
 def seal_of(path: Path) -> str:
@@ -65,8 +73,8 @@ def seal_of(path: Path) -> str:
     return line[len(SEAL) : -1].decode("ascii", "replace")
 
 
-def _check_seal(file: BinaryIO) -> str:
-    """What is wrong with the bytes, "" for nothing.
+def _checked_seal(file: BinaryIO) -> tuple[str, str]:
+    """SHA-256 of the bytes, "" without a seal; and what is wrong with them, "" for nothing.
 
     The file knows where its HDF5 data end (layout of the superblock: HDF5 File Format
     Specification, II.A, version 0, which `write_file` asks for). Behind there stands the seal, or
@@ -76,10 +84,10 @@ def _check_seal(file: BinaryIO) -> str:
     head = file.read(48)
     size = file.seek(0, os.SEEK_END)
     if len(head) < 48 or head[8] != 0:  # another version of the superblock: another program's file
-        return ""
+        return "", ""
     end = int.from_bytes(head[40:48], "little")
     if size < end:
-        return f"{size} bytes are left of {end}: cut off while copying?"
+        return "", f"{size} bytes are left of {end}: cut off while copying?"
     file.seek(0)
     sha = hashlib.sha256()
     rest = end
@@ -87,6 +95,8 @@ def _check_seal(file: BinaryIO) -> str:
         sha.update(piece)
         rest -= len(piece)
     seal = SEAL + sha.hexdigest().encode() + b"\n"
-    if size == end or file.read(len(seal) + 1) == seal:
-        return ""
-    return "its bytes have changed since it was written."
+    if size == end:
+        return "", ""
+    if file.read(len(seal) + 1) == seal:
+        return sha.hexdigest(), ""
+    return "", "its bytes have changed since it was written."

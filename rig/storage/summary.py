@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import InputError
-from rig.storage.seal import BROKEN, SCHEMA, check_bytes
+from rig.storage.seal import BROKEN, SCHEMA
 
 _ROBOT = re.compile(r"^robot:\s*([A-Za-z0-9_.-]+)\s*(?:#.*)?$", re.MULTILINE)
 _DIRECTIONS = re.compile(r"^directions:\s*\{(.*)\}\s*(?:#.*)?$", re.MULTILINE)
@@ -35,8 +35,8 @@ class Summary:
 
 
 def read_summary(path: Path) -> Summary:
-    """Of an HDF5 file whose seal holds. InputError for anything that is no data set."""
-    check_bytes(path)
+    """Of an HDF5 file whose bytes were checked (`rig.storage.seal.check_bytes`). InputError for
+    anything that is no data set."""
     try:
         root, text = _root(path)
         if root["schema"] != SCHEMA:

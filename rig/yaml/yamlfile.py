@@ -18,6 +18,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from rig.errors import InputError, close_to, closest, did_you_mean
+from rig.storage.files import neighbours
 from rig.yaml import yamlwords as words
 from rig.yaml.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, refuse
 
@@ -78,7 +79,7 @@ def read_text(path: Path) -> str:
         if path.is_dir():
             raise InputError(f"{path}: a folder; a YAML file is wanted.")
         if not path.exists():
-            raise InputError(f"{path}: no such file.{_neighbours(path)}")
+            raise InputError(f"{path}: no such file.{neighbours(path, '*.y*ml')}")
         if not path.is_file():
             raise InputError(f"{path}: not a regular file; a YAML file is wanted.")
         size = path.stat().st_size
@@ -91,13 +92,6 @@ def read_text(path: Path) -> str:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}.") from error
     return _decode(raw, str(path))
-
-
-def _neighbours(path: Path) -> str:
-    """The file that may have been meant, by what stands before the ending, or those there are."""
-    found = sorted(path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
-    near = {p.stem: p.name for p in found[:40]}
-    return did_you_mean(path.stem, near, near.__getitem__)
 
 
 def _decode(raw: bytes, name: str) -> str:

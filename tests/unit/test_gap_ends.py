@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,6 +61,14 @@ def test_a_recording_that_goes_on_long_after_a_break_is_unknown() -> None:
     found = diagnose_gap(data)
     assert found.verdict == "unknown"
     assert any("31 % of the readings come after that: a break" in n for n in found.notes)
+
+
+def test_a_break_is_told_by_its_reading_where_no_clock_was_recorded() -> None:
+    unclocked = [replace(recording(broken(N - left)), timed=False) for left in (6, 50)]
+    (note,) = without_ends(unclocked[0]).aside
+    assert "goes on (at reading 155): a break." in note
+    (fault,) = [f for f in found_in(unclocked[1]) if f.kind == BROKEN]
+    assert "goes on (at reading 111), and 31 % of" in fault.text
 
 
 @pytest.mark.parametrize("what", ["knee", "slips", "cycle", "stiff", "noise", "levels", "bridged"])

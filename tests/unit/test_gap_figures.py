@@ -20,7 +20,7 @@ from rig import cli
 from rig.dataset import write
 from rig.diagnosis.diagnose import Diagnosis, diagnose
 from rig.diagnosis.diagnose_text import _share
-from rig.diagnosis.gap_figures import change, curve, draw, legs, residual, withheld
+from rig.diagnosis.gap_figures import change, curve, draw, legs, probabilities, residual, withheld
 from rig.diagnosis.gap_layout import blank, noise_axis
 from rig.diagnosis.gap_map import _cells, _lines
 from rig.diagnosis.gap_points import (
@@ -119,6 +119,16 @@ def test_withheld_table_begins_with_the_fit_and_ends_with_the_rivals(slipped: Di
     assert t["before_rms_mm"][0] == pytest.approx(r.before * 1e3)
     assert list(t["explanation"][len(t["explanation"]) - len(r.runners_up) :]) == list(r.runners_up)
     assert t["after_rms_mm"][1] == pytest.approx(r.held_out[0].after * 1e3)
+
+
+def test_the_axis_of_probabilities_ends_at_one_with_room_for_the_labels(
+    slipped: Diagnosis,
+) -> None:
+    figure = probabilities(shown(slipped.result))
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    assert axes.get_xlim() == (0, 1)
+    assert all(text.get_window_extent().x1 < figure.bbox.x1 for text in axes.texts)
 
 
 def test_labels_over_short_changes_touch_no_marker(slipped: Diagnosis) -> None:

@@ -4,6 +4,7 @@ other effects they can show at all."""
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.recording.turns import passes, turns
 from identification.gap.words import STANDING
+from rig.diagnosis.diagnose_text import render
 from tests.unit.test_gap_operators import bench_data
 
 SPRING = 1e5  # N/m
@@ -448,3 +450,31 @@ def test_a_force_that_runs_through_zero_under_one_step_runs(creeps: float) -> No
     levels *= 1 - creeps * np.tile(np.linspace(0, 1, 30), 10)  # a screw that relaxes at each
     held = replace(running(levels, levels / SPRING), step=np.repeat(np.arange(10), 30))
     assert is_continuous(held, hold_ids(held)) is (creeps > 0.5)
+
+
+@pytest.mark.parametrize(
+    ("imposed", "told"), [("displacement", "it may pass 1"), ("force", "1: nothing moves before")]
+)
+def test_what_goes_through_friction_is_told_with_what_it_is_counted_against(
+    imposed: Literal["displacement", "force"], told: str
+) -> None:
+    """A friction half as stiff as the spring stands beside it; or half of the spring is held."""
+    way = np.sin(np.linspace(0, 6 * np.pi, 900))
+    held = np.zeros(len(way))
+    for i, step in enumerate(np.diff(way), 1):
+        held[i] = np.clip(held[i - 1] + step, -0.15, 0.15)
+    other = way + 0.5 * held if imposed == "displacement" else way - 0.5 * held
+    force, u = (other, way) if imposed == "displacement" else (way, other)
+    rng, meter = np.random.default_rng(1), Instruments(0.1, 1e-6, 0.005, 0.003)
+    found = diagnose_gap(
+        running(
+            100 * force + rng.normal(0, 0.1, len(way)),
+            1e-3 * u + rng.normal(0, 1e-6, len(way)),
+            imposed=imposed, instruments=meter,
+        )
+    )  # fmt: skip
+    assert found.verdict == "joint_hysteresis"
+    share = found.effects[0].parameters["share_through_friction"]
+    assert share.value == pytest.approx(0.5, abs=0.05)
+    (line,) = (s for s in render(found).splitlines() if s.startswith("  share_through_friction:"))
+    assert line.endswith(told)

@@ -10,6 +10,7 @@ import signal
 import stat
 import subprocess
 import sys
+import threading
 import time
 from math import inf, nan
 from pathlib import Path
@@ -18,7 +19,7 @@ import numpy as np
 import pytest
 
 from rig.errors import InputError
-from rig.journal import Journal, JournalError, journal_path, replay
+from rig.journal import Journal, JournalError, is_being_written, journal_path, replay
 from tests.unit.example_data import start
 
 PROJECT = Path(__file__).parents[2]
@@ -191,6 +192,22 @@ def test_two_writers_are_refused(path: Path) -> None:
         pytest.raises(InputError, match="another measurement is writing"),
     ):
         Journal.reopen(path)
+    Journal.reopen(path).close()
+
+
+def test_whether_it_is_being_written_can_be_asked(path: Path) -> None:
+    assert not is_being_written(path)
+    assert not is_being_written(path.with_name("none"))
+    with Journal.reopen(path):
+        assert is_being_written(path)
+    Journal.reopen(path).close()  # to ask has left no lock
+
+
+def test_who_only_asks_keeps_no_measurement_from_its_journal(path: Path) -> None:
+    fcntl = pytest.importorskip("fcntl")
+    asking = os.open(path, os.O_RDONLY)
+    fcntl.flock(asking, fcntl.LOCK_SH)
+    threading.Timer(0.05, os.close, [asking]).start()
     Journal.reopen(path).close()
 
 

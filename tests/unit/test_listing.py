@@ -18,7 +18,7 @@ from rig import cli
 from rig.catalogue import cache_folder, recall, remember
 from rig.dataset import write
 from rig.errors import InputError
-from rig.journal import journal_path
+from rig.journal import Journal, journal_path
 from rig.listing import list_folder
 from rig.storage.seal import seal_of
 from rig.storage.summary import _of_meta, as_written, by_any_program, read_summary
@@ -191,7 +191,7 @@ def test_a_second_listing_opens_no_known_file(
     opened: list[Path] = []
     monkeypatch.setattr("rig.listing.read_summary", lambda p: opened.append(p) or read_summary(p))
     assert list_folder(folder) == first
-    assert {p.name for p in opened} == {"broken.h5", "notes.h5", "other.hdf5"}
+    assert {p.name for p in opened} == {"other.hdf5"}
 
 
 def test_a_changed_file_is_looked_at_again(folder: Path) -> None:
@@ -203,6 +203,42 @@ def test_a_changed_file_is_looked_at_again(folder: Path) -> None:
     path.write_bytes(bytes(content[:-40]))
     found = list_folder(folder)
     assert "arm.h5" in dict(found.skipped)
+
+
+def test_a_damaged_copy_of_a_known_file_is_left_out(folder: Path) -> None:
+    list_folder(folder, analyze=True)
+    content = bytearray((folder / "arm.h5").read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    (folder / "copy.h5").write_bytes(content)
+    assert seal_of(folder / "copy.h5") == seal_of(folder / "arm.h5")  # its last line tells nothing
+    found = list_folder(folder)
+    assert "copy.h5" not in {e.file for e in found.entries}
+    assert dict(found.skipped)["copy.h5"] == (
+        "damaged: its bytes have changed since it was written. "
+        "Restore it from a copy, or build it anew from its journal."
+    )
+
+
+def test_no_resuming_is_offered_of_a_run_that_is_still_measured(folder: Path) -> None:
+    with Journal.reopen(journal_path(folder / "cut.h5")):
+        found = list_folder(folder)
+        text = found.to_text()
+    (entry,) = (d for d in found.to_json()["datasets"] if d["file"] == "cut.h5")
+    assert (entry["running"], entry["complete"], entry["journal"]) == (True, False, True)
+    assert "RUNNING, EMULATED" in text
+    assert "Being measured now: cut.h5." in text
+    assert "--resume" not in text
+    assert "cut.h5; `rig measure --resume FILE` goes on there." in list_folder(folder).to_text()
+
+
+def test_a_damaged_journal_is_left_out(folder: Path) -> None:
+    journal = journal_path(folder / "cut.h5")
+    lines = journal.read_bytes().splitlines(keepends=True)
+    lines[2] = lines[2].replace(b"sample", b"simple")
+    journal.write_bytes(b"".join(lines))
+    found = list_folder(folder)
+    assert "cut.h5" not in {e.file for e in found.entries}
+    assert "cut.h5.journal:3: damaged: its checksum" in dict(found.skipped)["cut.h5"]
 
 
 def test_recall_asks_for_any_number_of_files() -> None:

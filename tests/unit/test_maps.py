@@ -23,7 +23,7 @@ from identification.maps import (
     stiffness_map,
 )
 from rig.coupling.couple import couple
-from rig.coupling.coupling_figures import draw, marks, stiffness
+from rig.coupling.coupling_figures import draw, maps, marks, stiffness
 from rig.coupling.coupling_task import best_for, between_arms_deg
 from rig.errors import InputError
 from rig.models.model import MODELS, ArmModel, load_model
@@ -229,6 +229,20 @@ def test_figures(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="can't be written there"):
         draw(result, tmp_path / "file")
+
+
+def test_the_two_maps_and_their_scales_keep_apart() -> None:
+    figure = maps(couple(MODELS / "F2.yaml", samples=0))
+    figure.canvas.draw()
+    left, right = figure.axes
+    for axes in (left, right):
+        (scale,) = axes.child_axes
+        seen, map_ = scale.get_window_extent(), axes.get_window_extent()
+        assert (seen.y0, seen.y1) == pytest.approx((map_.y0, map_.y1))  # as high as the map
+        assert axes.title.get_window_extent().y1 < figure.bbox.y1
+    told = left.child_axes[0].yaxis.label.get_window_extent()
+    assert right.get_tightbbox().x0 - told.x1 > told.width  # nobody takes it for the other's axis
+    assert figure.bbox.height - left.get_tightbbox().height < 0.15 * figure.bbox.height
 
 
 def test_emulated_models_are_marked(tmp_path: Path) -> None:

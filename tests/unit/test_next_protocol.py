@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from rig.diagnosis.next_protocol import _rate_Hz, _seconds
-from rig.protocol_write import limit_lines
+from identification.gap.answer.designs import Design
+from identification.gap.data import Instruments
+from rig.diagnosis.next_protocol import _apart, _force_band, _rate_Hz, _seconds
+from rig.protocol_write import limit_lines, pose_line
 
 
 @pytest.mark.parametrize(
@@ -33,3 +36,42 @@ def test_slots_that_were_late_do_not_make_another_rate(measured_s: float, rate_H
 def test_a_limit_is_not_raised_without_need(allowed_N: float | None, written: int) -> None:
     before = {} if allowed_N is None else {"most_N": allowed_N}
     assert f"  force_N: {{max: {written}, at: stop}}" in limit_lines(220.0, "9", **before)
+
+
+def planned(*levels: tuple[float, ...]) -> Design:
+    return Design(
+        setups=(), levels=levels, repetitions=1, unload=True, both_senses=False, cycles=(1.0,),
+        hold_s=5.0, sample_s=1.0, approach_s=14.0, zero_s=6.0, rest_s=10.0, readings=False,
+        components=False, instruments=Instruments(0.1, 2e-6, 0.005, 0.003),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("levels", "absolute_N", "relative"),
+    [
+        ((20.0, 40.0, 220.0), 0.5, 0.01),  # as in every protocol here
+        ((1.6, 3.2, 4.8), 0.4, 0.01),  # a quarter of a step
+        ((0.6, 1.2, 60.0), 0.2, 0.15 / 60),  # what a hand can hold
+    ],
+)
+def test_a_band_is_no_finer_than_a_hand_can_hold(
+    levels: tuple[float, ...], absolute_N: float, relative: float
+) -> None:
+    band = _force_band(planned(levels))
+    assert band.absolute_N == pytest.approx(absolute_N)
+    assert band.relative == pytest.approx(relative)
+
+
+def test_levels_that_no_hand_can_set_apart_become_one() -> None:
+    design = _apart(planned((0.1, 9.7, 10.0, 20.0), (-0.3, -1.0), (0.05,)))
+    assert design.levels == ((10.0, 20.0), (-1.0,), (0.05,))
+    half = _force_band(planned(*design.levels[:2])).absolute_N
+    assert 10.0 + half < 20.0 - half
+
+
+def test_poses_are_written_in_degrees_as_in_the_other_protocols() -> None:
+    q = [math.radians(a) for a in (13.43, -99.84, -108.1, -62.06, 90.0, -1e-9)]
+    assert pose_line("P1", q, (0, 0, 50)) == (
+        "  P1: {q_deg: [13.43, -99.84, -108.1, -62.06, 90, 0], tcp_xyz_mm: [0, 0, 50], "
+        "program: null}"
+    )

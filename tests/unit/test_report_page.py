@@ -200,9 +200,19 @@ def test_where_an_effect_may_sit_is_said_with_the_numbers_of_the_json(
 ) -> None:
     one = {"name": "joint_yield", "probability": 1.0, "share_of_gap": 1.0, "parameters": {},
            "indistinguishable_from": [], "places": places}  # fmt: skip
-    blocks = tuple(_effects(Node({"effects": [one]}, "/gap")))
+    blocks = tuple(_effects(Node({"effects": [one], "parameter_meanings": {}}, "/gap")))
     text = Page(render(Document("", "", (), (Section("s", "", blocks),), ""))).text
     assert ("leave open: joint 1 (62 %), joint 5 (38 %)." in text) == (len(places) > 1)
+
+
+def test_a_parameter_whose_name_misleads_is_explained() -> None:
+    share = {"share_through_friction": {"unit": "1", "value": 4.6, "ci95": [0.2, 9.0]}}
+    one = {"name": "joint_hysteresis", "probability": 1.0, "share_of_gap": 1.0,
+           "parameters": share, "indistinguishable_from": [], "places": {}}  # fmt: skip
+    told = {"share_through_friction": "it may pass 1"}
+    blocks = tuple(_effects(Node({"effects": [one], "parameter_meanings": told}, "/gap")))
+    text = Page(render(Document("", "", (), (Section("s", "", blocks),), ""))).text
+    assert "share_through_friction: it may pass 1." in text
 
 
 def test_what_many_runs_have_to_themselves_is_its_range() -> None:
@@ -212,14 +222,14 @@ def test_what_many_runs_have_to_themselves_is_its_range() -> None:
     }
     one = {"name": "force_drift", "probability": 1.0, "share_of_gap": 1.0, "parameters": drift,
            "indistinguishable_from": [], "places": {}}  # fmt: skip
-    (table,) = _effects(Node({"effects": [one]}, "/gap"))
+    (table,) = _effects(Node({"effects": [one], "parameter_meanings": {}}, "/gap"))
     assert isinstance(table, Table)
     assert [cells[1] for cells in table.rows] == [
         "drift_x_run2, the least of 4 runs",
         "drift_x_run3, the largest of 4 runs",
     ]
     drift.pop("drift_x_run1"), drift.pop("drift_x_run4")
-    (table,) = _effects(Node({"effects": [one]}, "/gap"))
+    (table,) = _effects(Node({"effects": [one], "parameter_meanings": {}}, "/gap"))
     assert isinstance(table, Table)
     assert [cells[1] for cells in table.rows] == ["drift_x_run2", "drift_x_run3"]
 

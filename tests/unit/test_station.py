@@ -80,6 +80,11 @@ def test_an_unknown_station_is_told_with_where_it_was_named(
         station_for(Path("tests/plan.yaml"), "labor", other)
 
 
+def test_an_empty_name_is_no_wish_for_the_protocols_station() -> None:
+    with pytest.raises(InputError, match=r"^--station: station '': no name of a station"):
+        station_for(Path("tests/plan.yaml"), "emulated", "")
+
+
 def test_emulated_endpoints_need_the_emulation_section() -> None:
     problems = said(LAB, ("port: /dev/ttyUSB0 ", "port: emulated "))
     assert problems == [

@@ -311,7 +311,7 @@ def test_a_pipe_is_refused(tmp_path: Path) -> None:
 
 def test_missing_files(tmp_path: Path) -> None:
     (tmp_path / "META.yaml").write_text(example.META)
-    with pytest.raises(InputError, match=r"none\.csv: cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"none\.csv: cannot be read: no such file"):
         import_table(tmp_path / "none.csv", tmp_path / "META.yaml")
     with pytest.raises(InputError, match=r"none\.yaml: no such file"):
         import_table(tmp_path / "none.csv", tmp_path / "none.yaml")

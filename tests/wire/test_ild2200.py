@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 import serial
@@ -317,8 +320,51 @@ def test_closes_twice_and_opens_again(bench: Bench) -> None:
 
 def test_a_port_that_does_not_exist(bench: Bench) -> None:
     laser = bench.client("/dev/does-not-exist")
-    with pytest.raises(CannotConnect, match=r"No such file or directory.*station file"):
+    with pytest.raises(CannotConnect) as caught:
         laser.open()
+    assert str(caught.value).startswith(
+        "laser: cannot open the serial port /dev/does-not-exist at 691200 baud (there is no such "
+        "port). Plug the adapter in, or correct `port` in the station file. Ports of this computer:"
+    )
+
+
+def test_a_file_that_is_no_port(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "tty").write_text("")
+    for path in (tmp_path / "tty", tmp_path):
+        with pytest.raises(CannotConnect, match=r"\(that is no serial port\)\. Correct `port`"):
+            bench.client(str(path)).open()
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [  # as pyserial words them
+        (serial.SerialException(errno.EBUSY, "could not open port"), "another program has it open"),
+        (serial.SerialException(errno.EACCES, "could not open port"), "you may not use it"),
+        (
+            serial.SerialException(
+                "could not open port 'COM7': FileNotFoundError(2, 'The system cannot find the file "
+                "specified.', None, 2)"
+            ),
+            "there is no such port",
+        ),
+        (
+            serial.SerialException("Could not configure port: (22, 'Invalid argument')"),
+            "the adapter does not take this rate",
+        ),
+        (ValueError("Failed to set custom baud rate"), "the adapter does not take this rate"),
+        (serial.SerialException(errno.EIO, "could not open port"), os.strerror(errno.EIO)),
+    ],
+)
+def test_what_the_serial_library_says_is_put_in_words(error: Exception, reason: str) -> None:
+    said = str(complaints.no_port("COM7", 691200, error))
+    assert said.startswith(f"laser: cannot open the serial port COM7 at 691200 baud ({reason}). ")
+    assert said.count("COM7") == 1
+
+
+def test_a_port_that_has_gone_is_told_without_the_librarys_words() -> None:
+    words = "device reports readiness to read but returned no data"
+    gone = complaints.unplugged("COM7", serial.SerialException(words), connecting=True)
+    assert str(gone).startswith("laser: the serial port COM7 has gone. Plug the adapter in again")
 
 
 def test_a_stopped_output_is_started(bench: Bench) -> None:

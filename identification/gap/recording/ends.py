@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.gap.data import Array, Flags, GapData, Ints
-from identification.gap.recording.glitches import picked
+from identification.gap.recording.glitches import picked, when
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.turns import way_back
 
@@ -32,8 +32,8 @@ def without_ends(data: GapData) -> GapData:
     notes = []
     if after.any():
         notes.append(
-            f"The force falls at once while the stroke goes on (at {data.time[after][0]:.4g} s): a "
-            f"break. {_readings(after)} after it set aside."
+            f"The force falls at once while the stroke goes on ({when(data, after)}): a break. "
+            f"{_readings(after)} after it set aside."
         )
     if before.any():
         notes.append(

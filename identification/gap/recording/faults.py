@@ -16,6 +16,7 @@ import numpy as np
 
 from identification.gap.data import LOADING, Array, GapData
 from identification.gap.recording.ends import after_break
+from identification.gap.recording.glitches import when
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.running import first_rows
 
@@ -115,8 +116,8 @@ def _broken(data: GapData) -> str:
     if not broken.any():
         return ""
     return (
-        f"The force falls at once while the stroke goes on (at {data.time[broken][0]:.4g} s), "
-        f"and {100 * broken.mean():.0f} % of the readings come after that: a break. End the "
+        f"The force falls at once while the stroke goes on ({when(data, broken)}), and "
+        f"{100 * broken.mean():.0f} % of the readings come after that: a break. End the "
         "recording there to learn of what was before."
     )
 

@@ -1,0 +1,48 @@
+"""The drawing of the setup, and the figures that bear the name of what they show."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import pytest
+
+from rig.meta import Meta, MetaPose
+from rig.plotting import named
+from rig.report import figures
+from rig.report.setup_drawing import Load, arm_setup
+from tests.unit.example_data import dataset
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+BOTH_SENSES = [
+    Load(f"{sign:+d}"[0] + name, (sign * x, sign * y, sign * z))
+    for name, (x, y, z) in AXES.items()
+    for sign in (1, -1)
+]
+ONE_LINE = [Load("x_30", AXES["x"]), Load("x_60", AXES["x"]), Load("x", AXES["x"])]
+ASKEW = [Load("across", AXES["y"]), Load("askew", (0.0, 0.7, 0.7))]
+
+
+@pytest.mark.parametrize("loads", [BOTH_SENSES, ONE_LINE, ASKEW], ids=["ISO 9283", "x", "askew"])
+def test_no_name_of_a_load_lies_over_another(loads: list[Load]) -> None:
+    pose = MetaPose(q_rad=(0.234, -1.743, -1.887, -1.083, 1.571, -1.336), tcp_xyz_mm=(0, 0, 0))
+    figure = arm_setup(Meta.model_construct(robot="ur10e", poses={"P1": pose}), "P1", loads)
+    figure.canvas.draw()
+    for axes in figure.axes:
+        names = [text for text in axes.texts if text.get_text()]
+        assert {text.get_text() for text in names} == {load.name for load in loads}
+        for one, other in combinations(names, 2):
+            boxes = one.get_window_extent(), other.get_window_extent()
+            assert not boxes[0].overlaps(boxes[1]), (one.get_text(), other.get_text())
+
+
+def test_figures_bear_the_name_of_their_data_set() -> None:
+    quality = figures.quality("arm.h5", dataset(), ())
+    assert [t.get_text() for t in quality.texts] == ["EMULATED", "arm.h5"]
+    prior = {"joint_stiffness_Nm_per_rad": [1e4] * 6, "relative_sd": [0.3] * 6}
+    springs = [{"value": 1e4, "ci95": [9e3, 11e3]}] * 6
+    found = {"prior": prior, "joint_stiffness_Nm_per_rad": springs, "identified": [True] * 6}
+    one = figures.joints([("arm.h5", found)], [])
+    assert one.texts[-1].get_text() == "arm.h5"
+    several = figures.joints([("a.h5", found), ("b.h5", found)], [])
+    assert [t.get_text() for t in several.texts if t.get_text()] == []  # the legend names them
+    assert named(one, "again").texts[-1].get_text() == "again"
