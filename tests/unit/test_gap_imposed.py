@@ -15,6 +15,7 @@ from identification.gap.recording.imposed import _Channel, _slides, displacement
 from tests.conformance.gap_designs import linear
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
+from tests.unit.test_gap_running import running
 
 NOISE = 3e-4  # of the range
 N = 1500
@@ -308,3 +309,27 @@ def test_a_ramp_is_no_vibration() -> None:
     noise = make_bench(runs_on).noise
     assert noise.swings == 0
     assert not noise.misjudged
+
+
+@pytest.mark.parametrize("by_force", [True, False])
+def test_what_turns_where_it_turned_before_is_driven(by_force: bool) -> None:
+    """Pulses and cycles, while the other channel wanders or grows weaker: by its path alone one
+    looks as driven as the other."""
+    t = np.arange(1200)
+    pulses = 50 * np.clip(1.5 * np.sin(2 * np.pi * t / 120), 0.0, 1.0)
+    wanders = 12 * np.sin(2 * np.pi * t / 700) + 6 * np.sin(2 * np.pi * t / 410)
+    rng = np.random.default_rng(8)
+    driven = pulses + rng.normal(0, 0.05, 1200)
+    answers = pulses + wanders + rng.normal(0, 0.4, 1200)
+    force, moved = (driven, answers) if by_force else (answers, driven)
+    data = running(force, 1e-5 * moved)
+    assert displacement_simpler(data) is not by_force
+
+
+def test_a_rig_that_slides_at_one_force_was_not_driven_by_it() -> None:
+    """Strokes that grow turn elsewhere each time, and the force at what the seal holds."""
+    t = np.linspace(0.0, 1.0, 1200)
+    stroke = (0.4 + 0.6 * t) * triangle(t, 8)
+    rng = np.random.default_rng(9)
+    force = slider(stroke, 0.05) + rng.normal(0, 2e-4, 1200)
+    assert displacement_simpler(running(force * 100, 1e-3 * stroke))

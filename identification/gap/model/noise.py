@@ -20,7 +20,7 @@ from identification.gap.recording.holds import (
 )
 from identification.gap.recording.rows import Rows
 from identification.gap.recording.turns import turns
-from identification.gap.recording.white import LEAST_SAMPLES, white_noise, white_sd
+from identification.gap.recording.white import white_noise, white_sd
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -107,9 +107,21 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         raised=raised,
         swings=_swings(data, rows, hold),
         slow=_slow(data, rows, float(np.median(slope)), hold),
-        sure=data.arm or (rows.continuous and len(data.force) >= LEAST_SAMPLES),
+        sure=data.arm or (rows.continuous and _shown(data, imposed)),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),
     )  # fmt: skip
+
+
+def _shown(data: GapData, imposed: bool) -> bool:
+    """Whether a running recording shows all the noise that is stated of what answers: what is not
+    white of it second differences do not tell, and it may be as wrong as anything stated."""
+    force, displacement = _whites(data)
+    meter = data.instruments
+    white, stated = (force, meter.force) if imposed else (displacement, meter.displacement)
+    return white >= _WHITE * stated
+
+
+_WHITE = 0.85  # of what is stated: so closely a few hundred second differences tell
 
 
 def _apart(rows: Rows) -> Array:

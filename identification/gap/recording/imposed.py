@@ -19,7 +19,7 @@ import numpy as np
 from identification.gap.data import ZERO, Array, GapData, Ints
 from identification.gap.recording.bins import even_path
 from identification.gap.recording.holds import hold_ids, is_continuous
-from identification.gap.recording.turns import way_back
+from identification.gap.recording.turns import turns, way_back
 from identification.gap.recording.white import white_sd
 from identification.running import first_rows
 
@@ -81,6 +81,9 @@ def displacement_simpler(data: GapData) -> bool:
     back = _comes_back(data, mine, force), _comes_back(data, mine, moved)
     if any(back) and not all(back):
         return back[1]
+    turned = _turned_alike(force, moved), _turned_alike(moved, force)
+    if any(turned):
+        return turned[1]
     channels = _channels(
         _clock(data, mine), (force, moved), (instruments.force, instruments.displacement)
     )
@@ -148,6 +151,35 @@ def _comes_back(data: GapData, mine: Ints, values: Array) -> bool:
 
 
 _SAME_PLACE, _RUNS = 0.01, 3  # of the range
+
+
+def _turned_alike(values: Array, other: Array) -> bool:
+    """Whether a channel (m,) that comes and goes turns where it turned before, and the other one is
+    elsewhere each time: whatever drifts, flows, softens or is too fast for its rig answers so; but
+    for what is held at its ends by friction while the other one goes on."""
+    if _held_at_ends(values, other):
+        return False
+    at = np.array(turns(values, _PASS), dtype=np.intp)
+    high = values[at] > np.median(values)
+    if min(high.sum(), (~high).sum()) < _OFTEN:
+        return False
+    spread, others = (
+        [float(np.std(v[at[end]])) / (float(np.ptp(v)) or 1.0) for end in (high, ~high)]
+        for v in (values, other)
+    )
+    return max(spread) < _SAME_PLACE and max(others) > _ELSEWHERE
+
+
+def _held_at_ends(values: Array, other: Array) -> bool:
+    """Whether the other channel (m,) goes nearly all its way while this one (m,) is near its
+    ends."""
+    went = np.abs(np.diff(other))
+    ends = np.abs(values - (values.min() + values.max()) / 2) > _NEAR_ENDS * np.ptp(values)
+    return bool(went @ ends[1:] > _GOES_ON * went.sum())
+
+
+_PASS, _OFTEN, _ELSEWHERE = 0.5, 4, 0.05  # of the range; times at either end; of the range
+_NEAR_ENDS, _GOES_ON = 0.3, 0.8  # of the range, from its middle; of the other one's way
 
 
 def _slides(force: _Channel, moved: _Channel) -> bool:
