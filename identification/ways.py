@@ -59,6 +59,8 @@ def leading_on(
     going, far = elsewhere(force, displacement, sd, hold, middle, _STEEPER)
     level = np.bincount(hold, force * middle) / np.maximum(np.bincount(hold, middle), 1)
     for a, b in pairwise(starts.tolist()):
-        there, step = force[a:b][middle[a:b]], abs(level[hold[b]] - level[hold[a]])
-        if there.size and np.ptp(there) < _AT_REST * step and far[b - 1] > AWAY and going[b - 1]:
+        there, step = force[a:b][middle[a:b]], level[hold[b]] - level[hold[a]]
+        rested = there.size > 1 and np.ptp(there) < _AT_REST * abs(step)
+        onward = (force[b - 1] - level[hold[a]]) * step > _AT_REST * step**2
+        if rested and onward and far[b - 1] > AWAY and going[b - 1]:
             yield a + int(np.flatnonzero(~going[a:b]).max(initial=0)) + 1, b

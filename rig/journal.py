@@ -7,6 +7,7 @@ kill -9). The HDF5 file is only ever built from it.
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -283,8 +284,8 @@ def is_being_written(path: Path) -> bool:
         return False
     try:
         _take_lock(descriptor, exclusive=False)
-    except OSError:
-        return True
+    except OSError as refused:
+        return refused.errno in (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
     finally:
         os.close(descriptor)  # and with it the lock
     return False

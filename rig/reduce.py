@@ -199,14 +199,16 @@ def _leading_on(run: _Run, stated: _Stated) -> _Run:
     """The run with samples that a table has under the name of the level they leave, on their way to
     the next one, under the name of that. The procedure marks what is settled, and names no way."""
     branch, step = run.branch.copy(), run.step.copy()
-    read = np.isfinite(run.force) & np.isfinite(run.displacement)
-    if run.settled is not None or not read.all():
+    read = np.flatnonzero(np.isfinite(run.force) & np.isfinite(run.displacement))
+    if run.settled is not None or not read.size:
         return run
     first = first_rows(branch, step)
     hold = np.repeat(np.arange(first.size), np.diff(np.append(first, branch.size)))
+    _, named = np.unique(hold[read], return_inverse=True)
     sd = stated.force, stated.displacement
-    for leaves, b in leading_on(run.force, run.displacement, sd, hold):
-        branch[leaves:b], step[leaves:b] = branch[b], step[b]
+    for leaves, b in leading_on(run.force[read], run.displacement[read], sd, named):
+        way = slice(read[leaves], read[b])
+        branch[way], step[way] = branch[read[b]], step[read[b]]
     return replace(run, branch=branch, step=step)
 
 

@@ -81,6 +81,10 @@ def test_a_hook_that_is_hung_anew_for_every_run_moves_the_target_as_it_pulls_acr
     found = diagnose_gap(data)
     assert found.verdict == "load_misalignment"
     assert found.after < 1.2 * found.noise
+    bent = 3e-9 * straight.force**2  # what else there is has to be foretold
+    assert diagnose_gap(replace(data, displacement=data.displacement + bent)).verdict != (
+        "load_misalignment"
+    )
     bench = make_bench(data)
     hung = next(v for v in library(bench, ["load_misalignment"]) if v.label == "each run")
     law, units = law_of(bench, hung)

@@ -326,6 +326,18 @@ def test_what_turns_where_it_turned_before_is_driven(by_force: bool) -> None:
     assert displacement_simpler(data) is not by_force
 
 
+@pytest.mark.parametrize("most", [2.0, 4.0, 12.0])
+def test_strokes_that_grow_were_driven_against_what_yields(most: float) -> None:
+    """Three cycles each, from 1.3 times the stroke at which it yields: the force turns where it
+    yields, every time."""
+    cycles = np.repeat(np.linspace(1.3, most, 4), 3)
+    t = np.arange(12 * 100)
+    stroke = cycles[t // 100] * triangle(t / 100, 1)
+    rng = np.random.default_rng(10)
+    force = slider(stroke, 1.0) + rng.normal(0, 1e-3, len(t))
+    assert displacement_simpler(running(force * 100, 1e-3 * stroke))
+
+
 def test_a_rig_that_slides_at_one_force_was_not_driven_by_it() -> None:
     """Strokes that grow turn elsewhere each time, and the force at what the seal holds."""
     t = np.linspace(0.0, 1.0, 1200)

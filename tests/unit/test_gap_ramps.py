@@ -188,3 +188,9 @@ def test_only_what_rested_leaves() -> None:
     np.testing.assert_array_equal(_leading_on(two).step, two.step)
     one = replace(two, run=0 * runs)
     assert np.sum(_leading_on(one).step != one.step) == 5
+    slack = np.concatenate([np.linspace(100, 92, 40), np.full(40, 150.0), np.full(40, 50.0)])
+    screw = bench_data(slack, SPRING * slack, step=np.repeat([1, 2, 3], 40), imposed="force")
+    np.testing.assert_array_equal(_leading_on(screw).step, screw.step)  # not on its way up
+    late = np.cumsum(np.tile([10.0, 6.0, 2.0, 1.0], 4))
+    few = bench_data(late, SPRING * late, step=np.repeat([1, 2, 3, 4], 4), imposed="force")
+    np.testing.assert_array_equal(_leading_on(few).step, few.step)  # four samples do not rest

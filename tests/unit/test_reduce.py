@@ -204,6 +204,9 @@ def test_a_way_under_the_name_of_the_level_it_leaves_counts_to_the_next() -> Non
     assert curve.held
     assert [p.force for p in loading(curve)] == pytest.approx([10.0, 20.0, 30.0, 60.0])
     assert [p.displacement for p in loading(curve)] == pytest.approx([1e-4, 2e-4, 3e-4, 6e-4])
+    gap = named_late()  # a reading that is missing
+    gap.columns["force_N"][12] = np.nan
+    assert only(gap).held
     data = named_late()  # what the procedure recorded stands where it says
     data.columns["settled"] = np.ones(len(data.columns["step"]))
     assert not only(data).held

@@ -37,7 +37,6 @@ from identification.gap.laws.interval import Found, Parameter
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
-from identification.gap.recording.turns import turns
 
 WORD = "force_drift"
 SHARES = (0.001, 0.003, 0.01, 0.03, 0.1)  # of the largest force
@@ -70,26 +69,7 @@ def variants(bench: Bench) -> list[Variant]:
 
 
 def _cannot_drift(bench: Bench) -> bool:
-    return hangs(bench) or _reads_alike(bench) or _are_weights(bench) or _turns_alike(bench)
-
-
-def _turns_alike(bench: Bench) -> bool:
-    """Whether the reading of a load that comes and goes turns where it turned before, and the
-    displacement elsewhere each time: a drift of the force would have to be made up for by a load
-    that goes the other way. Of what runs on without an arm."""
-    if bench.data.arm or not bench.rows.continuous:
-        return False
-    force = bench.rows.measured_force
-    at = np.array(turns(force, _PASS), dtype=np.intp)
-    ends = at[force[at] > np.median(force)], at[force[at] <= np.median(force)]
-    if min(map(len, ends)) < _TURNS:
-        return False
-    read = max(float(np.std(force[k])) for k in ends)
-    moved = min(float(np.std((bench.response / bench.slope)[k])) for k in ends)
-    return read < _ALIKE * moved
-
-
-_PASS, _TURNS, _ALIKE = 0.5, 5, 0.2  # of the range; at either end; of what the other one does
+    return hangs(bench) or _reads_alike(bench) or _are_weights(bench)
 
 
 def _reads_alike(bench: Bench) -> bool:

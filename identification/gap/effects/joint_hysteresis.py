@@ -250,14 +250,14 @@ def _spectra(
     laws = [("Iwan", radius, slips - torque[:, None])]
     if bench.data.arm:
         laws.append(("Prandtl", radius[:-1], slips[:, :-1]))
-    turns = 1.0 if path is None else 2.0  # what was cycled before goes all the way back first
+    reach = 1.0 if path is None else 2.0  # what was cycled before goes all the way back first
     out = []
     for law, radii, states in laws:
         columns = [bench.add_joint(joint, unit * state) for state in states.T]
         label = f"{name} spectrum{' that slips' if law == 'Prandtl' else ''}"
         out.append(
             variant(WORD, label, columns, SCALES, smooth_root(len(columns), 0.6, 0.3), prior=0.25,
-                    each=True, within=_no_knee(bench, torque, turns * radii), joint=joint,
+                    each=True, within=_no_knee(bench, torque, reach * radii), joint=joint,
                     radius=radii, law=law)
         )  # fmt: skip
     return out

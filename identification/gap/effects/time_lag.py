@@ -323,7 +323,7 @@ def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
 def _columns(bench: Bench, law: Law) -> list[Array]:
     """The channel shows where the load was a little earlier."""
     c = law.constants
-    kinds = ("delay", "filter") if c["way"] == "window" else (c["way"],)
+    kinds = KINDS[:2] if c["way"] == "window" else (c["way"],)
     return [late(bench, c["channel"], kind, c["lag"]) for kind in kinds]
 
 

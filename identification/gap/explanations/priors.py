@@ -48,6 +48,8 @@ _ANY, _NO_WORD = frozenset(WORDS), frozenset[str]()
 RARER = (
     # Friction that was never seen to make a loop.
     Rarer(log(0.05), _HYSTERESIS, _NO_WORD, lambda c: c.once),
+    # A force that drifts, made up for by a load that goes the other way.
+    Rarer(-30.0, frozenset({"force_drift"}), _NO_WORD, lambda c: c.turns_alike),
     # A target that warms up while it is held in place.
     Rarer(log(0.05), frozenset({"thermal_drift"}), _NO_WORD, lambda c: c.imposed),
     # Loops at one rate are commonly friction; what comes late differs from it in details only, and

@@ -110,16 +110,26 @@ def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
     """Share of the weight that is kept after a look at withheld repetitions."""
     if explanation.words & DRIFTS and explanation.words <= FREE:
         return 1.0
-    if all("tips" in p.variant.info for p in explanation.parts):
-        return 1.0  # what every run has of its own another channel shows, and no other run
     engine = found.engine
+    fitted = fit(engine, explanation)
+    if _own_tips(engine, explanation, fitted):
+        return 1.0
     loose = DRIFTS if len(explanation.words) <= 2 else frozenset[str]()  # three have to earn it all
     after = held_out(engine, explanation, "repetition", fold, loose).after
-    fitted = fit(engine, explanation)
     seen = CLOSED * _moved(engine, fitted)
     unseen = engine.bench.rows.rms(open_to_hands(engine, fitted))
     limit = max(FAILS * noise_of(engine.bench), float(np.hypot(seen, unseen)))
     return float(1 / (1 + (after / limit) ** SHARP))
+
+
+def _own_tips(engine: Engine, explanation: Explanation, fitted: Fit) -> bool:
+    """Whether every run of a rig without an arm was pushed askew in its own way, which the force
+    across shows and no other run foretells, and nothing else is left."""
+    if engine.bench.data.arm or not all("tips" in p.variant.info for p in explanation.parts):
+        return False
+    bench = engine.bench
+    simulated = bench.response - engine.target[: bench.rows.n]
+    return sample_rms(bench, simulated + fitted.response) < FAILS * noise_of(bench)
 
 
 def _moved(engine: Engine, fitted: Fit) -> float:

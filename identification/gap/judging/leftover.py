@@ -179,7 +179,7 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
         return replace(e, log_weight=e.log_weight - COMES_BACK, log_good=e.log_good - COMES_BACK)
     left = _left(engine, fit(engine, explanation))
     if course.only_a_curve and explanation.words <= CURVES:
-        left = 0.0  # it is a curve as well
+        left = 0.0  # a curve as well: no reading of such a table stands off the next ones
     share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
     fall = course.fall
     gives = (fall > _FALL and explanation.words & CURVES) or (

@@ -42,7 +42,8 @@ class Noise:
     already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
     one sample. raised: how many times what is stated readings scatter, of a running recording or
     within holds, at least 1.
-    sure: of an arm's instruments, or measured; what else is stated is known to a factor UNSURE.
+    sure: of an arm's instruments, or measured to be as large as stated; what else is stated is
+    known to a factor UNSURE.
     swings: how many times what is stated an arm goes to and fro while nothing changes. slow: by
     which share of what is stated it may differ from hold to hold. seen: of one
     sample, m, as far as a rig without an arm showed it: 0 where it read every level but once."""

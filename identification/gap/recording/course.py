@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.gap.data import Array, Flags, GapData
 from identification.gap.recording.faults import Fault, found_in
-from identification.gap.recording.imposed import approaches
+from identification.gap.recording.imposed import approaches, turned_alike
 from identification.gap.recording.loops import lost
 from identification.gap.recording.rows import Rows
 from identification.gap.recording.snaps import Snaps, let_go
@@ -38,7 +38,8 @@ _MET_AGAIN = 0.2  # of the smaller one's range of load
 _RUNS_ON = 2.0  # times its mean speed: faster than anything creeps at rest
 _STANDS = 0.1  # of the mean speed, and of the time
 _HELD, _MANY_A_LEVEL = 2, 8  # samples
-_FEW_LEVELS, _MANY_LEVELS, _BACK = 5, 40, 2.0  # standard uncertainties of a displacement
+_FEW_LEVELS, _MANY_LEVELS, _BACK = 5, 40, 2.0  # readings; standard uncertainties
+_SCATTERS = 1.0  # squares of differences over squares: of what scatters it is 2 (von Neumann 1941)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +102,28 @@ class Course:
     @cached_property
     def only_a_curve(self) -> bool:
         """A table of loads that were read once, one after the other, each of which moved a rig
-        without an arm further: whatever it does from one to the next is a curve of the load, and
-        there is nothing else in it."""
+        without an arm further, and about as the ones beside it: whatever it does from one to the
+        next is a curve of the load, and there is nothing else in it."""
         n, one = self.rows.n, self.one_sided and len(self.data.setups) == 1 and not self.data.arm
         if not (one and self.once) or self.rows.continuous or not _FEW_LEVELS <= n <= _MANY_LEVELS:
             return False
-        far = np.abs(self.load), self.response * np.sign(self.load[np.abs(self.load).argmax()])
-        least = _BACK * self.data.instruments.displacement
-        return bool(np.all(np.diff(far[0]) > 0) and np.all(np.diff(far[1]) > -least))
+        load, meter = np.abs(self.load), self.data.instruments
+        moved = self.response * np.sign(self.load[load.argmax()])
+        sd = meter.force * float(self.slope.max()) if self.imposed else meter.displacement
+        if np.any(np.diff(load) <= 0) or np.any(np.diff(moved) < -_BACK * sd):
+            return False
+        left = moved - np.polynomial.Polynomial.fit(load, moved, 1)(load)
+        return bool(np.sum(np.diff(left) ** 2) < _SCATTERS * np.sum(left**2))
+
+    @cached_property
+    def turns_alike(self) -> bool:
+        """Of what runs on without an arm: the reading of a load that comes and goes turns where it
+        turned before, and the displacement elsewhere each time. A drift of the force would have to
+        be made up for by a load that goes the other way, as a controller alone does that trusts the
+        reading."""
+        if self.data.arm or not self.rows.continuous:
+            return False
+        return turned_alike(self.rows.measured_force, self.response / self.slope, least=0.0)
 
     @property
     def one_sided(self) -> bool:

@@ -34,6 +34,8 @@ _BEYOND = 3.0  # standard deviations of a point: so far it goes from one mean of
 _STILL = 2.0  # stated standard uncertainties: a channel that spreads by no more stands still
 _FOLLOWS = 0.5  # of its variance that the other channel explains
 _MISJUDGED = 3.0  # factor by which a stated uncertainty may be too small
+_PASS, _OFTEN = 0.5, 4  # of the range; turns
+_ELSEWHERE, _ALIKE = 0.04, 0.2  # of the range; of what the other channel does
 _TURNS = (0.5, 0.2, 0.08)  # of the range: what counts as going back
 _TOP = 0.03  # of a leg: a level next to its turning point
 _MOST_PIECES, _PIECES_PER_LEG, _SPARE = 200, 4, 9
@@ -81,8 +83,8 @@ def displacement_simpler(data: GapData) -> bool:
     back = _comes_back(data, mine, force), _comes_back(data, mine, moved)
     if any(back) and not all(back):
         return back[1]
-    turned = _turned_alike(force, moved), _turned_alike(moved, force)
-    if any(turned):
+    turned = turned_alike(force, moved), turned_alike(moved, force)
+    if any(turned) and not all(turned):
         return turned[1]
     channels = _channels(
         _clock(data, mine), (force, moved), (instruments.force, instruments.displacement)
@@ -153,33 +155,21 @@ def _comes_back(data: GapData, mine: Ints, values: Array) -> bool:
 _SAME_PLACE, _RUNS = 0.01, 3  # of the range
 
 
-def _turned_alike(values: Array, other: Array) -> bool:
-    """Whether a channel (m,) that comes and goes turns where it turned before, and the other one is
-    elsewhere each time: whatever drifts, flows, softens or is too fast for its rig answers so; but
-    for what is held at its ends by friction while the other one goes on."""
-    if _held_at_ends(values, other):
-        return False
+def turned_alike(values: Array, other: Array, least: float = _ELSEWHERE) -> bool:
+    """Whether a channel (m,) that comes and goes turns where it turned before, while the middle of
+    the other one's way is elsewhere each time, and its length about the same: whatever drifts,
+    slips or has a datum of its own answers so. (Strokes that grow against what yields or rubs turn
+    elsewhere at either end, to either side.) least: share of its range that this has to be."""
     at = np.array(turns(values, _PASS), dtype=np.intp)
-    high = values[at] > np.median(values)
-    if min(high.sum(), (~high).sum()) < _OFTEN:
+    if len(at) < 2 * _OFTEN:
         return False
-    spread, others = (
-        [float(np.std(v[at[end]])) / (float(np.ptp(v)) or 1.0) for end in (high, ~high)]
-        for v in (values, other)
-    )
-    return max(spread) < _SAME_PLACE and max(others) > _ELSEWHERE
-
-
-def _held_at_ends(values: Array, other: Array) -> bool:
-    """Whether the other channel (m,) goes nearly all its way while this one (m,) is near its
-    ends."""
-    went = np.abs(np.diff(other))
-    ends = np.abs(values - (values.min() + values.max()) / 2) > _NEAR_ENDS * np.ptp(values)
-    return bool(went @ ends[1:] > _GOES_ON * went.sum())
-
-
-_PASS, _OFTEN, _ELSEWHERE = 0.5, 4, 0.05  # of the range; times at either end; of the range
-_NEAR_ENDS, _GOES_ON = 0.3, 0.8  # of the range, from its middle; of the other one's way
+    high = values[at] > np.median(values)
+    span = float(np.ptp(values))
+    spread = max(float(np.std(values[at[end]])) for end in (high, ~high)) / span
+    length, middle = np.diff(other[at]) * np.where(high[1:], 1, -1), other[at][1:] + other[at][:-1]
+    wanders = float(np.std(middle / 2)) / (float(np.ptp(other)) or 1.0)
+    steady = float(np.std(length)) < float(np.std(middle / 2))
+    return steady and wanders > least and spread < min(_SAME_PLACE, _ALIKE * wanders)
 
 
 def _slides(force: _Channel, moved: _Channel) -> bool:
