@@ -21,7 +21,7 @@ AWAY = 0.01  # of the range: so far the outermost sample of a way has to go at l
 # crept on meanwhile: so much more of its range one channel may go than the other.
 _STEEPER = 4.0
 _MIDDLE = (0.35, 0.75)  # of a hold: it rests there, if it ever does
-_AT_REST = 0.1  # of the step to the next one
+_AT_REST, _ONWARD = 0.1, 0.02  # of the step to the next one
 
 
 def elsewhere(
@@ -61,6 +61,6 @@ def leading_on(
     for a, b in pairwise(starts.tolist()):
         there, step = force[a:b][middle[a:b]], level[hold[b]] - level[hold[a]]
         rested = there.size > 1 and np.ptp(there) < _AT_REST * abs(step)
-        onward = (force[b - 1] - level[hold[a]]) * step > _AT_REST * step**2
+        onward = (force[b - 1] - level[hold[a]]) * step > _ONWARD * step**2
         if rested and onward and far[b - 1] > AWAY and going[b - 1]:
             yield a + int(np.flatnonzero(~going[a:b]).max(initial=0)) + 1, b
