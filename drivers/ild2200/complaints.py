@@ -27,6 +27,7 @@ _REMEDIES = {
 }
 # Of what pyserial raises on Linux, macOS and Windows, where a port in use is a forbidden one.
 _HIDDEN = re.compile(r"(?:\[Errno |Error\(|port: \()(\d+)")
+_RATE = re.compile(r"baud", re.IGNORECASE)
 _BUSY = {errno.EWOULDBLOCK, errno.EBUSY} | ({errno.EACCES} if sys.platform == "win32" else set())
 _MISSING = {errno.ENOENT, errno.ENODEV, errno.ENXIO}
 _NO_PORT = {errno.ENOTTY, errno.EISDIR, errno.ENOTDIR}
@@ -48,8 +49,8 @@ def no_port(port: str, baud: int, error: Exception) -> CannotConnect:
     elif number in _FORBIDDEN:
         reason = "you may not use it"
         remedy = "Join the group that owns it (on Linux: dialout), and sign in again."
-    elif number not in (None, errno.EINVAL):
-        reason = os.strerror(number)
+    elif number not in (None, errno.EINVAL) or (number is None and not _RATE.search(str(error))):
+        reason = os.strerror(number) if number else str(error)
         remedy = f"Check the adapter and its cable, and `port` in the station file. {_ports()}"
     else:
         reason = "the adapter does not take this rate"

@@ -353,6 +353,7 @@ def test_a_file_that_is_no_port(bench: Bench, tmp_path: Path) -> None:
         ),
         (ValueError("Failed to set custom baud rate"), "the adapter does not take this rate"),
         (serial.SerialException(errno.EIO, "could not open port"), os.strerror(errno.EIO)),
+        (serial.SerialException("the driver is asleep"), "the driver is asleep"),
     ],
 )
 def test_what_the_serial_library_says_is_put_in_words(error: Exception, reason: str) -> None:
