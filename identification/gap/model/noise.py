@@ -20,7 +20,7 @@ from identification.gap.recording.holds import (
 )
 from identification.gap.recording.rows import Rows
 from identification.gap.recording.turns import turns
-from identification.gap.recording.white import white_noise, white_sd
+from identification.gap.recording.white import LEAST_SAMPLES, white_noise, white_sd
 
 ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
 ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
@@ -42,8 +42,8 @@ class Noise:
     already in `response`; hold (n,), run: common to a hold, to a run, m; force N, stated m: of
     one sample. raised: how many times what is stated readings scatter, of a running recording or
     within holds, at least 1.
-    sure: of an arm's instruments, or measured to be as large as stated; what else is stated is
-    known to a factor UNSURE.
+    sure: of an arm's instruments, or of a running recording that shows no less than stated; what
+    else is stated is known to a factor UNSURE.
     swings: how many times what is stated an arm goes to and fro while nothing changes. slow: by
     which share of what is stated it may differ from hold to hold. seen: of one
     sample, m, as far as a rig without an arm showed it: 0 where it read every level but once."""
@@ -114,12 +114,13 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
 
 
 def _shown(data: GapData, imposed: bool) -> bool:
-    """Whether a running recording shows all the noise that is stated of what answers: what is not
-    white of it second differences do not tell, and it may be as wrong as anything stated."""
+    """Whether a running recording leaves no room for noise beyond what is stated of what answers:
+    where second differences show less than that, the rest is not white, and may be as wrong as
+    anything stated."""
     force, displacement = _whites(data)
     meter = data.instruments
     white, stated = (force, meter.force) if imposed else (displacement, meter.displacement)
-    return white >= _WHITE * stated
+    return len(data.force) >= LEAST_SAMPLES and not 0 < white < _WHITE * stated
 
 
 _WHITE = 0.85  # of what is stated: so closely a few hundred second differences tell
