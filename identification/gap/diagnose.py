@@ -22,7 +22,7 @@ from identification.gap.evidence.engine import Engine, eta_levels
 from identification.gap.explanations.explanation import Explanation, Found, Likeness
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.judging.choice import chosen_of
-from identification.gap.judging.earned import earned, noise_of, sample_rms
+from identification.gap.judging.earned import earned, left_of, noise_of, sample_rms
 from identification.gap.judging.heldout import HeldOut, folds, held_out, stated_prediction
 from identification.gap.judging.leftover import looked_up
 from identification.gap.judging.strain import what_is_strained
@@ -167,7 +167,7 @@ def explain_gap(
     chosen, each = settled(engine, variants, chosen, found.explanations)
     result = _with_twins(_result(found, verdict, chosen, each), chosen, out)
     if not forced <= plain.words:
-        result = replace(result, without_added=_left(engine, fit(engine, plain)))
+        result = replace(result, without_added=left_of(engine, fit(engine, plain)))
 
     def whole() -> GapResult:
         tell("what to measure next", 0.9)
@@ -215,7 +215,7 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         where=NOWHERE if verdict == "none" else locate(engine, fitted, chosen.sizes, structural),
         noise=noise_of(bench),
         before=sample_rms(bench, stated_prediction(engine)),
-        after=_left(engine, fitted),
+        after=left_of(engine, fitted),
         held_out=held,
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,
@@ -227,12 +227,6 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
         fit=fitted,
         found=found,
     )
-
-
-def _left(engine: Engine, fitted: Fit) -> float:
-    """rms m over samples."""
-    bench = engine.bench
-    return sample_rms(bench, bench.response - engine.target[: bench.rows.n] + fitted.response)
 
 
 def _likeness(found: Found, verdict: str) -> Likeness | None:

@@ -199,12 +199,11 @@ def _both_ways(bench: Bench, j: int) -> bool:
 
 def _level_by_level(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
     """A curve of no simple form, of a table that shows nothing else."""
-    x, c = np.abs(bench.true_torque[:, j]) / top, bench.compliance[j] * top
     if not bench.course.only_a_curve:
         return []
-    places = np.unique(np.append(x, 0.0))
-    columns = [bench.add_joint(j, c * hinge(bench.true_torque[:, j] / top, b))
-               for b in places[1:-1]]  # fmt: skip
+    x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
+    places = np.unique(np.append(np.abs(x), 0.0))
+    columns = [bench.add_joint(j, c * hinge(x, b)) for b in places[1:-1]]
     return [variant(WORD, f"joint {j + 1} curve from level to level", [line, *columns], SCALES,
                     _from_level_to_level(places), positive=False, prior=0.5,
                     kinds=("line", *places[1:-1].tolist()), joint=j, torque=top)]  # fmt: skip

@@ -55,7 +55,7 @@ def variants(bench: Bench) -> list[Variant]:
     known: dict[str, list[_Known]] = {}
     slants: dict[str, float] = {}
     for name in dict.fromkeys(s.direction for s in bench.data.setups):
-        mine = np.array([s.direction == name for s in bench.data.setups])[bench.rows.setup]
+        mine = _pushed(bench, name)
         slants[name] = _slant(bench, mine)
         known[name] = [
             _Known(label, shapes, _in_pool(bench, shapes, mine), share, _read(bench, shapes, mine))
@@ -121,9 +121,15 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
 def _as_read(bench: Bench, direction: str) -> list[Array]:
     """What a rig without an arm gives way under the force along either tangent, as it was read in a
     direction; where it is as stiff across as along, of a tangent of USUAL."""
-    mine = np.array([s.direction == direction for s in bench.data.setups])[bench.rows.setup]
-    read = np.zeros((bench.rows.n, 2)) if bench.rows.tangential is None else bench.rows.tangential
-    return [gives(bench, np.where(mine, load, 0.0)) / USUAL for load in read.T]
+    mine, read = _pushed(bench, direction), bench.rows.tangential
+    loads = () if read is None else read.T
+    return [gives(bench, np.where(mine, load, 0.0)) / USUAL for load in loads]
+
+
+def _pushed(bench: Bench, direction: str) -> Flags:
+    """(n,) rows of a direction."""
+    mine = np.array([s.direction == direction for s in bench.data.setups])
+    return np.asarray(mine[bench.rows.setup])
 
 
 class _Known(NamedTuple):
@@ -183,7 +189,7 @@ def _given(bench: Bench, names: list[str], each: tuple[_Known, ...]) -> list[int
     """Columns of what a rig without an arm gives way; of a tangent of USUAL as read."""
     out = []
     for name, known in zip(names, each, strict=True):
-        mine = np.array([s.direction == name for s in bench.data.setups])[bench.rows.setup]
+        mine = _pushed(bench, name)
         for shape, tangent in zip(known.shapes, known.read, strict=False):
             load = np.where(mine, across(bench, shape), 0.0)
             out.append(bench.add(tangent / USUAL * gives(bench, load)))
@@ -282,8 +288,7 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
         if t.coefficient == "gives":
             out.append(gives(bench, load))
             continue
-        shares = np.stack([s.tangents @ np.array(t.shape["across"]) for s in bench.data.setups])
-        out.append(pulled(bench, load, shares))
+        out.append(pulled(bench, load, _shares(bench, t.shape["across"])))
     return out
 
 
@@ -291,8 +296,13 @@ def _read_along(bench: Bench, direction: tuple[float, ...]) -> Array:
     """(n,) N of the force across along a direction; 0 where it was not read."""
     if bench.rows.tangential is None:
         return np.zeros(bench.rows.n)
-    shares = np.stack([s.tangents @ np.array(direction) for s in bench.data.setups])
-    return np.asarray(np.sum(shares[bench.rows.setup] * bench.rows.tangential, axis=1))
+    shares = _shares(bench, direction)[bench.rows.setup]
+    return np.asarray(np.sum(shares * bench.rows.tangential, axis=1))
+
+
+def _shares(bench: Bench, direction: tuple[float, ...]) -> Array:
+    """(setups, 2): a direction along the tangents of every setup."""
+    return np.stack([s.tangents @ np.array(direction) for s in bench.data.setups])
 
 
 def _goes(how: Shape) -> dict[str, Any]:

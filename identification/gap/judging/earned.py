@@ -127,9 +127,7 @@ def _own_tips(engine: Engine, explanation: Explanation, fitted: Fit) -> bool:
     across shows and no other run foretells, and nothing else is left."""
     if engine.bench.data.arm or not all("tips" in p.variant.info for p in explanation.parts):
         return False
-    bench = engine.bench
-    simulated = bench.response - engine.target[: bench.rows.n]
-    return sample_rms(bench, simulated + fitted.response) < FAILS * noise_of(bench)
+    return left_of(engine, fitted) < FAILS * noise_of(engine.bench)
 
 
 def _moved(engine: Engine, fitted: Fit) -> float:
@@ -147,6 +145,12 @@ def noise_of(bench: Bench) -> float:
     count = np.ones(bench.rows.n) if bench.rows.continuous else weight
     square = noise.response**2 * count + noise.hold**2 + noise.run**2
     return float(np.sqrt(weight @ square / weight.sum()))
+
+
+def left_of(engine: Engine, fitted: Fit) -> float:
+    """rms (m) over samples that a fit leaves."""
+    bench = engine.bench
+    return sample_rms(bench, bench.response - engine.target[: bench.rows.n] + fitted.response)
 
 
 def sample_rms(bench: Bench, predicted: Array) -> float:

@@ -60,12 +60,12 @@ def law_of_knee(v: Variant, place: dict[str, Any], unit: float) -> tuple[Law, Ar
 def states_of(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
     """Number of the term -> its state (n,); those of a kind are made in one go. None of a spring of
     its own."""
-    flow, fresh = flow_of(bench, law, load), fresh_after(bench, law.constants["memory"])
+    flow = flow_of(bench, law, load)
     out = dict(zip(_with(law, "threshold")[0], states(bench, flow).T, strict=True))
     growing, beyond = _with(law, "grows_beyond")
-    out |= zip(growing, grown(load, beyond, fresh).T, strict=True)
+    out |= zip(growing, grown(load, beyond, flow.fresh).T, strict=True)
     for i in _with(law, "after")[0]:
-        out[i] = _back(bench, law.terms[i], load, fresh)
+        out[i] = _back(bench, law.terms[i], load, flow.fresh)
     return out
 
 

@@ -74,8 +74,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     hold = rest_ids(data, hold_ids(data))
     steep = slope if imposed or rows.continuous else np.maximum(slope, tangent(rows, meter.force))
     common = np.where(rows.steady, steep * meter.force / np.sqrt(rows.hold_weight), 0.0)
+    whites = _whites(data) if rows.continuous else (0.0, 0.0)
     if rows.continuous:
-        per_sample, common = _running(data, rows, slope, imposed), np.zeros(rows.n)
+        per_sample, common = _running(data, rows, slope, imposed, whites), np.zeros(rows.n)
     elif imposed:  # the force answers
         answer = _scatter(data, data.force, hold) or meter.force
         per_sample = np.hypot(slope * max(answer, 0.33 * meter.force),
@@ -94,7 +95,7 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     white = stated if rows.continuous else _scatter(data, data.displacement, hold) or 0.0
     raised = 1.0
     if rows.continuous:
-        raised = _raised(data)
+        raised = _raised(data, whites)
     elif not imposed:
         less = data.displacement - float(np.median(slope)) * data.force
         follows = _scatter(data, less, hold)
@@ -108,17 +109,16 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         raised=raised,
         swings=_swings(data, rows, hold),
         slow=_slow(data, rows, float(np.median(slope)), hold),
-        sure=data.arm or (rows.continuous and _shown(data, imposed)),
+        sure=data.arm or (rows.continuous and _shown(data, imposed, whites)),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),
     )  # fmt: skip
 
 
-def _shown(data: GapData, imposed: bool) -> bool:
+def _shown(data: GapData, imposed: bool, whites: tuple[float, float]) -> bool:
     """Whether a running recording leaves no room for noise beyond what is stated of what answers:
     where second differences show less than that, the rest is not white, and may be as wrong as
     anything stated."""
-    force, displacement = _whites(data)
-    meter = data.instruments
+    (force, displacement), meter = whites, data.instruments
     white, stated = (force, meter.force) if imposed else (displacement, meter.displacement)
     return len(data.force) >= LEAST_SAMPLES and not 0 < white < _WHITE * stated
 
@@ -207,9 +207,9 @@ def _between_repetitions(data: GapData, rows: Rows) -> float | None:
     return float(np.median(spread) * (rows.n / free) ** 0.5)
 
 
-def _raised(data: GapData) -> float:
+def _raised(data: GapData, whites: tuple[float, float]) -> float:
     """The larger ratio of what a channel scatters to what is stated of it, at least 1."""
-    force, displacement = _whites(data)
+    force, displacement = whites
     return max(1.0, force / data.instruments.force, displacement / data.instruments.displacement)
 
 
@@ -219,12 +219,14 @@ def _whites(data: GapData) -> tuple[float, float]:
     return white_noise(force, displacement), white_noise(displacement, force)
 
 
-def _running(data: GapData, rows: Rows, slope: Array, imposed: bool) -> Array:
+def _running(
+    data: GapData, rows: Rows, slope: Array, imposed: bool, whites: tuple[float, float]
+) -> Array:
     """Noise of one sample's response (n,) in a running recording, m: that of what answers, and
     that of what is driven times how steeply the answer follows it there. On a plateau of friction,
     or of a metal that flows, a displacement that is driven adds nothing."""
     meter = data.instruments
-    force, displacement = _whites(data)
+    force, displacement = whites
     force, displacement = max(meter.force, force), max(meter.displacement, displacement)
     if imposed:
         stiff = _steepness(rows, rows.displacement, rows.measured_force, displacement, 1 / slope)

@@ -166,9 +166,10 @@ def turned_alike(values: Array, other: Array, least: float = _ELSEWHERE) -> bool
     high = values[at] > np.median(values)
     span = float(np.ptp(values))
     spread = max(float(np.std(values[at[end]])) for end in (high, ~high)) / span
-    length, middle = np.diff(other[at]) * np.where(high[1:], 1, -1), other[at][1:] + other[at][:-1]
-    wanders = float(np.std(middle / 2)) / (float(np.ptp(other)) or 1.0)
-    steady = float(np.std(length)) < float(np.std(middle / 2))
+    there = other[at]
+    length, middle = np.diff(there) * np.where(high[1:], 1, -1), (there[1:] + there[:-1]) / 2
+    wanders = float(np.std(middle)) / (float(np.ptp(other)) or 1.0)
+    steady = float(np.std(length)) < float(np.std(middle))
     return steady and wanders > least and spread < min(_SAME_PLACE, _ALIKE * wanders)
 
 
