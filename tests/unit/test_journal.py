@@ -203,6 +203,16 @@ def test_whether_it_is_being_written_can_be_asked(path: Path) -> None:
     Journal.reopen(path).close()  # to ask has left no lock
 
 
+def test_where_locks_cannot_be_asked_for_nothing_is_said_to_run(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOLCK, "no locks on this drive")
+
+    monkeypatch.setattr("rig.journal._take_lock", refused)
+    assert not is_being_written(path)
+
+
 def test_who_only_asks_keeps_no_measurement_from_its_journal(path: Path) -> None:
     fcntl = pytest.importorskip("fcntl")
     asking = os.open(path, os.O_RDONLY)
