@@ -113,7 +113,7 @@ def import_(
 def export(dataset: DatasetArgument, output: _Exported) -> None:
     """Write a data set as CSV or Parquet."""
     from rig.dataset import load
-    from rig.tables import export_table
+    from rig.tables_out import export_table
 
     export_table(load(dataset), output)
     say(f"{output}: written")

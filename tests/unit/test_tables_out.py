@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from rig.dataset import Dataset, equal, load, write
 from rig.errors import InputError
-from rig.tables import export_table, import_table
+from rig.tables import import_table
+from rig.tables_out import export_table
 from tests.unit import example_data as example
 from tests.unit.example_data import TABLE, bring
 
