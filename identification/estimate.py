@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.curve import Array
 from identification.fit import LineFit, weighted_line, york_line
-from identification.levels import Table
+from identification.levels import LevelTable
 
 Weighting = Literal["proportional", "1/s^2", "none", "errors-in-variables"]
 WEIGHTINGS: tuple[Weighting, ...] = ("proportional", "1/s^2", "none", "errors-in-variables")
@@ -38,7 +38,7 @@ class Choice:
         return f"{_WORDS[self.weighting]}, {place}"
 
 
-def line(table: Table, choice: Choice) -> LineFit:
+def line(table: LevelTable, choice: Choice) -> LineFit:
     """The line u = u0 + c F through n levels; slope c in m/N, k = 1 / c.
 
     Displacement is regressed on force, with s_i of the displacement:
@@ -63,7 +63,7 @@ def line(table: Table, choice: Choice) -> LineFit:
     return weighted_line(force, displacement, s, intercept=choice.intercept)
 
 
-def _deviations(table: Table, choice: Choice) -> Array:
+def _deviations(table: LevelTable, choice: Choice) -> Array:
     """(n,) m: standard deviations of the displacement that the weighting gives the levels."""
     if choice.weighting == "errors-in-variables":
         return _with_scatter(table)
@@ -77,7 +77,7 @@ def _deviations(table: Table, choice: Choice) -> Array:
     return np.hypot(_with_scatter(table), plain.slope * table.u_force)
 
 
-def _without_noise(table: Table) -> Array:
+def _without_noise(table: LevelTable) -> Array:
     """(n,) m: displacements as weights may use them.
 
     A level that noise moved too little would weigh too much, and k come out too high: by 0.3, 6 and
@@ -101,7 +101,7 @@ def _without_noise(table: Table) -> Array:
     return np.asarray(force * (own * secant + (1 - own) * drawn))
 
 
-def stiffness(table: Table, choice: Choice) -> float:
+def stiffness(table: LevelTable, choice: Choice) -> float:
     """k in N/m of `line`; ValueError where the displacement does not change with the force."""
     slope = line(table, choice).slope
     if slope == 0.0 or not np.isfinite(slope):
@@ -109,7 +109,7 @@ def stiffness(table: Table, choice: Choice) -> float:
     return 1.0 / slope
 
 
-def stated_uncertainty(table: Table, choice: Choice) -> float:
+def stated_uncertainty(table: LevelTable, choice: Choice) -> float:
     """Standard uncertainty of k (N/m) from the stated uncertainties of the levels alone.
 
     The larger of two readings of the stated uncertainty, which does not say how much of it the
@@ -125,7 +125,7 @@ def stated_uncertainty(table: Table, choice: Choice) -> float:
     return float(np.sqrt(max(alone, together)))
 
 
-def _alone_with_weights_held(table: Table, choice: Choice) -> float:
+def _alone_with_weights_held(table: LevelTable, choice: Choice) -> float:
     """Variance of k from independent errors of the levels: k^4 sum(g_i^2 (u_u^2 + c^2 u_F^2)),
     g the weights of the displacements in the slope c."""
     w = _deviations(table, choice) ** -2.0
@@ -136,7 +136,7 @@ def _alone_with_weights_held(table: Table, choice: Choice) -> float:
     return float(variance / c**4)
 
 
-def gain_effect(table: Table, choice: Choice, gain_sd: float) -> float:
+def gain_effect(table: LevelTable, choice: Choice, gain_sd: float) -> float:
     """Standard uncertainty of k (N/m) from the gain of the force.
 
     Where the force reads g times too high, u at the stated force is off by F du/dF (g - 1): on a
@@ -156,7 +156,7 @@ def gain_effect(table: Table, choice: Choice, gain_sd: float) -> float:
     return abs(up - down)
 
 
-def _effect(table: Table, choice: Choice, step: Array) -> float:
+def _effect(table: LevelTable, choice: Choice, step: Array) -> float:
     """Squared change of k when the levels err by `step` (n,) standard uncertainties."""
     total = 0.0
     for force, displacement in ((table.u_force, 0.0), (0.0, table.u_displacement)):
@@ -167,5 +167,5 @@ def _effect(table: Table, choice: Choice, step: Array) -> float:
     return total
 
 
-def _with_scatter(table: Table) -> Array:
+def _with_scatter(table: LevelTable) -> Array:
     return np.hypot(np.nan_to_num(table.scatter), table.u_displacement)

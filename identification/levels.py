@@ -75,9 +75,9 @@ class Grid:
             self.u_displacement[:, mask],
         )
 
-    def mean(self) -> Table:
+    def mean(self) -> LevelTable:
         """All repetitions together."""
-        return Table(
+        return LevelTable(
             _mean(self.force),
             _mean(self.displacement),
             _mean(self.u_force),
@@ -85,10 +85,10 @@ class Grid:
             self.scatter,
         )
 
-    def run(self, row: int) -> Table:
+    def run(self, row: int) -> LevelTable:
         """One repetition, the levels it reached; their scatter is that of all repetitions."""
         there = np.isfinite(self.displacement[row])
-        return Table(
+        return LevelTable(
             self.force[row, there],
             self.displacement[row, there],
             self.u_force[row, there],
@@ -98,7 +98,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Table:
+class LevelTable:
     """Levels as a fit takes them, (n,) each: force N, displacement m, their stated standard
     uncertainties, and the scatter of the displacement over the repetitions (nan: unknown)."""
 
@@ -113,9 +113,9 @@ class Table:
         """Number of levels."""
         return self.force.size
 
-    def shifted(self, force: Array | float, displacement: Array | float) -> Table:
+    def shifted(self, force: Array | float, displacement: Array | float) -> LevelTable:
         """The same levels with errors (n,) N and m added."""
-        return Table(
+        return LevelTable(
             self.force + force,
             self.displacement + displacement,
             self.u_force,

@@ -38,8 +38,8 @@ from identification.levels import (
     Grid,
     Hysteresis,
     Level,
+    LevelTable,
     PointwiseStiffness,
-    Table,
     grid_of,
     hysteresis,
     pointwise,
@@ -261,7 +261,7 @@ def _by_repetition(used: Grid, choice: Choice) -> tuple[float, ...]:
 
 
 def _budget(
-    curve: Curve, table: Table, choice: Choice, k: float, each: tuple[float, ...]
+    curve: Curve, table: LevelTable, choice: Choice, k: float, each: tuple[float, ...]
 ) -> tuple[Contribution, ...]:
     """Type A and type B contributions to u(k), N/m."""
     n = len(each)

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from identification.curve import Array
-from identification.levels import Grid, PointwiseStiffness, Table
+from identification.levels import Grid, LevelTable, PointwiseStiffness
 
 Status = Literal["ok", "doubtful", "undefined"]
 BENT = 0.2  # change of the stiffness along a curve that is worth a word
@@ -18,7 +18,7 @@ BY_CHANCE = 1e-3  # of calling a straight curve bent
 SIGNIFICANT = 3.0  # slope over its standard deviation, where the force is within its noise
 
 
-def undefined(table: Table, through_origin: bool) -> str:
+def undefined(table: LevelTable, through_origin: bool) -> str:
     """Why these levels have no stiffness, as a sentence; empty if they have one."""
     start = "The stiffness is undefined: "
     if table.size == 0:
@@ -47,7 +47,7 @@ def _related(force: Array, displacement: Array) -> bool:
     return abs(r) * math.sqrt((force.size - 2) / max(1e-300, 1.0 - r * r)) > SIGNIFICANT
 
 
-def judge(table: Table, residuals: Array, k: float) -> tuple[Status, str]:
+def judge(table: LevelTable, residuals: Array, k: float) -> tuple[Status, str]:
     """Whether one line describes the levels; k N/m. A doubt comes with its sentence."""
     if k < 0:
         return "doubtful", "The displacement falls while the force rises: k is negative."

@@ -19,7 +19,7 @@ from identification.gap.data import GapData, Ints
 from identification.gap.effects import library
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine, eta_levels
-from identification.gap.explanations.explanation import Explanation, Found, Likeness
+from identification.gap.explanations.explanation import Explanation, Likeness, SearchResult
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.judging.choice import chosen_of
 from identification.gap.judging.earned import earned, left_of, noise_of, sample_rms
@@ -36,7 +36,7 @@ from identification.gap.recording.faults import SIGNS, SILENT
 from identification.gap.recording.glitches import without_glitches
 from identification.gap.recording.ramps import ramps_told
 from identification.gap.recording.slack import without_slack
-from identification.gap.search.breaks import strangers, told
+from identification.gap.search.breaks import troubles_of, with_plain_trouble
 from identification.gap.search.refine import refine
 from identification.gap.search.search import force, search
 from identification.gap.search.strange import with_strangers
@@ -49,7 +49,7 @@ Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Effect:
+class EffectFound:
     """One effect of the chosen explanation; probability: that it is present at all. places:
     "joint 3" or "axis y" -> probability that it sits there, the likeliest first."""
 
@@ -76,7 +76,7 @@ class GapResult:
 
     verdict: str
     probabilities: dict[str, float]
-    effects: tuple[Effect, ...]
+    effects: tuple[EffectFound, ...]
     where: Where
     noise: float
     before: float
@@ -90,7 +90,7 @@ class GapResult:
     bench: Bench
     engine: Engine
     fit: Fit
-    found: Found
+    found: SearchResult
     without_added: float | None = None
 
     @property
@@ -153,12 +153,12 @@ def explain_gap(
         variants += finer
         engine.extend()
         singles += score(engine, engine.levels, finer)
-    nameless = strangers(bench, base, target)
+    nameless = troubles_of(bench, base, target)
     if nameless:
         variants += nameless
         engine.extend()
         singles += score(engine, engine.levels, nameless)
-    found = with_strangers(told(search(engine, variants, singles)))
+    found = with_strangers(with_plain_trouble(search(engine, variants, singles)))
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
@@ -200,7 +200,9 @@ def check_words(words: set[str] | frozenset[str]) -> None:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
 
 
-def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known]) -> GapResult:
+def _result(
+    found: SearchResult, verdict: str, chosen: Explanation, known: list[Known]
+) -> GapResult:
     engine, bench = found.engine, found.engine.bench
     n = bench.rows.n
     fitted = fit(engine, chosen)
@@ -229,7 +231,7 @@ def _result(found: Found, verdict: str, chosen: Explanation, known: list[Known])
     )
 
 
-def _likeness(found: Found, verdict: str) -> Likeness | None:
+def _likeness(found: SearchResult, verdict: str) -> Likeness | None:
     """Of an unknown gap; none of one whose channels count in opposite senses, or of which one says
     nothing."""
     course = found.engine.bench.course
@@ -238,7 +240,9 @@ def _likeness(found: Found, verdict: str) -> Likeness | None:
     return found.looks_like
 
 
-def _effects(found: Found, chosen: Explanation, known: list[Known]) -> tuple[Effect, ...]:
+def _effects(
+    found: SearchResult, chosen: Explanation, known: list[Known]
+) -> tuple[EffectFound, ...]:
     weights = np.array([e.log_good + log(found.kept.get(e.words, 1.0) + 1e-300)
                         for e in found.explanations])  # fmt: skip
     share = np.exp(weights - weights.max())
@@ -251,7 +255,7 @@ def _effects(found: Found, chosen: Explanation, known: list[Known]) -> tuple[Eff
             float(s) for e, s in zip(found.explanations, share, strict=True) if part.word in e.words
         )
         out.append(
-            Effect(
+            EffectFound(
                 name=part.word,
                 label=part.variant.label,
                 probability=min(1.0, present / total),
@@ -288,7 +292,7 @@ def _shared(probabilities: Mapping[str, float], word: str, twin: str) -> dict[st
     return {word: mine, twin: both - mine}
 
 
-def _alike(found: Found, chosen: Explanation, word: str) -> tuple[str, ...]:
+def _alike(found: SearchResult, chosen: Explanation, word: str) -> tuple[str, ...]:
     """Words that could stand in for `word` in the explanation, at the same evidence."""
     rest = chosen.words - {word}
     out = []
@@ -302,7 +306,7 @@ def _alike(found: Found, chosen: Explanation, word: str) -> tuple[str, ...]:
 
 
 def _runners_up(
-    engine: Engine, found: Found, verdict: str, ways: dict[str, Ints]
+    engine: Engine, found: SearchResult, verdict: str, ways: dict[str, Ints]
 ) -> dict[str, float]:
     """The three best explanations by one other word: withheld rms on the main fold."""
     if not ways or verdict == "none":
@@ -313,7 +317,7 @@ def _runners_up(
 
 
 def _next(
-    found: Found,
+    found: SearchResult,
     variants: list[Variant],
     chosen: Explanation,
     result: GapResult,
@@ -352,7 +356,7 @@ def _across(bench: Bench, chosen: Explanation) -> tuple[Note, ...]:
 _MOVES = 0.2  # of the noise of a sample
 
 
-def _disbelieved(found: Found, verdict: str) -> tuple[Note, ...]:
+def _disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
     """Why an arm's best explanation was not believed, where that is what it asks for: META may
     state too little, and only its author can tell."""
     best, swings = found.explanations[0], found.engine.bench.noise.swings

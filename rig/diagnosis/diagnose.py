@@ -13,7 +13,7 @@ from identification.gap.answer.forms import Form
 from identification.gap.answer.known import NotKnown
 from identification.gap.data import BRANCH_NAMES, GapData
 from identification.gap.diagnose import (
-    Effect,
+    EffectFound,
     GapResult,
     NotShown,
     diagnose_gap,
@@ -201,7 +201,7 @@ def _looks_like(r: GapResult) -> dict[str, Any] | None:
     return {"kind": like.kind, **size, "text": looks_like(like, arm=r.bench.data.arm)}
 
 
-def _effect(e: Effect, data: GapData) -> dict[str, Any]:
+def _effect(e: EffectFound, data: GapData) -> dict[str, Any]:
     def direction(found: re.Match[str]) -> str:
         names = [data.spring_name(int(n) - 1) for n in found.groups()[1:] if n]
         return f"direction{found[1]} {' and '.join(names)}".rstrip()

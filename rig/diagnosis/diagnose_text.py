@@ -10,7 +10,7 @@ from rig.digits import brief, likely
 from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
-    from identification.gap.diagnose import Effect, GapResult
+    from identification.gap.diagnose import EffectFound, GapResult
     from identification.gap.explanations.explanation import Likeness
     from identification.gap.laws.interval import Parameter
 
@@ -204,13 +204,13 @@ def _effects(r: GapResult) -> str:
     return "\n".join(lines)
 
 
-def _title(e: Effect, names: list[str]) -> str:
+def _title(e: EffectFound, names: list[str]) -> str:
     """Its name; of one that sits in several joints with the joint."""
     place = next(iter(e.places), "")
     return f"{e.name}, {place}" if place and names.count(e.name) > 1 else e.name
 
 
-def _one_effect(e: Effect, title: str) -> list[str]:
+def _one_effect(e: EffectFound, title: str) -> list[str]:
     lines = [
         f"  {title}: present with a probability of {likely(e.probability)}; does "
         f"{_share(e.share_of_gap)} of the gap"

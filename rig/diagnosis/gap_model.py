@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.gap.answer.forms import Form, describe, lasting
 from identification.gap.data import Array
-from identification.gap.diagnose import Effect, GapResult
+from identification.gap.diagnose import EffectFound, GapResult
 from rig.dataset import Dataset
 from rig.diagnosis.diagnose import Diagnosis
 from rig.diagnosis.diagnose_text import meanings
@@ -124,7 +124,7 @@ def _effects(diagnosis: Diagnosis, dataset: Dataset) -> list[str]:
     return lines
 
 
-def _about(effect: Effect, dataset: Dataset) -> dict[str, Any]:
+def _about(effect: EffectFound, dataset: Dataset) -> dict[str, Any]:
     out: dict[str, Any] = {
         "name": effect.name,
         "form": effect.label,
@@ -142,7 +142,7 @@ def _about(effect: Effect, dataset: Dataset) -> dict[str, Any]:
     return out
 
 
-def _comment(effect: Effect, meaning: str) -> str:
+def _comment(effect: EffectFound, meaning: str) -> str:
     text = f"{meaning}; {100 * effect.share_of_gap:.0f} % of the gap"
     if len(effect.places) > 1:
         text += f"; it may sit at {', '.join(effect.places)}"

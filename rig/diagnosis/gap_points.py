@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from identification.gap.answer.remainder import Remainder, branches
 from identification.gap.data import BRANCH_NAMES, ZERO, Array, Ints
-from identification.gap.diagnose import Effect, GapResult
+from identification.gap.diagnose import EffectFound, GapResult
 from identification.gap.judging.heldout import HeldOut, stated_prediction
 from identification.gap.model.bench import Bench
 from rig.units import MM_PER_M
@@ -75,7 +75,7 @@ class Shown:
     continuous: bool
     verdict: str
     probabilities: dict[str, float]
-    effects: tuple[Effect, ...]
+    effects: tuple[EffectFound, ...]
     noise: float
     before: float
     after: float

@@ -13,7 +13,7 @@ from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.evidence.parts import Part, Sizes
 from identification.gap.explanations.explanation import Explanation, explain
-from identification.gap.explanations.penalties import pettiness
+from identification.gap.explanations.penalties import minor_parts
 from identification.gap.explanations.several import family_of, in_more_joints
 from identification.gap.model.bench import make_bench
 from rig.diagnosis.diagnose_text import render
@@ -126,5 +126,5 @@ def test_a_joint_that_does_next_to_nothing_is_not_one_of_several() -> None:
     assert both.log_weight > -100.0
     assert petty.log_weight < -5000.0
     rubs = Sizes(np.array([1e-5, 2e-6]), np.array([1e-5, 2e-6]), 1e-10)
-    assert pettiness(found.engine, (first, second), rubs) == 0.0
+    assert minor_parts(found.engine, (first, second), rubs) == 0.0
     assert both.troubles["joint_hysteresis"] == pytest.approx(np.hypot(*both.sizes))

@@ -11,7 +11,7 @@ import pytest
 
 from identification.gap.answer.discriminate import NextMeasurement
 from identification.gap.answer.forms import law_of
-from identification.gap.diagnose import Effect, GapResult
+from identification.gap.diagnose import EffectFound, GapResult
 from identification.gap.effects import EFFECTS, library
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.fit import Fit
@@ -110,7 +110,7 @@ def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.
         result.fit, parts=(Part(v, 1.0),), coefficients=w, covariance=np.diag(w**2) * 1e-4,
         joint_covariance=np.diag(np.append(np.full(b, 1e-6), w**2 * 1e-4)),
     )  # fmt: skip
-    effect = Effect(word, v.label, 1.0, {}, {}, (), 1.0, 1e-4)
+    effect = EffectFound(word, v.label, 1.0, {}, {}, (), 1.0, 1e-4)
     found = replace(result, verdict=word, effects=(effect,), fit=fitted)
     changes = np.zeros(bench.layout.size)
     for name, beta in zip(result.engine.base.names, base, strict=True):

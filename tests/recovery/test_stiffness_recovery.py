@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from identification.estimate import Choice, stiffness
-from identification.levels import Table
+from identification.levels import LevelTable
 from identification.stiffness import Options, Stiffness, analyze_curve, ratio
 from identification.uncertainty import Quantity
 from rig.protocol import load_protocol
@@ -59,7 +59,7 @@ def truth(direction: str, world: str = "paper", most_N: float = np.inf) -> float
     displacement = make_world(world, 0).true_curve(PROTOCOL.directions[direction], levels)
     n = len(levels)
     tiny = np.full(n, 1e-12)
-    return stiffness(Table(np.array(levels), displacement, tiny, tiny, tiny), Choice())
+    return stiffness(LevelTable(np.array(levels), displacement, tiny, tiny, tiny), Choice())
 
 
 def k_of(result: Stiffness) -> Quantity:

@@ -13,7 +13,7 @@ from drivers.errors import CannotConnect
 from identification.gap.answer.discriminate import NextMeasurement, Option
 from identification.gap.answer.locate import Where
 from identification.gap.answer.notes import ASIDE, UNDECIDED, Note
-from identification.gap.diagnose import Effect, GapResult
+from identification.gap.diagnose import EffectFound, GapResult
 from identification.gap.explanations.explanation import Likeness
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter
@@ -99,13 +99,13 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
 
 def explained() -> Diagnosis:
     """Two effects, one of which another word explains as well."""
-    yields = Effect(
+    yields = EffectFound(
         "joint_yield", "joint 1", 0.994,
         {"threshold_Nm": Parameter(67.31, 66.82, 67.9, "Nm"),
          "stiffness_ratio_above": Parameter(0.0213, 0.0185, 0.0241, "1")},
         {"joint 1": 0.62, "joint 5": 0.38}, ("base_slip",), 0.93, 1.2e-4,
     )  # fmt: skip
-    drifts = Effect(
+    drifts = EffectFound(
         "force_drift", "", 0.871, {"rate": Parameter(-0.002, -0.0031, -0.0009, "N/s")}, {}, (),
         0.05, 4e-6,
     )  # fmt: skip

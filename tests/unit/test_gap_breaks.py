@@ -13,7 +13,7 @@ from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.explanations.priors import LOG_UNKNOWN, prior_of
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
-from identification.gap.search.breaks import _just_turned, jump_rows, strangers
+from identification.gap.search.breaks import _just_turned, jump_rows, troubles_of
 from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING, WANDERS, WORDS
 from rig.diagnosis.diagnose_text import LOOKS_LIKE, looks_like
 from tests.unit.test_gap_forms import arm_data
@@ -133,7 +133,7 @@ def test_only_recordings_that_run_on_without_an_arm_are_looked_at() -> None:
     def of(data: GapData) -> list[str]:
         bench = make_bench(data)
         target = bench.observed - prediction(bench)
-        return sorted({v.word for v in strangers(bench, base_columns(bench), target)})
+        return sorted({v.word for v in troubles_of(bench, base_columns(bench), target)})
 
     assert of(pulled(slips())) == sorted(NAMELESS)
     assert of(arm_data()) == []
@@ -154,7 +154,7 @@ def test_a_stiffness_that_goes_its_own_way_in_time_is_nobody_s_word(
     data = running(force + noise, stroke, imposed="displacement")
     bench = make_bench(data)
     target = bench.observed - prediction(bench)
-    assert (WANDERS in {v.word for v in strangers(bench, base_columns(bench), target)}) is told
+    assert (WANDERS in {v.word for v in troubles_of(bench, base_columns(bench), target)}) is told
     if told:
         found = diagnose_gap(data)
         assert found.verdict == "unknown"
@@ -171,7 +171,7 @@ def test_what_stays_when_the_load_is_gone_does_not_only_soften(stays: float) -> 
                                np.append(STROKE[:-20], np.full(20, left[-1])),
                                imposed="displacement"))  # fmt: skip
     target = bench.observed - prediction(bench)
-    found = {v.word for v in strangers(bench, base_columns(bench), target)}
+    found = {v.word for v in troubles_of(bench, base_columns(bench), target)}
     assert (SOFTENING in found) is (stays == 0.0)
     assert DAMAGE in found
 

@@ -11,9 +11,9 @@ from identification.gap.data import Array, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, Sizes
-from identification.gap.explanations.explanation import Explanation, Found
-from identification.gap.explanations.penalties import cancelling, pettiness, trifle
-from identification.gap.explanations.verdict import weighed
+from identification.gap.explanations.explanation import Explanation, SearchResult
+from identification.gap.explanations.penalties import below_noise, cancelling, minor_parts
+from identification.gap.explanations.verdict import with_posterior
 from identification.gap.judging.choice import WORTH_OF_THIRD, chosen_of
 from identification.gap.judging.earned import _foretold, earned
 from identification.gap.judging.heldout import ALWAYS_IN, HeldOut, _stacked_keep, folds, held_out
@@ -58,11 +58,11 @@ def explained(columns: list[int], word: str, weight: float) -> Explanation:
     return Explanation((Part(v, BUMP),), weight, 0.0, (BUMP / 3,), weight)
 
 
-def found(e: Engine, *explanations: Explanation) -> Found:
+def found(e: Engine, *explanations: Explanation) -> SearchResult:
     none = Explanation((), -500.0, 0.0, (), -500.0)
     words = {w: 0.0 for x in explanations for w in x.words}
     ranked = (*sorted(explanations, key=lambda x: -x.log_weight), none)
-    return weighed(Found(e, ranked, words, {}, ranked[0], -400.0, 1e-6), {})
+    return with_posterior(SearchResult(e, ranked, words, {}, ranked[0], -400.0, 1e-6), {})
 
 
 def test_the_first_repetition_is_never_withheld() -> None:
@@ -243,8 +243,8 @@ def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: b
     spoken = after.foretold.get(both.words)
     assert spoken is (None if needed or second == "thermal_drift" else bump)
     assert chosen_of(after, "joint_nonlinear_stiffness" if spoken else second) is (spoken or both)
-    spoken_for = weighed(replace(after, foretold={both.words: bump}), {})
-    for result, word in ((weighed(replace(after, foretold={}), {}), second),
+    spoken_for = with_posterior(replace(after, foretold={both.words: bump}), {})
+    for result, word in ((with_posterior(replace(after, foretold={}), {}), second),
                          (spoken_for, "joint_nonlinear_stiffness")):  # fmt: skip
         assert result.probabilities[word] > 0.7
 
@@ -323,9 +323,9 @@ def test_what_is_linear_counts_as_it_moves_and_not_by_what_springs_leave_of_it()
     slant = explained([1], "load_misalignment", 0.0).parts
     drift = explained([1], "thermal_drift", 0.0).parts
     hidden = Sizes(np.array([1e-5, 0.0]), np.array([1e-5, 8e-6]), 0.0)
-    assert pettiness(e, lag + slant, hidden) == 0.0
-    assert pettiness(e, lag + drift, hidden) > 100
-    # nor is a spring that is off a trifle where the rig runs on
+    assert minor_parts(e, lag + slant, hidden) == 0.0
+    assert minor_parts(e, lag + drift, hidden) > 100
+    # nor is a spring that is off below the noise where the rig runs on
     force = 20.0 * np.arange(200.0)
     data = bench_data(force, 1e-5 * force, step=np.full(200, -1))
     bench = make_bench(data)
@@ -334,10 +334,12 @@ def test_what_is_linear_counts_as_it_moves_and_not_by_what_springs_leave_of_it()
         bench, base_columns(bench), bench.observed - prediction(bench), np.array([0.0, 1e-6])
     )
     spring = explained([0], "joint_stiffness_error", 0.0).parts
-    assert trifle(running, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0
-    assert trifle(running, spring, Sizes(np.zeros(1), np.array([1e-9]), 0.0)) > 20
+    assert below_noise(running, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0
+    assert below_noise(running, spring, Sizes(np.zeros(1), np.array([1e-9]), 0.0)) > 20
     beside = spring + drift  # a large one does not hide a small one
-    assert trifle(running, beside, Sizes(np.array([0.0, 1e-9]), np.array([1e-4, 1e-9]), 0.0)) > 20
+    assert (
+        below_noise(running, beside, Sizes(np.array([0.0, 1e-9]), np.array([1e-4, 1e-9]), 0.0)) > 20
+    )
 
 
 @pytest.mark.parametrize(("cycles", "swings"), [(1.0, False), (4.0, True)])
@@ -387,8 +389,8 @@ def test_what_moves_the_target_by_nothing_is_a_trifle_whoever_shows_it() -> None
     bench, variants, _ = of("load_misalignment", "rich")
     engine, noise = quick_engine(bench), bench.noise.stated
     part = (Part(variants[0], 1.0),)
-    assert trifle(engine, part, Sizes(np.zeros(1), np.array([0.05 * noise]), 0.0)) > 20
-    assert trifle(engine, part, Sizes(np.zeros(1), np.array([0.5 * noise]), 0.0)) == 0.0
+    assert below_noise(engine, part, Sizes(np.zeros(1), np.array([0.05 * noise]), 0.0)) > 20
+    assert below_noise(engine, part, Sizes(np.zeros(1), np.array([0.5 * noise]), 0.0)) == 0.0
 
 
 def test_a_path_that_may_take_any_way_is_no_effect_below_the_noise_of_a_sample() -> None:
@@ -400,7 +402,7 @@ def test_a_path_that_may_take_any_way_is_no_effect_below_the_noise_of_a_sample()
 
     def charged(v: Variant, size: float) -> float:
         one = np.array([size * noise])
-        return trifle(engine, (Part(v, 1.0),), Sizes(one, one, 0.0))
+        return below_noise(engine, (Part(v, 1.0),), Sizes(one, one, 0.0))
 
     assert charged(line, 0.8) == pytest.approx(20 * np.log(1 / 0.8))
     assert charged(free, 0.8) == pytest.approx((20 + 60) * np.log(1 / 0.8))

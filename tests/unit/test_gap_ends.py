@@ -11,7 +11,7 @@ from identification.gap.data import Array, GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part, Sizes
-from identification.gap.explanations.penalties import straight
+from identification.gap.explanations.penalties import unbent_curves
 from identification.gap.explanations.priors import prior_of
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.ends import after_break, without_ends
@@ -155,12 +155,12 @@ def test_a_line_far_off_that_bends_within_the_noise_is_a_spring(
     assert (alone.log_weight > found.found.explanations[0].log_weight - 8.0) == curve
     line = next(v for v in library(found.bench, list(alone.words)) if "line" in v.info["kinds"])
     sizes = Sizes(np.array([4e-6]), np.array([1.5e-4 if off > 1 else 1.5e-5]), 0.0)
-    assert (straight(found.engine, (Part(line, 1.0),), sizes) == 0.0) == curve
+    assert (unbent_curves(found.engine, (Part(line, 1.0),), sizes) == 0.0) == curve
     measured = diagnose_gap(recording(SPRING * np.linspace(0.0, 1e-3, 600))).engine
     assert measured.bench.noise.sure
     noise = measured.bench.noise.stated
     sizes = Sizes(np.array([0.4 * noise]), np.array([1.5e-4]), 0.0)
-    assert straight(measured, (Part(line, 1.0),), sizes) == 0.0
+    assert unbent_curves(measured, (Part(line, 1.0),), sizes) == 0.0
 
 
 def test_a_force_that_grows_while_the_reading_stands_is_no_hold() -> None:

@@ -20,8 +20,13 @@ from identification.gap.evidence.engine import (
     run_columns,
 )
 from identification.gap.evidence.imperfection import LOG_STEP, level_prior, log_share
-from identification.gap.evidence.parts import Part, log_joint_between, log_joints, mended
-from identification.gap.evidence.table import Table
+from identification.gap.evidence.parts import (
+    Part,
+    evidence_correction,
+    log_joint_between,
+    log_joints,
+)
+from identification.gap.evidence.table import EvidenceTable
 from identification.gap.explanations.explanation import conditioned
 from identification.gap.explanations.fit import _holds
 from identification.gap.explanations.priors import prior_of
@@ -124,8 +129,10 @@ def test_levels_that_are_not_looked_at_add_nothing(monkeypatch: pytest.MonkeyPat
             ("time_lag", [0], -np.ones(1)), ("contact_seating", [0, 1], np.array([1.0, -1.0])),
         )
     ]  # fmt: skip
-    looked, look = [], Table.look
-    monkeypatch.setattr(Table, "look", lambda self: (look(self), looked.append(self.logs))[0])
+    looked, look = [], EvidenceTable.look
+    monkeypatch.setattr(
+        EvidenceTable, "look", lambda self: (look(self), looked.append(self.logs))[0]
+    )
     few = [s.log_evidence for s in score(engine, engine.levels, shapes)]
     assert any(np.isneginf(logs).any() for logs in looked)
     looked.clear()
@@ -143,9 +150,11 @@ def test_far_worse_shapes_of_a_word_are_not_looked_at_further(
     near = variant("joint_creep", "near", [0], (2.0, 8.0))
     wrong = variant("joint_creep", "wrong", [1], (3.0, 30.0))
     shapes = [right, near, wrong]
-    looked, make = [], Table._make
+    looked, make = [], EvidenceTable._make
     monkeypatch.setattr(
-        Table, "_make", lambda self, i, which: (make(self, i, which), looked.extend(which))[0]
+        EvidenceTable,
+        "_make",
+        lambda self, i, which: (make(self, i, which), looked.extend(which))[0],
     )
     few = [s.log_evidence for s in score(engine, engine.levels, shapes)]
     assert few[0] > few[2] + 90
@@ -269,7 +278,7 @@ def test_effects_are_as_likely_together_in_whichever_order_they_are_added() -> N
         levels, energy = conditioned(engine, (one,))
         (scored,) = score(engine, levels, [other.variant], energy)
         together = log_joints(engine, (one, other))
-        off.append(mended(engine, (one, other), energy, together))
+        off.append(evidence_correction(engine, (one, other), energy, together))
         found.append(scored.log_evidence + off[-1])
     assert found[0] == pytest.approx(found[1], abs=1e-6)
     assert abs(off[0] - off[1]) > 0.1

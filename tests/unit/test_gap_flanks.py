@@ -14,7 +14,7 @@ from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, part_sizes
-from identification.gap.explanations.penalties import pettiness
+from identification.gap.explanations.penalties import minor_parts
 from identification.gap.laws.lost_motion import PLACED
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
@@ -254,7 +254,7 @@ def test_what_only_rubs_is_no_play_that_a_curve_takes_back(column: int, plays: b
     found = part_sizes(engine, parts, 0)
     assert found.signed == (plays, True)
     alike = replace(found, gap=np.array([1e-5, 1e-5]), moved=np.array([1e-5, 1e-5]))
-    assert (pettiness(engine, parts, alike) > 5e3) == (not plays)
+    assert (minor_parts(engine, parts, alike) > 5e3) == (not plays)
     on_arm = copy(engine)
     on_arm.bench = replace(bench, data=replace(bench.data, arm=True))
-    assert pettiness(on_arm, parts, alike) < 5e3
+    assert minor_parts(on_arm, parts, alike) < 5e3

@@ -17,7 +17,7 @@ from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, Sizes, _beyond_springs
 from identification.gap.evidence.signs import Limits, log_odds
-from identification.gap.explanations.penalties import straight, trifle, within_stated
+from identification.gap.explanations.penalties import below_noise, unbent_curves, within_stated
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
@@ -117,12 +117,12 @@ def test_a_curve_that_hardly_bends_is_a_wrong_spring(bench: Bench) -> None:
     one = (Part(curve, 1.0),)
 
     def charge(gap: float) -> float:
-        return straight(engine, one, Sizes(np.array([gap]), np.array([1e-4]), 0.0))
+        return unbent_curves(engine, one, Sizes(np.array([gap]), np.array([1e-4]), 0.0))
 
     assert charge(1e-5) == 0.0
     assert charge(1e-6) == pytest.approx(60 * np.log(4))
     spring = (Part(of(bench, "joint_stiffness_error")[1]["joint 1"], 1.0),)
-    assert straight(engine, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0
+    assert unbent_curves(engine, spring, Sizes(np.zeros(1), np.array([1e-4]), 0.0)) == 0.0
 
 
 @pytest.mark.parametrize("word", ["force_scale", "displacement_scale"])
@@ -175,7 +175,7 @@ def test_at_rest_no_mechanism_far_below_the_noise_is_named(bench: Bench) -> None
 
     def charge(words: list[str], sizes: list[float]) -> float:
         gap = np.array(sizes) * noise
-        return trifle(engine, tuple(found[w] for w in words), Sizes(gap, 1e3 * gap, 0.0))
+        return below_noise(engine, tuple(found[w] for w in words), Sizes(gap, 1e3 * gap, 0.0))
 
     for what in ("joint_hysteresis", "gain that bends", "gain that changes at 0.45"):
         assert charge([what], [0.25]) == pytest.approx(60 * np.log(2))

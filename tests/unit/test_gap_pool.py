@@ -14,7 +14,7 @@ from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence import compare
 from identification.gap.evidence.compare import score
-from identification.gap.evidence.table import Table
+from identification.gap.evidence.table import EvidenceTable
 from identification.gap.model.bench import make_bench
 from identification.gap.model.growing import Growing
 from identification.gap.model.pool import Pool
@@ -52,13 +52,13 @@ def test_one_shape_under_several_names_is_scored_once(monkeypatch: pytest.Monkey
     other = replace(shapes[0], root=2 * shapes[0].root)
     engine, looked = small_engine(bench), []
 
-    class Counted(Table):
+    class Counted(EvidenceTable):
         def limit(self) -> None:
             looked.append(len(self._columns))
             super().limit()
 
     plain = score(engine, engine.levels, shapes)
-    monkeypatch.setattr(compare, "Table", Counted)
+    monkeypatch.setattr(compare, "EvidenceTable", Counted)
     engine.stacks.clear()
     both = score(engine, engine.levels, [*shapes, *twins, other])
     assert [s.variant for s in both] == [*shapes, *twins, other]

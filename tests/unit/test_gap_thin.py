@@ -12,7 +12,7 @@ import pytest
 
 from identification.gap import diagnose as module
 from identification.gap.diagnose import diagnose_gap
-from identification.gap.explanations.explanation import Explanation, Found
+from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.imposed import displacement_imposed
 from rig.dataset import Origin, load
@@ -120,7 +120,7 @@ def test_what_asks_for_too_much_without_any_effect_is_told_so(
     asks = "the stiffness of a joint 7 standard deviations off what META states"
     monkeypatch.setattr(module, "what_is_strained", lambda *_: asks)
     nothing = Explanation((), 0.0, 0.0, (), 0.0)
-    found = cast("Found", SimpleNamespace(engine=engine, explanations=(nothing,)))
+    found = cast("SearchResult", SimpleNamespace(engine=engine, explanations=(nothing,)))
     (note,) = module._disbelieved(found, "unknown")
     assert note.text.startswith(f"Without any effect, the best fit asks for {asks}: it was not")
 

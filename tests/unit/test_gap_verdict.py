@@ -28,7 +28,7 @@ from identification.gap.explanations.verdict import (
     _heir,
     _main,
     _tells_of_three,
-    weighed,
+    with_posterior,
 )
 from identification.gap.judging.choice import chosen_of, foresees
 from identification.gap.judging.leftover import looked_up
@@ -110,20 +110,20 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         sizes = (1e-5, 0.5e-5, 1e-5 * least)[: len(parts)]
         one = replace(found, explanations=(said(parts, sizes, 0.0, OFF),), unknown=-800.0, alone={})
         doubted = BENCH_DOUBT * share * max(0.0, 2 * share - 1) / 2  # the other half is `none`'s
-        found_out = weighed(one, {}).probabilities["unknown"]
+        found_out = with_posterior(one, {}).probabilities["unknown"]
         assert found_out == pytest.approx(share - doubted)
     # where three laws fit to the noise there is less room for another
     noise = found.engine.bench.noise.stated
     for eta, unknown in ((1.9 * noise, 1 - THREE_CLOSELY), (2.1 * noise, 1 - THREE)):
         one = replace(found, explanations=(said(three, (1e-5, 5e-6, 3e-6), 0.0, eta),),
                       unknown=-800.0, alone={})  # fmt: skip
-        assert weighed(one, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
+        assert with_posterior(one, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
     # two of them explain nearly as much: then they are meant, whatever the third does
     third = said(three, (1e-5, 1e-5, 5e-6), 0.0, OFF)
     for worth, unknown in ((TAKES_MORE - 1, 0.0), (TAKES_MORE + 1, 0.9)):
         two = said(three[1:], (2e-5, 1e-6), -worth)
         both = replace(found, explanations=(third, two), unknown=-800.0, alone={})
-        p = weighed(both, {}).probabilities
+        p = with_posterior(both, {}).probabilities
         assert p["unknown"] == pytest.approx(unknown, abs=0.1)
         assert (p["thermal_drift"] > 0.9) == (unknown == 0)
     # of a gap that stands out far, what the laws of two are off asks for more
@@ -131,7 +131,7 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
     for share, unknown in ((0.9, 0.0), (1.1, 0.9)):
         two = said(three[1:], (2e-5, 1e-6), -share * LAW_REMAINDER**2 * 1e6)
         both = replace(found, explanations=(third, two, none), unknown=-1e5, alone={})
-        assert weighed(both, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
+        assert with_posterior(both, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
 
 
 def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> None:
@@ -144,9 +144,9 @@ def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> N
         for worth in (most - 1, most + 1):
             pair, one = said((gain, second), (3e-5, 3e-6)), said((second,), (1e-5,), -worth)
             both = replace(found, explanations=(pair, one), unknown=-800.0, alone={})
-            weights = weighed(replace(both, engine=on_arm), {}).probabilities
+            weights = with_posterior(replace(both, engine=on_arm), {}).probabilities
             assert (weights[second.word] > 0.99) == (worth < most)
-            assert weighed(both, {}).probabilities["force_scale"] > 0.9  # of a bench
+            assert with_posterior(both, {}).probabilities["force_scale"] > 0.9  # of a bench
             shown = chosen_of(replace(both, engine=on_arm), second.word)
             assert shown is (one if worth < most else pair)
 
@@ -223,7 +223,7 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
         engine = replace_bench(found.engine, replace(bench, data=data))
         one = said(law, (1e-5,), -20.0, eta)
         whole = replace(found, engine=engine, explanations=(one,), unknown=0.0, alone={})
-        given = weighed(whole, {}).probabilities
+        given = with_posterior(whole, {}).probabilities
         if unknown is None:
             odds = np.log(given["joint_creep"] / given["unknown"])
             assert odds == pytest.approx(EXPLAINED, abs=0.2)
@@ -231,7 +231,7 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
             assert given["unknown"] == pytest.approx(unknown, abs=1e-6)
     failed = {frozenset({"joint_creep"}): 0.1}
     whole = replace(found, explanations=(said(law, (1e-5,), -20.0, noise),), unknown=0.0, alone={})
-    assert weighed(whole, failed).probabilities["unknown"] == pytest.approx(sure, abs=1e-6)
+    assert with_posterior(whole, failed).probabilities["unknown"] == pytest.approx(sure, abs=1e-6)
 
 
 def test_what_no_word_names_is_unknown_unless_a_word_explains_it_as_well() -> None:
@@ -248,7 +248,7 @@ def test_what_no_word_names_is_unknown_unless_a_word_explains_it_as_well() -> No
         word = said((creep,), (1e-5,), -20.0, eta)
         odd = said(parts, (1e-5, 0.5e-5)[: len(parts)], 20.0, 0.0)
         whole = replace(found, explanations=(word,), nameless=(odd,), unknown=-90.0, alone={})
-        given = weighed(whole, {}).probabilities
+        given = with_posterior(whole, {}).probabilities
         assert max(given, key=lambda w: given[w]) == main
         assert given.keys() == found.probabilities.keys()
 
@@ -291,14 +291,14 @@ def test_a_sure_verdict_gives_a_little_away_on_a_bench_more_of_it(arm: bool, mos
     sure = said((part("joint_creep", [0]),), (1e-5,), 0.0)
     alone = {"joint_creep": 0.0, "joint_hysteresis": 0.0}
     one = replace(found, engine=engine, explanations=(sure,), unknown=-800.0, alone=alone)
-    given = weighed(one, {}).probabilities
+    given = with_posterior(one, {}).probabilities
     # half of it goes to `unknown`, half to all words alike; on a bench that and `none` are of these
     each = 0.5 * most / (2 if arm else 4)
     assert given["joint_creep"] == pytest.approx(1 - most + each)
     assert given["unknown"] == pytest.approx(0.5 * most + (0.0 if arm else each))
     nothing = replace(sure, parts=(), sizes=())
     one = replace(found, engine=engine, explanations=(nothing,), unknown=-800.0, alone=alone)
-    none = weighed(one, {}).probabilities["none"]
+    none = with_posterior(one, {}).probabilities["none"]
     assert none == pytest.approx(1.0 if arm else 1 - most + each)
 
 

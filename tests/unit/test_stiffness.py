@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from identification.curve import Curve, Point
 from identification.estimate import Choice, gain_effect, stated_uncertainty, stiffness
-from identification.levels import Table
+from identification.levels import LevelTable
 from identification.stiffness import Options, Stiffness, analyze_curve, ratio
 
 LEVELS = (20.0, 40.0, 60.0, 80.0, 100.0)
@@ -42,9 +42,9 @@ def unloading(c: Curve, law: Callable[[float], float], remaining: float) -> Curv
     return replace(c, points=(*c.points, *back, *ends))
 
 
-def table(force: Sequence[float], displacement: Sequence[float]) -> Table:
+def table(force: Sequence[float], displacement: Sequence[float]) -> LevelTable:
     n = len(force)
-    return Table(
+    return LevelTable(
         np.array(force), np.array(displacement), np.full(n, 0.1), np.full(n, 1e-9),
         np.full(n, np.nan),
     )  # fmt: skip
@@ -97,7 +97,7 @@ def test_a_single_repetition_falls_back_on_what_was_stated() -> None:
 
 def test_the_stated_uncertainty_of_one_level_is_that_of_its_secant() -> None:
     """u(k) / k = sqrt((u_F / F)^2 + (u_u / u)^2)."""
-    one = Table(*(np.array([v]) for v in (50.0, 5e-4, 0.5, 1e-6, np.nan)))
+    one = LevelTable(*(np.array([v]) for v in (50.0, 5e-4, 0.5, 1e-6, np.nan)))
     expected = 1e5 * math.hypot(0.01, 0.002)
     assert stated_uncertainty(one, Choice()) == pytest.approx(expected, rel=1e-4)
 
@@ -107,7 +107,7 @@ def test_the_stated_uncertainty_of_many_levels_agrees_with_that_of_few() -> None
 
     def stated(n: int) -> float:
         force = np.linspace(10.0, 100.0, n)
-        many = Table(force, force / 1e5, np.full(n, 0.1), np.full(n, 1e-6), np.full(n, np.nan))
+        many = LevelTable(force, force / 1e5, np.full(n, 0.1), np.full(n, 1e-6), np.full(n, np.nan))
         return stated_uncertainty(many, Choice("none", intercept=True)) * math.sqrt(n)
 
     assert stated(201) == pytest.approx(stated(200), rel=0.005)
@@ -342,7 +342,7 @@ def test_noise_does_not_make_k_larger(share: float, bend: float) -> None:
     noise = np.full(11, share * true[0])
     rng = np.random.default_rng(1)
     ks = [
-        stiffness(Table(force, u, noise / 50, noise, np.full(11, np.nan)), Choice())
+        stiffness(LevelTable(force, u, noise / 50, noise, np.full(11, np.nan)), Choice())
         for u in true + noise * rng.standard_normal((2000, 11))
     ]
     error = float(np.mean(ks)) / stiffness(table(force, true), Choice()) - 1

@@ -27,8 +27,8 @@ from identification.gap.answer.twins import PLACE, twin_of
 from identification.gap.data import Array, GapData
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.compare import Scored, log_mean, score
-from identification.gap.evidence.engine import Engine, Level, eta_levels
-from identification.gap.explanations.explanation import Explanation, Found
+from identification.gap.evidence.engine import Engine, NoiseLevel, eta_levels
+from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.laws.flows import make
 from identification.gap.laws.law import Law
@@ -84,7 +84,7 @@ Others = Callable[[], Sequence[Elsewhere]]
 
 
 def next_measurement(
-    found: Found,
+    found: SearchResult,
     variants: Sequence[Variant],
     chosen: Explanation,
     pair: tuple[str, str],
@@ -162,7 +162,7 @@ def _nats(value: float) -> str:
 
 
 def _rival(
-    found: Found, variants: Sequence[Variant], chosen: Explanation, first: str, word: str
+    found: SearchResult, variants: Sequence[Variant], chosen: Explanation, first: str, word: str
 ) -> _Rival | None:
     """The explanation with `word` in the place of `first`, else by itself."""
     wanted = (chosen.words - {first}) | {word}
@@ -182,7 +182,9 @@ def _rival(
     return _Rival(word, tuple(forms), _springs(engine, fitted), shapes)
 
 
-def _same_elsewhere(found: Found, chosen: Explanation, first: _Rival, word: str) -> _Rival | None:
+def _same_elsewhere(
+    found: SearchResult, chosen: Explanation, first: _Rival, word: str
+) -> _Rival | None:
     """The first explanation's law at the other word's place, where the data see no difference."""
     part = next((p for p in chosen.parts if p.word == first.word), None)
     if part is None or word not in ("joint_yield", "base_slip"):
@@ -256,7 +258,7 @@ def _discrimination(bench: Bench, design: Design, rivals: tuple[_Rival, _Rival])
     return float(min(won))
 
 
-def _told(level: Level, place: int) -> Level:
+def _told(level: NoiseLevel, place: int) -> NoiseLevel:
     """The level of a bench on which nothing was observed, had the pool's column been observed."""
     moment = level.beside([place])[0]
     misfit = float(moment[place])

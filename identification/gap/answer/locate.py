@@ -11,7 +11,7 @@ from identification.gap.data import BRANCH_NAMES, Array, Flags
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import Fit
 from identification.gap.model.variants import Variant
-from identification.gap.words import INSTRUMENTS, LINEAR
+from identification.gap.words import INSTRUMENTS, LINEAR, SPRINGS
 
 _SHOWS = 0.15  # an effect shows where it reaches this share of its largest part
 
@@ -118,7 +118,7 @@ def _joints(engine: Engine, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]
             continue
         if "joint" in p.variant.info:
             out.append(int(p.variant.info["joint"]) + 1)
-        elif "joints" in p.variant.info and p.word == "joint_stiffness_error":
+        elif "joints" in p.variant.info and p.word == SPRINGS:
             w, cov = fit.of(i)
             part = np.abs(w) * _size_of_each(engine, p.variant)
             shows = (np.abs(w) > 2 * np.sqrt(np.diag(cov))) & (part >= _SHOWS * part.max())

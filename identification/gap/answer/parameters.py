@@ -20,7 +20,7 @@ from __future__ import annotations
 from identification.gap.data import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
-from identification.gap.laws.interval import NOMINAL, Found, Parameter, Softer
+from identification.gap.laws.interval import NOMINAL, Coefficients, Parameter, Softer
 from identification.gap.model.bench import Bench
 
 
@@ -29,4 +29,4 @@ def parameters(
 ) -> dict[str, Parameter]:
     """Named parameters of one part; units are written out in the result. w (k,), cov (k, k): its
     coefficients and their covariance; softer: what the springs turned out to be."""
-    return EFFECTS[part.word].parameters(bench, part.variant, Found(w, cov, softer))
+    return EFFECTS[part.word].parameters(bench, part.variant, Coefficients(w, cov, softer))

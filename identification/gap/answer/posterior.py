@@ -19,7 +19,7 @@ from identification.gap.evidence.imperfection import IMPERFECTION, STEP, level_p
 from identification.gap.evidence.parts import Part, energies, log_joints, part_sizes, signs_kept
 from identification.gap.explanations.explanation import Explanation, conditioned
 from identification.gap.explanations.fit import Fit, fit
-from identification.gap.explanations.penalties import SAME_JOINT, pettiness
+from identification.gap.explanations.penalties import SAME_JOINT, minor_parts
 from identification.gap.explanations.several import family_of
 from identification.gap.laws.interval import Parameter, Softer, from_zero
 from identification.gap.model.variants import Variant, place_of
@@ -296,7 +296,7 @@ def _open(engine: Engine, variants: list[Variant], chosen: Explanation, index: i
 def _petty(engine: Engine, parts: tuple[Part, ...], level: int) -> float:
     """Nats that a set of effects is charged where one of them does next to nothing: what has moved
     to another joint must still be an effect there."""
-    return pettiness(engine, parts, part_sizes(engine, parts, level)) if len(parts) > 1 else 0.0
+    return minor_parts(engine, parts, part_sizes(engine, parts, level)) if len(parts) > 1 else 0.0
 
 
 def _representatives(scored: list[Scored]) -> list[tuple[Scored, float]]:

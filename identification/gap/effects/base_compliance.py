@@ -20,7 +20,7 @@ import numpy as np
 from identification.gap.data import Array
 from identification.gap.laws.curves import hinge
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -127,7 +127,7 @@ def bent_column(bench: Bench, m: Array, beyond: float) -> Array:
     return bench.outside_column(m * hinge(m * bench.load, beyond))
 
 
-def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     return {
         f"compliance_about_{'xyz'[a]}": found.one(i, "rad/Nm") for i, a in enumerate(v.info["axes"])
     }

@@ -21,7 +21,7 @@ from identification.gap.effects.base_compliance import moments
 from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.flows import Flow
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.knees import knee_at, knee_variants
 from identification.gap.laws.knees_law import flow_of, law_of_knee, states_of
 from identification.gap.laws.law import Law, Laws
@@ -114,7 +114,7 @@ def _name(info: dict[str, Any]) -> str:
     return f"axis {info['axis']} {info['depth_m']:g} m below"
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     return of_knee(bench, v, found, _named)
 
 

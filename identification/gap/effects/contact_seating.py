@@ -20,7 +20,7 @@ import numpy as np
 from identification.gap.data import Array, Flags
 from identification.gap.laws.closer import Word, closing_in
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -242,7 +242,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     return [_slack(bench, law, w, 1 / len(FINER)) for w in wide]
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     f0, top = float(v.info["force_N"]), float(np.abs(bench.load).max())
     scales = v.info["laws"]
     at_top = np.array([LAWS[law](np.array(top / scale)) for law, scale in scales])

@@ -33,7 +33,7 @@ from identification.gap.laws.drift import (
 )
 from identification.gap.laws.drift_law import OF_SESSION, law_of_path, path_of
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -205,7 +205,7 @@ def _tared(bench: Bench, path: Array) -> Array:
     return np.asarray(path - path[starts][np.cumsum(bench.rows.starts) - 1])
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     return changes(bench, v, found, "N")
 
 

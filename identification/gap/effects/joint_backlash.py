@@ -33,7 +33,7 @@ from identification.gap.data import Array, Flags
 from identification.gap.laws import lost_motion_law
 from identification.gap.laws.closer import Word, closing_in, nearly_leads, places, seen
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter, normal
+from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Laws
 from identification.gap.laws.lost_motion import (
     HELD,
@@ -324,7 +324,7 @@ def _resting(bench: Bench, joint: int, places: dict[bytes, list[int]]) -> list[i
     return places[b"rest"]
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """What nobody reached of a play was taken to be as the shape has it: a rectangular
     distribution, from nothing to twice that (GUM 4.3.7)."""
     arm = bench.data.arm

@@ -23,7 +23,7 @@ import numpy as np
 from identification.gap.data import Array, Flags
 from identification.gap.laws.curves import BENT_SLOPE
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import ANEW, Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import half_sample, retarded, row_time
@@ -135,7 +135,7 @@ def bent(load: Array) -> Array:
     return np.asarray(load * np.abs(load) / (float(np.abs(load).max()) or 1.0))
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     times, seconds = np.asarray(v.info["times_s"]), run_seconds(bench)
     whole = in_session(bench, times)
     power = np.maximum(found.w, 0.0)

@@ -39,7 +39,7 @@ from identification.gap.laws.friction_law import (
     SLIPPING,
     by_ratio,
 )
-from identification.gap.laws.interval import Found, Parameter, from_zero
+from identification.gap.laws.interval import Coefficients, Parameter, from_zero
 from identification.gap.laws.law import Laws
 from identification.gap.laws.specimens import with_other_springs
 from identification.gap.model.bench import Bench
@@ -337,7 +337,7 @@ def _exponential(
     return out
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Of the strengths that slip, which takes a load beyond them, and of those near the largest one
     the less the less they do; of friction in proportion to the load, at the largest one."""
     radius, joint = np.asarray(v.info["radius"]), int(v.info["joint"])

@@ -21,7 +21,7 @@ from identification.gap.evidence.engine import NEIGHBOUR
 from identification.gap.laws.closer import Word, closing_in
 from identification.gap.laws.curves import above, beyond, hinge
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import TOOL_KG, Bench
 from identification.gap.model.variants import Variant, smooth_root, variant
@@ -278,7 +278,7 @@ def _finely(bench: Bench, j: int, top: float) -> tuple[tuple[float, ...], list[i
     return places, [bench.add_joint(j, c * hinge(x, b)) for b in places]
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """What the compliance at the largest torque has more than at none: a hinge adds itself, a
     power its exponent, a line nothing."""
     grows = {"line": 0.0, "quadratic": 2.0, "even": 2.0, "cubic": 3.0}

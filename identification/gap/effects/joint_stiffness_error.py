@@ -18,7 +18,7 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import LEAST_FACTOR, Found, Parameter
+from identification.gap.laws.interval import LEAST_FACTOR, Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -67,7 +67,7 @@ def variants(bench: Bench) -> list[Variant]:
     return out
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Factor on the stiffness: of compliance where force is imposed, else of force. The spring it
     acts on is known to its stated relative sd only, by which the factor can be told no better."""
     out = {}

@@ -27,7 +27,7 @@ from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.flow_back import flowing_back
 from identification.gap.laws.flows import Flow
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.knees import (
     SCALES,
     THRESHOLDS,
@@ -106,7 +106,7 @@ def _under_weight(
 _PUSHED = 0.2  # of the joint's largest torque: so far beyond its weight some push must go
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     return of_knee(bench, v, found, _named)
 
 

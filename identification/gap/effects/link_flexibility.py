@@ -18,7 +18,7 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -66,7 +66,7 @@ def _placed(bench: Bench, links: Array, placed: str) -> list[Variant]:
     return out
 
 
-def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Of bending the mean along the segment, as an even tube has it."""
     shares = {"bending": [*BENDING.values(), 0.0], "twist": [*np.zeros(len(BENDING)), 1.0]}
     out, segments = {}, v.info["segments"]

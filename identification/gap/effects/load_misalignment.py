@@ -22,7 +22,7 @@ import numpy as np
 from identification.gap.data import Array, Flags, Setup
 from identification.gap.laws.closer import about_springs
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term, along, in_pose, triple
 from identification.gap.model.base import MOST_CROSSTALK
 from identification.gap.model.bench import Bench
@@ -225,7 +225,7 @@ def gives(bench: Bench, load: Array) -> Array:
     return bench.outside_column(bench.stated_slope * load)
 
 
-def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Tangents at the largest load, as it was come to; of single runs their mean."""
     info = v.info
     names, count = list(info["directions"]), len(info["shapes"][0])

@@ -28,7 +28,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import conditioned
 from identification.gap.laws.closer import Estimate, Word, estimate, evidence
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term, triple
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -189,7 +189,7 @@ def _variant(
     )  # fmt: skip
 
 
-def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Tool offset, angles of the joints, turn of the base."""
     kind = v.info["kind"]
     out: dict[str, Parameter] = {}

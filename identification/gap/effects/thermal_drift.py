@@ -30,7 +30,7 @@ from identification.gap.laws.drift import (
 )
 from identification.gap.laws.drift_law import OF_SESSION, law_of_path, path_of
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term, along
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import followed
@@ -110,7 +110,7 @@ def _lags(bench: Bench) -> Array:
     return lags[lags > _SEEN * bench.course.session_span / bench.rows.n]
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     return changes(bench, v, found, "mm", 1e3)
 
 

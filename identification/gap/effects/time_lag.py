@@ -21,7 +21,7 @@ import numpy as np
 from identification.gap.data import Array
 from identification.gap.laws.closer import Word, closing_in, shows
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter, normal
+from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import (
@@ -243,7 +243,7 @@ _SETTLED, _ON_THE_WAY = 0.02, 0.2
 _HOLDS_BACK = 0.05  # of a sample's weight: keeps what nobody saw from running away
 
 
-def _parameters(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Mean delay. Readings do not change in proportion to a lag (one shorter than the wait before
     a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
     is read as the lag of every kind that does the same, each the more the closer it comes."""

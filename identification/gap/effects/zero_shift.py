@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -44,7 +44,7 @@ def variants(bench: Bench) -> list[Variant]:
     return out
 
 
-def _parameters(_: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     if len(found.w) == 1:
         run = v.info["runs"][0] + 1
         return {f"shift_before_run{run}": found.one(0, "mm", 1e3)}

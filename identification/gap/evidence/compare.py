@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.gap.data import Array, Ints
-from identification.gap.evidence.engine import Engine, Level
+from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.imperfection import IMPERFECTION, LAW_IMPERFECTION
 from identification.gap.evidence.products import squares_of
 from identification.gap.evidence.signs import Limits
-from identification.gap.evidence.table import Stack, Table
+from identification.gap.evidence.table import EvidenceTable, Stack
 from identification.gap.model.variants import Variant
 from identification.gap.words import LINEAR
 
@@ -31,7 +31,7 @@ class Scored(NamedTuple):
 
 
 def score(
-    engine: Engine, levels: list[Level], variants: list[Variant], already: float = 0.0
+    engine: Engine, levels: list[NoiseLevel], variants: list[Variant], already: float = 0.0
 ) -> list[Scored]:
     """Evidence of every variant on top of `levels` (base, or base and an effect already chosen).
 
@@ -62,11 +62,11 @@ def _size(k: int) -> int:
 
 
 def _score_batch(
-    engine: Engine, levels: list[Level], families: list[list[Variant]], k: int, already: float
+    engine: Engine, levels: list[NoiseLevel], families: list[list[Variant]], k: int, already: float
 ) -> dict[Variant, tuple[float, float, int]]:
     """Of variants with up to k coefficients each, word by word: log evidence, scale and level that
     contribute most."""
-    table = Table(engine, levels, [_stack(engine, tuple(f), k) for f in families], already)
+    table = EvidenceTable(engine, levels, [_stack(engine, tuple(f), k) for f in families], already)
     table.look()
     table.limit()
     batch = [v for family in families for v in family]
@@ -119,7 +119,7 @@ def imperfect(variant: Variant) -> Array:
     return share
 
 
-def condition(level: Level, columns: tuple[int, ...], root: Array, scale: float) -> Level:
+def condition(level: NoiseLevel, columns: tuple[int, ...], root: Array, scale: float) -> NoiseLevel:
     """The level with an effect of fixed scale integrated out as well."""
     c = np.array(columns)
     T = scale * root

@@ -40,7 +40,7 @@ LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class NoiseLevel:
     """Pool and data with the base integrated out, for one size of imperfection eta (m), the
     `number`th of its engine.
 
@@ -100,7 +100,7 @@ class Engine:
         self._gathered = Gathered(self._whiten(self.columns([])))
         none = np.zeros(0)
         self.levels = [
-            Level(self, i, float(eta), none, b.log_base, b.misfit, np.zeros((0, 0)))
+            NoiseLevel(self, i, float(eta), none, b.log_base, b.misfit, np.zeros((0, 0)))
             for i, (eta, b) in enumerate(zip(etas, self._bases, strict=True))
         ]
         self.extend()
@@ -254,7 +254,7 @@ class Engine:
         none = Growing(np.zeros((0, kb + count)))
         return _Integrated(turn, left, log_base, misfit, none)
 
-    def _grown(self, level: Level, beside: Array) -> Level:
+    def _grown(self, level: NoiseLevel, beside: Array) -> NoiseLevel:
         """A level with further columns, of which the products (c, p) with its base are known."""
         i = level.number
         base = self._bases[i]
@@ -285,7 +285,7 @@ def _groups(noise: Array) -> tuple[slice, ...]:
 class _Integrated:
     """Turn (k, k): the prior root of base and imperfection over the Cholesky factor of their
     precision, `L^-1 root^T`; what the target (k,) and the pool (p, k) share with them, evidence of
-    the base alone, and its misfit (as of a `Level`)."""
+    the base alone, and its misfit (as of a `NoiseLevel`)."""
 
     turn: Array
     left: Array

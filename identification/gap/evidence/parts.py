@@ -8,12 +8,12 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.evidence.compare import imperfect, logsumexp, mean_squares
-from identification.gap.evidence.engine import Engine, Level
+from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.imperfection import level_priors
 from identification.gap.evidence.signs import Limits, all_kept, log_odds
 from identification.gap.model.variants import Variant, block
-from identification.gap.words import DRIFTS, LINEAR
+from identification.gap.words import BETWEEN_RUNS, LINEAR
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     precision = float(np.sum(1 / engine.sigma[: rows.n] ** 2))
     sizes, moves, signed, energy, start = [], [], [], 0.0, 0
     linear = np.zeros(rows.n)
-    between = sum(p.word in _BETWEEN_RUNS for p in parts)  # of two, one may undo the other
+    between = sum(p.word in BETWEEN_RUNS for p in parts)  # of two, one may undo the other
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
@@ -75,7 +75,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
             mine = slice(start, start + k)
             structural = float(part @ plain[mine, mine] @ part) / precision
             size = max(structural, 0.0) ** 0.5
-            if p.word in _BETWEEN_RUNS and between == 1:
+            if p.word in BETWEEN_RUNS and between == 1:
                 size = max(size, _beyond_scatter(engine, moved))
             sizes.append(min(size, moves[-1]))
         energy += rows.rms(faulty) ** 2
@@ -134,10 +134,9 @@ def _beyond_scatter(engine: Engine, moved: Array) -> float:
 
 
 _SCATTERS = 3.0
-_BETWEEN_RUNS = DRIFTS | {"zero_shift"}
 
 
-def signs_kept(level: Level, parts: tuple[Part, ...]) -> float:
+def signs_kept(level: NoiseLevel, parts: tuple[Part, ...]) -> float:
     """log of the odds that every part keeps the sign physics wants, all fitted together."""
     columns = [c for p in parts for c in p.variant.columns]
     root = block([p.root for p in parts])
@@ -201,7 +200,9 @@ def _energies_each(engine: Engine, parts: tuple[Part, ...]) -> Array:
     return np.asarray(np.add.reduceat(squares, starts, axis=1))
 
 
-def mended(engine: Engine, parts: tuple[Part, ...], taken: float, joint: Array) -> float:
+def evidence_correction(
+    engine: Engine, parts: tuple[Part, ...], taken: float, joint: Array
+) -> float:
     """Nats by which the last part's evidence beside the others is off, if these were taken to have
     a mean square of `taken` (m^2), as without it: what a law tries to do alone is not what it does
     beside another one, and by that its imperfection is judged. joint (l,): `log_joints` of all."""

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.gap.data import Array, Flags, Ints
-from identification.gap.evidence.engine import Engine, Level
+from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.imperfection import log_level
 from identification.gap.evidence.signs import Limits, log_odds, log_odds_together, padded
 
@@ -41,7 +41,7 @@ class Stack:
     alike: Array
     squares: dict[int, Array] = field(default_factory=dict)
 
-    def at(self, level: Level) -> Array:
+    def at(self, level: NoiseLevel) -> Array:
         """Products (v, k, k) of the columns at a level, but for what effects take there."""
         if level.number not in self.squares:
             made = level.engine.squares(self.columns, level.number, self.alike)
@@ -49,11 +49,11 @@ class Stack:
         return self.squares[level.number]
 
 
-class Table:
+class EvidenceTable:
     """logs (l, v, s): log evidence by level, variant and scale, -inf where it can't count."""
 
     def __init__(
-        self, engine: Engine, levels: list[Level], stacks: list[Stack], already: float
+        self, engine: Engine, levels: list[NoiseLevel], stacks: list[Stack], already: float
     ) -> None:
         """stacks: of several words, one after the other. already: mean square (m^2) of the effects
         that the levels contain."""
@@ -147,7 +147,7 @@ class Table:
         self._seen[i, which] = True
         self._bound(i, which, fit.max(axis=1), level.misfit - taken.max(axis=1))
 
-    def _gram(self, level: Level, which: Ints, root: Array) -> Array:
+    def _gram(self, level: NoiseLevel, which: Ints, root: Array) -> Array:
         """Products (w, k, k) of unit coefficients of some variants."""
         ends = pairwise(np.searchsorted(which, self._edges))
         part = np.concatenate([

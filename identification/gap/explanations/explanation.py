@@ -11,24 +11,24 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.evidence.compare import condition
-from identification.gap.evidence.engine import Engine, Level
+from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.imperfection import level_prior, level_priors
 from identification.gap.evidence.parts import (
     Part,
     Sizes,
     energies,
+    evidence_correction,
     log_joints,
-    mended,
     needed,
     part_sizes,
     signs_kept,
 )
 from identification.gap.explanations.penalties import (
     TOE_AND_KNEE,
+    below_noise,
     cancelling,
-    pettiness,
-    straight,
-    trifle,
+    minor_parts,
+    unbent_curves,
     within_stated,
 )
 from identification.gap.explanations.priors import prior_of
@@ -103,7 +103,7 @@ class Likeness:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SearchResult:
     """What the search found: explanations (best first), evidence of the words alone (nats, against
     none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
     gap that no law explains, what share of its weight withheld data leave an explanation, and what
@@ -134,7 +134,7 @@ def explain(
     bases = log_joints(engine, parts)
     likeliest = int(bases.argmax())
     sizes = part_sizes(engine, parts, likeliest)
-    each, energy = _counted(engine, parts, sizes, likeliest), sizes.energy
+    each, energy = _ranking_sizes(engine, parts, sizes, likeliest), sizes.energy
     together = _together(parts, each)
     logs = bases + [level_prior(engine.etas, i, energy) for i in range(len(levels))]
     best = int(logs.argmax())
@@ -148,12 +148,12 @@ def explain(
     fraction = float(share @ good / share.sum())
     order = _order(parts, each)
     if taken is not None:
-        log_evidence += mended(engine, parts, taken, bases)
+        log_evidence += evidence_correction(engine, parts, taken, bases)
     weight = log_evidence + prior_of(frozenset(p.word for p in parts), engine.bench)
-    weight -= trifle(engine, parts, sizes) + straight(engine, parts, sizes)
+    weight -= below_noise(engine, parts, sizes) + unbent_curves(engine, parts, sizes)
     weight -= within_stated(engine, parts, sizes)
     if len(parts) > 1:
-        weight -= pettiness(engine, parts, sizes) + cancelling(engine, parts, sizes, each)
+        weight -= minor_parts(engine, parts, sizes) + cancelling(engine, parts, sizes, each)
         weight += signs_kept(levels[best], parts)
     return Explanation(
         tuple(parts[i] for i in order),
@@ -164,52 +164,68 @@ def explain(
     )
 
 
-def _counted(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) -> Array:
-    """Sizes of the parts. Without an arm friction brings its own mean stiffness, and what was
-    simulated may be its first slope: a spring that is off beside it counts by what the friction
-    leaves of the gap, and for less than the friction where it would move more than was measured
-    and the friction takes it back. A toe and a knee count as they move: what a spring would hide of
-    either, the other shows; but a ball on a plate is no toe, and goes on like a spring. Of an
-    imposed stroke creep, too, brings a mean stiffness, and what a spring leaves of either says
-    little: the larger is the one that the other can do less without; at one rate the friction, from
-    which creep differs in details only. Where most of the way is left when the load is gone, what
-    gives way is larger than any curve."""
+def _ranking_sizes(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) -> Array:
+    """Sizes (p,) m by which parts are ranked: what each does to the gap, but on a rig without an
+    arm, whose one spring may hide most of any mechanism, see the rules below."""
     if engine.bench.data.arm:
         return sizes.gap
-    rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
-    curves = np.array([p.word in CURVES for p in parts], dtype=bool)
-    creeps = np.array([p.word == "joint_creep" for p in parts], dtype=bool)
-    if len(parts) == _PAIR and rubs.any():
-        if curves.any() and engine.bench.course.stays > _STAYS:
-            return _led(sizes.gap, int(rubs.argmax()))
-        if creeps.any() and engine.bench.course.one_rate:
-            return _led(sizes.gap, int(rubs.argmax()))
-        if creeps.any() and engine.bench.imposed:
-            return _led(sizes.gap, int(needed(engine, parts, level).argmax()))
-    goes_on = any(p.variant.info.get("goes_on") for p in parts)
-    if frozenset(p.word for p in parts) == TOE_AND_KNEE and not goes_on:
+    leads = _leading_of_two(engine, parts, level)
+    if leads is not None:
+        return sizes.gap if sizes.gap.argmax() == leads else sizes.gap[::-1]
+    if _toe_and_knee(parts):
         return sizes.moved
+    return _beside_friction(engine, parts, sizes)
+
+
+def _leading_of_two(engine: Engine, parts: tuple[Part, ...], level: int) -> int | None:
+    """Which one of friction and another effect is the larger, where sizes can't say.
+
+    - Beside a curve the friction, where most of the way is left when the load is gone: no curve
+      keeps anything.
+    - Beside creep at one rate the friction: creep then differs from it in details only.
+    - Beside creep under an imposed stroke the one that the other can do less without: both bring a
+      mean stiffness, and what a spring leaves of either says little.
+    """
+    bench, words = engine.bench, [p.word for p in parts]
+    rubs = next((i for i, w in enumerate(words) if w in FRICTION), None)
+    if len(parts) != _PAIR or rubs is None:
+        return None
+    curves, creeps = any(w in CURVES for w in words), "joint_creep" in words
+    if (curves and bench.course.stays > _STAYS) or (creeps and bench.course.one_rate):
+        return rubs
+    return int(needed(engine, parts, level).argmax()) if creeps and bench.imposed else None
+
+
+_PAIR, _STAYS = 2, 0.5  # effects; of the way
+
+
+def _toe_and_knee(parts: tuple[Part, ...]) -> bool:
+    """A soft start and a yield, which count as they move: what a spring would hide of either the
+    other shows. A seat that gets ever stiffer (a ball on a plate) ends in no spring of its own."""
+    goes_on = any(p.variant.info.get("goes_on") for p in parts)
+    return frozenset(p.word for p in parts) == TOE_AND_KNEE and not goes_on
+
+
+def _beside_friction(engine: Engine, parts: tuple[Part, ...], sizes: Sizes) -> Array:
+    """Sizes in which linear effects beside friction count by what it leaves of the gap: friction
+    brings its own mean stiffness, and what was simulated may be its first slope. Where one would
+    move more than was measured, which the friction takes back, it counts for less than that."""
+    rubs = np.array([p.word in FRICTION for p in parts], dtype=bool)
     if not rubs.any():
         return sizes.gap
     linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
-    mine = float(sizes.gap[rubs].max())
-    rest = max(engine.structural**2 - mine**2, 0.0) ** 0.5
-    rest = np.where(sizes.moved**2 > engine.most, min(rest, _LESS * mine), rest)
+    friction = float(sizes.gap[rubs].max())
+    rest = max(engine.structural**2 - friction**2, 0.0) ** 0.5
+    rest = np.where(sizes.moved**2 > engine.most, min(rest, _LESS * friction), rest)
     return np.where(linear, np.minimum(sizes.gap, rest), sizes.gap)
 
 
 _LESS = 0.99
-_PAIR, _STAYS = 2, 0.5  # effects; of the way
-
-
-def _led(sizes: Array, first: int) -> Array:
-    """Sizes of two, of which the first one is the larger."""
-    return sizes if sizes.argmax() == first else sizes[::-1]
 
 
 def conditioned(
-    engine: Engine, parts: tuple[Part, ...], among: list[Level] | None = None
-) -> tuple[list[Level], float]:
+    engine: Engine, parts: tuple[Part, ...], among: list[NoiseLevel] | None = None
+) -> tuple[list[NoiseLevel], float]:
     """Levels (all of them, or some) with the parts integrated out, and the mean square (m^2) of
     the parts at the likeliest of these."""
     levels = engine.levels if among is None else among
@@ -222,7 +238,7 @@ def conditioned(
     return levels, part_sizes(engine, parts, int(weights.argmax())).energy
 
 
-def up_to_likeliest(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[Level], float]:
+def up_to_likeliest(engine: Engine, parts: tuple[Part, ...]) -> tuple[list[NoiseLevel], float]:
     """The same as `conditioned`, at levels up to the likeliest: with an effect more, no more
     imperfection is needed. All levels where there are no parts."""
     if not parts:

@@ -88,7 +88,7 @@ def fit(
     kb = engine.base.columns.shape[1]
     w = beta[kb:]
     if alike and explanation.eta > 0:
-        errs = _misled(engine, explanation.parts, w, explanation.eta)
+        errs = _imperfection_columns(engine, explanation.parts, w, explanation.eta)
         moves = solved.T @ (weighed.T @ errs)
         covariance = covariance + moves @ moves.T
     effect = (E @ w)[:n]
@@ -104,7 +104,7 @@ def fit(
     )
 
 
-def _misled(engine: Engine, parts: tuple[Part, ...], w: Array, eta: float) -> Array:
+def _imperfection_columns(engine: Engine, parts: tuple[Part, ...], w: Array, eta: float) -> Array:
     """(size, c) columns with independent unit coefficients: what an imperfection of eta m does that
     repeats from run to run, that a run has to itself (`engine`), and that all
     holds have in common: in their first rows and in later ones, after rises and falls of the load,

@@ -17,6 +17,7 @@ from identification.gap.words import (
     LINEAR,
     MECHANISMS,
     NAMELESS,
+    SPRINGS,
 )
 
 # A second effect smaller than this share of the first can't be told from the first one's law.
@@ -25,18 +26,19 @@ LEAST_SHARE = 0.12
 LEAST_SHARE_AKIN = 0.3
 CANCELLING = 1.4  # times the gap: larger effects of one explanation cancel each other
 TOE_AND_KNEE = frozenset({"contact_seating", "joint_yield"})
+FORBIDDEN = 1e4  # nats: beyond what any data bring
 SAME_JOINT = 5.0  # nats: two troubles of one kind seldom sit in the same joint
 
 
-def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
+def minor_parts(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     """Penalty in nats, a steep wall, for parts that may be freedom of another one's law."""
-    penalty, sizes = 0.0, _counted(parts, found)
+    penalty, sizes = 0.0, _sizes_that_show(parts, found)
     for i, p in enumerate(parts):
         for k, other in enumerate(parts):
             if _only_rubs(engine, p, other) and found.signed and not found.signed[i]:
-                penalty += 1e4
+                penalty += FORBIDDEN
             if i < k and _same_element(engine, p, other) and not _on_its_own(parts, found, i, k):
-                penalty += 1e4
+                penalty += FORBIDDEN
             # a small knee beside a large error of the springs is no freedom of the latter
             if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
                 continue
@@ -45,17 +47,21 @@ def pettiness(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
                 penalty += SAME_JOINT
             share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
             if p.word == other.word and share < LEAST_SHARE:
-                penalty += 1e4  # what a joint that does next to nothing explains is another's law
+                penalty += (
+                    FORBIDDEN  # what a joint that does next to nothing explains is another's law
+                )
             least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
             penalty += _wall(least / share)
     return penalty
 
 
 def cancelling(engine: Engine, parts: tuple[Part, ...], found: Sizes, sizes: Array) -> float:
-    """Penalty in nats for effects that are larger than the gap and take each other back; what is
-    linear the springs of the base take back from it, and it is left alone but where another takes
-    back nearly all of it; as is a single effect beside it on an arm, whose springs may hide most of
-    either."""
+    """Penalty in nats for effects that are larger than the gap and take each other back.
+
+    Linear effects may be large: the springs take them back. On an arm they are charged only where
+    another linear one takes back nearly all of them, and one mechanism beside them is not charged:
+    springs may hide most of either.
+    """
     bent = [float(s) for p, s in zip(parts, sizes, strict=True) if p.word not in LINEAR]
     arm = engine.bench.data.arm
     linear = _taken_back(parts, found) if arm else 0.0  # of a bench the sizes say it already
@@ -80,15 +86,21 @@ _TWO = 2  # to take each other back
 
 
 def _wall(beyond: float) -> float:
-    """Nats for what is so many times beyond its limit."""
-    return 60.0 * max(0.0, float(np.log(max(beyond, 1e-300))))
+    """Nats for what is so many times beyond its limit: steep, so that a limit holds, but finite, so
+    that of two that are beyond it the nearer one is better."""
+    return _STEEP * max(0.0, float(np.log(max(beyond, 1e-300))))
 
 
-def straight(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats, a steep wall, for curves of a joint that hardly bend, and for seats of a
-    bench that go on like a spring: a spring is off there. An arm's turning bends its line a little;
-    a bench's line that is far off may bend within the noise of a sample, where that is stated to a
-    factor."""
+_STEEP = 60.0  # nats per factor e
+
+
+def unbent_curves(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
+    """Penalty in nats, a wall, for curves that hardly bend: there a spring is off.
+
+    Curves of joints that have a line of their own, and seats of a rig without an arm that go on
+    like a spring. An arm's turning bends its line a little (BENDS); a bench's line that is far off
+    may bend within the noise of a sample, where that is known to a factor only.
+    """
     noise, arm, penalty = engine.bench.noise, engine.bench.data.arm, 0.0
     for p, gap, moved in zip(parts, found.gap, found.moved, strict=True):
         info = p.variant.info
@@ -118,7 +130,7 @@ def within_stated(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> floa
     }
     for p, moved in zip(parts, found.moved, strict=True):
         limit = least.get(p.word, 0.0)
-        if "joint" in p.variant.info and p.word == "joint_stiffness_error":
+        if "joint" in p.variant.info and p.word == SPRINGS:
             sds = engine.bench.data.compliance_relative_sd
             limit = _SPRING_WITHIN * float(sds[p.variant.info["joint"]])
         if limit > 0:
@@ -137,18 +149,21 @@ def _rms_of_line(engine: Engine, part: Part) -> float:
 _WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
 
 
-def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats for every effect below the noise of a single sample of a rig without an arm,
-    or of a running recording, steep below half of it, or all of it where a path may take any way:
-    thousands of samples would show it, but noise of low frequency wanders as far. Of levels
-    at rest for every one far below what is stated: that is no gap. What springs may hide, or other
-    channels show, counts by how far it moves; or by how far these are beyond what instruments do
-    (`shown`), if it moves nothing."""
+def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
+    """Penalty in nats for effects that are smaller than the noise of a single sample.
+
+    - Where the noise of samples is seen (running recordings, rigs without an arm): a slope below
+      it, a wall below half of it. Thousands of samples would show such an effect, but noise of low
+      frequency wanders as far; of a path that may take any way the wall stands at all of it.
+    - Of levels at rest: a wall far below what is stated of a sample, where a gap is none.
+    - What the springs hide, or other channels show, counts by how far it moves; if it moves
+      nothing, by how far those channels are beyond what instruments do (`shown`).
+    """
     noise, seen = engine.bench.noise.stated, engine.bench.noise.seen
     shown = np.array([float(p.variant.info.get("shown", 0.0)) for p in parts])
     if seen > 0:
-        sizes = np.maximum(_counted(parts, found), shown * seen + 1e-300)
-        below = 20.0 * float(np.maximum(np.log(seen / sizes), 0.0).sum())
+        sizes = np.maximum(_sizes_that_show(parts, found), shown * seen + 1e-300)
+        below = _SLOPE * float(np.maximum(np.log(seen / sizes), 0.0).sum())
         share = [1.0 if p.variant.info.get("path") == "free" else _WANDERS for p in parts]
         return below + sum(_wall(w * seen / float(s)) for w, s in zip(share, sizes, strict=True))
     elsewhere = np.array([p.word in _SHOWN_ELSEWHERE and not _bends(p) for p in parts], dtype=bool)
@@ -156,6 +171,9 @@ def trifle(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     sizes = np.where(elsewhere, found.moved, found.gap)
     sizes = np.maximum(sizes, shown * least + 1e-300)
     return sum(_wall(least / float(size)) for size in sizes)
+
+
+_SLOPE = 20.0  # nats per factor e below the noise
 
 
 def _bends(part: Part) -> bool:
@@ -172,7 +190,7 @@ _GUESSED = 0.2  # of a rig whose readings don't tell their noise: then what is s
 _SHOWN_ELSEWHERE = LINEAR | {"force_drift"}
 
 
-def _counted(parts: tuple[Part, ...], found: Sizes) -> Array:
+def _sizes_that_show(parts: tuple[Part, ...], found: Sizes) -> Array:
     """Size of each part; what is linear as it moves: the springs hide it in the displacement of one
     direction, other directions and channels show it."""
     linear = np.array([p.word in LINEAR for p in parts], dtype=bool)
@@ -199,7 +217,7 @@ def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     bends = MECHANISMS | frozenset(NAMELESS) - {JERKS}
     if not engine.bench.data.arm and (words <= CURVES or (words & LINEAR and words & bends)):
         return True
-    springs = "joint_stiffness_error" in words and words & MECHANISMS
+    springs = SPRINGS in words and words & MECHANISMS
     if not (springs or words <= FRICTION):
         return False
     return same or not (engine.bench.has_q or _apart(engine, one, other))
@@ -224,7 +242,7 @@ def _on_its_own(parts: tuple[Part, ...], found: Sizes, i: int, k: int) -> bool:
     linear part of its law. A curve that has a line of its own has one of any size."""
     for a, b in ((i, k), (k, i)):
         line = "line" in parts[b].variant.info.get("kinds", ())
-        if parts[a].word == "joint_stiffness_error" and parts[b].word not in LINEAR and not line:
+        if parts[a].word == SPRINGS and parts[b].word not in LINEAR and not line:
             return bool(found.moved[a] > _FAR_MORE * found.moved[b])
     return False
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.explanations.explanation import LAW_REMAINDER, Explanation, Found
+from identification.gap.explanations.explanation import LAW_REMAINDER, Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE, joints_of
 from identification.gap.model.noise import UNSURE
 from identification.gap.words import LINEAR, WORDS
@@ -38,7 +38,7 @@ def trusted(
     return out
 
 
-def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
+def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) -> SearchResult:
     """With the posterior over words as main cause. kept: words of an explanation -> share of its
     weight that it keeps, where withheld data were looked at. What it loses, and what leaves a large
     remainder, goes to its heir."""
@@ -73,7 +73,15 @@ def weighed(found: Found, kept: Mapping[frozenset[str], float]) -> Found:
     return replace(found, probabilities=probabilities, kept=kept)
 
 
-def _explained(found: Found, kept: Mapping[frozenset[str], float]) -> float:
+def foresaw(kept: Mapping[frozenset[str], float], words: frozenset[str]) -> bool:
+    """Whether an explanation with these words foretold withheld data, or nobody looked."""
+    return kept.get(words, 1.0) > FORESAW
+
+
+FORESAW = 0.5  # of its weight is kept
+
+
+def _explained(found: SearchResult, kept: Mapping[frozenset[str], float]) -> float:
     """Above which log weight a gap is not said to be one that no law explains: of a rig without an
     arm just below a law that leaves no more than the noise, infinite where none does. A short table
     any smooth path passes as well as the law that made it; a drift that takes any path is no such
@@ -88,7 +96,7 @@ def _explained(found: Found, kept: Mapping[frozenset[str], float]) -> float:
         and not any(p.variant.info.get("path") == "free" for p in e.parts)
         and e.good
         and e.eta <= (1.0 if bench.noise.sure else UNSURE) * bench.noise.stated
-        and kept.get(e.words, 1.0) > 0.5
+        and foresaw(kept, e.words)
     )
     return next(laws, np.inf)
 
@@ -136,7 +144,7 @@ def _simpler(
         and f.words < e.words
         and f.log_weight > e.log_weight - most
         and f.good
-        and kept.get(f.words, 1.0) > 0.5
+        and foresaw(kept, f.words)
     )
     return next(near, None)
 
@@ -217,7 +225,7 @@ def _heir(
     for e in ranked:
         fewer = e.parts and e.words < explanation.words
         near = e.log_weight > explanation.log_weight - _INHERITS or e.eta < _CLOSELY * noise
-        if fewer and near and e.good and kept.get(e.words, 1.0) > 0.5:
+        if fewer and near and e.good and foresaw(kept, e.words):
             return e.parts[0].word
     return "unknown"
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from identification.gap.explanations.explanation import Explanation, Found
+from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
-from identification.gap.explanations.verdict import TAKES_MORE, TAKES_TWO
-from identification.gap.judging.earned import FREE, noise_of
-from identification.gap.words import LINEAR
+from identification.gap.explanations.verdict import FORESAW, TAKES_MORE, TAKES_TWO
+from identification.gap.judging.earned import noise_of
+from identification.gap.words import BETWEEN_RUNS, LINEAR
 
 WORTH = 3.0  # nats that one effect more has to bring before it is named;
 # a third one more: what it does to some channel may be how far the other two's laws are off.
@@ -17,7 +17,7 @@ WORTH_OF_THIRD = 10.0
 BELOW_NOISE = 0.6
 
 
-def chosen_of(found: Found, verdict: str) -> Explanation:
+def chosen_of(found: SearchResult, verdict: str) -> Explanation:
     """The best explanation with the verdict as its largest effect; where that is far worse than
     those with a larger one beside it, which then is one of several alike, the best of these."""
     if verdict in ("none", "unknown"):
@@ -36,14 +36,14 @@ def chosen_of(found: Found, verdict: str) -> Explanation:
         return best
     troubles = best.troubles
     least = min(LEAST_SHARE * max(troubles.values()), BELOW_NOISE * noise_of(found.engine.bench))
-    petty = {w for w, size in troubles.items() if size < least} - FREE
+    petty = {w for w, size in troubles.items() if size < least} - BETWEEN_RUNS
     return next((e for e in simpler if best.words - e.words <= petty), best)
 
 
-def _needless(found: Found, explanation: Explanation) -> bool:
+def _needless(found: SearchResult, explanation: Explanation) -> bool:
     """Whether fewer of its effects foretell withheld data better; what drifts nothing foretells."""
     simpler = found.foretold.get(explanation.words)
-    return simpler is not None and not (explanation.words - simpler.words) & FREE
+    return simpler is not None and not (explanation.words - simpler.words) & BETWEEN_RUNS
 
 
 def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:
@@ -57,10 +57,10 @@ def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:
         best = max(near, key=lambda e: e.log_weight)
 
 
-def foresees(found: Found, explanation: Explanation) -> bool:
+def foresees(found: SearchResult, explanation: Explanation) -> bool:
     """Whether it foresees withheld repetitions; where nobody looked, whether nothing that failed is
     contained in it: what is added to a failure does not mend it."""
     kept = found.kept.get(explanation.words)
     if kept is not None:
-        return kept > 0.5
-    return not any(k <= 0.5 and w <= explanation.words for w, k in found.kept.items())
+        return kept > FORESAW
+    return not any(k <= FORESAW and w <= explanation.words for w, k in found.kept.items())

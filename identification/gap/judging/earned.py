@@ -16,28 +16,26 @@ import numpy as np
 
 from identification.gap.data import Array, Ints
 from identification.gap.evidence.engine import Engine
-from identification.gap.explanations.explanation import Explanation, Found
+from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
-from identification.gap.explanations.verdict import weighed
+from identification.gap.explanations.verdict import foresaw, with_posterior
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.heldout import folds, held_out
 from identification.gap.model.bench import Bench
-from identification.gap.words import DRIFTS, FRICTION, LATE, LINEAR
+from identification.gap.words import BETWEEN_RUNS, DRIFTS, FRICTION, LATE, LINEAR
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
 CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
 SHARP = 8.0  # how fast weight is lost about the limit, per factor e
-# What drifts do in one run no other run foretells; nor a jump of the datum beside them.
-FREE = DRIFTS | {"zero_shift"}
 _LOOKED_AT, _WITHIN = 6, 9.0  # explanations, and nats below the best, that are looked at
 
 
-def earned(found: Found) -> Found:
+def earned(found: SearchResult) -> SearchResult:
     """The posterior after a look at withheld data; as it was where there are none."""
     ways = folds(found.engine)
     if ways and _comes_again(found.engine.bench):
         simpler = _foretold(found, *next(iter(ways.items())))
-        found = weighed(replace(found, foretold=simpler), found.kept) if simpler else found
+        found = with_posterior(replace(found, foretold=simpler), found.kept) if simpler else found
     fold = ways.get("repetition")
     if fold is None:
         return found
@@ -47,7 +45,7 @@ def earned(found: Found) -> Found:
         if not todo:
             break
         kept[todo[0].words] = _kept(found, todo[0], fold)
-    return weighed(found, kept)
+    return with_posterior(found, kept)
 
 
 def _comes_again(bench: Bench) -> bool:
@@ -59,7 +57,7 @@ def _comes_again(bench: Bench) -> bool:
 _PASSES = 2
 
 
-def _foretold(found: Found, name: str, fold: Ints) -> dict[frozenset[str], Explanation]:
+def _foretold(found: SearchResult, name: str, fold: Ints) -> dict[frozenset[str], Explanation]:
     """Of explanations with two effects that matter, the one effect that foretells withheld data
     better than both: words that stand for each other foretell the same; of two that do, alike, the
     one that explains more. What comes late speaks for no friction at one rate, at which they do the
@@ -68,10 +66,10 @@ def _foretold(found: Found, name: str, fold: Ints) -> dict[frozenset[str], Expla
     first, out = found.explanations[0].log_weight, {}
     pairs = [e for e in found.explanations[:_PAIRS] if e.log_weight > first - _NEAR]
     for both in (e for e in pairs if len(e.words) == _TWO):
-        drifts = both.parts[0].word in FREE
+        drifts = both.parts[0].word in BETWEEN_RUNS
         most = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
         rubs = found.engine.bench.course.one_rate and both.words & FRICTION
-        mute = FREE | LATE if rubs else FREE
+        mute = BETWEEN_RUNS | LATE if rubs else BETWEEN_RUNS
         each = [e for e in found.explanations if e.words < both.words and e.words - mute]
         after = [held_out(found.engine, e, name, fold).after for e in each]
         best = min(after, default=most)
@@ -86,7 +84,7 @@ _TWO, _PAIRS, _NEAR = 2, 3, 25.0  # so many of the best, and nats below the firs
 _BETTER, _PLAINLY, _ALIKE = 0.98, 0.5, 1.1
 
 
-def _weighty(found: Found, kept: dict[frozenset[str], float]) -> list[Explanation]:
+def _weighty(found: SearchResult, kept: dict[frozenset[str], float]) -> list[Explanation]:
     """Explanations with effects that matter, the heaviest (with what it keeps) first."""
     weight = {
         e.words: e.log_weight + float(np.log(kept.get(e.words, 1.0) + 1e-300))
@@ -101,14 +99,16 @@ def _weighty(found: Found, kept: dict[frozenset[str], float]) -> list[Explanatio
     fewer = [
         e
         for e in found.explanations
-        if e.parts and e.good and any(e.words < h.words for h in heavy if kept[h.words] < 0.5)
+        if e.parts
+        and e.good
+        and any(e.words < h.words for h in heavy if not foresaw(kept, h.words))
     ]
     return [*matter, *[e for e in fewer if e not in matter]]
 
 
-def _kept(found: Found, explanation: Explanation, fold: Ints) -> float:
+def _kept(found: SearchResult, explanation: Explanation, fold: Ints) -> float:
     """Share of the weight that is kept after a look at withheld repetitions."""
-    if explanation.words & DRIFTS and explanation.words <= FREE:
+    if explanation.words & DRIFTS and explanation.words <= BETWEEN_RUNS:
         return 1.0
     engine = found.engine
     fitted = fit(engine, explanation)

@@ -21,10 +21,10 @@ from identification.gap.explanations.explanation import (
     REMAINDER,
     SOFT,
     Explanation,
-    Found,
+    SearchResult,
 )
 from identification.gap.explanations.fit import Fit, fit
-from identification.gap.explanations.verdict import weighed
+from identification.gap.explanations.verdict import with_posterior
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.strain import LIMIT, strain
 from identification.gap.model.noise import UNSURE
@@ -42,13 +42,13 @@ _SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three t
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
 
 
-def looked_up(found: Found) -> Found:
+def looked_up(found: SearchResult) -> SearchResult:
     """The posterior with what the best explanations really leave; of levels that rest, after a look
     for readings that nothing on a rig makes."""
     engine = found.engine
     if engine.bench.course.faults:
         doubted = [replace(e, log_good=e.log_good + log(FAULTY)) for e in found.explanations]
-        return weighed(replace(found, explanations=tuple(doubted)), found.kept)
+        return with_posterior(replace(found, explanations=tuple(doubted)), found.kept)
     judge = _still_good if engine.bench.data.arm else _judged
     first = _near(found.explanations)
     done = {e.words: judge(engine, e) for e in first if e.parts}
@@ -67,7 +67,7 @@ def looked_up(found: Found) -> Found:
         tuple(sorted((done.get(e.words, e) for e in each), key=lambda e: -e.log_weight))
         for each in (found.explanations, found.nameless)
     )
-    return weighed(replace(found, explanations=out, nameless=nameless), found.kept)
+    return with_posterior(replace(found, explanations=out, nameless=nameless), found.kept)
 
 
 def _near(ranked: tuple[Explanation, ...]) -> list[Explanation]:

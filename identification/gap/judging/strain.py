@@ -20,7 +20,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import REMAINDER
 from identification.gap.explanations.fit import Fit
 from identification.gap.explanations.penalties import joints_of
-from identification.gap.words import MECHANISMS
+from identification.gap.words import MECHANISMS, SPRINGS
 
 # Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and
 # two beyond 5.5; of 16 stand-ins that were strained at all 13 beyond 6, the others between 5 and 6.
@@ -82,7 +82,7 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     moves[base.index("offset")] = LEVER_M
     loose = np.divide(eta, moves, out=np.zeros(len(moves)), where=moves > 0)
     pulls = np.abs(fitted.base) / np.hypot(base.sd, loose)
-    said = any(p.word == "joint_stiffness_error" for p in fitted.parts)
+    said = any(p.word == SPRINGS for p in fitted.parts)
     own = {j for p in fitted.parts if p.word in MECHANISMS for j in joints_of(p)}
     for j in range(engine.bench.data.joints) if said else own:
         pulls[base.index(f"spring{j + 1}")] = 0.0

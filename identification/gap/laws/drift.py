@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.gap.data import Array, Flags
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import followed
 from identification.gap.model.variants import Variant, variant
@@ -234,7 +234,7 @@ _PLACE, _TURNS = 0.15, 30.0  # variance where it starts; of its rate at the end,
 
 
 def changes(
-    bench: Bench, v: Variant, found: Found, unit: str, scale: float = 1.0
+    bench: Bench, v: Variant, found: Coefficients, unit: str, scale: float = 1.0
 ) -> dict[str, Parameter]:
     """Change from start to end of the session, per direction where it has its own."""
     names, path = v.info["names"], v.info["path"]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from identification.gap.laws.closer import Word
-from identification.gap.laws.interval import Found, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Laws
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
@@ -33,7 +33,7 @@ class Effect:
 
     word: str
     variants: Callable[[Bench], list[Variant]]
-    parameters: Callable[[Bench, Variant, Found], dict[str, Parameter]]
+    parameters: Callable[[Bench, Variant, Coefficients], dict[str, Parameter]]
     laws: Laws
     lengths: tuple[str, ...]
     finer: Callable[[Word], list[Variant]] | None

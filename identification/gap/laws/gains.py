@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.gap.data import Array
 from identification.gap.laws.curves import BENT_SLOPE, hinge
-from identification.gap.laws.interval import LEAST_FACTOR, Found, Parameter
+from identification.gap.laws.interval import LEAST_FACTOR, Coefficients, Parameter
 from identification.gap.laws.law import Law, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
@@ -21,7 +21,7 @@ def scales(bench: Bench) -> tuple[float, ...]:
     return SCALES if bench.data.arm else (*SCALES, BENCH_SCALE)
 
 
-def factor(bench: Bench, v: Variant, found: Found) -> dict[str, Parameter]:
+def factor(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     """Read over true. The columns are shares of what was read, but for an imposed displacement.
     Of a gain that bends or changes, the straight line of least squares; of one component's gain,
     with its name."""

@@ -64,7 +64,7 @@ NOMINAL = Softer({}, {}, {})
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Coefficients:
     """Coefficients (k,) of a part, their covariance (k, k), and the springs beside it."""
 
     w: Array
@@ -93,18 +93,18 @@ class Found:
         square -= 2 * ratio * float(functional @ self.softer.cross[joint])
         return normal(ratio, max(square, 0.0) / softer**2, unit)
 
-    def first(self, k: int) -> Found:
+    def first(self, k: int) -> Coefficients:
         """The first k coefficients alone."""
         s = self.softer
         cross = {j: c[:k] for j, c in s.cross.items()}
-        return Found(self.w[:k], self.cov[:k, :k], Softer(s.value, s.variance, cross))
+        return Coefficients(self.w[:k], self.cov[:k, :k], Softer(s.value, s.variance, cross))
 
-    def without_line(self, joint: int) -> Found:
+    def without_line(self, joint: int) -> Coefficients:
         """All coefficients but the last, which is what the joint's spring has more."""
         k = len(self.w) - 1
         return self.on_spring(np.eye(k + 1)[k], joint).first(k)
 
-    def on_spring(self, functional: Array, joint: int) -> Found:
+    def on_spring(self, functional: Array, joint: int) -> Coefficients:
         """A linear function of the coefficients counted as compliance of the joint's spring."""
         s, moves = self.softer, self.cov @ functional
         cross = s.cross.get(joint, np.zeros(len(self.w)))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from identification.gap.data import Array
-from identification.gap.laws.interval import Found, Parameter, normal
+from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 from identification.uncertainty import TWO_SIDED
@@ -21,7 +21,7 @@ _GRID_STEP = 0.03  # between finely spaced thresholds, as their share
 
 
 def of_knee(
-    bench: Bench, v: Variant, found: Found,
+    bench: Bench, v: Variant, found: Coefficients,
     named: Callable[[Bench, Variant, Parameter], dict[str, Parameter]],
 ) -> dict[str, Parameter]:  # fmt: skip
     """Threshold, of an arm the push where it is met, slope beyond and flow time. named: what the
@@ -50,7 +50,7 @@ def of_knee(
     return out
 
 
-def _threshold(bench: Bench, v: Variant, knee: Found) -> Parameter:
+def _threshold(bench: Bench, v: Variant, knee: Coefficients) -> Parameter:
     """`top - sum w (top - r)^2 / sum w (top - r)` of plays of radii r, by its derivatives; one
     alone is known to the step of its grid. The gain of the force acts on every threshold."""
     info = v.info

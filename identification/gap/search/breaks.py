@@ -3,7 +3,7 @@
 On a rig without an arm a grip slips in jerks or an interferometer loses fringes, fibres break for
 good, rubber is softer wherever it was stretched before (Mullins 1969). Words with any freedom, as
 drifts that take every path, follow such a thing somehow. So these take part in the search as words
-do, alone and beside them; what they explain best is `unknown`, and what it looks like is told.
+do, alone and beside them; what they explain best is `unknown`, and what it looks like is said.
 
 jerks: the response jumps at rows found one after the other, and stays. damage: the stiffness that
 is lost grows with the largest load so far. softening: below the largest load so far it is softer,
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from identification.gap.data import Array, Flags
-from identification.gap.explanations.explanation import Found, Likeness
+from identification.gap.explanations.explanation import Likeness, SearchResult
 from identification.gap.laws.drift import free_path, path_root
 from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
@@ -41,7 +41,7 @@ _CURVE, _LOOP, _SLOW = 7, 4, 5  # degrees of a smooth response that jumps are lo
 _NOTHING_NEW = 1e-6  # of its square is left of a jump beside what is known
 
 
-def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
+def troubles_of(bench: Bench, base: Base, target: Array) -> list[Variant]:
     """Variants of a running recording without an arm whose load moves (`word`: the kind)."""
     moves = bench.rows.continuous and not (bench.data.arm or bench.course.rests)
     if not moves or bench.rows.n < _FEWEST_ROWS:
@@ -52,7 +52,7 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     return [*lasting, *_wanders(bench), *_jerks(bench, base, target)]
 
 
-def told(found: Found) -> Found:
+def with_plain_trouble(found: SearchResult) -> SearchResult:
     """With what the gap looks like, where one of these is plain: the larger part of what explains
     it better than words do."""
     best = found.nameless[0] if found.nameless else None

@@ -13,19 +13,19 @@ from identification.gap.evidence.imperfection import LOG_STEP
 from identification.gap.evidence.parts import Part, log_joint_between, part_sizes
 from identification.gap.explanations.explanation import (
     Explanation,
-    Found,
+    SearchResult,
     explain,
     up_to_likeliest,
 )
 from identification.gap.explanations.penalties import joints_of
 from identification.gap.explanations.priors import LOG_NONE, log_unknown
 from identification.gap.explanations.several import in_more_joints, polished
-from identification.gap.explanations.verdict import weighed
+from identification.gap.explanations.verdict import with_posterior
 from identification.gap.model.noise import UNSURE
 from identification.gap.model.variants import Variant
 from identification.gap.search.readings import reading_all
 from identification.gap.search.shares import measured
-from identification.gap.words import MECHANISMS, NAMELESS
+from identification.gap.words import MECHANISMS, NAMELESS, SPRINGS
 
 # Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
 # factor of two.
@@ -38,11 +38,12 @@ _PROMISING = 7  # further words of an explanation that are looked at closely
 # poor alone, where the spring is wrong as well.
 _SEEDS, _BENCH_SEEDS = 4, 6
 _READING = 6  # explanations whose instruments are looked at beside what else moves
-SPRINGS = "joint_stiffness_error"
 _WINDOW = 12.0  # nats below the best that a word may lie and still be conditioned on
 
 
-def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None = None) -> Found:
+def search(
+    engine: Engine, variants: list[Variant], singles: list[Scored] | None = None
+) -> SearchResult:
     """All single effects, then sets around the best ones, each re-fitted jointly. Where no levels
     repeat from run to run, a third effect is but freedom of the other two's laws. variants: grow by
     what is looked at beside others; singles: their scores one by one, where they are known."""
@@ -68,7 +69,7 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
     ranked = measured(engine, ranked)
     named = tuple(e for e in ranked if not e.words & frozenset(NAMELESS))
     strange = [lv for lv in engine.levels if lv.eta > _hidden(engine)]
-    found = Found(
+    found = SearchResult(
         engine=engine,
         explanations=named,
         nameless=tuple(e for e in ranked if e not in named),
@@ -78,7 +79,7 @@ def search(engine: Engine, variants: list[Variant], singles: list[Scored] | None
         unknown=log_mean([lv.log_base for lv in strange]) + log_unknown(engine.bench.course),
         unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
     )
-    return weighed(found, {})
+    return with_posterior(found, {})
 
 
 def _as_stated(engine: Engine) -> float:

@@ -22,9 +22,9 @@ from identification.gap.data import Array, Ints
 from identification.gap.evidence.compare import by_word, log_mean, marginal, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, part_sizes
-from identification.gap.explanations.explanation import Found, Likeness
+from identification.gap.explanations.explanation import Likeness, SearchResult
 from identification.gap.explanations.priors import log_unknown
-from identification.gap.explanations.verdict import TAKES_TWO, weighed
+from identification.gap.explanations.verdict import TAKES_TWO, with_posterior
 from identification.gap.laws.drift import by_direction, free_path, path_root, waited
 from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
@@ -45,7 +45,7 @@ _ALIKE, _MOST_LEVELS = 0.02, 200  # of the range of the load: loads that count a
 _FEWEST_ROWS = 30  # a table shorter than that any wave passes
 
 
-def with_strangers(found: Found) -> Found:
+def with_strangers(found: SearchResult) -> SearchResult:
     """With strangers beside the words: half of the prior of `unknown` is on no shape at all, half
     on theirs; and what the gap looks like, where one of them is plain."""
     engine = found.engine
@@ -60,10 +60,10 @@ def with_strangers(found: Found) -> Found:
     shares = [1.0, *(1.0 / KINDS for _ in alike)]
     unknown = log_mean([none, *(a.log_evidence for a in alike)], shares)
     plain = next((a for a in alike if a.log_evidence > none + PLAIN), None)
-    return weighed(replace(found, unknown=unknown + prior, looks_like=plain), found.kept)
+    return with_posterior(replace(found, unknown=unknown + prior, looks_like=plain), found.kept)
 
 
-def _creeps(found: Found, settles: float) -> bool:
+def _creeps(found: SearchResult, settles: float) -> bool:
     """Whether creep of the joints leaves no more than noise, and explains about as much as what
     settles (log evidence): in two directions what goes on by amounts and times of its own in each
     is what two joints do."""
