@@ -151,12 +151,10 @@ def explain_gap(
     finer = refine(engine, singles)
     if finer:
         variants += finer
-        engine.extend()
         singles += score(engine, engine.levels, finer)
     nameless = troubles_of(bench, base, target)
     if nameless:
         variants += nameless
-        engine.extend()
         singles += score(engine, engine.levels, nameless)
     found = with_strangers(with_plain_trouble(search(engine, variants, singles)))
     tell("withheld data", 0.7)

@@ -9,7 +9,7 @@ import pytest
 
 from identification.gap.evidence.parts import Sizes, needed
 from identification.gap.explanations import explanation
-from identification.gap.explanations.explanation import _counted
+from identification.gap.explanations.explanation import _ranking_sizes
 from identification.gap.explanations.penalties import _apart, _on_its_own, _same_element
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.course import Course
@@ -25,19 +25,19 @@ def test_without_an_arm_a_wrong_spring_counts_by_what_friction_leaves_of_the_gap
     rubs, spring = part("joint_hysteresis", [0]), part("joint_stiffness_error", [1])
     gap = engine.structural * np.array([0.8, 9.0])
     sizes = Sizes(gap, np.full(2, 0.9) * engine.most**0.5, 0.0)
-    assert _counted(engine, (rubs, spring), sizes, 0) == pytest.approx(
+    assert _ranking_sizes(engine, (rubs, spring), sizes, 0) == pytest.approx(
         engine.structural * np.array([0.8, 0.6])
     )
     far = Sizes(gap, np.array([0.0, 2.0]) * engine.most**0.5, 0.0)  # than was measured
-    assert _counted(engine, (rubs, spring), far, 0)[1] < gap[0]
+    assert _ranking_sizes(engine, (rubs, spring), far, 0)[1] < gap[0]
     slight = Sizes(np.array([0.2, 9.0]) * engine.structural, far.moved, 0.0)
-    assert _counted(engine, (rubs, spring), slight, 0)[1] < slight.gap[0]
+    assert _ranking_sizes(engine, (rubs, spring), slight, 0)[1] < slight.gap[0]
     bent = part("joint_nonlinear_stiffness", [0])
-    assert _counted(engine, (bent, spring), sizes, 0) is gap  # a curve has its line from the spring
+    assert _ranking_sizes(engine, (bent, spring), sizes, 0) is gap  # its line is the spring
     toe, knee = part("contact_seating", [0]), part("joint_yield", [1])
-    assert _counted(engine, (toe, knee), sizes, 0) is sizes.moved
+    assert _ranking_sizes(engine, (toe, knee), sizes, 0) is sizes.moved
     arm = replace_bench(engine, replace(engine.bench, data=replace(engine.bench.data, arm=True)))
-    assert _counted(arm, (rubs, spring), sizes, 0) is gap
+    assert _ranking_sizes(arm, (rubs, spring), sizes, 0) is gap
 
 
 def test_two_frictions_without_readings_are_apart_in_different_directions() -> None:
@@ -72,7 +72,7 @@ def test_where_most_of_the_way_is_left_what_gives_way_is_larger_than_a_curve(sec
         load = np.append(np.linspace(0, 80, 9), 0.0)
         moved = np.append(1e-5 * load[:-1], (1 - back) * 8e-4)
         bench = make_bench(bench_data(load, moved, step=np.arange(10)))
-        found = _counted(small_engine_of(bench), parts, sizes, 0)
+        found = _ranking_sizes(small_engine_of(bench), parts, sizes, 0)
         assert found.argmax() == 1 - larger
 
 
@@ -123,6 +123,6 @@ def test_of_creep_and_friction_in_an_imposed_stroke_the_needed_one_is_larger(
     monkeypatch.setattr(explanation, "needed", lambda *_: np.array([36.0, 250.0]))
     parts = part("joint_creep", [0]), part("joint_yield", [1])
     sizes = Sizes(np.array([5e-7, 1e-7]), np.array([8e-6, 5e-4]), 0.0)
-    found = _counted(engine, parts, sizes, 0)
+    found = _ranking_sizes(engine, parts, sizes, 0)
     assert found.argmax() == larger
     assert sorted(found) == sorted(sizes.gap)

@@ -235,7 +235,6 @@ def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: b
     way = np.array([0, 1.0, 1, 1 if needed else -1])[e.bench.rows.repetition]
     e.bench.add(other)
     e.target[:n] += 2 * BUMP * way * other[:n]
-    e.extend()
     bump = explained([0], "joint_nonlinear_stiffness", -40.0)
     more = explained([4], second, -60.0)
     both = Explanation(more.parts + bump.parts, 0.0, 0.0, (2 * BUMP / 3, BUMP / 3), 0.0)

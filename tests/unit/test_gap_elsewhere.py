@@ -82,7 +82,6 @@ def test_the_axis_of_a_slip_is_looked_for_between_the_depths_of_the_grid() -> No
     variants = library(bench, ["base_slip"])
     engine = engine_with(bench, bench.columns[slip])
     finer = refine(engine, score(engine, engine.levels, variants))
-    engine.extend()
     best = max(score(engine, engine.levels, [*variants, *finer]), key=lambda s: s.log_evidence)
     assert (best.variant.info["axis"], best.variant.info["depth_m"]) == ("x", 0.35)
     assert_lawful(bench, [best.variant])
@@ -114,7 +113,6 @@ def test_what_is_far_worse_beside_the_best_is_not_looked_at_again() -> None:
     found = next(v for v in variants if v.label == "joint 4 at 0.68 sharp")
     engine = engine_with(bench, 10 * bench.columns[found.columns[0]])
     finer = refine(engine, score(engine, engine.levels, variants))
-    engine.extend()
     there = [v for v in finer if v.info["joint"] == 3]
     logs = [s.log_evidence for s in score(engine, engine.levels, there)]
     assert 0 < len(there) < len(knees_closer.refined(bench, found))
@@ -172,7 +170,6 @@ def test_without_readings_a_joint_is_not_named_for_having_been_looked_at_closely
     engine = engine_with(bench, effect)
     singles = score(engine, engine.levels, library(bench, ["joint_yield"]))
     finer = refine(engine, singles)
-    engine.extend()
     best: dict[tuple[str, ...], Scored] = {}
     for s in sorted(score(engine, engine.levels, finer), key=lambda s: s.log_evidence):
         best[place_of(s.variant)] = s

@@ -171,7 +171,6 @@ def test_products_are_those_of_the_columns() -> None:
     engine = small_engine(bench, (0.0, 3e-6, 1e-5))
     for k in range(4):
         bench.add(bench.stacked(1e-5 * np.sin((k + 2) * np.arange(bench.rows.n))))
-    engine.extend()
     dense = small_engine(small_bench(), (0.0, 3e-6, 1e-5))
     for column in list(bench.columns)[2:]:
         dense.bench.add(column)

@@ -35,7 +35,6 @@ def closed_in(bench: Bench, x: Array, zone: float) -> Variant:
     base, target = base_columns(bench), bench.observed - prediction(bench)
     engine = Engine(bench, base, target + play, np.array([0.0, 1e-7, 2.5e-7]))
     finer = refine(engine, score(engine, engine.levels, variants))
-    engine.extend()
     return max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence).variant
 
 

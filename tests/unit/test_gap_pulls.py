@@ -171,7 +171,6 @@ def test_no_energy_is_larger_than_the_response() -> None:
     u = np.concatenate([np.linspace(0, 6e-4, 20), np.linspace(1e-3, 3e-2, 40)])
     engine = pulled(voce(u), u).engine
     for v in library(engine.bench, ["joint_yield"])[:3]:
-        engine.extend()
         assert energies(engine, (Part(v, 14.0),)).max() <= engine.most
 
 

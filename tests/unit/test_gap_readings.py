@@ -53,7 +53,6 @@ def engine_of(data: GapData) -> Engine:
 def explanation(engine: Engine) -> Explanation:
     gain = one(engine.bench, "displacement_scale", "gain")
     creep = one(engine.bench, "joint_creep", "joint 2 spectrum")
-    engine.extend()
     return Explanation((Part(gain, 0.2), Part(creep, 0.6)), 0.0, 0.0, (1e-5, 1e-5), 0.0)
 
 
@@ -79,7 +78,6 @@ def test_only_instruments_of_the_response_beside_what_moves_are_looked_at() -> N
     assert reading_all(blind, explanation(blind)) == []
     force = one(engine.bench, "time_lag", "force delay 1 s")
     laser = one(engine.bench, "time_lag", "displacement delay 1 s")
-    engine.extend()
     beside = Part(force, 1.0), both.parts[1]
     assert reading_all(engine, replace(both, parts=beside)) == []
     fresh = reading_all(engine, replace(both, parts=(Part(laser, 1.0), both.parts[1])))
@@ -91,7 +89,6 @@ def test_a_lag_acts_on_what_there_was_before_it() -> None:
     engine = engine_of(arm_data())
     creep = one(engine.bench, "joint_creep", "joint 2 spectrum")
     laser = one(engine.bench, "time_lag", "displacement delay 1 s")
-    engine.extend()
     parts = (Part(laser, 1.0), Part(creep, 0.6))
     found = Explanation(parts, 0.0, 0.0, (1e-5, 1e-5), 0.0)
     fresh = next(v for v in reading_all(engine, found) if v.info["kind"] == "delay")
@@ -109,7 +106,6 @@ def test_a_laser_that_reads_wrong_beside_creep_is_met_to_the_noise(gain: float) 
     """The joint reading sees the creep as it is, the laser a share of it."""
     engine = engine_of(read_low(gain))
     variants = library(engine.bench, ["displacement_scale", "joint_creep", "joint_hysteresis"])
-    engine.extend()
     before = len(variants)
     best = search(engine, variants).best
     assert best.words == {"displacement_scale", "joint_creep"}

@@ -75,7 +75,6 @@ def test_a_load_askew_on_springs_that_are_off_is_met_by_a_finer_shape() -> None:
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 4e-6, 2e-5]))
     singles = score(engine, engine.levels, variants)
     finer = refine(engine, singles)
-    engine.extend()
     before = max(s.log_evidence for s in singles)
     after = max(s.log_evidence for s in score(engine, engine.levels, finer))
     assert after > before + 20

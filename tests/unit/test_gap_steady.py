@@ -92,7 +92,6 @@ def test_the_place_and_the_rate_of_a_steady_path_are_no_jumps(
     path = next(v for v in library(bench, ["thermal_drift"]) if v.label == label)
     target = bench.observed - prediction(bench)
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, NOISE]))
-    engine.extend()
     pulls = np.ones(len(path.columns))
     pulls[1] = 40.0  # the rate of one, a step of the other
     assert (_jumps(engine, Part(path, NOISE), pulls).max() > JUMP) == stands_out
@@ -103,11 +102,9 @@ def test_offsets_far_beyond_the_scatter_of_runs_count_as_they_move() -> None:
     target = bench.observed - prediction(bench)
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, NOISE]))
     found = next(v for v in library(bench, ["zero_shift"]) if v.label == "every run")
-    engine.extend()
     sizes = part_sizes(engine, (Part(found, 10 * NOISE),), 0)
     assert sizes.gap[0] > 0.6 * sizes.moved[0]
     drift = next(v for v in library(bench, ["thermal_drift"]) if v.label == "steady path")
-    engine.extend()
     undone = part_sizes(engine, (Part(found, 10 * NOISE), Part(drift, 10 * NOISE)), 0)
     assert undone.gap[0] < 0.5 * undone.moved[0]
     small = np.linspace(-1, 1, RUNS)[bench.rows.run] * bench.noise.run

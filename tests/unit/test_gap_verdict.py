@@ -320,7 +320,6 @@ def test_pairs_are_looked_for_around_the_best_words(
 
     monkeypatch.setattr("identification.gap.search.search._seeds", spy)
     variants = library(bench, words)
-    engine.extend()
     search(engine, variants)
     assert asked == [around]
     ranked = [replace(said((part(w, [0]),), (3e-5,)), log_weight=-float(i), eta=1e-6)

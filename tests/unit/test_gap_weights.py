@@ -325,7 +325,6 @@ def test_a_second_spring_comes_to_bear_between_the_places_of_the_grid() -> None:
     engine = Engine(bench, base, target + second, np.array([0.0, 2e-6, 5e-6]))
     singles = score(engine, engine.levels, variants)
     finer = refine(engine, singles)
-    engine.extend()
     best = max([*singles, *score(engine, engine.levels, finer)], key=lambda s: s.log_evidence)
     assert best.variant.label.startswith("joint 1 corner")
     assert best.variant.info["kinds"][1] == pytest.approx(0.337, abs=0.01)

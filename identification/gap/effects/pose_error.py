@@ -255,7 +255,6 @@ def _look_closer(word: Word) -> list[Variant]:
         for s in kinds.values()
         for f in refined(engine.bench, s.variant, partial(estimate, engine))
     ]
-    engine.extend()
     best = max(score(engine, engine.levels, finer), key=evidence)
     levels, energy = conditioned(engine, (Part(best.variant, best.scale),))
     names = ({*word.ranked} | LINEAR) & word.families.keys() - {best.variant.word}

@@ -97,17 +97,28 @@ class Engine:
         self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
         self._bases = self._integrated(etas, self._weights)
         self._finer: dict[float, tuple[Weights, _Integrated]] = {}
-        self._gathered = Gathered(self._whiten(self.columns([])))
+        self._taken = Gathered(self._whiten(self.columns([])))
         none = np.zeros(0)
-        self.levels = [
+        self._levels = [
             NoiseLevel(self, i, float(eta), none, b.log_base, b.misfit, np.zeros((0, 0)))
             for i, (eta, b) in enumerate(zip(etas, self._bases, strict=True))
         ]
-        self.extend()
 
-    def extend(self) -> None:
+    @property
+    def levels(self) -> list[NoiseLevel]:
+        """All sizes of the imperfection, with all columns of the bench's pool."""
+        self._take_in()
+        return self._levels
+
+    @property
+    def _gathered(self) -> Gathered:
+        """What the evidence needs of all columns of the bench's pool."""
+        self._take_in()
+        return self._taken
+
+    def _take_in(self) -> None:
         """Takes in the columns that were put into the bench's pool since."""
-        added = range(len(self._gathered.white), len(self.bench.columns))
+        added = range(len(self._taken.white), len(self.bench.columns))
         if not added:
             return
         step = max(1, _AT_ONCE // self.bench.layout.size)
@@ -116,8 +127,8 @@ class Engine:
         beside = [
             np.hstack(b) for b in zip(*(self._common(p, self._weights) for p in parts), strict=True)
         ]
-        self.levels = [self._grown(*each) for each in zip(self.levels, beside, strict=True)]
-        self._gathered.put(parts)
+        self._levels = [self._grown(*each) for each in zip(self._levels, beside, strict=True)]
+        self._taken.put(parts)
 
     def columns(self, numbers: Iterable[int]) -> Array:
         """(size, k) stacked columns of the pool."""
@@ -135,8 +146,8 @@ class Engine:
 
     def squares(self, columns: NDArray[np.intp], number: int, alike: Array) -> Array:
         """(v, k, k): parts of a level's Gram matrix of the columns (v, k) of every variant."""
-        shared = self._bases[number].pool.values[columns]
         made = self._gathered.white.squares(columns, self._weights[number], alike)
+        shared = self._bases[number].pool.values[columns]
         return np.asarray(made - shared @ np.swapaxes(shared, 1, 2))
 
     def square(self, columns: tuple[int, ...]) -> Array:

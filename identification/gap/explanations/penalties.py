@@ -47,9 +47,7 @@ def minor_parts(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
                 penalty += SAME_JOINT
             share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
             if p.word == other.word and share < LEAST_SHARE:
-                penalty += (
-                    FORBIDDEN  # what a joint that does next to nothing explains is another's law
-                )
+                penalty += FORBIDDEN  # a joint that does next to nothing is another's law
             least = LEAST_SHARE_AKIN if akin else LEAST_SHARE
             penalty += _wall(least / share)
     return penalty

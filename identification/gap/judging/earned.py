@@ -96,12 +96,9 @@ def _weighty(found: SearchResult, kept: dict[frozenset[str], float]) -> list[Exp
     best = max(weight.values())
     matter = [e for e in found.explanations if e.parts and weight[e.words] > best - _WITHIN]
     heavy = [e for e in matter if e.words in kept]
+    failed = [h.words for h in heavy if not foresaw(kept, h.words)]
     fewer = [
-        e
-        for e in found.explanations
-        if e.parts
-        and e.good
-        and any(e.words < h.words for h in heavy if not foresaw(kept, h.words))
+        e for e in found.explanations if e.parts and e.good and any(e.words < w for w in failed)
     ]
     return [*matter, *[e for e in fewer if e not in matter]]
 

@@ -81,7 +81,6 @@ def closing_in(
     for share in closer if fresh else ():
         best: Variant | None = None
         for _ in range(_LOOKS if share > closer[-1] else 1):
-            engine.extend()
             found += scored_beside(engine, word.families, word.ranked, fresh)
             last, best = best, max(found, key=evidence).variant
             if best is last:
@@ -121,7 +120,6 @@ class Estimate(NamedTuple):
 def estimate(engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()) -> Estimate:
     """What is most probable with a variant whose columns the engine may not know yet, beside other
     parts."""
-    engine.extend()
     levels, energy = conditioned(engine, beside)
     eta = engine.levels[score(engine, levels, [variant], energy)[0].level].eta
     fitted = fit(engine, Explanation((Part(variant, 1.0), *beside), 0.0, eta, (0.0,), 0.0))

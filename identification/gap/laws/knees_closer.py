@@ -86,7 +86,6 @@ def _elsewhere(word: Word, closer: list[Variant], between: Between | None) -> li
     able = [v for v in closer if "weight" not in v.info]
     if not able or len({place for _, place in others}) < 2:
         return []
-    word.engine.extend()
     found = sorted(scored_beside(word.engine, word.families, word.ranked, able), key=evidence)
     moved = []
     for v in (s.variant for s in found[-_ELSEWHERE:]):

@@ -237,7 +237,6 @@ def _reading_all(engine: Engine, variants: list[Variant], start: Explanation) ->
     if not fresh:
         return start
     variants += fresh
-    engine.extend()
     return polished(engine, variants, start)
 
 

@@ -52,7 +52,6 @@ def with_strangers(found: SearchResult) -> SearchResult:
     variants = strangers(engine.bench, engine.base, engine.target)
     if not variants:
         return found
-    engine.extend()
     alike = likenesses(engine, variants)
     alike = tuple(a for a in alike if a.kind != SETTLES or not _creeps(found, a.log_evidence))
     prior = log_unknown(engine.bench.course)
