@@ -133,3 +133,11 @@ def test_the_architecture_lists_the_rooms_of_the_diagnosis_and_what_stands_in_th
         for module in modules:
             assert (gap / room / f"{module}.py").is_file(), f"{room}/{module}"
     assert sum(map(len, rooms.values())) > 30
+
+
+def test_the_architecture_names_every_module_of_the_identification() -> None:
+    text = (HOME / "docs" / "architecture.md").read_text("utf-8")
+    home = HOME / "identification"
+    files = [p for p in home.glob("**/*.py") if p.parent != home / "gap" / "effects"]
+    names = {p.stem for p in files} - {"__init__"}
+    assert sorted(n for n in names if not re.search(rf"\b{n}\b", text)) == []
