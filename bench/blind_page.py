@@ -20,6 +20,7 @@ DEFINITIONS = """\
 `rig blind` draws measurements with hidden effects, writes each as an ordinary HDF5 data set, has it diagnosed in another process that is given
 the path and nothing else, then opens the answers and scores. The generator shares no code with `identification`. Everything on this page is
 simulated; the labelled and real cases that the diagnosis was developed with are not among these.
+Earlier runs, and test sets that were written independently: [blind_history.md](blind_history.md). Each section below begins with the command that repeats it.
 
 ## What the figures mean
 
@@ -39,7 +40,7 @@ with at least `--snr-min` (3), and those without an effect; the table by size co
 | ECE, reliability | the verdict's probability against *exact*, ten bins of equal width; an accepted stand-in does not count here, since the probability is that of the word |
 | ECE by chance | the same error of as many verdicts whose probabilities are exactly right: its mean, and what it exceeds once in twenty times; bins of a few cases are off by chance |
 | Brier | verdict: mean of (p - exact)^2; all words: mean over the cases of the sum of (p_word - 1 if true)^2 |
-| intervals | parameters that answers and diagnosis define alike, of effects found under their own word; the 90 % interval as the diagnosis gives it (`ci90`; before decision 19 it was taken from the 95 % one by a normal law, which gives none where a mechanism may sit at one joint or another) |
+| intervals | parameters that answers and diagnosis define alike, of effects found under their own word; the 90 % interval as the diagnosis gives it (`ci90`) |
 | where | of single effects named exactly: the joints are the true ones, the direction with the largest gap is named, the same directions are named (those with 15 % of the largest), the encoders' view is right |
 | fitted, withheld / noise | rms that the explanation leaves, on the data it was fitted to and on the first kind of withheld data, over the noise as the generator made it; cases with known effects and with none |
 | beats wrong runners-up | of effects named exactly: the share of other words, not accepted, that leave more on withheld data |
