@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from identification.running import first_rows
 
@@ -20,7 +21,7 @@ AWAY = 0.01  # of the range: so far the outermost sample of a way has to go at l
 # What leaves may do so along a steeper or flatter part of the curve than the whole of it, and has
 # crept on meanwhile: so much more of its range one channel may go than the other.
 _STEEPER = 4.0
-_MIDDLE = (0.35, 0.75)  # of a hold: it rests there, if it ever does
+_REST = 0.4  # of a hold: so long it rests, if it ever does
 _AT_REST, _ONWARD = 0.1, 0.02  # of the step to the next one
 
 
@@ -50,17 +51,33 @@ def leading_on(
     """Of one run, the samples at the end of a hold that has come to rest which are on their way to
     the next one: (first of them, first of the next). force, displacement, hold (n,); sd: of one
     sample of each. Where every sample is named after the level next to it, that is the first half
-    of every ramp."""
+    of every ramp; where it is named after the level left, all of it."""
     hold = hold - hold[0]
     starts = first_rows(hold)
-    count = np.diff(np.append(starts, len(hold)))
-    share = (np.arange(len(hold)) - np.repeat(starts, count)) / np.repeat(count, count)
-    middle = (share >= _MIDDLE[0]) & (share < _MIDDLE[1])
-    going, far = elsewhere(force, displacement, sd, hold, middle, _STEEPER)
-    level = np.bincount(hold, force * middle) / np.maximum(np.bincount(hold, middle), 1)
+    rests = _rests(force, np.append(starts, len(hold)))
+    going, far = elsewhere(force, displacement, sd, hold, rests, _STEEPER)
+    level = np.bincount(hold, force * rests) / np.maximum(np.bincount(hold, rests), 1)
     for a, b in pairwise(starts.tolist()):
-        there, step = force[a:b][middle[a:b]], level[hold[b]] - level[hold[a]]
+        there, step = force[a:b][rests[a:b]], level[hold[b]] - level[hold[a]]
         rested = there.size > 1 and np.ptp(there) < _AT_REST * abs(step)
         onward = (force[b - 1] - level[hold[a]]) * step > _ONWARD * step**2
         if rested and onward and far[b - 1] > AWAY and going[b - 1]:
             yield a + int(np.flatnonzero(~going[a:b]).max(initial=0)) + 1, b
+
+
+def _rests(force: Array, edges: Ints) -> Flags:
+    """(n,) the part of every hold, `_REST` of its samples in a row, in which the force (n,) changes
+    least; about the middle of the hold where that is as good. edges (h + 1,): first samples."""
+    out = np.zeros(len(force), dtype=bool)
+    for a, b in pairwise(edges.tolist()):
+        width = max(1, round(_REST * (b - a)))
+        inside = slice(width // 2, width // 2 + b - a - width + 1)  # windows that lie in the hold
+        spans = (maximum_filter1d(force[a:b], width) - minimum_filter1d(force[a:b], width))[inside]
+        middle = (b - a - width) / 2
+        quiet = np.flatnonzero(spans <= _AS_QUIET * spans.min())
+        first = a + int(quiet[np.argmin(np.abs(quiet - middle))])
+        out[first : first + width] = True
+    return out
+
+
+_AS_QUIET = 1.5  # times: noise of a few samples differs by as much

@@ -173,6 +173,19 @@ def test_a_ramp_named_after_the_level_it_leaves_belongs_to_the_next(hardens: boo
     assert np.abs(rows.force[rows.zero]).max() < 0.5
 
 
+@pytest.mark.parametrize("ramp", [6, 9])
+def test_long_ramps_that_bear_the_name_of_the_level_left_belong_to_the_next(ramp: int) -> None:
+    """Twelve samples at every level, and then the whole way to the next one under its name: no part
+    of the level, though it begins before three quarters of what bears the name."""
+    rng, hold = np.random.default_rng(4), 12
+    on = np.concatenate([np.zeros(hold), np.arange(1, ramp + 1) / (ramp + 1)])
+    number = np.repeat(np.arange(5), hold + ramp)
+    force = 10.0 * (number + np.tile(on, 5)) + rng.normal(0, 0.05, len(number))
+    data = bench_data(force, SPRING * force, step=number, imposed="force")
+    way = (np.tile(on, 5) > 0) & (number < 4)
+    np.testing.assert_array_equal(_leading_on(data).step, number + way)
+
+
 def test_only_what_rested_leaves() -> None:
     """Neither a triangle cut into steps nor a part that creeps on at its level changes names."""
     load = np.concatenate([np.linspace(0, 60, 90), np.linspace(60, 0, 90)])
