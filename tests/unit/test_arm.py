@@ -330,15 +330,3 @@ def test_refusals(ur10e: Arm) -> None:
     other = Arm("scara", d=np.ones(6), a=np.ones(6), alpha=np.zeros(6))
     with pytest.raises(ValueError, match="scara is not"):
         other.inverse(np.eye(4))
-
-
-def test_compiled_compliance_is_the_same(arm: Arm) -> None:
-    pytest.importorskip("numba")
-    from identification.kernels import compliance_many
-
-    q, tool = random_poses(200), tool_offset([0.02, -0.05, 0.28])
-    np.testing.assert_allclose(
-        compliance_many(arm, q, tool), arm.compliance(q, tool), rtol=1e-9, atol=1e-17
-    )
-    with pytest.raises(ValueError, match=r"\(n, 6\) is wanted"):
-        compliance_many(arm, q[0])
