@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from identification import workspace
 from identification.arm import along, invert_compliance
-from identification.coupling import Kind, State, coupled, decide, load_axes
+from identification.coupling import Kind, State, coupled, decide, load_axes, on_axes
 from identification.coupling import base_distance as distance_of
 from identification.when import Schedule
 from identification.workspace import Workspace
@@ -114,7 +114,7 @@ def couple(
     spec = _spec(read)
     C = _regular_compliance(read)
     kinds = _kinds(spec)
-    single = _stiffness(C, np.eye(3))
+    single = on_axes(C, np.eye(3))
     pair = {name: _pair(C, spec, kind, half) for name, kind, half in kinds}
     u_single, u_pair = _uncertainty(read, spec, kinds)
     track = read_path(Path(path)) if path is not None else None
@@ -161,12 +161,8 @@ def _kinds(spec: CouplingSpec) -> list[tuple[str, Kind, Array | None]]:
     return kinds
 
 
-def _stiffness(C: Array, axes: Array) -> Array:
-    return np.array([along(C, axes[:, i]) for i in range(3)])
-
-
 def _pair(C: Array, spec: CouplingSpec, kind: Kind, half: Array | None) -> Array:
-    return _stiffness(coupled(C, spec.beta, kind, half), load_axes(spec.beta, spec.load_axes))
+    return on_axes(coupled(C, spec.beta, kind, half), load_axes(spec.beta, spec.load_axes))
 
 
 def _uncertainty(
@@ -182,7 +178,7 @@ def _uncertainty(
             factor[i] += sign * step
             varied = arm.with_stiffness(arm.joint_stiffness * factor)
             C = varied.compliance(model.q, model.tool, links=model.links, base=model.mounting)
-            found = {"single": _stiffness(C, np.eye(3))}
+            found = {"single": on_axes(C, np.eye(3))}
             found |= {name: _pair(C, spec, kind, half) for name, kind, half in kinds}
             sides.append(found)
         for name in variances:
