@@ -226,22 +226,6 @@ class Arm:
             C = C + A @ np.asarray(base, dtype=float) @ np.swapaxes(A, -1, -2)
         return C
 
-    def stiffness(self, q: ArrayLike, tool: ArrayLike | None = None, **further: object) -> Array:
-        """Cartesian stiffness at the tool (..., 6, 6), the inverse of `compliance`.
-
-        Raises ValueError in a singular pose, where some twist meets no compliance at all.
-        """
-        C = self.compliance(q, tool, **further)  # type: ignore[arg-type]
-        return invert_compliance(C)
-
-    def directional_stiffness(
-        self, q: ArrayLike, direction: ArrayLike, tool: ArrayLike | None = None, **further: object
-    ) -> Array:
-        """Force over displacement along unit vectors `direction` (..., 3) under a pure force
-        along them, N/m: `1 / (n^T C_tt n)`; infinite where the joints do not see the force."""
-        C = self.compliance(q, tool, **further)  # type: ignore[arg-type]
-        return along(C, direction)
-
 
 _ARRAYS = (
     "d", "a", "alpha", "mass", "centre", "torque_limit", "q_min", "q_max",

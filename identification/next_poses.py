@@ -126,11 +126,6 @@ def _worst(P: Array, gained: Array) -> Array:
 _CRITERIA = {"A": _summed, "D": _volume, "E": _worst}
 
 
-def expected_after(proposals: list[Proposal], fit: JointFit) -> Array:
-    """Relative standard uncertainties (6,) when all proposals have been measured."""
-    return proposals[-1].expected if proposals else fit.relative_sd
-
-
 def _predictions(levers: Array, force: Array, stiffness: Array, plan: Plan) -> tuple[Array, Array]:
     """Derivatives (m, 8) of ln s by ln c and the gains, and the standard uncertainty (m,) of ln s.
 

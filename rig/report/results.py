@@ -103,15 +103,6 @@ def escaped(key: str) -> str:
     return key.replace("~", "~0").replace("/", "~1")
 
 
-def look_up(document: Any, pointer: str) -> Any:
-    """What stands at a pointer; KeyError, IndexError where nothing does."""
-    value = document
-    for step in pointer.split("/")[1:]:
-        key = step.replace("~1", "/").replace("~0", "~")
-        value = value[int(key)] if isinstance(value, list) else value[key]
-    return value
-
-
 def quantity(node: Node, scale: float = 1.0) -> Rich:
     """`value [low, high]` of a quantity with its 95 % interval."""
     if node["value"].value is None:

@@ -183,14 +183,6 @@ class World:
         self.advance_m = self.target_m = HOME_GAP_M + reach - clearance
         return state
 
-    def true_curve(self, direction: Sequence[float], forces_N: Sequence[float]) -> Array:
-        """(n,) m: the tool's displacement along `direction` in the present pose, first loading
-        through `forces_N` in this order, each settled for ever; no gains, no scatter, no noise."""
-        fresh = World(self.design, 0, 0.0, 0.0)
-        fresh.move(tuple(self.q), tuple(self.tcp_m))
-        fresh.mount(direction)
-        return np.array([fresh._take(float(f), math.inf).displacement_m for f in forces_N])
-
     def _end_step(self, force: float, dt: float) -> State:
         before = self.state
         self._force = force

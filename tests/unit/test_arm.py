@@ -12,6 +12,7 @@ from identification.arm import (
     STANDARD_GRAVITY,
     Arm,
     along,
+    invert_compliance,
     tool_offset,
     unit_vector,
 )
@@ -125,7 +126,7 @@ def test_loaded_term_is_the_derivative_of_the_load_torques(arm: Arm) -> None:
 
 def test_published_single_stiffness(ur10e: Arm) -> None:
     arm = ur10e.with_stiffness(F1_C)
-    found = [float(arm.directional_stiffness(F1_Q, n)) / 1e3 for n in np.eye(3)]
+    found = [float(along(arm.compliance(F1_Q), n)) / 1e3 for n in np.eye(3)]
     np.testing.assert_allclose(found, [95.94, 57.42, 30.4], rtol=1e-3)
 
 
@@ -151,8 +152,8 @@ def test_compliance_is_what_the_springs_do(ur10e: Arm) -> None:
 def test_loaded_compliance_shifts_little_and_in_the_right_sense(ur10e: Arm) -> None:
     """Own geometry under load, PHYSICS's size: 0.1 to 1.3 %."""
     arm = ur10e.with_stiffness(F1_C)
-    plain = arm.directional_stiffness(F1_Q, [1, 0, 0])
-    loaded = arm.directional_stiffness(F1_Q, [1, 0, 0], wrench=[200.0, 0, 0, 0, 0, 0])
+    plain = along(arm.compliance(F1_Q), [1, 0, 0])
+    loaded = along(arm.compliance(F1_Q, wrench=[200.0, 0, 0, 0, 0, 0]), [1, 0, 0])
     assert 1e-4 < abs(loaded / plain - 1) < 1.5e-2
 
 
@@ -163,7 +164,8 @@ def test_a_load_beyond_the_springs_is_refused(ur10e: Arm) -> None:
 
 def test_stiffness_is_the_inverse_of_compliance(arm: Arm) -> None:
     q = random_poses(20)
-    product = arm.stiffness(q) @ arm.compliance(q)
+    C = arm.compliance(q)
+    product = invert_compliance(C) @ C
     np.testing.assert_allclose(product, np.broadcast_to(np.eye(6), product.shape), atol=1e-6)
 
 
@@ -326,7 +328,7 @@ def test_refusals(ur10e: Arm) -> None:
     with pytest.raises(ValueError, match="no rotation matrix"):
         ur10e.fk(np.zeros(6), np.diag([2.0, 1, 1, 1]))
     with pytest.raises(ValueError, match="singular pose"):
-        ur10e.stiffness([0.3, -1.0, 1.2, 0.4, 0.0, 0.2])
+        invert_compliance(ur10e.compliance([0.3, -1.0, 1.2, 0.4, 0.0, 0.2]))
     other = Arm("scara", d=np.ones(6), a=np.ones(6), alpha=np.zeros(6))
     with pytest.raises(ValueError, match="scara is not"):
         other.inverse(np.eye(4))
