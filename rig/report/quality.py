@@ -28,6 +28,7 @@ NOTABLE = (
     "resumed",
     "stopped",
     "top",
+    "values_lost",
 )
 MOST_EVENTS = 40
 
