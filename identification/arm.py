@@ -112,7 +112,7 @@ class Arm:
         Column i is `[z_i x (p - p_i); z_i]`, z_i and p_i axis and origin of frame i-1.
         """
         frames = self.frames(q)
-        return _columns(frames, _tool_point(frames, tool))
+        return _columns(frames, tool_point(frames, tool))
 
     def inverse(self, T: ArrayLike, q6: float = 0.0) -> Array:
         """All closed-form solutions, (..., 8, 6) rad, NaN where a branch does not exist.
@@ -163,7 +163,7 @@ class Arm:
         W = np.asarray(wrench, dtype=float)
         z = frames[..., :JOINTS, :3, 2]
         origin = frames[..., :JOINTS, :3, 3]
-        out = _force_hessian(z, origin, _tool_point(frames, tool), W[..., :3])
+        out = _force_hessian(z, origin, tool_point(frames, tool), W[..., :3])
         turned = np.cross(z[..., None, :, :], z[..., :, None, :])  # [i, j] = z_j x z_i
         moment = np.einsum("...ijk,...k->...ij", turned, W[..., 3:])
         out += np.tril(moment, -1)
@@ -208,7 +208,7 @@ class Arm:
         if not np.isfinite(self.joint_stiffness).all():
             raise ValueError(f"the model of {self.name} has no joint stiffness for all six joints")
         frames = self.frames(q)
-        point = _tool_point(frames, tool)
+        point = tool_point(frames, tool)
         J = _columns(frames, point)
         if wrench is None and gravity is None:
             C = (J / self.joint_stiffness) @ np.swapaxes(J, -1, -2)
@@ -310,7 +310,8 @@ def tool_offset(xyz: ArrayLike) -> Array:
     return T
 
 
-def _tool_point(frames: Array, tool: ArrayLike | None) -> Array:
+def tool_point(frames: Array, tool: ArrayLike | None) -> Array:
+    """Position (..., 3) m of the tool (of the flange without one) for `Arm.frames`."""
     flange = frames[..., JOINTS, :, :]
     placed = flange if tool is None else flange @ tool_transform(tool)
     return np.asarray(placed[..., :3, 3])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import JOINTS, Arm, unit_vector
-from identification.uncertainty import TWO_SIDED
+from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 
 Array = NDArray[np.float64]
 
@@ -85,8 +85,6 @@ class JointFit:
 
     stiffness: Array
     covariance: Array
-    gain_values: Array
-    gain_covariance: Array
     data_share: Array
     lower_bound: Array
     rank: int
@@ -153,8 +151,6 @@ def identify(
     return JointFit(
         stiffness=np.exp(parameters[:JOINTS]),
         covariance=own,
-        gain_values=parameters[JOINTS:],
-        gain_covariance=covariance[JOINTS:, JOINTS:],
         data_share=share,
         lower_bound=_lower_bounds(arm, observations, gains),
         rank=rank,
@@ -266,7 +262,7 @@ def _lower_bounds(arm: Arm, observations: Sequence[Observation], gains: Sequence
     for one in observations:
         gain = np.hypot(gains[one.setup].force, gains[one.setup].displacement)
         u = np.hypot(one.u_compliance, gain * one.compliance)
-        out = np.maximum(out, one.levers(arm) ** 2 / (one.compliance + 1.645 * u))
+        out = np.maximum(out, one.levers(arm) ** 2 / (one.compliance + TWO_SIDED_90 * u))
     return out
 
 

@@ -45,8 +45,6 @@ def identified() -> IdentifyResult:
     fit = JointFit(
         stiffness=np.array([37201.0, 56946.0, 18110.0, 7108.0, 7533.0, 8000.0]),
         covariance=np.diag(np.array([0.004, 0.021, 0.062, 0.093, 0.0995, 0.1]) ** 2),
-        gain_values=np.zeros(2),
-        gain_covariance=np.eye(2),
         data_share=np.array([0.998, 0.956, 0.615, 0.135, 0.01, -1e-9]),
         lower_bound=np.array([36904.0, 54600.0, 15800.0, 2100.0, 310.0, 0.0]),
         rank=5,
