@@ -28,12 +28,10 @@ AMPLIFIER_SPAN_V = 10.0
 class Calibration:
     """Linear map from channel volts to force N and moment Nm on the robot in its base frame.
 
-    `newton_per_volt` (channels,) is the gain of every single channel; `matrix`
-    (components, channels) takes volts to the components: Fx, Fy, Fz, and, with eight channels,
-    Mx, My, Mz about the point at height az0 over the sensor's origin.
+    `matrix` (components, channels) takes volts to the components: Fx, Fy, Fz, and, with eight
+    channels, Mx, My, Mz about the point at height az0 over the sensor's origin.
     """
 
-    newton_per_volt: Array
     matrix: Array
 
     @classmethod
@@ -43,7 +41,7 @@ class Calibration:
         rotation = np.array(settings.axes_in_base).T * settings.force_on_robot_sign
         sums = channel_sums(settings)
         blocks = [rotation @ sums[i : i + 3] for i in range(0, len(sums), 3)]
-        return cls(newton_per_volt=scale, matrix=np.vstack(blocks) * scale)
+        return cls(matrix=np.vstack(blocks) * scale)
 
     def components(self, volts: Array) -> Array:
         """Force N and moment Nm (n, 3 or 6) of channel volts (n, channels)."""

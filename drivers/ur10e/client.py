@@ -21,7 +21,7 @@ from drivers.errors import (
 from drivers.readings import Reading, RobotState, Signal
 from drivers.stream import Block, Stream
 from drivers.ur10e.dashboard import Dashboard
-from drivers.ur10e.probe import Handshake, probe
+from drivers.ur10e.probe import probe
 from drivers.ur10e.process import ReceiveProcess
 from drivers.ur10e.reduce import PLACES
 from drivers.ur10e.settings import Ur10eSettings
@@ -55,7 +55,7 @@ class Ur10e:
         self._source = "emulated+ur10e" if emulated else "ur10e"
         self._stream = Stream(len(SIGNALS), clock, self._source)
         self._process: ReceiveProcess | None = None
-        self._handshake: Handshake | None = None
+        self._controller_version = "not connected"
         self._facts: dict[str, str] = {}
         self._lock = Lock()
         self._last: tuple[float, ...] = ()
@@ -75,7 +75,7 @@ class Ur10e:
         self.close()
         deadline = time.monotonic() + self._settings.connect_deadline_s
         try:
-            self._handshake = probe(
+            self._controller_version = probe(
                 self.name, self._settings.host, self._settings.frequency_Hz, deadline
             )
             if self._settings.dashboard:
@@ -95,12 +95,11 @@ class Ur10e:
 
     def identity(self) -> Mapping[str, str]:
         """What controller, Dashboard and station file say: who was measured, and through what."""
-        version = self._handshake.controller_version if self._handshake else "not connected"
         return {
             "source": self._source,
             "host": self._settings.host,
             "frequency_Hz": f"{self._settings.frequency_Hz:g}",
-            "controller_version": version,
+            "controller_version": self._controller_version,
             **self._facts,
         }
 
