@@ -100,9 +100,7 @@ def volts_of(force_on_robot: Array, settings: KistlerSettings) -> Array:
     return volts
 
 
-def drift_bound_N_per_s(
-    settings: KistlerSettings, drift_pC_per_s: float = CHARGE_DRIFT_pC_PER_S
-) -> Array:
+def drift_bound_N_per_s(settings: KistlerSettings) -> Array:
     """Fastest drift (3,) of Fx, Fy, Fz in N/s, base frame, if every channel drifts alike.
 
     A charge drift over the sensitivity is a force drift; the drifts of the channels in a sum add,
@@ -110,7 +108,7 @@ def drift_bound_N_per_s(
     amplifier's full scale is in N, so this is the only use of the charge sensitivity.
     """
     sensitivity = np.abs(per_channel(settings.sensitivity_pC_per_N, settings.channels))
-    sensor = np.abs(channel_sums(settings)[:3]) @ (drift_pC_per_s / sensitivity)
+    sensor = np.abs(channel_sums(settings)[:3]) @ (CHARGE_DRIFT_pC_PER_S / sensitivity)
     result: Array = np.abs(np.array(settings.axes_in_base)).T @ sensor
     return result
 

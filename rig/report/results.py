@@ -88,9 +88,9 @@ class Node:
             return (Number(f"< {_LEAST_P:g}", self.value, self.pointer),)
         return self.number(2)
 
-    def interval(self, digits: int = 4, scale: float = 1.0) -> Rich:
+    def interval(self, digits: int = 4) -> Rich:
         """`low to high` of a pair."""
-        low, high = self[0].number(digits, scale), self[1].number(digits, scale)
+        low, high = self[0].number(digits), self[1].number(digits)
         return (*low, " to ", *high)
 
     def text(self) -> str:

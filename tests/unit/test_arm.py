@@ -297,18 +297,18 @@ def test_out_of_reach(ur10e: Arm) -> None:
 
 
 def test_reach_about_the_shoulder(ur10e: Arm) -> None:
-    from identification.workspace import tool_points
+    from identification.workspace import flange_points
 
     q = random_poses(1_000_000, seed=1)
-    distance = np.linalg.norm(tool_points(ur10e, q) - [0, 0, ur10e.d[0]], axis=1)
+    distance = np.linalg.norm(flange_points(ur10e, q) - [0, 0, ur10e.d[0]], axis=1)
     assert 1.355 < distance.max() < 1.36417
 
 
-def test_tool_points_are_fk(arm: Arm) -> None:
-    from identification.workspace import tool_points
+def test_flange_points_are_fk(arm: Arm) -> None:
+    from identification.workspace import flange_points
 
-    q, tool = random_poses(50), tool_offset([0.1, 0.2, 0.3])
-    np.testing.assert_allclose(tool_points(arm, q, tool), arm.fk(q, tool)[:, :3, 3], atol=1e-12)
+    q = random_poses(50)
+    np.testing.assert_allclose(flange_points(arm, q), arm.fk(q)[:, :3, 3], atol=1e-12)
 
 
 # --- bad input -----------------------------------------------------------------------------------

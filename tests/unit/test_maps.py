@@ -60,9 +60,7 @@ def test_every_cell_is_reached_and_the_stiffest(f1: ArmModel) -> None:
     rng = np.random.default_rng(0)
     points = rng.uniform([-1.2, -1.2, -0.3], [1.2, 1.2, 1.2], (4, 60, 3))
     stance = Stance(DOWN, f1.tool, turn=0.4)
-    seen: list[float] = []
-    cells = stiffness_map(f1.arm, points, stance, [0.6, 0.0, 0.8], progress=seen.append)
-    assert seen[-1] == 1.0
+    cells = stiffness_map(f1.arm, points, stance, [0.6, 0.0, 0.8])
     reached = np.isfinite(cells.stiffness)
     assert 0.2 < reached.mean() < 0.9
     assert (cells.branch[~reached] == -1).all()

@@ -24,9 +24,9 @@ def _drive(random: Generator, low: float) -> Path:
     return through(points, samples(random, len(points)), eased=bool(random.random() < 0.4))
 
 
-def _with_loop(random: Generator, u: Array, force: Array, share: float = 0.1) -> Array:
-    """The curve with a small loop: at most `share` of what is bent in it."""
-    most = random.uniform(0.0, share) * bent(u, force)
+def _with_loop(random: Generator, u: Array, force: Array) -> Array:
+    """The curve with a small loop: at most a tenth of what is bent in it."""
+    most = random.uniform(0.0, 0.1) * bent(u, force)
     length = random.uniform(0.02, 0.1)
     return np.asarray(force + most * slider(u / length, np.ones(len(u))))
 
