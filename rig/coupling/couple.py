@@ -16,12 +16,14 @@ from identification.coupling import Kind, State, coupled, decide, load_axes, on_
 from identification.coupling import base_distance as distance_of
 from identification.when import Schedule
 from identification.workspace import Workspace
+from rig.coupling import coupling_task
 from rig.coupling.coupling_path import read_path, run_path
 from rig.errors import InputError
 from rig.models.model import ArmModel, CouplingSpec, load_model
 from rig.units import MM_PER_M, N_PER_MM
 
 Array = NDArray[np.float64]
+SCHEMA = "rig.coupling/1"
 _AXES = ("x", "y", "z")
 
 
@@ -51,12 +53,13 @@ class CouplingResult:
     decisions: tuple[Decision, ...]
     schedule: Schedule | None
     notes: tuple[str, ...]
+    placement: coupling_task.TaskResult | None = None  # where it was asked for
 
     def to_json(self) -> dict[str, Any]:
         """`rig.coupling/1`, with further keys."""
         first, *others = self.workspaces
         out: dict[str, Any] = {
-            "schema": "rig.coupling/1",
+            "schema": SCHEMA,
             "model": self.model.name,
             "load_axes": self.spec.load_axes,
             "kind": self.spec.described,
@@ -88,13 +91,15 @@ class CouplingResult:
                 {"from_s": i.start, "to_s": i.end, "state": i.state}
                 for i in self.schedule.intervals()
             ]
+        if self.placement is not None:
+            out["placement"] = self.placement.to_json()
         return out
 
     def to_text(self) -> str:
         """Tables for a terminal."""
         from rig.coupling.couple_text import text
 
-        return text(self)
+        return text(self) if self.placement is None else f"{text(self)}\n{self.placement.to_text()}"
 
 
 def couple(
@@ -104,9 +109,11 @@ def couple(
     seed: int = 0,
     path: str | Path | None = None,
     dead_band: float = 0.0,
+    best_placement: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> CouplingResult:
-    """Workspace, stiffness and decisions of a model file; along `path` (CSV) the schedule too.
+    """Workspace, stiffness and decisions of a model file; along `path` (CSV) the schedule, and the
+    best placement of the second arm where they are asked for.
 
     samples: joint positions of the Monte Carlo workspace, 0 leaves it out. Raises InputError.
     """
@@ -120,6 +127,7 @@ def couple(
     track = read_path(Path(path)) if path is not None else None
     if not 0 <= dead_band < 1:
         raise InputError(f"--dead-band is {dead_band:g}; wanted: at least 0 and below 1.")
+    placement = coupling_task.best_place(read) if best_placement else None
     return CouplingResult(
         model=read,
         spec=spec,
@@ -131,6 +139,7 @@ def couple(
         decisions=_decisions(read, C, spec),
         schedule=run_path(read, spec, track, dead_band) if track is not None else None,
         notes=tuple(_notes(read, spec)),
+        placement=placement,
     )
 
 

@@ -29,23 +29,23 @@ _MAP_CELLS = 81
 _LABEL = "Stiffness in N/mm"
 
 
-def draw(result: CouplingResult, folder: Path, placement: TaskResult | None = None) -> list[Path]:
+def draw(result: CouplingResult, folder: Path) -> list[Path]:
     """Writes the figures as PNG and SVG into `folder`; the files written.
 
     InputError if the folder can't be written to.
     """
-    return write_figures(folder, lambda: _figures(result, placement))
+    return write_figures(folder, lambda: _figures(result))
 
 
-def _figures(result: CouplingResult, placement: TaskResult | None) -> list[tuple[str, Figure]]:
+def _figures(result: CouplingResult) -> list[tuple[str, Figure]]:
     out = [("stiffness", stiffness(result))]
     # an arm that the closed form does not cover has no map; the rest stands without it
     with suppress(ValueError):
         out.append(("map", maps(result)))
     if result.schedule is not None:
         out.append(("schedule", schedule(result)))
-    if placement is not None:
-        out.append(("placement", place(placement)))
+    if result.placement is not None:
+        out.append(("placement", place(result.placement)))
     return out
 
 
