@@ -14,7 +14,7 @@ from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
 from rig.canvas import blank
 from rig.coupling.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
-from rig.plotting import COLOURS, named, write_figures
+from rig.plotting import COLOURS, watermark, write_figures
 from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
@@ -209,11 +209,7 @@ def _plain_numbers(axis: Any) -> None:
 
 def _finish(figure: Figure, model: ArmModel) -> Figure:
     """The model's name; and across the figure what must not be overlooked."""
-    words = [word for word in marks([model.note]) if word]
-    if words:
-        figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.3,
-                    ha="center", va="center", rotation=25)  # fmt: skip
-    return named(figure, Path(model.name).name)
+    return watermark(figure, marks([model.note]), Path(model.name).name)
 
 
 def marks(notes: Sequence[str]) -> list[str]:

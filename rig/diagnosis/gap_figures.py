@@ -14,6 +14,8 @@ from rig.canvas import blank
 from rig.diagnosis.diagnose import Diagnosis
 from rig.diagnosis.diagnose_text import LEAST_PROBABILITY
 from rig.diagnosis.gap_layout import (
+    answer_label,
+    drive_label,
     first_column,
     label_below,
     log_axis,
@@ -39,7 +41,7 @@ from rig.diagnosis.gap_points import (
 )
 from rig.digits import likely
 from rig.errors import InputError
-from rig.plotting import COLOURS, named, write_figures
+from rig.plotting import COLOURS, watermark, write_figures
 from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
@@ -105,11 +107,7 @@ class _Drawing:
 
     def _finish(self, figure: Figure) -> Figure:
         """The data set's name; and across the figure what must not be overlooked."""
-        words = [banner.split(":", maxsplit=1)[0] for banner in self.banners]
-        if words:
-            figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.25,
-                        ha="center", va="center", rotation=25)  # fmt: skip
-        return named(figure, self.name)
+        return watermark(figure, self.banners, self.name)
 
 
 def curve(r: Shown, p: Points) -> Figure:
@@ -127,9 +125,9 @@ def curve(r: Shown, p: Points) -> Figure:
         upper.set_title(r.setup_name(s), fontsize=10)
     noise_axis(grid[0][1], noise, float(np.abs(p.gap_before * scale).max()))  # they share it
     for upper, lower in first_column(grid):
-        upper.set_ylabel("Force in N" if r.imposed else "Displacement in mm")
+        upper.set_ylabel(answer_label(r.imposed))
         lower.set_ylabel("Gap in N" if r.imposed else "Gap in mm")
-    label_below(grid, "Displacement in mm" if r.imposed else "Force in N")
+    label_below(grid, drive_label(r.imposed))
     set_title(figure, f"Measured, and simulated before and after ({_after(r)})")
     shared_legend(figure, [axes for pair in grid for axes in pair])
     return figure
@@ -223,7 +221,7 @@ def residual(r: Shown, p: Points) -> Figure:
         if mine.any():
             _noise_band(left, (p.displacement if r.imposed else p.force)[mine], p.noise[mine])
     _noise_band(right, elapsed, p.noise)
-    left.set_xlabel("Displacement in mm" if r.imposed else "Force in N")
+    left.set_xlabel(drive_label(r.imposed))
     assumed = not r.clock and len(np.unique(p.run)) > 1
     right.set_xlabel(f"Time in the session in {unit}" + ", rests assumed" * assumed)
     left.set_ylabel(_gap_label(r, "Left"))
@@ -352,7 +350,7 @@ def remaining(r: Shown, p: Points, m: Remainder) -> Figure:
             axes.fill_between(x, mean - 2 * sd, mean + 2 * sd, color=edge, alpha=0.2, linewidth=0)
             axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
         axes.set_title(r.setup_name(s), fontsize=10)
-    label_below(grid, "Displacement in mm" if r.imposed else "Force in N")
+    label_below(grid, drive_label(r.imposed))
     figure.supylabel(_gap_label(r, "Left unexplained"), fontsize=10)
     set_title(figure, _remainder_title(r, m))
     shared_legend(figure, [axes for (axes,) in grid])

@@ -7,12 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.canvas import blank
+from rig.canvas import DISPLACEMENT, FORCE, blank
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_PANELS = 12
+
+
+def drive_label(imposed: bool) -> str:
+    """Axis of what drives the rig: the force, or the displacement where that is imposed."""
+    return DISPLACEMENT if imposed else FORCE
+
+
+def answer_label(imposed: bool) -> str:
+    """Axis of what answers."""
+    return drive_label(not imposed)
 
 
 def panels(setups: int, *, below: bool = False) -> tuple[Figure, list[list[Any]], list[int]]:
