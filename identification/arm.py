@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from identification.arrays import Array
 from identification.elastic import Beam, transport
 
-Array = NDArray[np.float64]
 JOINTS = 6
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # m/s^2 in the base frame of an arm that stands upright
 

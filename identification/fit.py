@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.curve import Array
+from identification.arrays import Array
 
 MAX_ITERATIONS = 200
 RELATIVE_CHANGE = 1e-13

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import JOINTS, Arm, unit_vector
+from identification.arrays import Array
 from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
-
-Array = NDArray[np.float64]
 
 # A joint counts as identified when its 95 % interval is well inside +-5 % (three standard
 # uncertainties), and when at least nine tenths of what is known of it come from the data.

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.arm import Arm, along, unit_vector
+from identification.arrays import Array
 from identification.coupling import Kind, coupled, load_axes
 from identification.elastic import Beam
 from identification.inverse import BRANCHES, solve, tool_pose
 
-Array = NDArray[np.float64]
 _ROUNDS = 4  # of the search around the best cell of a grid
 _BLOCK = 5_000  # cells at once: eight branches of 6 x 6 each, a few MB
 # Smallest singular value of the Jacobian (lengths by 1 m) that still counts as away from

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import JOINTS, Arm, tool_point
+from identification.arrays import Array
 from identification.joints import Gains, JointFit
 from identification.maps import LEAST_SINGULAR
 
-Array = NDArray[np.float64]
 # A: least sum of the relative standard uncertainties; D: least volume of the joint confidence
 # region; E: least uncertainty of the worst-known combination of joints.
 Criterion = Literal["A", "D", "E"]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.arm import JOINTS, Arm
+from identification.arrays import Array
 
-Array = NDArray[np.float64]
 _CHUNK = 50_000  # rows that stay in the processor's cache
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.world import World
 
 

@@ -13,11 +13,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.kistler.settings import KistlerSettings, PerAxis
-
-Array = NDArray[np.float64]
 
 AXES_OF_CHANNELS = {3: "xyz", 8: "xxyyzzzz"}
 CHARGE_DRIFT_pC_PER_S = 0.05  # most that the makers of charge amplifiers allow for one channel

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import workspace
 from identification.arm import along, invert_compliance
@@ -16,14 +15,14 @@ from identification.coupling import Kind, State, coupled, decide, load_axes, on_
 from identification.coupling import base_distance as distance_of
 from identification.when import Schedule
 from identification.workspace import Workspace
+from rig import schemas
+from rig.arrays import Array
 from rig.coupling import coupling_task
 from rig.coupling.coupling_path import read_path, run_path
 from rig.errors import InputError
 from rig.models.model import ArmModel, CouplingSpec, load_model
 from rig.units import MM_PER_M, N_PER_MM
 
-Array = NDArray[np.float64]
-SCHEMA = "rig.coupling/1"
 _AXES = ("x", "y", "z")
 
 
@@ -59,7 +58,7 @@ class CouplingResult:
         """`rig.coupling/1`, with further keys."""
         first, *others = self.workspaces
         out: dict[str, Any] = {
-            "schema": SCHEMA,
+            "schema": schemas.COUPLING,
             "model": self.model.name,
             "load_axes": self.spec.load_axes,
             "kind": self.spec.described,

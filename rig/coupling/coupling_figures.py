@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
+from rig.arrays import Array
 from rig.canvas import blank
 from rig.coupling.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
 from rig.plotting import COLOURS, watermark, write_figures
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rig.coupling.coupling_task import TaskResult
     from rig.models.model import ArmModel
 
-Array = NDArray[np.float64]
 _MAP_CELLS = 81
 _LABEL = "Stiffness in N/mm"
 

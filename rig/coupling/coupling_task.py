@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.inverse import tool_pose
 from identification.maps import Need, Placement, Stance, Task, best_placement
+from rig import schemas
 from rig.errors import InputError
 from rig.models.model import ArmModel, CouplingSpec, load_model
 from rig.units import MM_PER_M, N_PER_MM
 
-Array = NDArray[np.float64]
-SCHEMA = "rig.placement/1"
 _DISTANCES_MM = (800.0, 2400.0)
 _BETAS_DEG = (-60.0, 60.0)
 _GRID = (41, 41)
@@ -39,7 +37,7 @@ class TaskResult:
         """`rig.placement/1`."""
         best = self.best
         return {
-            "schema": SCHEMA,
+            "schema": schemas.PLACEMENT,
             "model": self.model.name,
             "base_distance_mm": MM_PER_M * best.base_distance,
             "beta_deg": float(np.rad2deg(best.beta)),

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arm import Arm, tool_offset, tool_transform, unit_vector
 from identification.elastic import MATERIALS, Beam, Section, cantilever, tube
 from identification.inverse import BRANCHES, solutions, tool_pose
+from rig.arrays import Array
 from rig.errors import InputError, did_you_mean
 from rig.models.model_schema import (
     BeamFile,
@@ -29,7 +29,6 @@ from rig.units import MM_PER_M, N_PER_MM
 from rig.yaml.yamlfile import Document, read_document
 from rig.yaml.yamlnodes import Problem
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 MODELS = Path(__file__).resolve().parents[2] / "data" / "models"

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arm import tool_offset
+from rig.arrays import Array
 from rig.canvas import blank
 from rig.meta import Meta, MetaPose
 from rig.models.model import load_robot
@@ -20,7 +20,6 @@ from rig.units import MM_PER_M
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 _ARM, _LASER = "0.35", "#CC3311"
 _LINE_POINTS, _LINE_MM = 13.0, 60.0  # of names above each other; about as much in the drawing
 _VIEWS = (("From above", 0, 1), ("From the side", 0, 2))

@@ -21,7 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.worlds.arm import Array, Placement, place
+from rig.arrays import Array
+from rig.worlds.arm import Placement, place
 from rig.worlds.balance import root
 from rig.worlds.laws import Law
 

@@ -7,8 +7,9 @@ import threading
 import numpy as np
 import pytest
 
+from rig.arrays import Array
 from rig.worlds import make_world
-from rig.worlds.arm import Array, tool_poses
+from rig.worlds.arm import tool_poses
 from rig.worlds.history import History
 from rig.worlds.linear import REFERENCE_Q_RAD
 from rig.worlds.scene import IDLE_TICKS, TICK_S, WorldScene

@@ -9,10 +9,10 @@ import sys
 import numpy as np
 import pytest
 
+from rig.arrays import Array
 from rig.errors import InputError
 from rig.worlds import WORLDS, make_world
 from rig.worlds import paper as paper_module
-from rig.worlds.arm import Array
 from rig.worlds.laws import Spring
 from rig.worlds.world import (
     HAND_SPEED_M_PER_S,

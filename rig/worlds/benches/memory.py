@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.worlds.benches.trial import Array
+from rig.arrays import Array
 
 
 def stops(path: Array, limit: Array, stiff: Array) -> Array:

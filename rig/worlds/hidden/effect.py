@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.scene import Change, Scene
 
 _FAIR_SHARE = 0.08  # of the elastic deflection in a setup, for a joint that an effect sits at

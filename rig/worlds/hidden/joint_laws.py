@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden import memory
 from rig.worlds.hidden.effect import Drawn, Form, Unsuited, draw_joint, one_joint, share_of_joints
 from rig.worlds.hidden.meaning import equal_work_threshold, run_seconds, straight_factor
