@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from identification import maps, workspace
 from identification.inverse import BRANCHES
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 
 
 def timed(what: str, count: int, work: Callable[[], object], repeat: int = 3) -> float:

@@ -18,7 +18,7 @@ from identification.times import MOUNT_S, SCREW_S, UNLOAD_S
 from rig import schemas
 from rig.arrays import Array
 from rig.digits import counted
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.plan_margins import (
     MARGIN,
     beyond_joints,

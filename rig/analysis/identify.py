@@ -23,7 +23,8 @@ from rig.arrays import Array
 from rig.dataset import Dataset, load_each
 from rig.digits import counted
 from rig.errors import InputError
-from rig.models.model import load_model, load_robot
+from rig.models.model import load_model
+from rig.models.robot import load_robot
 from rig.reduce import curves
 from rig.units import MM_PER_M
 

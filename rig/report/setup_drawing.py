@@ -13,7 +13,7 @@ from identification.arm import tool_offset
 from rig.arrays import Array
 from rig.canvas import blank
 from rig.meta import Meta, MetaPose
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.plotting import COLOURS
 from rig.units import MM_PER_M
 

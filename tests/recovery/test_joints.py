@@ -15,7 +15,7 @@ from identification.next_poses import (
     _candidates,
     propose,
 )
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from tests.recovery.joint_world import deflect, place
 
 Array = NDArray[np.float64]

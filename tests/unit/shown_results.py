@@ -27,7 +27,8 @@ from rig.check import Check, DeviceState
 from rig.coupling.couple import CouplingResult, Decision
 from rig.coupling.coupling_task import TaskResult
 from rig.diagnosis.diagnose import Diagnosis
-from rig.models.model import ArmModel, CouplingSpec, Requirement, load_robot
+from rig.models.model import ArmModel, CouplingSpec, Requirement
+from rig.models.robot import load_robot
 from rig.models.simulate import CurvePath, PredictedCurve, Simulation
 from rig.plan import Plan, PlannedRun
 

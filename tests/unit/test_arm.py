@@ -18,7 +18,7 @@ from identification.arm import (
 )
 from identification.elastic import ALUMINIUM, STEEL, Beam, cantilever, transport, tube
 from identification.inverse import BRANCHES, nearest, solutions
-from rig.models.model import load_robot, robot_names
+from rig.models.robot import load_robot, robot_names
 
 Array = NDArray[np.float64]
 ROBOTS = robot_names()
@@ -332,3 +332,8 @@ def test_refusals(ur10e: Arm) -> None:
     other = Arm("scara", d=np.ones(6), a=np.ones(6), alpha=np.zeros(6))
     with pytest.raises(ValueError, match="scara is not"):
         other.inverse(np.eye(4))
+
+
+def test_a_robot_is_read_once() -> None:
+    """Commands ask for the same one again and again."""
+    assert load_robot("ur10e") is load_robot("ur10e")

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from identification.arm import Arm, along, tool_offset
 from identification.coupling import coupled, mirror_axes
 from identification.elastic import STEEL, Beam, cantilever, tube
-from rig.models.model import MODELS, load_model, load_robot
+from rig.models.model import load_model
+from rig.models.robot import MODELS, load_robot
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,8 @@ from rig.coupling.couple import couple
 from rig.coupling.coupling_figures import draw, maps, marks, stiffness
 from rig.coupling.coupling_task import best_for, between_arms_deg
 from rig.errors import InputError
-from rig.models.model import MODELS, ArmModel, load_model
+from rig.models.model import ArmModel, load_model
+from rig.models.robot import MODELS
 
 DOWN = np.array([0.0, 0.0, -1.0])
 

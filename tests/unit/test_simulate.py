@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rig.errors import InputError
-from rig.models.model import MODELS
+from rig.models.robot import MODELS
 from rig.models.simulate import Simulation, simulate, write_csv
 from rig.protocol import load_protocol
 from rig.worlds import make_world
