@@ -21,6 +21,7 @@ class Reading:
     `values` and `sd` run over the device's `signals`: mean and standard deviation (n - 1) of the
     `count` valid single values that arrived between `start` and `end` (seconds of the clock).
     With `count` 0 values are nan. `invalid` single values were discarded; `problems` names them.
+    `lost` single values came before these and were pushed out, because nobody collected them.
     `age_s` is the wall-clock age of the newest single value: nothing old may look live.
     `source` begins with "emulated" for every stand-in.
     """
@@ -34,6 +35,7 @@ class Reading:
     age_s: float
     source: str
     problems: tuple[str, ...] = ()
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,7 +57,8 @@ class Stream:
     """Thread-safe hand-over of blocks: `collect` gives each block once, `latest` peeks.
 
     One thread puts, one thread collects, any thread may peek. Holds at most `keep` blocks that
-    nobody has collected yet; older ones are dropped and counted in `dropped`.
+    nobody has collected yet; the single values of older ones are lost, and the next reading that
+    is collected says how many (`Reading.lost`).
     """
 
     def __init__(self, width: int, clock: Clock, source: str, keep: int = 4096) -> None:
@@ -70,14 +71,14 @@ class Stream:
         self._arrived = math.nan
         self._condition = threading.Condition()
         self._failure: Exception | None = None
-        self.dropped = 0
+        self._lost = 0  # single values, since the last collection
 
     def put(self, block: Block) -> None:
         """Called by the device's thread."""
         with self._condition:
             if len(self._blocks) >= self._keep:
-                self._blocks.popleft()
-                self.dropped += 1
+                pushed_out = self._blocks.popleft()
+                self._lost += pushed_out.count + pushed_out.invalid
             self._blocks.append(block)
             self._newest = block
             self._arrived = time.monotonic()
@@ -113,7 +114,8 @@ class Stream:
                 self._condition.wait(remaining)
             blocks = list(self._blocks)
             self._blocks.clear()
-        return self._reading([b for b in blocks if b.end >= since] or blocks[-1:])
+            lost, self._lost = self._lost, 0
+        return self._reading([b for b in blocks if b.end >= since] or blocks[-1:], lost)
 
     def latest(self) -> Reading | None:
         """The newest block, whether collected or not; None before the first."""
@@ -123,7 +125,7 @@ class Stream:
             newest = self._newest
         return None if newest is None else self._reading([newest])
 
-    def _reading(self, blocks: list[Block]) -> Reading:
+    def _reading(self, blocks: list[Block], lost: int = 0) -> Reading:
         count, mean, sd = pool(blocks, self._width)
         problems = tuple(dict.fromkeys(p for b in blocks for p in b.problems))
         return Reading(
@@ -136,4 +138,5 @@ class Stream:
             age_s=self.age_s(),
             source=self._source,
             problems=problems,
+            lost=lost,
         )

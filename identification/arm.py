@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from identification.arrays import Array
 from identification.elastic import Beam, transport
 
-Array = NDArray[np.float64]
 JOINTS = 6
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # m/s^2 in the base frame of an arm that stands upright
 
@@ -112,7 +112,7 @@ class Arm:
         Column i is `[z_i x (p - p_i); z_i]`, z_i and p_i axis and origin of frame i-1.
         """
         frames = self.frames(q)
-        return _columns(frames, _tool_point(frames, tool))
+        return _columns(frames, tool_point(frames, tool))
 
     def inverse(self, T: ArrayLike, q6: float = 0.0) -> Array:
         """All closed-form solutions, (..., 8, 6) rad, NaN where a branch does not exist.
@@ -163,7 +163,7 @@ class Arm:
         W = np.asarray(wrench, dtype=float)
         z = frames[..., :JOINTS, :3, 2]
         origin = frames[..., :JOINTS, :3, 3]
-        out = _force_hessian(z, origin, _tool_point(frames, tool), W[..., :3])
+        out = _force_hessian(z, origin, tool_point(frames, tool), W[..., :3])
         turned = np.cross(z[..., None, :, :], z[..., :, None, :])  # [i, j] = z_j x z_i
         moment = np.einsum("...ijk,...k->...ij", turned, W[..., 3:])
         out += np.tril(moment, -1)
@@ -208,7 +208,7 @@ class Arm:
         if not np.isfinite(self.joint_stiffness).all():
             raise ValueError(f"the model of {self.name} has no joint stiffness for all six joints")
         frames = self.frames(q)
-        point = _tool_point(frames, tool)
+        point = tool_point(frames, tool)
         J = _columns(frames, point)
         if wrench is None and gravity is None:
             C = (J / self.joint_stiffness) @ np.swapaxes(J, -1, -2)
@@ -225,22 +225,6 @@ class Arm:
             A = transport(point)
             C = C + A @ np.asarray(base, dtype=float) @ np.swapaxes(A, -1, -2)
         return C
-
-    def stiffness(self, q: ArrayLike, tool: ArrayLike | None = None, **further: object) -> Array:
-        """Cartesian stiffness at the tool (..., 6, 6), the inverse of `compliance`.
-
-        Raises ValueError in a singular pose, where some twist meets no compliance at all.
-        """
-        C = self.compliance(q, tool, **further)  # type: ignore[arg-type]
-        return invert_compliance(C)
-
-    def directional_stiffness(
-        self, q: ArrayLike, direction: ArrayLike, tool: ArrayLike | None = None, **further: object
-    ) -> Array:
-        """Force over displacement along unit vectors `direction` (..., 3) under a pure force
-        along them, N/m: `1 / (n^T C_tt n)`; infinite where the joints do not see the force."""
-        C = self.compliance(q, tool, **further)  # type: ignore[arg-type]
-        return along(C, direction)
 
 
 _ARRAYS = (
@@ -326,7 +310,8 @@ def tool_offset(xyz: ArrayLike) -> Array:
     return T
 
 
-def _tool_point(frames: Array, tool: ArrayLike | None) -> Array:
+def tool_point(frames: Array, tool: ArrayLike | None) -> Array:
+    """Position (..., 3) m of the tool (of the flange without one) for `Arm.frames`."""
     flange = frames[..., JOINTS, :, :]
     placed = flange if tool is None else flange @ tool_transform(tool)
     return np.asarray(placed[..., :3, 3])

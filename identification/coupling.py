@@ -12,11 +12,10 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arm import along
+from identification.arrays import Array
 
-Array = NDArray[np.float64]
 Kind = Literal["rigid", "point", "compliant"]
 State = Literal["single", "couple", "infeasible"]
 

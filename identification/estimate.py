@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from identification.curve import Array
+from identification.arrays import Array
 from identification.fit import LineFit, weighted_line, york_line
 from identification.levels import LevelTable
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.curve import Array
+from identification.arrays import Array
 
 MAX_ITERATIONS = 200
 RELATIVE_CHANGE = 1e-13
@@ -68,30 +68,28 @@ def weighted_line(x: Array, y: Array, s: Array, *, intercept: bool) -> LineFit:
     return LineFit(slope, offset, covariance, chi2, x.size - 1 - int(intercept), residuals)
 
 
-def york_line(
-    x: Array, y: Array, sx: Array, sy: Array, *, intercept: bool = True, r: float = 0.0
-) -> LineFit:
+def york_line(x: Array, y: Array, sx: Array, sy: Array, *, intercept: bool = True) -> LineFit:
     """Line through points uncertain in both coordinates; the generalised least-squares estimate.
 
-    The unified equations of York, Evensen, Martinez, Delgado, Am. J. Phys. 72 (2004) 367, eqs. 13.
-    Without intercept the same equations hold with the weighted means replaced by the origin.
-    x, y, sx, sy: (n,), sx > 0 and sy > 0 standard uncertainties; r: correlation of the two errors
-    of a point. A fit that does not settle is returned with `converged` False.
+    The unified equations of York, Evensen, Martinez, Delgado, Am. J. Phys. 72 (2004) 367, eqs. 13,
+    for errors of a point in x and in y that are independent of each other. Without intercept the
+    same equations hold with the weighted means replaced by the origin.
+    x, y, sx, sy: (n,), sx > 0 and sy > 0 standard uncertainties. A fit that does not settle is
+    returned with `converged` False.
     Raises ValueError as `weighted_line` does.
     """
     _check(x, y, sx, 2)
     _check(x, y, sy, 2)
     wx, wy = sx**-2.0, sy**-2.0
-    alpha = np.sqrt(wx * wy)
     slope = weighted_line(x, y, sy, intercept=intercept).slope
     converged = False
     for _ in range(MAX_ITERATIONS):
-        w, beta, x0, y0 = _york_terms(x, y, wx, wy, alpha, slope, r, intercept)
+        w, beta, x0, y0 = _york_terms(x, y, wx, wy, slope, intercept)
         previous, slope = slope, float((w * beta) @ (y - y0) / ((w * beta) @ (x - x0)))
         if abs(slope - previous) <= RELATIVE_CHANGE * abs(slope):
             converged = True
             break
-    w, beta, x0, y0 = _york_terms(x, y, wx, wy, alpha, slope, r, intercept)
+    w, beta, x0, y0 = _york_terms(x, y, wx, wy, slope, intercept)
     offset = y0 - slope * x0
     adjusted = x0 + beta
     centre = float(w @ adjusted / w.sum()) if intercept else 0.0
@@ -108,21 +106,14 @@ def york_line(
 
 
 def _york_terms(
-    x: Array,
-    y: Array,
-    wx: Array,
-    wy: Array,
-    alpha: Array,
-    slope: float,
-    r: float,
-    intercept: bool,
+    x: Array, y: Array, wx: Array, wy: Array, slope: float, intercept: bool
 ) -> tuple[Array, Array, float, float]:
     """Weights, adjusted x about the centre, and the centre, at a given slope (York eqs. 13b, c)."""
-    w = wx * wy / (wx + slope**2 * wy - 2.0 * slope * r * alpha)
+    w = wx * wy / (wx + slope**2 * wy)
     x0 = float(w @ x / w.sum()) if intercept else 0.0
     y0 = float(w @ y / w.sum()) if intercept else 0.0
     dx, dy = x - x0, y - y0
-    beta = w * (dx / wy + slope * dy / wx - (slope * dx + dy) * r / alpha)
+    beta = w * (dx / wy + slope * dy / wx)
     return w, beta, x0, y0
 
 

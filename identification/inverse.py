@@ -11,12 +11,13 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from identification.arrays import Array
 
 if TYPE_CHECKING:
     from identification.arm import Arm
 
-Array = NDArray[np.float64]
 
 # Names of the eight branches, in the order of `solve`.
 BRANCHES: tuple[str, ...] = tuple(

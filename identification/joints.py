@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import JOINTS, Arm, unit_vector
-from identification.uncertainty import TWO_SIDED
-
-Array = NDArray[np.float64]
+from identification.arrays import Array
+from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 
 # A joint counts as identified when its 95 % interval is well inside +-5 % (three standard
 # uncertainties), and when at least nine tenths of what is known of it come from the data.
@@ -85,8 +84,6 @@ class JointFit:
 
     stiffness: Array
     covariance: Array
-    gain_values: Array
-    gain_covariance: Array
     data_share: Array
     lower_bound: Array
     rank: int
@@ -153,8 +150,6 @@ def identify(
     return JointFit(
         stiffness=np.exp(parameters[:JOINTS]),
         covariance=own,
-        gain_values=parameters[JOINTS:],
-        gain_covariance=covariance[JOINTS:, JOINTS:],
         data_share=share,
         lower_bound=_lower_bounds(arm, observations, gains),
         rank=rank,
@@ -266,7 +261,7 @@ def _lower_bounds(arm: Arm, observations: Sequence[Observation], gains: Sequence
     for one in observations:
         gain = np.hypot(gains[one.setup].force, gains[one.setup].displacement)
         u = np.hypot(one.u_compliance, gain * one.compliance)
-        out = np.maximum(out, one.levers(arm) ** 2 / (one.compliance + 1.645 * u))
+        out = np.maximum(out, one.levers(arm) ** 2 / (one.compliance + TWO_SIDED_90 * u))
     return out
 
 

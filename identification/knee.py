@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.curve import Array
+from identification.arrays import Array
 
 EVIDENCE = 10.0  # difference of BIC: odds of about 150 to 1 at equal priors
 SLOPE_RATIO = 0.5

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.curve import Array, Curve, Point
+from identification.arrays import Array
+from identification.curve import Curve, Point
 from identification.knee import Samples
 
 

@@ -7,7 +7,6 @@ of the model: a cell that is reached here need not be free.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.arm import Arm, along, unit_vector
+from identification.arrays import Array
 from identification.coupling import Kind, coupled, load_axes
 from identification.elastic import Beam
 from identification.inverse import BRANCHES, solve, tool_pose
 
-Array = NDArray[np.float64]
+_ROUNDS = 4  # of the search around the best cell of a grid
 _BLOCK = 5_000  # cells at once: eight branches of 6 x 6 each, a few MB
 # Smallest singular value of the Jacobian (lengths by 1 m) that still counts as away from
 # singularities: nearer, joints race, and joint springs alone promise a stiffness that links deny.
@@ -72,12 +72,11 @@ def stiffness_map(
     stance: Stance,
     direction: ArrayLike,
     coupling: Coupling | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> Cells:
     """Stiffness along `direction` (3,) in the base frame at tool positions (..., 3) m.
 
     Of one arm; with `coupling` of the pair, whose mirror plane then passes through each point.
-    `progress` gets the share that is done. Raises ValueError for bad vectors or a wrong arm.
+    Raises ValueError for bad vectors or a wrong arm.
     """
     where = np.asarray(points, dtype=float)
     if where.shape[-1:] != (3,) or not np.isfinite(where).all():
@@ -89,8 +88,6 @@ def stiffness_map(
     for start in range(0, len(flat), _BLOCK):
         part = slice(start, start + _BLOCK)
         k[part], q[part], branch[part] = _block(arm, flat[part], stance, n, coupling)
-        if progress is not None:
-            progress(min(1.0, (start + _BLOCK) / len(flat)))
     shape = where.shape[:-1]
     return Cells(k.reshape(shape), q.reshape(*shape, 6), branch.reshape(shape))
 
@@ -203,13 +200,11 @@ class Placement:
         return self.margin >= 1
 
 
-def best_placement(
-    arm: Arm, task: Task, distances: ArrayLike, betas: ArrayLike, rounds: int = 4
-) -> Placement:
+def best_placement(arm: Arm, task: Task, distances: ArrayLike, betas: ArrayLike) -> Placement:
     """Base distance (m) and angle (rad) that meet the needs with the largest margin.
 
     The node lies on arm A's base x axis, so its radius is `distance / (2 cos beta)`. The whole
-    grid is computed; then the best cell's neighbourhood is searched `rounds` times, each a quarter
+    grid is computed; then the best cell's neighbourhood is searched, and again, each time a quarter
     as wide. Raises ValueError when the arm reaches no cell, or for ranges that are none.
     """
     D, B = np.atleast_1d(np.asarray(distances, float)), np.atleast_1d(np.asarray(betas, float))
@@ -224,7 +219,7 @@ def best_placement(
     i, j = np.unravel_index(np.nanargmax(margins), margins.shape)
     best_D, best_B = float(D[i]), float(B[j])
     step_D, step_B = _spacing(D), _spacing(B)
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         fine_D = np.clip(best_D + step_D * np.linspace(-1, 1, 9), D.min(), D.max())
         fine_B = np.clip(best_B + step_B * np.linspace(-1, 1, 9), B.min(), B.max())
         fine, *_ = _margins(arm, task, fine_D, fine_B)

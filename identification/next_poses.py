@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.arm import JOINTS, Arm, tool_transform
+from identification.arm import JOINTS, Arm, tool_point
+from identification.arrays import Array
 from identification.joints import Gains, JointFit
+from identification.maps import LEAST_SINGULAR
 
-Array = NDArray[np.float64]
 # A: least sum of the relative standard uncertainties; D: least volume of the joint confidence
 # region; E: least uncertainty of the worst-known combination of joints.
 Criterion = Literal["A", "D", "E"]
@@ -40,7 +41,7 @@ class Plan:
     tool: Array | None = None
     torque_share: float = 0.8
     range: float = 8e-3
-    least_singular: float = 0.08
+    least_singular: float = LEAST_SINGULAR
     least_radius: float = 0.35
     lowest: float = 0.15
     highest: float = 1.3
@@ -126,11 +127,6 @@ def _worst(P: Array, gained: Array) -> Array:
 _CRITERIA = {"A": _summed, "D": _volume, "E": _worst}
 
 
-def expected_after(proposals: list[Proposal], fit: JointFit) -> Array:
-    """Relative standard uncertainties (6,) when all proposals have been measured."""
-    return proposals[-1].expected if proposals else fit.relative_sd
-
-
 def _predictions(levers: Array, force: Array, stiffness: Array, plan: Plan) -> tuple[Array, Array]:
     """Derivatives (m, 8) of ln s by ln c and the gains, and the standard uncertainty (m,) of ln s.
 
@@ -168,9 +164,8 @@ def _candidates(arm: Arm, plan: Plan, seed: int, count: int) -> tuple[Array, Arr
 def _allowed_places(arm: Arm, q: Array, plan: Plan) -> NDArray[np.bool_]:
     """Tool, elbow and wrist above the table, the tool away from the arm's own column."""
     frames = arm.frames(q)
-    flange = frames[:, JOINTS]
-    tool = flange if plan.tool is None else flange @ tool_transform(plan.tool)
-    height, radius = tool[:, 2, 3], np.hypot(tool[:, 0, 3], tool[:, 1, 3])
+    x, y, height = tool_point(frames, plan.tool).T
+    radius = np.hypot(x, y)
     joints_up = (frames[:, 2:, 2, 3] > plan.lowest).all(axis=-1)
     return np.asarray(
         joints_up & (height > plan.lowest) & (height < plan.highest) & (radius > plan.least_radius)

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from identification.arrays import Array
+
 Ints = NDArray[np.int64]
 
 _RUNNING_SHARE = 0.5  # a level through which the force runs by half its range is none

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from identification.curve import Array
+from identification.arrays import Array
 from identification.levels import Grid, LevelTable, PointwiseStiffness
 
 Status = Literal["ok", "doubtful", "undefined"]

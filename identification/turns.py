@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identification.curve import Array
+from identification.arrays import Array
 
 
 def turning_points(values: Array, back: float) -> list[int]:

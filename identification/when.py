@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.arm import Arm, along, unit_vector
+from identification.arrays import Array
 from identification.coupling import Kind, State, coupled, decide
 from identification.elastic import Beam
-
-Array = NDArray[np.float64]
 
 
 class CouplingRule:

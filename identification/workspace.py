@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.arm import JOINTS, Arm, tool_transform
+from identification.arm import JOINTS, Arm
+from identification.arrays import Array
 
-Array = NDArray[np.float64]
 _CHUNK = 50_000  # rows that stay in the processor's cache
 
 
@@ -48,10 +48,10 @@ def analytic(reach: float, distance: float) -> Workspace:
     )
 
 
-def tool_points(arm: Arm, q: ArrayLike, tool: ArrayLike | None = None) -> Array:
-    """Positions (n, 3) m of the tool for q (n, 6): the last column of `fk`, without the rest."""
+def flange_points(arm: Arm, q: ArrayLike) -> Array:
+    """Positions (n, 3) m of the flange for q (n, 6): the last column of `fk`, without the rest."""
     angles = np.asarray(q, dtype=float)
-    x, y, z = (tool_transform(tool)[:3, 3] if tool is not None else np.zeros(3))[:, None]
+    x, y, z = np.zeros((3, 1))
     for i in range(JOINTS - 1, -1, -1):
         c, s = np.cos(angles[:, i]), np.sin(angles[:, i])
         ca, sa = np.cos(arm.alpha[i]), np.sin(arm.alpha[i])
@@ -97,7 +97,6 @@ def sample(
     samples: int,
     seed: int = 0,
     *,
-    tool: ArrayLike | None = None,
     cell: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Reached:
@@ -116,14 +115,14 @@ def sample(
     low, span = arm.q_min, np.minimum(arm.q_max - arm.q_min, 2 * np.pi)
     full_turn = bool(span[0] >= 2 * np.pi)
     sectors = 1 if full_turn else 180
-    limit = _outermost(arm, tool)
+    limit = _outermost(arm)
     shape = (int(limit / cell) + 2, int((limit + abs(arm.d[0])) / cell) + 2, sectors)
     cells = np.zeros(shape, dtype=bool)
     for start in range(0, samples, _CHUNK):
         q = low + span * rng.random((min(_CHUNK, samples - start), JOINTS))
         if full_turn:
             q[:, 0] = 0.0  # turning about axis 1 changes neither radius nor height
-        p = tool_points(arm, q, tool)
+        p = flange_points(arm, q)
         p = p[p[:, 2] > 0]
         turn = np.arctan2(p[:, 1], p[:, 0]) / (2 * np.pi) % 1.0
         azimuth = np.minimum((turn * sectors).astype(int), sectors - 1)
@@ -140,19 +139,16 @@ def monte_carlo(
     samples: int = 1_000_000,
     seed: int = 0,
     *,
-    tool: ArrayLike | None = None,
-    cell: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Workspace:
     """Volumes from `sample`: what one arm reaches, and what it shares with its mirror image whose
     base stands `distance` m away along x."""
-    reached = sample(arm, samples, seed, tool=tool, cell=cell, progress=progress)
-    what = "flange" if tool is None else "tool"
+    reached = sample(arm, samples, seed, progress=progress)
     return Workspace(
         reached.volume(),
         _shared(reached, distance),
         f"Monte Carlo: {samples} joint positions, uniform within the joint limits; cells of "
-        f"{reached.cell * 1e3:.3g} mm about axis 1 that the {what} falls into, z > 0; coupled "
+        f"{reached.cell * 1e3:.3g} mm about axis 1 that the flange falls into, z > 0; coupled "
         f"where its mirror image, base {distance:g} m away, does too",
     )
 
@@ -177,10 +173,9 @@ def _shared(reached: Reached, distance: float) -> float:
     return 2 * count * step**3
 
 
-def _outermost(arm: Arm, tool: ArrayLike | None) -> float:
-    """No point of the tool is farther from the base than the sum of all lengths."""
-    extra = 0.0 if tool is None else float(np.linalg.norm(tool_transform(tool)[:3, 3]))
-    return float(np.hypot(arm.a, arm.d).sum()) + extra
+def _outermost(arm: Arm) -> float:
+    """The flange is no farther from the base than the sum of all lengths."""
+    return float(np.hypot(arm.a, arm.d).sum())
 
 
 def _cell(samples: int) -> float:

@@ -17,6 +17,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
+from rig import schemas
 from rig.software import software_version
 
 _TABLE = """CREATE TABLE IF NOT EXISTS found (
@@ -81,9 +82,9 @@ def remember_result(dataset: Path, found: Mapping[str, Any]) -> None:
         if journal_path(dataset).exists():
             return
         digest = seal_of(dataset)
-        if found["schema"] == "rig.analysis/1":
+        if found["schema"] == schemas.ANALYSIS:
             remember("stiffness", {digest: stiffness_of(found)})
-        elif found["schema"] == "rig.diagnosis/1":
+        elif found["schema"] == schemas.DIAGNOSIS:
             verdict = found["verdict"]
             share = found["probabilities"][verdict]
             remember("verdict", {digest: {"word": verdict, "probability": share}})

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.errors import DeviceError
+from rig import schemas
 from rig.measure import SAFETY_NOTE, emulated_rig
 from rig.plan import Plan, plan
 from rig.procedure.devices import in_short, make_devices, station_clock
@@ -63,7 +64,7 @@ class Check:
             for d in self.devices
         }  # fmt: skip
         return {
-            "schema": "rig.check/1",
+            "schema": schemas.CHECK,
             "station": self.station,
             "emulated": self.emulated,
             "plan": self.plan.to_json(),

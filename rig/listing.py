@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from rig import schemas
 from rig.catalogue import recall, remember, stiffness_of
 from rig.digits import likely, number
 from rig.errors import InputError
@@ -15,10 +16,9 @@ from rig.journal import is_being_written, journal_path, replay
 from rig.storage.files import ENDINGS
 from rig.storage.seal import check_bytes
 from rig.storage.summary import Summary, journal_summary, read_summary
+from rig.terminal import Progress
 
-SCHEMA = "rig.list/1"
 _JOURNAL = ".journal"
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Listing:
     def to_json(self) -> dict[str, Any]:
         """Schema rig.list/1; null for what is not known yet."""
         return {
-            "schema": SCHEMA,
+            "schema": schemas.LIST,
             "folder": str(self.folder),
             "datasets": [_json(e) for e in self.entries],
             "skipped": [{"file": f, "reason": r} for f, r in self.skipped],

@@ -11,7 +11,7 @@ from rig.meta import (
     MetaPose,
     Simulation,
 )
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.protocol import MeasurementProtocol
 from rig.station import Station
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.curve import Array
 from identification.running import first_rows, runs_through
+from rig.arrays import Array
 
 BINS = 20  # over the range of force
 TURN = 0.25  # share of the range by which the force must come back to count as a turn

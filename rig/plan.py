@@ -12,12 +12,13 @@ from itertools import pairwise
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arm import Arm, along, tool_offset
 from identification.times import MOUNT_S, SCREW_S, UNLOAD_S
+from rig import schemas
+from rig.arrays import Array
 from rig.digits import counted
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.plan_margins import (
     MARGIN,
     beyond_joints,
@@ -34,8 +35,6 @@ from rig.station import Station
 from rig.units import MM_PER_M, N_PER_MM
 from rig.yaml.yamlfile import read_document_text
 from rig.yaml.yamlnodes import Key, Problem, refuse
-
-Array = NDArray[np.float64]
 
 # What devices take, in s; the text of the plan names every one, as what hands take.
 TARE_S = 2.0
@@ -107,7 +106,7 @@ class Plan:
     def to_json(self) -> dict[str, object]:
         """The same for programs."""
         return {
-            "schema": "rig.plan/1",
+            "schema": schemas.PLAN,
             "title": self.title,
             "robot": self.robot,
             "station": self.station,

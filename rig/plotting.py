@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig.banners import marks
 from rig.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,6 +29,17 @@ def named(figure: Figure, name: str) -> Figure:
     """The file that a figure shows, small in a corner: it may leave its folder or page."""
     figure.text(0.995, 0.003, name, fontsize=6, color="0.4", ha="right", va="bottom")
     return figure
+
+
+def watermark(
+    figure: Figure, banners: Iterable[str], name: str, *, size: float = 40, turn: float = 25
+) -> Figure:
+    """Across the figure, `turn` deg, what must not be overlooked: it may leave the text that says
+    so. name: as in `named`."""
+    if words := marks(banners):
+        figure.text(0.5, 0.5, " · ".join(words), fontsize=size, color="0.5", alpha=0.25,
+                    ha="center", va="center", rotation=turn)  # fmt: skip
+    return named(figure, name)
 
 
 def write_figures(folder: Path, figures: Callable[[], Iterable[tuple[str, Figure]]]) -> list[Path]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from drivers.interfaces import Branch
-from rig.models.model import robot_names
+from rig.models.robot import robot_names
 from rig.protocolfile import (
     ForceBand,
     Limit,

@@ -34,10 +34,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.curve import Array, Curve, Point
+from identification.curve import Curve, Point
 from identification.running import first_rows
 from identification.turns import turning_points
 from identification.ways import leading_on
+from rig.arrays import Array
 from rig.digits import counted
 from rig.passes import TURN, binned, is_held
 from rig.units import M_PER_MM

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig import schemas
 from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.storage.columns import NO_STEP, TABLE_COLUMNS
@@ -58,7 +59,7 @@ def _header_lines(dataset: Dataset) -> list[str]:
         "origin": dataset.origin,
         "software": dataset.software,
     }
-    lines = [*dataset.banners(), "rig.table/1", *(f"{k}: {v}" for k, v in facts.items() if v)]
+    lines = [*dataset.banners(), schemas.TABLE, *(f"{k}: {v}" for k, v in facts.items() if v)]
     return ["# " + line.replace("\r", " ").replace("\n", " ") for line in lines]
 
 
@@ -84,7 +85,7 @@ def _write_parquet(dataset: Dataset, out: Path) -> None:
         ) from None
     table = pa.Table.from_pandas(_frame(dataset), preserve_index=False)
     facts = {
-        "schema": "rig.table/1",
+        "schema": schemas.TABLE,
         "uuid": dataset.uuid,
         "created": dataset.created,
         "origin": dataset.origin,

@@ -13,11 +13,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.kistler.settings import KistlerSettings, PerAxis
-
-Array = NDArray[np.float64]
 
 AXES_OF_CHANNELS = {3: "xyz", 8: "xxyyzzzz"}
 CHARGE_DRIFT_pC_PER_S = 0.05  # most that the makers of charge amplifiers allow for one channel
@@ -28,12 +26,10 @@ AMPLIFIER_SPAN_V = 10.0
 class Calibration:
     """Linear map from channel volts to force N and moment Nm on the robot in its base frame.
 
-    `newton_per_volt` (channels,) is the gain of every single channel; `matrix`
-    (components, channels) takes volts to the components: Fx, Fy, Fz, and, with eight channels,
-    Mx, My, Mz about the point at height az0 over the sensor's origin.
+    `matrix` (components, channels) takes volts to the components: Fx, Fy, Fz, and, with eight
+    channels, Mx, My, Mz about the point at height az0 over the sensor's origin.
     """
 
-    newton_per_volt: Array
     matrix: Array
 
     @classmethod
@@ -43,7 +39,7 @@ class Calibration:
         rotation = np.array(settings.axes_in_base).T * settings.force_on_robot_sign
         sums = channel_sums(settings)
         blocks = [rotation @ sums[i : i + 3] for i in range(0, len(sums), 3)]
-        return cls(newton_per_volt=scale, matrix=np.vstack(blocks) * scale)
+        return cls(matrix=np.vstack(blocks) * scale)
 
     def components(self, volts: Array) -> Array:
         """Force N and moment Nm (n, 3 or 6) of channel volts (n, channels)."""
@@ -102,9 +98,7 @@ def volts_of(force_on_robot: Array, settings: KistlerSettings) -> Array:
     return volts
 
 
-def drift_bound_N_per_s(
-    settings: KistlerSettings, drift_pC_per_s: float = CHARGE_DRIFT_pC_PER_S
-) -> Array:
+def drift_bound_N_per_s(settings: KistlerSettings) -> Array:
     """Fastest drift (3,) of Fx, Fy, Fz in N/s, base frame, if every channel drifts alike.
 
     A charge drift over the sensitivity is a force drift; the drifts of the channels in a sum add,
@@ -112,7 +106,7 @@ def drift_bound_N_per_s(
     amplifier's full scale is in N, so this is the only use of the charge sensitivity.
     """
     sensitivity = np.abs(per_channel(settings.sensitivity_pC_per_N, settings.channels))
-    sensor = np.abs(channel_sums(settings)[:3]) @ (drift_pC_per_s / sensitivity)
+    sensor = np.abs(channel_sums(settings)[:3]) @ (CHARGE_DRIFT_pC_PER_S / sensitivity)
     result: Array = np.abs(np.array(settings.axes_in_base)).T @ sensor
     return result
 

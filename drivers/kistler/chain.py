@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.kistler.calibration import (
     AMPLIFIER_SPAN_V,
     CHARGE_DRIFT_pC_PER_S,
@@ -17,7 +17,6 @@ from drivers.kistler.calibration import (
 )
 from drivers.kistler.settings import KistlerSettings
 
-Array = NDArray[np.float64]
 Force = Callable[[Array], Array]  # times s (n,) -> N (n, 3) on the robot, base frame
 
 JUMP_pC = 2.0  # of the order that charge amplifiers show when they leave Reset

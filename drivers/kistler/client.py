@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.clock import Clock
 from drivers.errors import BadReply, CannotConnect, NotDischarged, Overload, ReadTimeout
 from drivers.kistler.calibration import Calibration, drift_bound_N_per_s
@@ -25,7 +25,6 @@ from drivers.stream import Block, Stream
 if TYPE_CHECKING:
     from drivers.kistler.daq import Daq
 
-Array = NDArray[np.float64]
 
 RESET_RESIDUAL_V = 0.2  # an amplifier in Reset gives some mV, whatever its charge was
 _NOT_OPEN = ("it is not open", "Start the measurement again.")

@@ -15,9 +15,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers import network
+from drivers.arrays import Array
 from drivers.errors import CannotConnect
 from drivers.kistler.explain import DEVICE, NonsenseReply
 from drivers.kistler.settings import KistlerSettings
@@ -31,8 +31,6 @@ import nidaqmx.errors
 from nidaqmx.constants import AcquisitionType, LineGrouping, TerminalConfiguration
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 from nidaqmx.system import Device, System
-
-Array = NDArray[np.float64]
 
 # ValueError: nidaqmx at an enumeration value it does not know, gRPC on a channel that was closed.
 DAQ_ERRORS: tuple[type[Exception], ...] = (

@@ -12,21 +12,19 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from drivers.arrays import Array
+
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 import grpc
-import numpy as np
 from nidaqmx._stubs import nidaqmx_pb2 as messages
 from nidaqmx._stubs import nidaqmx_pb2_grpc as stubs
-from numpy.typing import NDArray
 
 from drivers.kistler.chain import ChargeChain
 from drivers.kistler.listener import RawListener
 from drivers.kistler.service import NiError, Tasks, TaskService
 from drivers.kistler.settings import KistlerSettings
 from drivers.scene import Scene
-
-Array = NDArray[np.float64]
 
 # Raised by every call that touches the device; the others only by reads.
 _DEVICE_CODES = {"unplugged": -201003, "unknown_device": -200220, "aborted": -50405}

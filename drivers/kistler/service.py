@@ -13,14 +13,12 @@ import numpy as np
 from nidaqmx._stubs import nidaqmx_pb2 as messages
 from nidaqmx._stubs import nidaqmx_pb2_grpc as stubs
 from nidaqmx.constants import ChannelType, UsageTypeAI
-from numpy.typing import NDArray
 
+from drivers.arrays import Array
 from drivers.kistler.settings import KistlerSettings
 
-Array = NDArray[np.float64]
-
 _VERSION = {0x1272: 24, 0x1923: 8, 0x2F22: 0}  # NI-DAQmx major, minor, update
-_PRODUCT_TYPE, _SERIAL_NUMBER = 0x631, 0x632
+_PRODUCT_TYPE = 0x631
 _CHANNEL_NAMES = 0x1273
 _MEASUREMENT_TYPE = 0x695
 _INPUTS = 32

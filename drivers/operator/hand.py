@@ -17,7 +17,7 @@ FIRST_GUESS_N_PER_MM = 150.0  # stiffer than the arm: first turns come out too s
 SEARCH_GUESS_N_PER_MM = 100.0
 GAVE_WAY = 0.3  # of the stiffest: below it the arm gives way, above it it is merely soft
 HAND_MM_PER_S = 1.0
-HANDS_OFF: tuple[Phase, ...] = ("idle", "mounting", "settling", "sampling", "paused")
+STANDS_BY: tuple[Phase, ...] = ("idle", "mounting", "settling", "sampling", "paused")
 PATIENCE_S, PATIENCE_WALL_S = 5.0, 0.5
 
 
@@ -68,7 +68,7 @@ class Hand:
 
     def decide(self, view: LiveView, now_s: float) -> float | None:
         """The advance to turn now, mm (negative loosens), or None. `now_s`: the clock's."""
-        if view.stale or view.phase in HANDS_OFF:
+        if view.stale or view.phase in STANDS_BY:
             return None
         if not (math.isfinite(view.force_N) and math.isfinite(view.target_N)):
             return None

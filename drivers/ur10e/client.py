@@ -20,16 +20,15 @@ from drivers.errors import (
 )
 from drivers.readings import Reading, RobotState, Signal
 from drivers.stream import Block, Stream
+from drivers.ur10e.arrival import Arrival
 from drivers.ur10e.dashboard import Dashboard
-from drivers.ur10e.probe import Handshake, probe
+from drivers.ur10e.probe import probe
 from drivers.ur10e.process import ReceiveProcess
 from drivers.ur10e.reduce import PLACES
 from drivers.ur10e.settings import Ur10eSettings
 from drivers.ur10e.signals import SIGNALS, from_row
-from drivers.ur10e.words import PLAYING, REDUCED, Modes, program_changed, unsafe
+from drivers.ur10e.words import REDUCED, Modes, program_changed, unsafe
 
-STILL_RAD_PER_S = 0.002  # the controller's own speed readings scatter by less when it stands
-STILL_FOR_S = 0.5
 _UNPLUGGED = (
     "Loosen the screw by hand until it no longer touches, then check the controller, the network "
     "cable, and that the pendant shows the robot running."
@@ -55,7 +54,7 @@ class Ur10e:
         self._source = "emulated+ur10e" if emulated else "ur10e"
         self._stream = Stream(len(SIGNALS), clock, self._source)
         self._process: ReceiveProcess | None = None
-        self._handshake: Handshake | None = None
+        self._controller_version = "not connected"
         self._facts: dict[str, str] = {}
         self._lock = Lock()
         self._last: tuple[float, ...] = ()
@@ -75,7 +74,7 @@ class Ur10e:
         self.close()
         deadline = time.monotonic() + self._settings.connect_deadline_s
         try:
-            self._handshake = probe(
+            self._controller_version = probe(
                 self.name, self._settings.host, self._settings.frequency_Hz, deadline
             )
             if self._settings.dashboard:
@@ -95,12 +94,11 @@ class Ur10e:
 
     def identity(self) -> Mapping[str, str]:
         """What controller, Dashboard and station file say: who was measured, and through what."""
-        version = self._handshake.controller_version if self._handshake else "not connected"
         return {
             "source": self._source,
             "host": self._settings.host,
             "frequency_Hz": f"{self._settings.frequency_Hz:g}",
-            "controller_version": version,
+            "controller_version": self._controller_version,
             **self._facts,
         }
 
@@ -313,13 +311,13 @@ class Ur10e:
         self.accept_present_state()
         with self._lock:
             self._baseline = None
-        deadline = time.monotonic() + deadline_s
+        arrival = Arrival(self.name, program, q_rad, tolerance_rad, deadline_s)
         with self._dashboard() as dashboard:
             dashboard.load(program)
             self._go_on(program, wanted)
             try:
                 dashboard.play()
-                self._await_arrival(program, q_rad, tolerance_rad, deadline, deadline_s, wanted)
+                self._await_arrival(arrival, wanted)
             except BaseException:
                 self._stop_program()
                 raise
@@ -346,55 +344,15 @@ class Ur10e:
             fault = f'the program "{program}" was called off before the arm arrived'
             raise NotWanted(self.name, fault, "See that the arm stands still.")
 
-    def _await_arrival(
-        self,
-        program: str,
-        q_rad: Sequence[float],
-        tolerance_rad: float,
-        deadline: float,
-        deadline_s: float,
-        wanted: Callable[[], bool],
-    ) -> None:
-        still_since: float | None = None
-        runtime = -1
+    def _await_arrival(self, arrival: Arrival, wanted: Callable[[], bool]) -> None:
         while True:
-            self._go_on(program, wanted)
+            self._go_on(arrival.program, wanted)
             self._check()
-            state = self._state()
-            now = time.monotonic()
-            still = state.speed_rad_per_s < STILL_RAD_PER_S and state.runtime_state == runtime
-            runtime = state.runtime_state
-            still_since = (still_since or now) if still else None
-            if still_since is not None and now - still_since >= STILL_FOR_S:
-                where = _farthest(state.q, q_rad)
-                if where[1] <= tolerance_rad:
-                    return
-                if runtime != PLAYING:
-                    raise self._elsewhere(program, "ended", where, tolerance_rad)
-            if now > deadline:
-                what = f"did not arrive within {deadline_s:g} s: the arm stands"
-                raise self._elsewhere(program, what, _farthest(state.q, q_rad), tolerance_rad)
+            if arrival.seen_in(self._state()):
+                return
             time.sleep(0.02)
-
-    def _elsewhere(
-        self, program: str, what: str, where: tuple[int, float], tolerance_rad: float
-    ) -> BadReply:
-        joint, off = where
-        fault = (
-            f'the program "{program}" {what} with joint {joint} {off:.4f} rad away from the '
-            f"reference pose (allowed {tolerance_rad:.4f} rad)"
-        )
-        remedy = "Look at the pendant, and compare the program's last waypoint with the protocol."
-        return BadReply(self.name, fault, remedy)
 
 
 def _modes(row: Sequence[float]) -> Modes:
     names = ("robot_mode", "safety_mode", "safety_status_bits", "runtime_state")
     return Modes(*(int(row[PLACES[name]][0]) for name in names))
-
-
-def _farthest(q: Sequence[float], q_ref: Sequence[float]) -> tuple[int, float]:
-    """Number of the joint that is farthest from the reference (1-6), and by how much, rad."""
-    off = [abs(a - b) for a, b in zip(q, q_ref, strict=True)]
-    worst = max(range(len(off)), key=off.__getitem__)
-    return worst + 1, off[worst]

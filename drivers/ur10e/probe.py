@@ -11,7 +11,6 @@ import socket
 import struct
 import time
 from collections import deque
-from dataclasses import dataclass
 
 from drivers import network
 from drivers.errors import BadReply, CannotConnect, DeviceError
@@ -22,14 +21,6 @@ _SERVICES = (
     "(Settings, Security, Services)."
 )
 _RESTART = "Restart the controller, and check that no other device answers at this address."
-
-
-@dataclass(frozen=True, slots=True)
-class Handshake:
-    """What the controller said of itself."""
-
-    controller_version: str
-    timestamp_s: float
 
 
 def connect(device: str, host: str, port: int, deadline: float, remedy: str) -> socket.socket:
@@ -51,8 +42,8 @@ def connect(device: str, host: str, port: int, deadline: float, remedy: str) -> 
     raise CannotConnect(device, fault, remedy)
 
 
-def probe(device: str, host: str, frequency_Hz: float, deadline: float) -> Handshake:
-    """Goes through the whole handshake, up to data whose timestamp moves on.
+def probe(device: str, host: str, frequency_Hz: float, deadline: float) -> str:
+    """The controller's version, after the whole handshake up to data whose timestamp moves on.
 
     `deadline` in time.monotonic(). Raises CannotConnect (no route, refused, mute, closed, no RTDE,
     wrong version, no data) or BadReply (a variable is not delivered, the timestamp stands still).
@@ -73,7 +64,7 @@ class _Probe:
         self._timestamp: float | None = None
         self._said = ""
 
-    def run(self, frequency_Hz: float) -> Handshake:
+    def run(self, frequency_Hz: float) -> str:
         version = struct.pack(">H", rtde.PROTOCOL_VERSION)
         accepted = self._ask(rtde.PROTOCOL, version, "the protocol version")
         if accepted[:1] != b"\x01":
@@ -86,7 +77,8 @@ class _Probe:
         started = self._ask(rtde.START, b"", "the start of the data")
         if started[:1] != b"\x01":
             raise self._error(f"{self._where} refuses to start sending data", _RESTART)
-        return Handshake(".".join(str(n) for n in numbers), self._moving_timestamp(layout))
+        self._await_moving_timestamp(layout)
+        return ".".join(str(n) for n in numbers)
 
     def _outputs(self, frequency_Hz: float) -> struct.Struct:
         names = ",".join(rtde.VARIABLES)
@@ -104,12 +96,12 @@ class _Probe:
             )
         return rtde.package(types)
 
-    def _moving_timestamp(self, layout: struct.Struct) -> float:
+    def _await_moving_timestamp(self, layout: struct.Struct) -> None:
         while True:
             data = self._next(rtde.DATA, "data")
             timestamp = float(self._unpack(layout.format, data)[1])
             if self._timestamp is not None and timestamp != self._timestamp:
-                return timestamp
+                return
             self._timestamp = timestamp
 
     def _ask(self, kind: int, payload: bytes, what: str) -> bytes:

@@ -22,7 +22,6 @@ def slices() -> Mapping[str, slice]:
 
 
 PLACES = slices()
-WIDTH = sum(_LENGTH[kind] for kind in VARIABLES.values())
 _ROTATION = slice(PLACES["actual_TCP_pose"].start + 3, PLACES["actual_TCP_pose"].stop)
 _MODES = slice(PLACES["robot_mode"].start, PLACES["runtime_state"].stop)
 

@@ -11,11 +11,11 @@ from typing import Any, Literal, Protocol
 from identification import stiffness as st
 from identification.estimate import WEIGHTINGS, Weighting
 from identification.uncertainty import Contribution, Quantity
+from rig import schemas
 from rig.errors import InputError, close_to
 from rig.reduce import Measurements, curves
 from rig.units import MM_PER_M, N_PER_MM
 
-SCHEMA = "rig.analysis/1"
 AUTO: Literal["auto"] = "auto"
 
 
@@ -105,7 +105,7 @@ class Analysis:
     def to_json(self) -> dict[str, Any]:
         """Schema rig.analysis/1: units in the keys, null for what is not defined."""
         return {
-            "schema": SCHEMA,
+            "schema": schemas.ANALYSIS,
             "dataset": self.uuid,
             "origin": self.origin,
             "complete": self.complete,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.analyze import Analysis, Direction
-from rig.canvas import blank
+from rig.canvas import DISPLACEMENT, FORCE, blank
 from rig.digits import number
-from rig.plotting import COLOURS, MARKERS, named, write_figures
+from rig.plotting import COLOURS, MARKERS, watermark, write_figures
 from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def draw(analysis: Analysis, folder: Path) -> list[Path]:
 
 def curve(analysis: Analysis) -> Figure:
     """Mean displacement over force with its standard deviation, and the line of k."""
-    figure, axes = _axes("Force in N", "Displacement in mm")
+    figure, axes = _axes(FORCE, DISPLACEMENT)
     for colour, marker, key, direction in _styles(analysis):
         _curve(axes, direction, key, colour, marker)
     axes.set_title("Displacement over force: mean and standard deviation of the repetitions")
@@ -39,7 +39,7 @@ def curve(analysis: Analysis) -> Figure:
 
 def pointwise(analysis: Analysis) -> Figure:
     """Pointwise stiffness over force with its standard deviation, and k."""
-    figure, axes = _axes("Force in N", "Stiffness in N/mm")
+    figure, axes = _axes(FORCE, "Stiffness in N/mm")
     for colour, marker, key, direction in _styles(analysis):
         points = direction.result.pointwise
         if not points:
@@ -118,8 +118,4 @@ def _finish(figure: Figure, axes: Any, analysis: Analysis) -> Figure:
                     frameon=False, fontsize=8)  # fmt: skip
     else:
         axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center")
-    words = [banner.split(":", maxsplit=1)[0] for banner in analysis.banners]
-    if words:
-        figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.25,
-                    ha="center", va="center", rotation=25)  # fmt: skip
-    return named(figure, analysis.name)
+    return watermark(figure, analysis.banners, analysis.name)

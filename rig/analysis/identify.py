@@ -18,14 +18,15 @@ from identification.joints import identify as estimate
 from identification.levels import grid_of
 from identification.next_poses import Criterion, Plan, Proposal, propose
 from identification.stiffness import Stiffness, analyze_curve
+from rig import schemas
+from rig.arrays import Array
 from rig.dataset import Dataset, load_each
 from rig.digits import counted
 from rig.errors import InputError
-from rig.models.model import load_model, load_robot
+from rig.models.model import load_model
+from rig.models.robot import load_robot
 from rig.reduce import curves
 from rig.units import MM_PER_M
-
-Array = NDArray[np.float64]
 
 # What a joint reading may be off by from one load to another. The readings' resolution is far
 # finer; their linearity is not published: +-0.01 deg, usual for absolute encoders of that size,
@@ -55,7 +56,7 @@ class IdentifyResult:
         """`rig.joints/1`, with further keys."""
         fit, ci = self.fit, self.fit.ci95
         return {
-            "schema": "rig.joints/1",
+            "schema": schemas.JOINTS,
             "datasets": list(self.datasets),
             "banners": list(self.banners),
             "joint_stiffness_Nm_per_rad": [

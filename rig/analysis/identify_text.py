@@ -18,6 +18,8 @@ from rig.units import KNM
 if TYPE_CHECKING:
     from rig.analysis.identify import IdentifyResult
 
+_LEVELS = 10  # of a proposed run
+
 
 def text(result: IdentifyResult) -> str:
     """Everything that a terminal shows."""
@@ -69,19 +71,19 @@ def model_text(result: IdentifyResult) -> str:
     return "\n".join(lines) + "\n"
 
 
-def protocol_text(result: IdentifyResult, station: str | None = None, levels: int = 10) -> str:
-    """A protocol file that measures the proposed poses and directions; without a station on the
-    laboratory's, after emulated data on the emulated one."""
-    station = station or ("emulated" if result.emulated else "ur10e_lab")
+def protocol_text(result: IdentifyResult) -> str:
+    """A protocol file that measures the proposed poses and directions; on the laboratory's station,
+    after emulated data on the emulated one."""
+    station = "emulated" if result.emulated else "ur10e_lab"
     if not result.proposals:
         raise InputError("rig identify: no next poses were looked for; there is no protocol.")
     poses, runs = [], []
     for i, p in enumerate(result.proposals, 1):
         poses.append(pose_line(f"N{i}", p.q, result.tool_xyz))
-        step = p.force / levels
+        step = p.force / _LEVELS
         runs.append(
             f"  - {{pose: N{i}, direction: {p.axis}, "
-            f"steps_N: [{numbers(step * np.arange(1, levels + 1), 5)}]}}"
+            f"steps_N: [{numbers(step * np.arange(1, _LEVELS + 1), 5)}]}}"
         )
     greatest = max(p.force for p in result.proposals)
     softest = max(
@@ -112,9 +114,9 @@ def write_model(result: IdentifyResult, path: Path) -> None:
     _write(path, model_text(result))
 
 
-def write_protocol(result: IdentifyResult, path: Path, station: str | None = None) -> None:
+def write_protocol(result: IdentifyResult, path: Path) -> None:
     """Writes `protocol_text`; what rig measure runs. InputError if the folder refuses."""
-    _write(path, protocol_text(result, station))
+    _write(path, protocol_text(result))
 
 
 def _write(path: Path, text: str) -> None:

@@ -17,11 +17,9 @@ from dataclasses import dataclass, replace
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.arrays import Array
 from rig.worlds.arm import place
-
-Array = NDArray[np.float64]
 
 STEP_S = 0.02
 SWING = 6.0  # rad/s

@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.arrays import Array
 from rig.blind.mujoco_arm import SWING, Hinge, places
 
-Array = NDArray[np.float64]
 Random = np.random.Generator
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from rig.blind.mujoco_arm import Array
+from rig.arrays import Array
 from rig.blind.mujoco_effects import Hidden
 from rig.blind.mujoco_session import AXES, Design, Row, levers, true_mm
 from rig.worlds.arm import place

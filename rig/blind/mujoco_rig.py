@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.blind.mujoco_arm import Array
+from rig.arrays import Array
 from rig.blind.mujoco_effects import EFFECTS, Hidden, Random, Rig, draw_effect
 from rig.blind.mujoco_label import answers, structural_mm
 from rig.blind.mujoco_session import AXES, Design, Row, levers, session, true_mm

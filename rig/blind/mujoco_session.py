@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.blind.mujoco_arm import RAMP_S, SETTLE_S, Array, Hinge, MujocoArm, places
+from rig.arrays import Array
+from rig.blind.mujoco_arm import RAMP_S, SETTLE_S, Hinge, MujocoArm, places
 from rig.blind.mujoco_effects import Hidden, Rig, spring
 from rig.worlds.arm import place
 

@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from rig import schemas
 from rig.blind import judge as j
 from rig.blind.campaign import Campaign
 from rig.blind.judge import Judged
 from rig.blind.rates import auroc, ece, ece_by_chance, quantiles, rate, reliability
 from rig.software import software_version
 
-SCHEMA = "rig.blind/1"
 BINS = ((0.0, 1.5), (1.5, 3.0), (3.0, 10.0), (10.0, float("inf")))
 
 
@@ -22,7 +22,7 @@ def report(campaign: Campaign) -> dict[str, Any]:
     plan = campaign.plan
     clear = [c for c in judged if c.kind == "none" or c.snr >= plan.snr_min]
     return {
-        "schema": SCHEMA,
+        "schema": schemas.BLIND,
         "simulated": True,
         "command": plan.command,
         "seed": plan.seed,

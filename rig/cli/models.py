@@ -17,7 +17,6 @@ from rig.cli.options import (
     give,
     list_written,
     say,
-    show,
 )
 
 _Path = Annotated[
@@ -49,23 +48,21 @@ def couple(
 ) -> None:
     """Coupled state of two arms: workspace, compound stiffness, when to couple."""
     from rig.coupling.couple import couple as run_couple
-    from rig.coupling.coupling_task import best_for
     from rig.models import model_export
-    from rig.models.model import load_model
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
         told = lambda share: progress("sampling the workspace", share)  # noqa: E731
-        result = run_couple(model, samples=samples, path=path, dead_band=dead_band, progress=told)
+        result = run_couple(
+            model, samples=samples, path=path, dead_band=dead_band, best_placement=best_placement,
+            progress=told,
+        )  # fmt: skip
     give(result, json_file)
-    placement = best_for(model) if best_placement else None
-    if placement is not None and json_file != "-":
-        show(placement.to_text())
     if figures is not None:
         from rig.coupling.coupling_figures import draw
 
-        list_written(draw(result, figures, placement))
-    written = model_export.write(load_model(model), mujoco=export_mujoco, urdf_file=export_urdf)
+        list_written(draw(result, figures))
+    written = model_export.write(result.model, mujoco=export_mujoco, urdf_file=export_urdf)
     list_written(written)
 
 

@@ -8,20 +8,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import workspace
 from identification.arm import along, invert_compliance
-from identification.coupling import Kind, State, coupled, decide, load_axes
+from identification.coupling import Kind, State, coupled, decide, load_axes, on_axes
 from identification.coupling import base_distance as distance_of
 from identification.when import Schedule
 from identification.workspace import Workspace
+from rig import schemas
+from rig.arrays import Array
+from rig.coupling import coupling_task
 from rig.coupling.coupling_path import read_path, run_path
 from rig.errors import InputError
 from rig.models.model import ArmModel, CouplingSpec, load_model
 from rig.units import MM_PER_M, N_PER_MM
 
-Array = NDArray[np.float64]
 _AXES = ("x", "y", "z")
 
 
@@ -51,12 +52,13 @@ class CouplingResult:
     decisions: tuple[Decision, ...]
     schedule: Schedule | None
     notes: tuple[str, ...]
+    placement: coupling_task.TaskResult | None = None  # where it was asked for
 
     def to_json(self) -> dict[str, Any]:
         """`rig.coupling/1`, with further keys."""
         first, *others = self.workspaces
         out: dict[str, Any] = {
-            "schema": "rig.coupling/1",
+            "schema": schemas.COUPLING,
             "model": self.model.name,
             "load_axes": self.spec.load_axes,
             "kind": self.spec.described,
@@ -88,13 +90,15 @@ class CouplingResult:
                 {"from_s": i.start, "to_s": i.end, "state": i.state}
                 for i in self.schedule.intervals()
             ]
+        if self.placement is not None:
+            out["placement"] = self.placement.to_json()
         return out
 
     def to_text(self) -> str:
         """Tables for a terminal."""
         from rig.coupling.couple_text import text
 
-        return text(self)
+        return text(self) if self.placement is None else f"{text(self)}\n{self.placement.to_text()}"
 
 
 def couple(
@@ -104,9 +108,11 @@ def couple(
     seed: int = 0,
     path: str | Path | None = None,
     dead_band: float = 0.0,
+    best_placement: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> CouplingResult:
-    """Workspace, stiffness and decisions of a model file; along `path` (CSV) the schedule too.
+    """Workspace, stiffness and decisions of a model file; along `path` (CSV) the schedule, and the
+    best placement of the second arm where they are asked for.
 
     samples: joint positions of the Monte Carlo workspace, 0 leaves it out. Raises InputError.
     """
@@ -114,12 +120,13 @@ def couple(
     spec = _spec(read)
     C = _regular_compliance(read)
     kinds = _kinds(spec)
-    single = _stiffness(C, np.eye(3))
+    single = on_axes(C, np.eye(3))
     pair = {name: _pair(C, spec, kind, half) for name, kind, half in kinds}
     u_single, u_pair = _uncertainty(read, spec, kinds)
     track = read_path(Path(path)) if path is not None else None
     if not 0 <= dead_band < 1:
         raise InputError(f"--dead-band is {dead_band:g}; wanted: at least 0 and below 1.")
+    placement = coupling_task.best_place(read) if best_placement else None
     return CouplingResult(
         model=read,
         spec=spec,
@@ -131,6 +138,7 @@ def couple(
         decisions=_decisions(read, C, spec),
         schedule=run_path(read, spec, track, dead_band) if track is not None else None,
         notes=tuple(_notes(read, spec)),
+        placement=placement,
     )
 
 
@@ -161,12 +169,8 @@ def _kinds(spec: CouplingSpec) -> list[tuple[str, Kind, Array | None]]:
     return kinds
 
 
-def _stiffness(C: Array, axes: Array) -> Array:
-    return np.array([along(C, axes[:, i]) for i in range(3)])
-
-
 def _pair(C: Array, spec: CouplingSpec, kind: Kind, half: Array | None) -> Array:
-    return _stiffness(coupled(C, spec.beta, kind, half), load_axes(spec.beta, spec.load_axes))
+    return on_axes(coupled(C, spec.beta, kind, half), load_axes(spec.beta, spec.load_axes))
 
 
 def _uncertainty(
@@ -182,7 +186,7 @@ def _uncertainty(
             factor[i] += sign * step
             varied = arm.with_stiffness(arm.joint_stiffness * factor)
             C = varied.compliance(model.q, model.tool, links=model.links, base=model.mounting)
-            found = {"single": _stiffness(C, np.eye(3))}
+            found = {"single": on_axes(C, np.eye(3))}
             found |= {name: _pair(C, spec, kind, half) for name, kind, half in kinds}
             sides.append(found)
         for name in variances:

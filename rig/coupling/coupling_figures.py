@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.coupling import load_axes, mirror_axes
 from identification.maps import Coupling, Stance, branch_of, stiffness_map
+from rig.arrays import Array
 from rig.canvas import blank
 from rig.coupling.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
-from rig.plotting import COLOURS, named, write_figures
+from rig.plotting import COLOURS, watermark, write_figures
 from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
@@ -24,28 +24,27 @@ if TYPE_CHECKING:
     from rig.coupling.coupling_task import TaskResult
     from rig.models.model import ArmModel
 
-Array = NDArray[np.float64]
 _MAP_CELLS = 81
 _LABEL = "Stiffness in N/mm"
 
 
-def draw(result: CouplingResult, folder: Path, placement: TaskResult | None = None) -> list[Path]:
+def draw(result: CouplingResult, folder: Path) -> list[Path]:
     """Writes the figures as PNG and SVG into `folder`; the files written.
 
     InputError if the folder can't be written to.
     """
-    return write_figures(folder, lambda: _figures(result, placement))
+    return write_figures(folder, lambda: _figures(result))
 
 
-def _figures(result: CouplingResult, placement: TaskResult | None) -> list[tuple[str, Figure]]:
+def _figures(result: CouplingResult) -> list[tuple[str, Figure]]:
     out = [("stiffness", stiffness(result))]
     # an arm that the closed form does not cover has no map; the rest stands without it
     with suppress(ValueError):
         out.append(("map", maps(result)))
     if result.schedule is not None:
         out.append(("schedule", schedule(result)))
-    if placement is not None:
-        out.append(("placement", place(placement)))
+    if result.placement is not None:
+        out.append(("placement", place(result.placement)))
     return out
 
 
@@ -209,11 +208,7 @@ def _plain_numbers(axis: Any) -> None:
 
 def _finish(figure: Figure, model: ArmModel) -> Figure:
     """The model's name; and across the figure what must not be overlooked."""
-    words = [word for word in marks([model.note]) if word]
-    if words:
-        figure.text(0.5, 0.5, " · ".join(words), fontsize=40, color="0.5", alpha=0.3,
-                    ha="center", va="center", rotation=25)  # fmt: skip
-    return named(figure, Path(model.name).name)
+    return watermark(figure, marks([model.note]), Path(model.name).name)
 
 
 def marks(notes: Sequence[str]) -> list[str]:

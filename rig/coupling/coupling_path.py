@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from identification.arm import Arm
 from identification.when import Schedule, schedule
+from rig.arrays import Array
 from rig.errors import InputError, did_you_mean
 from rig.models.model import ArmModel, CouplingSpec
 from rig.units import N_PER_MM
 
-Array = NDArray[np.float64]
 _Q = tuple(f"q{i}_rad" for i in range(1, 7))
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
 _COLUMNS = ("time_s", *_Q, *_DIRECTION, "required_N_per_mm")

@@ -7,17 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.inverse import tool_pose
 from identification.maps import Need, Placement, Stance, Task, best_placement
+from rig import schemas
 from rig.errors import InputError
 from rig.models.model import ArmModel, CouplingSpec, load_model
 from rig.units import MM_PER_M, N_PER_MM
 
-Array = NDArray[np.float64]
-DISTANCES_MM = (800.0, 2400.0)
-BETAS_DEG = (-60.0, 60.0)
+_DISTANCES_MM = (800.0, 2400.0)
+_BETAS_DEG = (-60.0, 60.0)
 _GRID = (41, 41)
 
 
@@ -38,7 +37,7 @@ class TaskResult:
         """`rig.placement/1`."""
         best = self.best
         return {
-            "schema": "rig.placement/1",
+            "schema": schemas.PLACEMENT,
             "model": self.model.name,
             "base_distance_mm": MM_PER_M * best.base_distance,
             "beta_deg": float(np.rad2deg(best.beta)),
@@ -83,31 +82,30 @@ class TaskResult:
         return "\n".join([*lines, *(f"Note: {note}" for note in self.notes)])
 
 
-def best_for(
-    model: str | Path,
-    distances_mm: tuple[float, float] = DISTANCES_MM,
-    betas_deg: tuple[float, float] = BETAS_DEG,
-) -> TaskResult:
-    """Base distance and angle within the ranges that meet the model's `required` best.
+def best_for(model: str | Path) -> TaskResult:
+    """`best_place` for a model file. Raises InputError as `load_model` does, too."""
+    return best_place(load_model(model))
+
+
+def best_place(read: ArmModel) -> TaskResult:
+    """Base distance and angle within the ranges above that meet the model's `required` best.
 
     Height of the node and how the tool is held are the model's; the branch is free.
-    Raises InputError for models without requirements, empty ranges, or out of reach.
+    Raises InputError for models without requirements, or out of reach.
     """
-    read = load_model(model)
     if read.coupling is None or not read.required:
         raise InputError(
             f"{read.name}: the best placement needs `coupling` (how the arms are joined) and "
             "`required` (direction and stiffness_N_per_mm). data/models/F1.yaml shows both."
         )
-    _check_ranges(distances_mm, betas_deg)
     spec = read.coupling
     task, azimuth = _task(read, spec)
-    distances = np.linspace(distances_mm[0] / MM_PER_M, distances_mm[1] / MM_PER_M, _GRID[0])
-    betas = np.deg2rad(np.linspace(*betas_deg, _GRID[1]))
+    distances = np.linspace(*_DISTANCES_MM, _GRID[0]) / MM_PER_M
+    betas = np.deg2rad(np.linspace(*_BETAS_DEG, _GRID[1]))
     try:
         best = best_placement(read.arm, task, distances, betas)
     except ValueError as error:
-        raise InputError(f"{read.name}: {error}. Widen the ranges, or move the node.") from error
+        raise InputError(f"{read.name}: {error}. Move the node nearer.") from error
     notes = _notes(read, best, azimuth)
     return TaskResult(read, spec, task, best, _as_modelled(read, spec), notes)
 
@@ -141,19 +139,6 @@ def _as_modelled(model: ArmModel, spec: CouplingSpec) -> float:
     pair = coupled(model.compliance(), spec.beta, spec.kind, spec.half)
     axes = load_axes(spec.beta, spec.load_axes)
     return min(float(along(pair, axes @ r.direction)) / r.stiffness for r in model.required)
-
-
-def _check_ranges(distances_mm: tuple[float, float], betas_deg: tuple[float, float]) -> None:
-    low, high = distances_mm
-    if not 0 < low <= high < float("inf"):
-        raise InputError(
-            f"base distances {low:g} to {high:g} mm are no range; wanted: above 0 mm, rising."
-        )
-    low, high = betas_deg
-    if not -90 < low <= high < 90:
-        raise InputError(
-            f"beta {low:g} to {high:g} deg is no range; wanted: between -90 and 90 deg, rising."
-        )
 
 
 def _notes(model: ArmModel, best: Placement, azimuth: float) -> tuple[str, ...]:

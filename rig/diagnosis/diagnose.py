@@ -22,6 +22,7 @@ from identification.gap.diagnose import (
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter
 from identification.gap.words import WORDS
+from rig import schemas
 from rig.dataset import Dataset
 from rig.diagnosis.gap_data import gap_data
 from rig.diagnosis.gap_forms import effects_of
@@ -30,11 +31,11 @@ from rig.diagnosis.other_simulator import with_curves
 from rig.errors import InputError, did_you_mean
 from rig.meta import Simulation
 from rig.models.model import ArmModel, load_model
+from rig.terminal import Progress
 from rig.units import MM_PER_M
 
 # As shapes are labelled, whatever their springs are called: joint 1, joints 1 and 2, joints but 3.
 _JOINT = re.compile(r"\bjoint(s?(?: but)?)(?: (\d+))?(?: and (\d+))?")
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Diagnosis:
 
         r = self.result
         return {
-            "schema": "rig.diagnosis/1",
+            "schema": schemas.DIAGNOSIS,
             "dataset": self.dataset,
             "verdict": r.verdict,
             "probabilities": {w: float(p) for w, p in r.probabilities.items()},

@@ -15,7 +15,8 @@ from identification.gap.data import BRANCH_NAMES, Array, Flags, GapData, Instrum
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from rig.dataset import Dataset
 from rig.errors import InputError
-from rig.models.model import ArmModel, load_robot
+from rig.models.model import ArmModel
+from rig.models.robot import load_robot
 from rig.storage.columns import SAMPLE_NUMBER
 from rig.units import M_PER_MM
 

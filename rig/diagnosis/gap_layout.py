@@ -7,12 +7,33 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.canvas import blank
+from rig.canvas import DISPLACEMENT, FORCE, blank
+from rig.diagnosis.gap_points import FALLING, RISING
+from rig.plotting import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+BLUE, ORANGE, GREEN = COLOURS[0], COLOURS[1], COLOURS[2]
+GREY = "0.45"
+SENSES = ((RISING, "loading", BLUE, BLUE, "o"), (FALLING, "unloading", ORANGE, "white", "s"))
+MANY = 400  # points of a panel beyond which markers hide each other
 _MOST_PANELS = 12
+
+
+def drive_label(imposed: bool) -> str:
+    """Axis of what drives the rig: the force, or the displacement where that is imposed."""
+    return DISPLACEMENT if imposed else FORCE
+
+
+def answer_label(imposed: bool) -> str:
+    """Axis of what answers."""
+    return drive_label(not imposed)
+
+
+def gap_label(imposed: bool, what: str, unit: str = "in mm") -> str:
+    """Axis of a gap, which of an imposed displacement is one of the force."""
+    return f"{what} {unit}" + (" (force over simulated stiffness)" if imposed else "")
 
 
 def panels(setups: int, *, below: bool = False) -> tuple[Figure, list[list[Any]], list[int]]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.gap.data import Array, Flags
 from rig.canvas import blank
+from rig.diagnosis.gap_layout import drive_label
 from rig.diagnosis.gap_points import FALLING, RISING, Points, Shown, session_clock
 from rig.units import MM_PER_M
 
@@ -101,7 +102,7 @@ def _strips(
     axes.autoscale_view()
     axes.set_facecolor("0.93")
     axes.grid(visible=False)
-    axes.set_xlabel("Displacement in mm" if r.imposed else "Force in N")
+    axes.set_xlabel(drive_label(r.imposed))
     return image
 
 
@@ -134,7 +135,7 @@ def _over_time(r: Shown, p: Points, axes: Any, gap: Array, norm: Any) -> None:
     axes.set_facecolor("0.93")
     axes.set_xlabel(f"Time in the session in {unit}")
     if axes.get_subplotspec().is_first_col():
-        axes.set_ylabel("Displacement in mm" if r.imposed else "Force in N")
+        axes.set_ylabel(drive_label(r.imposed))
 
 
 def _driven(r: Shown, p: Points) -> Array:

@@ -87,6 +87,13 @@ class Shown:
         pose, direction = self.setups[number]
         return f"{pose}, {direction}" if pose else direction
 
+    @property
+    def with_what(self) -> str:
+        """What stands in the simulation after."""
+        if self.effects:
+            return "with " + " + ".join(dict.fromkeys(e.name for e in self.effects))
+        return "with springs and gains refitted"
+
 
 def shown(r: GapResult) -> Shown:
     """Of a diagnosis."""

@@ -19,7 +19,7 @@ from rig.diagnosis.diagnose import Diagnosis
 from rig.diagnosis.other_setups import other_poses
 from rig.errors import InputError
 from rig.meta import Meta
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.plan import plan
 from rig.protocol import MeasurementProtocol, parse_protocol
 from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines

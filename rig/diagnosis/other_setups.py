@@ -11,7 +11,8 @@ from identification.inverse import solutions
 from rig.dataset import Dataset
 from rig.diagnosis.gap_data import arm_setup
 from rig.meta import Meta
-from rig.models.model import AXES, ArmModel, load_robot
+from rig.models.model import AXES, ArmModel
+from rig.models.robot import load_robot
 from rig.units import MM_PER_M
 
 _NEARER_M = 0.2  # of the point of load towards the base's axis: levers about a quarter shorter

@@ -6,16 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.gap.data import GapData, Setup
+from rig.arrays import Array
 from rig.errors import InputError
 from rig.storage.columns import Values
 from rig.storage.csvblocks import Block, CsvFile
 from rig.storage.csvcells import Reading, parse, shown
 from rig.units import MM_PER_M
-
-Array = NDArray[np.float64]
 
 NUMBERS = ("force_N", "displacement_mm")
 WANTED = "pose, direction, force_N, displacement_mm"

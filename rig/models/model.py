@@ -1,42 +1,26 @@
-"""Robot files and model files: YAML into `Arm` and `ArmModel`, SI inside, every value checked."""
+"""Model files: YAML into `ArmModel`, SI inside, every value checked."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cache
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arm import Arm, tool_offset, tool_transform, unit_vector
-from identification.elastic import MATERIALS, Beam, Section, cantilever, tube
+from identification.elastic import Beam, cantilever
 from identification.inverse import BRANCHES, solutions, tool_pose
+from rig.arrays import Array
 from rig.errors import InputError, did_you_mean
-from rig.models.model_schema import (
-    BeamFile,
-    BeamKind,
-    ComplianceKind,
-    ModelFile,
-    MountingFile,
-    RobotFile,
-    SegmentFile,
-    TubeFile,
-)
+from rig.models.model_schema import BeamKind, ComplianceKind, ModelFile, MountingFile
+from rig.models.robot import checked, robot_and_reach, section_of, segments
 from rig.units import MM_PER_M, N_PER_MM
 from rig.yaml.yamlfile import Document, read_document
 from rig.yaml.yamlnodes import Problem
 
-Array = NDArray[np.float64]
-T = TypeVar("T")
-
-MODELS = Path(__file__).resolve().parents[2] / "data" / "models"
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
-# --- what comes out ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,22 +77,6 @@ class ArmModel:
         return float(n @ C[:3, :3] @ n)
 
 
-# --- reading -------------------------------------------------------------------------------------
-
-
-def robot_names() -> list[str]:
-    """Robots that data/models holds."""
-    return sorted(p.stem for p in MODELS.glob("*.yaml") if "rig.robot/1" in p.read_text("utf-8"))
-
-
-def load_robot(name_or_path: str | Path) -> Arm:
-    """The arm of a robot file: a name (ur10e) or a path.
-
-    Raises InputError when there is no such robot, or its file does not hold one.
-    """
-    return _robot(name_or_path)[0]
-
-
 def told_first(notes: Sequence[str]) -> tuple[list[str], list[str]]:
     """Notes that have to be read before any number (where it comes from), and the others."""
     first = [note for note in notes if note.startswith(("EMULATED:", "INCOMPLETE:"))]
@@ -136,46 +104,6 @@ def load_model(path: str | Path) -> ArmModel:
         note=written.note,
         written_outside=_written_outside(written),
     )
-
-
-def _robot(name_or_path: str | Path) -> tuple[Arm, float]:
-    path = Path(name_or_path)
-    return _read(path) if path.suffix in (".yaml", ".yml") else _shipped(str(name_or_path))
-
-
-@cache
-def _shipped(name: str) -> tuple[Arm, float]:
-    """Of data/models, read once: commands ask for the same robot again and again."""
-    known = robot_names()
-    if name not in known:
-        hint = did_you_mean(name, known)
-        raise InputError(f'robot "{name}" is unknown.{hint} Or give a robot file (.yaml).')
-    return _read(MODELS / f"{name}.yaml")
-
-
-def _read(path: Path) -> tuple[Arm, float]:
-    document = read_document(path, RobotFile)
-    written = document.value
-    arm = _checked(
-        document,
-        (),
-        lambda: Arm(
-            name=written.name,
-            d=np.array(written.dh.d_m),
-            a=np.array(written.dh.a_m),
-            alpha=np.array(written.dh.alpha_rad),
-            mass=np.array(written.mass_kg),
-            centre=np.array(written.centre_of_mass_m),
-            torque_limit=np.array(written.joint_torque_limits_Nm),
-            q_min=np.deg2rad(written.joint_limits_deg.min),
-            q_max=np.deg2rad(written.joint_limits_deg.max),
-            joint_stiffness=np.array(written.joint_stiffness_Nm_per_rad),
-            joint_stiffness_relative_sd=np.full(6, written.joint_stiffness_relative_sd),
-            payload_limit=written.payload_limit_kg,
-            links=_segments(document, written.link_segments),
-        ),
-    )
-    return arm, written.reach_mm / MM_PER_M
 
 
 def _check_model(document: Document[ModelFile]) -> None:
@@ -218,14 +146,14 @@ def _model_arm(document: Document[ModelFile]) -> tuple[Arm, float | None]:
     reach: float | None = None
     if written.robot is not None:
         try:
-            arm, reach = _robot(_beside(document.name, written.robot))
+            arm, reach = robot_and_reach(_beside(document.name, written.robot))
         except InputError as error:
             document.refuse([document.problem(("robot",), str(error))])
             raise
     else:
         dh = written.dh
         assert dh is not None
-        arm = _checked(
+        arm = checked(
             document,
             ("dh",),
             lambda: Arm("dh", d=np.array(dh.d_m), a=np.array(dh.a_m), alpha=np.array(dh.alpha_rad)),
@@ -251,7 +179,7 @@ def _tool(document: Document[ModelFile]) -> Array:
     if written.flange_T_tcp is None:
         return tool_offset([0.0, 0.0, (written.length_mm or 0.0) / MM_PER_M])
     matrix = np.array(written.flange_T_tcp)
-    return _checked(document, ("tool", "flange_T_tcp"), lambda: tool_transform(matrix))
+    return checked(document, ("tool", "flange_T_tcp"), lambda: tool_transform(matrix))
 
 
 def _pose(document: Document[ModelFile], arm: Arm, tool: Array) -> Array:
@@ -267,14 +195,14 @@ def _pose(document: Document[ModelFile], arm: Arm, tool: Array) -> Array:
         what = f'"{pose.branch}" is no branch.{did_you_mean(pose.branch, BRANCHES)}'
         document.refuse([document.problem(("pose", "branch"), what)])
     direction = np.array(pose.direction)
-    target = _checked(
+    target = checked(
         document,
         ("pose", "direction"),
         lambda: tool_pose(
             np.array(pose.position_mm) / MM_PER_M, direction, np.deg2rad(pose.turn_deg)
         ),
     )
-    found = _checked(document, ("pose",), lambda: solutions(arm, target @ np.linalg.inv(tool)))
+    found = checked(document, ("pose",), lambda: solutions(arm, target @ np.linalg.inv(tool)))
     if pose.branch not in found:
         reached = "; branches that reach it: " + ", ".join(found) if found else ""
         what = (
@@ -308,33 +236,7 @@ def _model_links(document: Document[ModelFile], arm: Arm) -> tuple[Beam, ...]:
             what = f"the model of {arm.name} has no link segments; list them here."
             document.refuse([document.problem(("link_segments",), what)])
         return arm.links
-    return _segments(document, wanted)
-
-
-def _segments(document: Document[Any], written: list[SegmentFile]) -> tuple[Beam, ...]:
-    out = []
-    for i, segment in enumerate(written):
-        place = ("link_segments", i)
-        section = _section(document, (*place, "tube"), segment.tube)
-        build = _beam_of(segment, section)
-        out.append(_checked(document, place, build))
-    return tuple(out)
-
-
-def _beam_of(segment: SegmentFile, section: Section) -> Callable[[], Beam]:
-    return lambda: Beam(section, segment.from_m, segment.to_m, segment.frame, segment.name)
-
-
-def _section(
-    document: Document[Any], place: tuple[str | int, ...], written: TubeFile | BeamFile
-) -> Section:
-    material = MATERIALS.get(written.material)
-    if material is None:
-        what = f'"{written.material}" is unknown.{did_you_mean(written.material, MATERIALS)}'
-        document.refuse([document.problem((*place, "material"), what)])
-        raise AssertionError
-    wall = None if written.wall_mm is None else written.wall_mm / MM_PER_M
-    return _checked(document, place, lambda: tube(material, written.diameter_mm / MM_PER_M, wall))
+    return segments(document, wanted)
 
 
 def _written_outside(written: ModelFile) -> dict[str, Any]:
@@ -369,7 +271,7 @@ def _coupling(document: Document[ModelFile]) -> CouplingSpec | None:
     half: Array | None = None
     if isinstance(written.kind, BeamKind):
         beam = written.kind.beam
-        section = _section(document, ("coupling", "kind", "beam"), beam)
+        section = section_of(document, ("coupling", "kind", "beam"), beam)
         half = cantilever(section, beam.half_length_mm / MM_PER_M)
         described = (
             f"{beam.material} beam, diameter {beam.diameter_mm:g} mm, "
@@ -410,15 +312,6 @@ def _requirement(document: Document[ModelFile], i: int) -> Requirement:
     if isinstance(written.direction, str):
         return Requirement(written.direction, AXES[written.direction], stiffness)
     given = written.direction
-    _checked(document, ("required", i, "direction"), lambda: unit_vector(given))
+    checked(document, ("required", i, "direction"), lambda: unit_vector(given))
     name = "(" + ", ".join(f"{v:g}" for v in given) + ")"
     return Requirement(name, given, stiffness)
-
-
-def _checked(document: Document[Any], place: tuple[str | int, ...], build: Callable[[], T]) -> T:
-    """`build()`, its ValueError told as a problem of the file at `place`."""
-    try:
-        return build()
-    except ValueError as error:
-        document.refuse([document.problem(place, f"{error}.")])
-        raise

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.arm import JOINTS, STANDARD_GRAVITY, Arm, joint_positions, tool_transform
+from rig.arrays import Array
 from rig.storage.files import in_place_of
 
 if TYPE_CHECKING:
     from rig.analysis.identify import IdentifyResult
     from rig.models.model import ArmModel
 
-Array = NDArray[np.float64]
 
 # Inertia tensors are no part of a robot file, and statics do not ask for them: a ball stands in.
 _BALL_RADIUS_M = 0.05

@@ -7,12 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rig.arrays import Array
 from rig.units import MM_PER_M
-
-Array = NDArray[np.float64]
 
 _PLAIN = re.compile(r"(?!true|false|null)[a-z]{4,}(_[a-z]+)*")  # read as text by every YAML
 # Of the published pair; what stands in a model file until somebody edits it.

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arm import along, tool_offset
 from identification.gap.answer.forms import Form
 from identification.uncertainty import TWO_SIDED
+from rig import schemas
+from rig.arrays import Array
 from rig.diagnosis.gap_forms import effects_of
 from rig.diagnosis.gap_path import left_out, predict
 from rig.digits import number
@@ -27,8 +28,6 @@ from rig.models.model import ArmModel, load_model, told_first
 from rig.protocol import MeasurementProtocol, Run, load_protocol
 from rig.units import MM_PER_M, N_PER_MM
 
-Array = NDArray[np.float64]
-SCHEMA = "rig.simulation/1"
 CSV_HEADER = "pose,direction,force_N,displacement_mm"
 CSV_PATH = ",repetition,branch,step,session_s"
 
@@ -77,7 +76,7 @@ class Simulation:
     def to_json(self) -> dict[str, Any]:
         """`rig.simulation/1`."""
         return {
-            "schema": SCHEMA,
+            "schema": schemas.SIMULATION,
             "model": self.model,
             "protocol": self.protocol,
             "effects": list(self.effects),

@@ -120,11 +120,6 @@ class PanelLink:
             self._child.ended_within(ENDING_S)
         self._kill()
 
-    @property
-    def alive(self) -> bool:
-        """Whether the page is still being served."""
-        return not self.trouble and self._end is None
-
     def _write(self) -> None:
         while True:
             with self._wake:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.arm import Arm, along, tool_offset
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.panel.state import Plan, PlannedRun
 from rig.protocol import MeasurementProtocol, Pose
 from rig.units import MM_PER_M, N_PER_MM

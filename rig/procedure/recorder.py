@@ -34,6 +34,10 @@ class Slot:
         """Devices that delivered no valid value in this slot."""
         return [name for name, reading in self.readings().items() if reading.count == 0]
 
+    def lost(self) -> dict[str, int]:
+        """Single values that were pushed out before anybody collected them, by device."""
+        return {name: reading.lost for name, reading in self.readings().items() if reading.lost}
+
 
 @dataclass(frozen=True, slots=True)
 class Place:

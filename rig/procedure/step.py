@@ -163,7 +163,15 @@ class StepProcedure:
                 taken += 1
 
     def record(self, slot: Slot, where: Where, step: Step, *, settled: bool) -> bool:
-        """Writes the slot; False, and an event, if a device had no valid value in it."""
+        """Writes the slot; False, and an event, if a device had no valid value in it.
+
+        Values that were lost before the slot could hold them are an event and a warning.
+        """
+        if lost := slot.lost():
+            values = ", ".join(f"{count} values of {name}" for name, count in lost.items())
+            text = f"{values} before slot {slot.number} were lost: the program was held up"
+            self.event(where, "values_lost", text, lost=lost)
+            self._loader.notify(text, "warning")
         missing = slot.without_value()
         if missing:
             text = f"no valid value from {', '.join(missing)} in slot {slot.number}"

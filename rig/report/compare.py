@@ -31,11 +31,11 @@ _IDENTITY = (
 
 @dataclass(frozen=True)
 class Pair:
-    """One pose and direction in two data sets (numbers in the order given). N/m; ratio b / a.
+    """One pose and direction in the first data set and in a later one, by its number. N/m; ratio of
+    the later one over the first.
 
     p: of so large a difference by chance; adjusted: for all comparisons of the report."""
 
-    first: int
     second: int
     key: str
     difference: Quantity
@@ -52,7 +52,7 @@ class Pair:
     def to_json(self) -> dict[str, Any]:
         """Plain values; N/mm."""
         return {
-            "first": self.first,
+            "first": 0,
             "second": self.second,
             "direction": self.key,
             "difference_N_per_mm": quantity(self.difference, N_PER_MM),
@@ -77,7 +77,7 @@ def compare(sets: Sequence[tuple[Dataset, Analysis]]) -> list[Pair]:
                 continue
             a, b = first.directions[mine].result, analysis.directions[other].result
             if a.k is not None and b.k is not None:
-                found.append(paired(0, i, key, a, b, shared=shared))
+                found.append(paired(i, key, a, b, shared=shared))
     return adjusted(found)
 
 
@@ -122,7 +122,7 @@ def _known(
     return None
 
 
-def paired(first: int, second: int, key: str, a: Stiffness, b: Stiffness, *, shared: bool) -> Pair:
+def paired(second: int, key: str, a: Stiffness, b: Stiffness, *, shared: bool) -> Pair:
     """k of b against k of a. shared: the same instruments, whose gains cancel."""
     assert a.k is not None
     assert b.k is not None
@@ -132,7 +132,7 @@ def paired(first: int, second: int, key: str, a: Stiffness, b: Stiffness, *, sha
     relative = _budget(a, b, 1 / abs(a.k.value), 1 / abs(b.k.value), shared=shared)
     quotient = combined(ratio, [replace(c, u=abs(ratio) * c.u) for c in relative])
     p = probability(total)
-    return Pair(first, second, key, total, quotient, p, p, _remarks(a, b))
+    return Pair(second, key, total, quotient, p, p, _remarks(a, b))
 
 
 def _budget(

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.uncertainty import TWO_SIDED
+from rig import plotting
 from rig.analysis.analyze import Analysis
-from rig.canvas import blank
+from rig.canvas import DISPLACEMENT, FORCE, blank
 from rig.dataset import Dataset
-from rig.plotting import COLOURS, MARKERS, named
+from rig.plotting import COLOURS, MARKERS
 from rig.report.compare import aligned
 from rig.report.quality import RunZeros
 from rig.units import KNM, MM_PER_M, N_PER_MM
@@ -26,11 +27,7 @@ MOST_POINTS = 4000  # of a recording that are drawn: more than a page has dots
 def watermark(figure: Figure, banners: Sequence[str], name: str = "") -> Figure:
     """What must not be overlooked, across the figure: it may leave the page without its text. name:
     of the data set, where the figure shows one."""
-    words = [banner.split(":", maxsplit=1)[0] for banner in banners]
-    if words:
-        figure.text(0.5, 0.5, " · ".join(words), fontsize=34, color="0.5", alpha=0.22,
-                    ha="center", va="center", rotation=18)  # fmt: skip
-    return named(figure, name)
+    return plotting.watermark(figure, banners, name, size=34, turn=18)
 
 
 def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
@@ -195,7 +192,7 @@ def compared_curves(
 
     keys: what each data set calls it.
     """
-    figure, axes = _axes(7.5, 3.8, "Force in N", "Displacement in mm")
+    figure, axes = _axes(7.5, 3.8, FORCE, DISPLACEMENT)
     for i, ((label, analysis), key) in enumerate(zip(sets, keys, strict=True)):
         direction = None if key is None else analysis.directions[key]
         for branch, line in (("loading", "-"), ("unloading", ":")):

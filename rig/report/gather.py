@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig import schemas
 from rig.analysis.analyze import Analysis, analyze
 from rig.analysis.identify import IdentifyResult, identify
 from rig.dataset import Dataset, load_each
@@ -23,8 +24,6 @@ from rig.terminal import Progress, silent
 
 if TYPE_CHECKING:
     from rig.coupling.couple import CouplingResult
-
-SCHEMA = "rig.report/1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +96,7 @@ class Gathered:
         """Schema rig.report/1: every number of the page stands here."""
         first = self.sessions[0].dataset
         return {
-            "schema": SCHEMA,
+            "schema": schemas.REPORT,
             "software": self.software,
             "made": self.made,
             "banners": list(self.banners),

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from html import escape as _escape
 from importlib.resources import files
 
+from rig.banners import marks
 from rig.report.document import (
     Block,
     Bullets,
@@ -69,8 +70,7 @@ def render(document: Document) -> str:
 def _style(document: Document) -> str:
     """The style sheet; on paper the marks stand at the head of every page."""
     sheet = files("rig.report").joinpath("report.css").read_text("utf-8")
-    marks = [b.split(":", maxsplit=1)[0] for b in document.banners]
-    words = " · ".join(m for m in marks if m.isalpha())
+    words = " · ".join(m for m in marks(document.banners) if m.isalpha())
     return sheet.replace('"MARKS"', f'"{words}"')
 
 

@@ -12,6 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from rig.banners import marks
 from rig.errors import InputError
 from rig.report.document import (
     Block,
@@ -66,13 +67,12 @@ def _file(figure: Figure) -> str:
 
 
 def _document(document: Document) -> dict[str, Any]:
-    marks = [b.split(":", maxsplit=1)[0] for b in document.banners]
     return {
         "title": _clean(document.title),
         "subtitle": _clean(document.subtitle),
         "foot": _clean(document.foot),
         "banners": [_clean(b) for b in document.banners],
-        "marks": " · ".join(marks),
+        "marks": " · ".join(marks(document.banners)),
         "sections": [_block(s) for s in document.sections],
     }
 

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.arrays import Array
 from rig.dataset import Dataset
-
-Array = NDArray[np.float64]
 
 # What an operator or a device did that a reader of the results should know.
 NOTABLE = (
@@ -28,6 +27,7 @@ NOTABLE = (
     "resumed",
     "stopped",
     "top",
+    "values_lost",
 )
 MOST_EVENTS = 40
 

@@ -10,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig.banners import marks
 from rig.errors import InputError
 from rig.report.diagnosing import Job, diagnosing, usable_cores
 from rig.report.document import Document, Figure, figures
@@ -134,11 +135,11 @@ def write_pdf(report: Report, path: Path) -> None:
 def write_figures(report: Report, folder: Path) -> list[Path]:
     """Every figure as SVG and PNG, and the numbers behind it as CSV; the files written."""
     written: list[Path] = []
-    marks = [b.split(":", maxsplit=1)[0] for b in report.document.banners]
+    words = marks(report.document.banners)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for figure in figures(report.document.sections):
-            for kind, content in _files(figure, marks).items():
+            for kind, content in _files(figure, words).items():
                 path = folder / f"{figure.name}.{kind}"
                 path.write_bytes(content)
                 written.append(path)
@@ -150,18 +151,18 @@ def write_figures(report: Report, folder: Path) -> list[Path]:
     return written
 
 
-def _files(figure: Figure, marks: Sequence[str]) -> dict[str, bytes]:
+def _files(figure: Figure, words: Sequence[str]) -> dict[str, bytes]:
     files = {"svg": f'<?xml version="1.0" encoding="utf-8"?>\n{figure.svg}\n'.encode()}
     if figure.png is not None:
         files["png"] = figure.png
     if figure.header:
-        files["csv"] = _csv(figure, marks).encode("utf-8", "replace")
+        files["csv"] = _csv(figure, words).encode("utf-8", "replace")
     return files
 
 
-def _csv(figure: Figure, marks: Sequence[str]) -> str:
+def _csv(figure: Figure, words: Sequence[str]) -> str:
     buffer = io.StringIO()
-    for mark in marks:
+    for mark in words:
         buffer.write(f"# {mark}\n")
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(figure.header)

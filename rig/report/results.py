@@ -88,9 +88,9 @@ class Node:
             return (Number(f"< {_LEAST_P:g}", self.value, self.pointer),)
         return self.number(2)
 
-    def interval(self, digits: int = 4, scale: float = 1.0) -> Rich:
+    def interval(self, digits: int = 4) -> Rich:
         """`low to high` of a pair."""
-        low, high = self[0].number(digits, scale), self[1].number(digits, scale)
+        low, high = self[0].number(digits), self[1].number(digits)
         return (*low, " to ", *high)
 
     def text(self) -> str:
@@ -101,15 +101,6 @@ class Node:
 def escaped(key: str) -> str:
     """A key as a step of a JSON pointer."""
     return key.replace("~", "~0").replace("/", "~1")
-
-
-def look_up(document: Any, pointer: str) -> Any:
-    """What stands at a pointer; KeyError, IndexError where nothing does."""
-    value = document
-    for step in pointer.split("/")[1:]:
-        key = step.replace("~1", "/").replace("~0", "~")
-        value = value[int(key)] if isinstance(value, list) else value[key]
-    return value
 
 
 def quantity(node: Node, scale: float = 1.0) -> Rich:

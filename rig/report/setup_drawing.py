@@ -8,19 +8,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arm import tool_offset
+from rig.arrays import Array
 from rig.canvas import blank
 from rig.meta import Meta, MetaPose
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.plotting import COLOURS
 from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 _ARM, _LASER = "0.35", "#CC3311"
 _LINE_POINTS, _LINE_MM = 13.0, 60.0  # of names above each other; about as much in the drawing
 _VIEWS = (("From above", 0, 1), ("From the side", 0, 2))

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.world import HAND_SPEED_M_PER_S, World
 
 SET_UP_S = 120.0  # the fixture is turned to another direction or pose

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 
 
 class History:

@@ -14,7 +14,8 @@ import numpy as np
 
 from drivers.clock import Clock
 from drivers.scene import ArmSignals
-from rig.worlds.arm import Array, tool_poses
+from rig.arrays import Array
+from rig.worlds.arm import tool_poses
 from rig.worlds.history import History
 from rig.worlds.world import CONTROLLER_WAITS_S, ZERO_PLATEAU_S, World
 

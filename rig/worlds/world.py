@@ -21,7 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.worlds.arm import Array, Placement, place
+from rig.arrays import Array
+from rig.worlds.arm import Placement, place
 from rig.worlds.balance import root
 from rig.worlds.laws import Law
 
@@ -182,14 +183,6 @@ class World:
         reach = state.displacement_m + force_N / SCREW_STIFFNESS_N_PER_M
         self.advance_m = self.target_m = HOME_GAP_M + reach - clearance
         return state
-
-    def true_curve(self, direction: Sequence[float], forces_N: Sequence[float]) -> Array:
-        """(n,) m: the tool's displacement along `direction` in the present pose, first loading
-        through `forces_N` in this order, each settled for ever; no gains, no scatter, no noise."""
-        fresh = World(self.design, 0, 0.0, 0.0)
-        fresh.move(tuple(self.q), tuple(self.tcp_m))
-        fresh.mount(direction)
-        return np.array([fresh._take(float(f), math.inf).displacement_m for f in forces_N])
 
     def _end_step(self, force: float, dt: float) -> State:
         before = self.state

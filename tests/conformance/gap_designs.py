@@ -20,7 +20,7 @@ from identification.arm import tool_offset
 from identification.gap.data import GapData
 from rig.dataset import Dataset
 from rig.diagnosis.gap_data import gap_data
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.tables import import_table
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from identification.gap.effects.load_misalignment import Shape
 from identification.gap.effects.pose_error import turned
 from identification.gap.model.bench import make_bench
 from rig.diagnosis.gap_data import gap_data
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from tests.conformance.gap_designs import (
     DESIGNS,
     TCP_MM,

@@ -13,7 +13,7 @@ from identification.arm import tool_offset
 from identification.gap.effects.pose_error import secants
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from tests.conformance.effect_benches import (
     Array,
     of,

@@ -16,7 +16,7 @@ from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from identification.gap.search.refine import refine
 from rig.diagnosis.gap_data import gap_data
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from tests.conformance.gap_designs import (
     DESIGNS,
     TCP_MM,

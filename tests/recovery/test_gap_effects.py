@@ -25,7 +25,7 @@ from rig.diagnosis.diagnose import diagnose
 from rig.diagnosis.gap_data import gap_data
 from rig.diagnosis.gap_model import write_model
 from rig.errors import InputError
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.tables import import_table
 from tests.conformance.gap_designs import linear
 

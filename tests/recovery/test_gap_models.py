@@ -34,7 +34,8 @@ from rig.diagnosis.gap_path import planned_data
 from rig.diagnosis.next_protocol import next_text, write_next
 from rig.errors import InputError
 from rig.measured_meta import measured_meta
-from rig.models.model import MODELS, load_model
+from rig.models.model import load_model
+from rig.models.robot import MODELS
 from rig.models.simulate import simulate
 from rig.plan import plan
 from rig.protocol import load_protocol, parse_protocol
@@ -348,7 +349,7 @@ def test_other_places_are_where_they_say(paper: tuple[Dataset, Diagnosis]) -> No
     """Nearer by 200 mm with the same tool; turned at the same point with the other elbow."""
     from identification.arm import tool_offset
     from rig.diagnosis.other_setups import other_poses
-    from rig.models.model import load_robot
+    from rig.models.robot import load_robot
 
     meta = paper[0].meta
     arm, q = load_robot("ur10e"), np.array(meta.poses["P1"].q_rad)

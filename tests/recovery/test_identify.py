@@ -17,8 +17,9 @@ from rig.analysis.identify_text import model_text, protocol_text, write_model, w
 from rig.coupling.couple import couple
 from rig.dataset import load, write
 from rig.errors import InputError
-from rig.models.model import MODELS, load_model, load_robot
+from rig.models.model import load_model
 from rig.models.model_export import write as write_export
+from rig.models.robot import MODELS, load_robot
 from rig.models.simulate import simulate
 from rig.plan import plan
 from rig.protocol import load_protocol

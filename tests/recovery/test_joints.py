@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.arm import Arm, tool_offset
+from identification.arm import Arm, along, tool_offset
 from identification.joints import Gains, JointFit, Observation, Prior, identify
 from identification.next_poses import (
     _CRITERIA,
     Plan,
     Proposal,
     _candidates,
-    expected_after,
     propose,
 )
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from tests.recovery.joint_world import deflect, place
 
 Array = NDArray[np.float64]
@@ -212,7 +211,7 @@ def test_proposals_keep_their_promise_and_beat_chance(arm: Arm) -> None:
         found = propose(arm, before, plan, 4, seed=draw_number, candidates=600)
         chosen = [(p.q, p.direction, p.force) for p in found]
         after = identify(arm, start + measured(rng, truth, chosen, plan), [GAINS] * 2, prior)
-        promised = before.relative_sd.sum() - expected_after(found, before).sum()
+        promised = before.relative_sd.sum() - found[-1].expected.sum()
         assert before.relative_sd.sum() - after.relative_sd.sum() >= promised / 2
         chance = random_plan(arm, rng, plan, before.stiffness)
         rival = identify(arm, start + measured(rng, truth, chance, plan), [GAINS] * 2, prior)
@@ -244,9 +243,8 @@ def test_proposals_stay_within_the_limits(arm: Arm) -> None:
         assert singular[-1] >= plan.least_singular
         assert plan.lowest < arm.fk(p.q, plan.tool)[2, 3] < plan.highest
         assert p.force >= 0.05 * plan.force
-        moved = p.force / arm.with_stiffness(fit.stiffness).directional_stiffness(
-            p.q, p.direction, plan.tool
-        )
+        soft = arm.with_stiffness(fit.stiffness).compliance(p.q, plan.tool)
+        moved = p.force / along(soft, p.direction)
         assert moved <= plan.range * (1 + 1e-9)
 
 

@@ -20,6 +20,7 @@ from rig.protocol import load_protocol
 from rig.reduce import curves
 from rig.worlds import make_world
 from rig.worlds.direct import sample_protocol
+from tests.true_curves import true_curve
 
 PROTOCOL = load_protocol(Path(__file__).parents[2] / "protocols" / "paper_xy.yaml")
 META = SimpleNamespace(
@@ -56,7 +57,7 @@ def truth(direction: str, world: str = "paper", most_N: float = np.inf) -> float
     """k of the noise-free curve at the levels of the protocol, up to `most_N`."""
     run = next(r for r in PROTOCOL.runs if r.direction == direction)
     levels = [s.target_N for s in PROTOCOL.steps(run) if s.target_N <= most_N]
-    displacement = make_world(world, 0).true_curve(PROTOCOL.directions[direction], levels)
+    displacement = true_curve(make_world(world, 0), PROTOCOL.directions[direction], levels)
     n = len(levels)
     tiny = np.full(n, 1e-12)
     return stiffness(LevelTable(np.array(levels), displacement, tiny, tiny, tiny), Choice())

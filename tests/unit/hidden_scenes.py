@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.design import Plan, draw_plan
 from rig.worlds.hidden.draw import FORMS
 from rig.worlds.hidden.effect import Drawn

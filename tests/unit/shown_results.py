@@ -27,7 +27,8 @@ from rig.check import Check, DeviceState
 from rig.coupling.couple import CouplingResult, Decision
 from rig.coupling.coupling_task import TaskResult
 from rig.diagnosis.diagnose import Diagnosis
-from rig.models.model import ArmModel, CouplingSpec, Requirement, load_robot
+from rig.models.model import ArmModel, CouplingSpec, Requirement
+from rig.models.robot import load_robot
 from rig.models.simulate import CurvePath, PredictedCurve, Simulation
 from rig.plan import Plan, PlannedRun
 
@@ -45,8 +46,6 @@ def identified() -> IdentifyResult:
     fit = JointFit(
         stiffness=np.array([37201.0, 56946.0, 18110.0, 7108.0, 7533.0, 8000.0]),
         covariance=np.diag(np.array([0.004, 0.021, 0.062, 0.093, 0.0995, 0.1]) ** 2),
-        gain_values=np.zeros(2),
-        gain_covariance=np.eye(2),
         data_share=np.array([0.998, 0.956, 0.615, 0.135, 0.01, -1e-9]),
         lower_bound=np.array([36904.0, 54600.0, 15800.0, 2100.0, 310.0, 0.0]),
         rank=5,

@@ -12,12 +12,13 @@ from identification.arm import (
     STANDARD_GRAVITY,
     Arm,
     along,
+    invert_compliance,
     tool_offset,
     unit_vector,
 )
 from identification.elastic import ALUMINIUM, STEEL, Beam, cantilever, transport, tube
 from identification.inverse import BRANCHES, nearest, solutions
-from rig.models.model import load_robot, robot_names
+from rig.models.robot import load_robot, robot_names
 
 Array = NDArray[np.float64]
 ROBOTS = robot_names()
@@ -125,7 +126,7 @@ def test_loaded_term_is_the_derivative_of_the_load_torques(arm: Arm) -> None:
 
 def test_published_single_stiffness(ur10e: Arm) -> None:
     arm = ur10e.with_stiffness(F1_C)
-    found = [float(arm.directional_stiffness(F1_Q, n)) / 1e3 for n in np.eye(3)]
+    found = [float(along(arm.compliance(F1_Q), n)) / 1e3 for n in np.eye(3)]
     np.testing.assert_allclose(found, [95.94, 57.42, 30.4], rtol=1e-3)
 
 
@@ -151,8 +152,8 @@ def test_compliance_is_what_the_springs_do(ur10e: Arm) -> None:
 def test_loaded_compliance_shifts_little_and_in_the_right_sense(ur10e: Arm) -> None:
     """Own geometry under load, PHYSICS's size: 0.1 to 1.3 %."""
     arm = ur10e.with_stiffness(F1_C)
-    plain = arm.directional_stiffness(F1_Q, [1, 0, 0])
-    loaded = arm.directional_stiffness(F1_Q, [1, 0, 0], wrench=[200.0, 0, 0, 0, 0, 0])
+    plain = along(arm.compliance(F1_Q), [1, 0, 0])
+    loaded = along(arm.compliance(F1_Q, wrench=[200.0, 0, 0, 0, 0, 0]), [1, 0, 0])
     assert 1e-4 < abs(loaded / plain - 1) < 1.5e-2
 
 
@@ -163,7 +164,8 @@ def test_a_load_beyond_the_springs_is_refused(ur10e: Arm) -> None:
 
 def test_stiffness_is_the_inverse_of_compliance(arm: Arm) -> None:
     q = random_poses(20)
-    product = arm.stiffness(q) @ arm.compliance(q)
+    C = arm.compliance(q)
+    product = invert_compliance(C) @ C
     np.testing.assert_allclose(product, np.broadcast_to(np.eye(6), product.shape), atol=1e-6)
 
 
@@ -295,18 +297,18 @@ def test_out_of_reach(ur10e: Arm) -> None:
 
 
 def test_reach_about_the_shoulder(ur10e: Arm) -> None:
-    from identification.workspace import tool_points
+    from identification.workspace import flange_points
 
     q = random_poses(1_000_000, seed=1)
-    distance = np.linalg.norm(tool_points(ur10e, q) - [0, 0, ur10e.d[0]], axis=1)
+    distance = np.linalg.norm(flange_points(ur10e, q) - [0, 0, ur10e.d[0]], axis=1)
     assert 1.355 < distance.max() < 1.36417
 
 
-def test_tool_points_are_fk(arm: Arm) -> None:
-    from identification.workspace import tool_points
+def test_flange_points_are_fk(arm: Arm) -> None:
+    from identification.workspace import flange_points
 
-    q, tool = random_poses(50), tool_offset([0.1, 0.2, 0.3])
-    np.testing.assert_allclose(tool_points(arm, q, tool), arm.fk(q, tool)[:, :3, 3], atol=1e-12)
+    q = random_poses(50)
+    np.testing.assert_allclose(flange_points(arm, q), arm.fk(q)[:, :3, 3], atol=1e-12)
 
 
 # --- bad input -----------------------------------------------------------------------------------
@@ -326,19 +328,12 @@ def test_refusals(ur10e: Arm) -> None:
     with pytest.raises(ValueError, match="no rotation matrix"):
         ur10e.fk(np.zeros(6), np.diag([2.0, 1, 1, 1]))
     with pytest.raises(ValueError, match="singular pose"):
-        ur10e.stiffness([0.3, -1.0, 1.2, 0.4, 0.0, 0.2])
+        invert_compliance(ur10e.compliance([0.3, -1.0, 1.2, 0.4, 0.0, 0.2]))
     other = Arm("scara", d=np.ones(6), a=np.ones(6), alpha=np.zeros(6))
     with pytest.raises(ValueError, match="scara is not"):
         other.inverse(np.eye(4))
 
 
-def test_compiled_compliance_is_the_same(arm: Arm) -> None:
-    pytest.importorskip("numba")
-    from identification.kernels import compliance_many
-
-    q, tool = random_poses(200), tool_offset([0.02, -0.05, 0.28])
-    np.testing.assert_allclose(
-        compliance_many(arm, q, tool), arm.compliance(q, tool), rtol=1e-9, atol=1e-17
-    )
-    with pytest.raises(ValueError, match=r"\(n, 6\) is wanted"):
-        compliance_many(arm, q[0])
+def test_a_robot_is_read_once() -> None:
+    """Commands ask for the same one again and again."""
+    assert load_robot("ur10e") is load_robot("ur10e")

@@ -27,7 +27,8 @@ from identification.elastic import STEEL, Material, cantilever, tube
 from identification.when import CouplingRule, schedule
 from rig.coupling.couple import couple
 from rig.errors import InputError
-from rig.models.model import MODELS, ArmModel, load_model, load_robot
+from rig.models.model import ArmModel, load_model
+from rig.models.robot import MODELS, load_robot
 
 Array = NDArray[np.float64]
 BETA = np.deg2rad(36.5)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.arm import Arm, tool_offset
+from identification.arm import Arm, along, tool_offset
 from identification.coupling import coupled, mirror_axes
 from identification.elastic import STEEL, Beam, cantilever, tube
-from rig.models.model import MODELS, load_model, load_robot
+from rig.models.model import load_model
+from rig.models.robot import MODELS, load_robot
 
 Array = NDArray[np.float64]
 
@@ -130,7 +131,7 @@ def test_single_stiffness_against_mujoco() -> None:
     engine = mujoco.MjModel.from_xml_string(xml)
     for n in np.eye(3):
         moved = _equilibrium(mujoco, engine, 1.0 * n) @ n
-        wanted = float(model.arm.directional_stiffness(model.q, n))
+        wanted = float(along(model.arm.compliance(model.q), n))
         assert 1.0 / moved == pytest.approx(wanted, rel=5e-3)
 
 

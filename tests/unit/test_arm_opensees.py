@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from identification.coupling import coupled, mirror_axes
 from identification.elastic import STEEL, cantilever, tube
-from rig.models.model import MODELS, load_model
+from rig.models.model import load_model
+from rig.models.robot import MODELS
 from tests.recovery.joint_world import place
 
 Array = NDArray[np.float64]

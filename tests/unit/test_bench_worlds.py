@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rig.arrays import Array
 from rig.blind.campaign import Campaign, Outcome, Plan
 from rig.blind.case import generator, write_dataset
 from rig.blind.diagnosers import Reply
@@ -25,7 +26,7 @@ from rig.worlds.benches.memory import bouc_wen, chaboche, lowpass, maxwell, purs
 from rig.worlds.benches.paths import through, to_and_fro
 from rig.worlds.benches.rig import Rig, Stated, make_rig
 from rig.worlds.benches.sensors import Readings, columns_of, noise_rms_mm, read
-from rig.worlds.benches.trial import Array, Trial, bent
+from rig.worlds.benches.trial import Trial, bent
 from rig.worlds.hidden.words import EFFECTS as OF_AN_ARM
 
 LAWS = [(word, form.name) for word, forms in FORMS.items() for form in forms]

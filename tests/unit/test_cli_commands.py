@@ -63,6 +63,28 @@ def test_couple_gives_figures_exports_and_pure_json(rig: Rig, files: Path) -> No
     assert list((files / "f").glob("*.png"))
 
 
+@pytest.mark.parametrize("where", ["-", "c.json"])
+def test_the_best_placement_stands_in_the_json_too(rig: Rig, files: Path, where: str) -> None:
+    model = str(HOME / "data" / "models" / "F1.yaml")
+    words = ["couple", model, "--samples", "20000", "--best-placement", "--json", where]
+    status, out, err = rig(*words)
+    assert status == 0, err
+    result = json.loads(out if where == "-" else (files / where).read_text())
+    assert result["schema"] == "rig.coupling/1"
+    placement = result["placement"]
+    assert placement["schema"] == "rig.placement/1"
+    assert placement["feasible"] is True
+    assert placement["margin"] == pytest.approx(4.28, rel=5e-3)
+    assert ("Best place for the second arm: base distance 1015 mm" in out) == (where != "-")
+
+
+def test_nobody_who_has_not_asked_gets_a_placement(rig: Rig, files: Path) -> None:
+    model = str(HOME / "data" / "models" / "F1.yaml")
+    status, out, err = rig("couple", model, "--samples", "20000", "--json", "-")
+    assert status == 0, err
+    assert "placement" not in json.loads(out)
+
+
 def test_simulate_writes_the_curves_that_diagnose_reads(rig: Rig, files: Path) -> None:
     model = str(HOME / "data" / "models" / "F1.yaml")
     status, out, _ = rig("simulate", model, "p.yaml", "--csv", "c.csv")

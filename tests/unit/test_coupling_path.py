@@ -9,7 +9,8 @@ import pytest
 
 from rig.coupling.couple import couple
 from rig.errors import InputError
-from rig.models.model import MODELS, load_model
+from rig.models.model import load_model
+from rig.models.robot import MODELS
 
 
 def test_path_file(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
 from identification.gap.search.search import search
 from rig.diagnosis.gap_data import arm_setup
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
 

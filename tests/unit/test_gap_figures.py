@@ -20,8 +20,10 @@ from rig import cli
 from rig.dataset import write
 from rig.diagnosis.diagnose import Diagnosis, diagnose
 from rig.diagnosis.diagnose_text import _share
-from rig.diagnosis.gap_figures import change, curve, draw, legs, probabilities, residual, withheld
+from rig.diagnosis.gap_curve import curve, legs
+from rig.diagnosis.gap_figures import draw
 from rig.diagnosis.gap_layout import blank, noise_axis
+from rig.diagnosis.gap_left import residual
 from rig.diagnosis.gap_map import _cells, _lines
 from rig.diagnosis.gap_points import (
     FALLING,
@@ -33,6 +35,7 @@ from rig.diagnosis.gap_points import (
     shown,
     write_table,
 )
+from rig.diagnosis.gap_ranking import change, probabilities, withheld
 from rig.report.gap_view import view_of
 from rig.tables import import_table
 

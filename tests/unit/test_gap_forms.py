@@ -28,7 +28,7 @@ def arm_data(seed: int = 0, stretch: float = 1.0, directions: str = "xy") -> Gap
     """Two poses, x and y, twice loaded and unloaded; readings, force across, temperatures.
     stretch: all loads and times that much larger."""
     from rig.diagnosis.gap_data import arm_setup
-    from rig.models.model import load_robot
+    from rig.models.robot import load_robot
 
     arm, rng = load_robot("ur10e"), np.random.default_rng(seed)
     poses = {"P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],

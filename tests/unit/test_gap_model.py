@@ -28,7 +28,8 @@ from rig.diagnosis.gap_forms import FormError, effects_of, from_entry, to_entry
 from rig.diagnosis.gap_model import _comment
 from rig.diagnosis.gap_path import planned_data
 from rig.errors import InputError
-from rig.models.model import MODELS, load_model
+from rig.models.model import load_model
+from rig.models.robot import MODELS
 from rig.models.simulate import Simulation, simulate
 from rig.protocol import load_protocol
 from tests.unit.shown_results import explained

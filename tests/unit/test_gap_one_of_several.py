@@ -14,7 +14,7 @@ from identification.gap.effects import library
 from identification.gap.effects.base_compliance import bent_column, moments
 from identification.gap.effects.force_scale import component
 from identification.gap.model.bench import make_bench
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from tests.conformance.gap_designs import TCP_MM, TRUE, Array, Q, linear
 from tests.unit.test_gap_running import SPRING, running
 

@@ -27,7 +27,7 @@ from identification.gap.model.variants import variant
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.search.refine import refine
 from rig.diagnosis.gap_data import _joint_to_joint, arm_setup
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from tests.unit.test_gap_closer import assert_lawful
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data, fresh

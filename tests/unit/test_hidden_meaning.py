@@ -9,7 +9,8 @@ import pytest
 
 from rig.worlds.hidden import memory
 from rig.worlds.hidden.effect import Unsuited, draw_joint
-from rig.worlds.hidden.joint_laws import _knee_law, _reached, onset
+from rig.worlds.hidden.joint_path import onset, reached
+from rig.worlds.hidden.joint_yield import _knee_law
 from rig.worlds.hidden.meaning import equal_work_threshold, run_seconds, straight_factor
 from rig.worlds.hidden.scene import Scene, make_scene, observe, observe_path
 from tests.unit.hidden_scenes import contribution, effect_of, middle, plan_of, scene_of
@@ -50,7 +51,7 @@ def test_the_sharp_knee_of_a_round_one_ends_where_it_ends_with_equal_work(
     top = float(np.abs(scene.net[:, joint]).max())
     random = np.random.default_rng(5)
     draw_joint(scene, random)
-    limit = _reached(scene, joint, random.uniform(0.4, 0.88))
+    limit = reached(scene, joint, random.uniform(0.4, 0.88))
     assert np.abs(scene.weight[:, joint]).max() < limit < top
     follow, _ = _knee_law(limit, law, random)
     x = np.linspace(0.0, top, 4001)

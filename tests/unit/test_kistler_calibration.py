@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.arrays import Array
 from drivers.kistler.calibration import (
-    Array,
     Calibration,
     channel_forces,
     channel_sums,

@@ -11,8 +11,9 @@ import pytest
 
 from identification.arm import Arm
 from rig.errors import InputError
-from rig.models.model import MODELS, ArmModel, load_model
+from rig.models.model import ArmModel, load_model
 from rig.models.model_export import mujoco_xml, urdf, write
+from rig.models.robot import MODELS
 
 # beside the flange, and turned about all axes
 TOOL = np.array(

@@ -12,7 +12,7 @@ import pytest
 
 from rig.coupling.couple import couple
 from rig.errors import InputError
-from rig.models.model import MODELS
+from rig.models.robot import MODELS
 from rig.models.simulate import simulate
 
 PAPER_XY = Path(__file__).parents[2] / "protocols" / "paper_xy.yaml"

@@ -10,7 +10,7 @@ import pytest
 from drivers.kistler.settings import PerAxis
 from identification.times import MOUNT_S
 from rig.errors import InputError
-from rig.models.model import load_robot
+from rig.models.robot import load_robot
 from rig.plan import Plan, plan
 from rig.protocol import MeasurementProtocol, Pose, Run, load_protocol, parse_protocol
 from rig.station import Station, load_station

@@ -44,7 +44,7 @@ def side(each: list[float], gain: float = 0.0) -> Stiffness:
 
 
 def pair(a: Stiffness, b: Stiffness, *, shared: bool = False) -> Pair:
-    return paired(0, 1, "x", a, b, shared=shared)
+    return paired(1, "x", a, b, shared=shared)
 
 
 def test_without_gains_it_is_welchs_test() -> None:
@@ -86,7 +86,7 @@ def test_a_real_difference_is_seen() -> None:
 
 def test_several_comparisons_are_adjusted_after_holm() -> None:
     quantity = Quantity(1.0, 1.0, math.inf, (0.0, 2.0))
-    made = [Pair(0, i, "x", quantity, quantity, p, p, ()) for i, p in enumerate((0.04, 0.01, 0.03))]
+    made = [Pair(i, "x", quantity, quantity, p, p, ()) for i, p in enumerate((0.04, 0.01, 0.03))]
     found = [p.adjusted for p in adjusted(made)]
     assert found == pytest.approx([0.06, 0.03, 0.06])
     assert [p.differs for p in adjusted(made)] == [False, True, False]

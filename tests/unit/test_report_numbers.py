@@ -19,7 +19,7 @@ from rig.diagnosis.diagnose import diagnose
 from rig.digits import likely
 from rig.report.document import Block, Number, Section, Table, rich
 from rig.report.report import Report, make
-from rig.report.results import Node, look_up
+from rig.report.results import Node
 from rig.report.wishes import Wishes
 from tests.recovery.emulated_sets import PAPER_C, REFERENCE_Q, measure, protocol
 from tests.unit.report_sets import Page, bench
@@ -50,6 +50,15 @@ def of_bench(tmp_path_factory: pytest.TempPathFactory) -> Report:
     folder = tmp_path_factory.mktemp("bench")
     soft = bench(folder / "soft.h5", lambda f, r: f / 95 + (f / 60) ** 3 / 95 * (1 + r / 1e3))
     return make([soft, bench(folder / "stiff.h5")], Wishes(made="now"))
+
+
+def look_up(document: Any, pointer: str) -> Any:
+    """What stands at a pointer; KeyError, IndexError where nothing does."""
+    value = document
+    for step in pointer.split("/")[1:]:
+        key = step.replace("~1", "/").replace("~0", "~")
+        value = value[int(key)] if isinstance(value, list) else value[key]
+    return value
 
 
 def shown(page: Page) -> list[tuple[str, float, str, float]]:

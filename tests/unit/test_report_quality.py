@@ -54,6 +54,7 @@ def test_discards_and_events(plain: Dataset) -> None:
         {"kind": "limit", "text": "force near its limit", "session_s": 12.5},
         {"kind": "step_start", "text": "as planned", "session_s": 13.0},
         {"kind": "note", "text": "without a time", "session_s": float("nan")},
+        {"kind": "values_lost", "text": "300 values of laser", "session_s": 14.0},
     ]
     columns = {**plain.columns, "discarded": discarded}
     facts = assess(replace(plain, columns=columns, events=events)).facts
@@ -62,6 +63,7 @@ def test_discards_and_events(plain: Dataset) -> None:
     assert [(e["kind"], e["session_s"]) for e in facts["events"]] == [
         ("limit", 12.5),
         ("note", None),
+        ("values_lost", 14.0),
     ]
 
 

@@ -271,6 +271,25 @@ def test_a_slot_without_a_valid_value_is_no_row_but_an_event(bench: Bench) -> No
     assert bench.steps() == ALL
 
 
+def test_values_that_were_lost_are_an_event_and_a_warning(bench: Bench) -> None:
+    laser = bench.devices.laser
+    collect = laser.collect
+
+    def overrun(_since: float = 0.0) -> Any:
+        reading = collect()
+        here = [v for v in bench.loader.views[-1:] if v.phase == "sampling" and v.step == 2]
+        return replace(reading, lost=300) if here and not bench.events("values_lost") else reading
+
+    laser.collect = overrun  # type: ignore[method-assign]
+    bench.run()
+    (event,) = bench.events("values_lost")
+    text = f"300 values of laser before slot {event['text'].split()[6]} were lost"
+    assert event["text"] == f"{text}: the program was held up"
+    assert event["lost"] == {"laser": 300}
+    assert event["text"] in bench.loader.said
+    assert bench.steps() == ALL  # what did arrive counts
+
+
 def test_taring_is_no_missed_slot(bench: Bench) -> None:
     bench.run()
     assert all(r["values"]["slots_missed"] == 0 for r in bench.records("sample"))

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from rig.errors import InputError
-from rig.models.model import MODELS
+from rig.models.robot import MODELS
 from rig.models.simulate import Simulation, simulate, write_csv
 from rig.protocol import load_protocol
 from rig.worlds import make_world
+from tests.true_curves import true_curve
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 PAPER_XY = PROTOCOLS / "paper_xy.yaml"
@@ -46,7 +47,7 @@ def test_curves_are_those_of_an_independent_world(tmp_path: Path) -> None:
         world = make_world("linear", 0)
         pose = procedure.poses[curve.pose]
         world.move(pose.q_rad, [v / 1e3 for v in pose.tcp_xyz_mm])
-        true = world.true_curve(procedure.directions[curve.direction], curve.force[1:])
+        true = true_curve(world, procedure.directions[curve.direction], curve.force[1:])
         np.testing.assert_allclose(curve.displacement[1:], true, rtol=1e-6)
         assert curve.force[0] == curve.displacement[0] == 0
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.curve import Array
+from identification.arrays import Array
 from identification.knee import Samples, find_knee, locate
 
 LEVELS_X = np.arange(20.0, 221.0, 20.0)

@@ -36,6 +36,22 @@ def test_what_is_older_than_asked_for_is_left_out_but_for_the_last(
     assert blocks.collect(0.0) is None  # and it never comes up again
 
 
+def test_what_nobody_collects_in_time_is_counted_and_told_once() -> None:
+    blocks = Stream(1, JumpClock(), "emulated+test", keep=2)
+    for end in (1.0, 2.0, 3.0, 4.0):
+        blocks.put(Block(end - 0.1, end, 4, (end,), (0.0,), invalid=1))
+    newest = blocks.latest()
+    assert newest is not None
+    assert newest.lost == 0  # who looks takes nothing away
+    reading = blocks.collect(1.0)
+    assert reading is not None
+    assert (reading.start, reading.count, reading.lost) == (2.9, 8, 10)
+    blocks.put(Block(4.9, 5.0, 4, (5.0,), (0.0,)))
+    reading = blocks.collect(1.0)
+    assert reading is not None
+    assert reading.lost == 0
+
+
 class BlockedLaser(FakeLaser):
     """Blocks of 0.4 s, each of which reaches the computer half a second after its end."""
 

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.stream import Block, pool
-from drivers.ur10e.reduce import PLACES, WIDTH, Reduction, nearest_rotation
+from drivers.ur10e.reduce import PLACES, Reduction, nearest_rotation
 from drivers.ur10e.signals import SIGNALS, from_row
 
+WIDTH = max(place.stop for place in PLACES.values())
 Vector = tuple[float, float, float]
 
 

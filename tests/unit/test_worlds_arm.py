@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rig.arrays import Array
 from rig.worlds import arm
-from rig.worlds.arm import Array, place, tool_poses
+from rig.worlds.arm import place, tool_poses
 from rig.worlds.linear import REFERENCE_Q_RAD
 
 # Denavit-Hartenberg numbers (d, a, alpha) of the UR10e, as published by its maker

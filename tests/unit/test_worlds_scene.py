@@ -7,11 +7,13 @@ import threading
 import numpy as np
 import pytest
 
+from rig.arrays import Array
 from rig.worlds import make_world
-from rig.worlds.arm import Array, tool_poses
+from rig.worlds.arm import tool_poses
 from rig.worlds.history import History
 from rig.worlds.linear import REFERENCE_Q_RAD
 from rig.worlds.scene import IDLE_TICKS, TICK_S, WorldScene
+from tests.true_curves import true_curve
 
 Y = [0.0, 1.0, 0.0]
 OTHER_Q = (0.0, -1.5, -1.9, -1.3, 1.57, -1.3)
@@ -50,7 +52,7 @@ def test_force_and_displacement_lie_on_the_true_curve() -> None:
     assert force[[0, 2]] == pytest.approx([0.0, 0.0])
     assert 65 < force[1] < 72
     # scatter of one loading: half a percent and 3 um
-    assert moved == pytest.approx(scene.world.true_curve(Y, [force[1]])[0], rel=0.02)
+    assert moved == pytest.approx(true_curve(scene.world, Y, [force[1]])[0], rel=0.02)
 
 
 def test_gains_act_on_what_the_sensors_feel() -> None:

@@ -9,10 +9,10 @@ import sys
 import numpy as np
 import pytest
 
+from rig.arrays import Array
 from rig.errors import InputError
 from rig.worlds import WORLDS, make_world
 from rig.worlds import paper as paper_module
-from rig.worlds.arm import Array
 from rig.worlds.laws import Spring
 from rig.worlds.world import (
     HAND_SPEED_M_PER_S,
@@ -23,6 +23,7 @@ from rig.worlds.world import (
     World,
     joint_element,
 )
+from tests.true_curves import true_curve
 
 X, Y, Z = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]
 LEVELS_X = np.arange(20.0, 221.0, 20.0)
@@ -53,7 +54,7 @@ def turn(world: World, advance_m: float, dt: float = 0.05) -> State:
     ("direction", "stiffness"), [(X, 95.94), (Y, 57.42), (Z, 30.4)], ids=["x", "y", "z"]
 )
 def test_linear_world_has_the_stiffness_of_F1(direction: list[float], stiffness: float) -> None:
-    moved = make_world("linear", 1).true_curve(direction, [50.0, 100.0])
+    moved = true_curve(make_world("linear", 1), direction, [50.0, 100.0])
     assert 0.1 / moved[1] == pytest.approx(stiffness, rel=1e-3)
     assert moved[1] == pytest.approx(2 * moved[0], rel=1e-12)
 
@@ -61,24 +62,24 @@ def test_linear_world_has_the_stiffness_of_F1(direction: list[float], stiffness:
 def test_x_softens_as_published() -> None:
     world = paper()
     forces = [1e-3, 75.0, 220.0 - 1e-3, 220.0, 220.0 + 1e-3]
-    moved = 1e3 * world.true_curve(X, forces)
+    moved = 1e3 * true_curve(world, X, forces)
     assert 1e-3 / moved[0] == pytest.approx(133.0, rel=1e-3)  # ours 133.0 N/mm
     assert moved[1] == pytest.approx(0.73, rel=0.01)  # ours 0.730 mm
     assert moved[3] == pytest.approx(3.09, rel=0.01)  # ours 3.085 mm
     assert 2e-3 / (moved[4] - moved[2]) == pytest.approx(49.0, rel=0.01)  # ours 48.7 N/mm
-    curve = 1e3 * world.true_curve(X, list(LEVELS_X))
+    curve = 1e3 * true_curve(world, X, list(LEVELS_X))
     assert stiffness_through_origin(LEVELS_X, curve) == pytest.approx(95.94, rel=1e-3)
 
 
 def test_y_is_straight_up_to_the_knee() -> None:
-    moved = 1e3 * paper().true_curve(Y, list(LEVELS_Y))
+    moved = 1e3 * true_curve(paper(), Y, list(LEVELS_Y))
     assert stiffness_through_origin(LEVELS_Y, moved) == pytest.approx(57.42, rel=1e-3)
     np.testing.assert_allclose(LEVELS_Y / moved, 57.42, rtol=1e-3)
 
 
 def test_y_gives_way_at_75_N() -> None:
     forces = np.array([74.0, 74.9, 75.1, 76.0, 82.0])
-    moved = 1e3 * paper().true_curve(Y, list(forces))
+    moved = 1e3 * true_curve(paper(), Y, list(forces))
     slopes = np.diff(forces) / np.diff(moved)
     assert slopes[0] == pytest.approx(57.3, rel=0.01)
     # by hand: 0.75 m squared over 705 Nm/rad, in series with the springs
@@ -91,7 +92,7 @@ def test_y_gives_way_at_75_N() -> None:
 
 
 def test_y_gives_way_in_both_senses() -> None:
-    there = paper().true_curve([0.0, -1.0, 0.0], [82.0])[0]
+    there = true_curve(paper(), [0.0, -1.0, 0.0], [82.0])[0]
     assert there == pytest.approx(7.01e-3, rel=0.01)
 
 
@@ -241,9 +242,9 @@ def _world_without_scatter() -> World:
 
 def test_a_tool_adds_its_lever() -> None:
     world = make_world("linear", 1)
-    bare = world.true_curve(X, [100.0])[0]
+    bare = true_curve(world, X, [100.0])[0]
     world.move(world.q, (0.0, 0.0, 0.2))
-    assert world.true_curve(X, [100.0])[0] > 1.5 * bare
+    assert true_curve(world, X, [100.0])[0] > 1.5 * bare
 
 
 # --- chance ----------------------------------------------------------------------------------
@@ -278,7 +279,7 @@ def test_gains_have_the_stated_spread() -> None:
 
 def test_loadings_scatter_by_half_a_percent_and_some_micrometres() -> None:
     world = make_world("linear", 11)
-    true = world.true_curve(X, [10.0, 200.0])
+    true = true_curve(world, X, [10.0, 200.0])
     world.mount(X)
     off = np.empty((200, 2))
     for row in off:

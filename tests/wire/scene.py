@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from drivers.arrays import Array
 from drivers.clock import Clock
-from drivers.scene import ArmSignals, Array
+from drivers.scene import ArmSignals
 
 
 class StillScene:

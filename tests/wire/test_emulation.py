@@ -28,6 +28,7 @@ from rig.errors import InputError
 from rig.station import Emulation, FaultPlan, Station, load_station
 from rig.worlds import make_world
 from rig.worlds.linear import REFERENCE_Q_RAD
+from tests.true_curves import true_curve
 
 ROOT = Path(__file__).parents[2]
 Y = [0.0, 1.0, 0.0]
@@ -117,7 +118,7 @@ def test_the_real_clients_see_the_world(rig: EmulatedRig) -> None:
     # 1.2 mm shared by screw (5000 N/mm) and arm (57.4 N/mm); gains and drift within 3 %
     assert force[1] == pytest.approx(1.2 / (1 / 57.4 + 1 / 5000), rel=0.03)
     assert abs(force[0]) < 1.0
-    true_mm = 1e3 * world.true_curve(Y, [force[1] / world.force_gain])[0]
+    true_mm = 1e3 * true_curve(world, Y, [force[1] / world.force_gain])[0]
     assert moved_mm / world.displacement_gain == pytest.approx(true_mm, rel=0.025)
     assert (q1 - REFERENCE_Q_RAD[0]) == pytest.approx(force[1] * 0.75 / 36840, rel=0.05)
 

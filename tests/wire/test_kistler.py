@@ -13,6 +13,7 @@ import nidaqmx.errors
 import numpy as np
 import pytest
 
+from drivers.arrays import Array
 from drivers.errors import (
     BadReply,
     CannotConnect,
@@ -21,7 +22,7 @@ from drivers.errors import (
     Overload,
     ReadTimeout,
 )
-from drivers.kistler.calibration import Array, u_type_a
+from drivers.kistler.calibration import u_type_a
 from drivers.kistler.client import Kistler9257B
 from drivers.kistler.daq import probe
 from drivers.kistler.emulator import KistlerEmulator

@@ -220,9 +220,9 @@ def test_the_controller_falls_mute_after_the_handshake(
     real_probe = probe_module.probe
 
     def probe_then_silence(*args: object) -> object:
-        handshake = real_probe(*args)  # type: ignore[arg-type]
+        version = real_probe(*args)  # type: ignore[arg-type]
         emulator.inject("silence")
-        return handshake
+        return version
 
     monkeypatch.setattr("drivers.ur10e.client.probe", probe_then_silence)
     monkeypatch.setattr(robot, "_ask_dashboard", lambda deadline: {})
@@ -304,9 +304,9 @@ def test_the_dashboard_alone_fails(
     real_probe = probe_module.probe
 
     def probe_then_fault(*args: object) -> object:
-        handshake = real_probe(*args)  # type: ignore[arg-type]
+        version = real_probe(*args)  # type: ignore[arg-type]
         emulator.inject(fault)
-        return handshake
+        return version
 
     monkeypatch.setattr("drivers.ur10e.client.probe", probe_then_fault)
     with pytest.raises(kind) as caught:

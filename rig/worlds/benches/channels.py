@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from rig.arrays import Array
 from rig.worlds.benches.memory import lowpass, rough
 from rig.worlds.benches.paths import Path, samples, through, to_and_fro
-from rig.worlds.benches.trial import Array, Form, Imposed, Trial, log_uniform, whole
+from rig.worlds.benches.trial import Form, Imposed, Trial, log_uniform, whole
 
 
 def _wander(random: Generator, time: Array) -> tuple[Array, str]:

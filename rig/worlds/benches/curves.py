@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from rig.arrays import Array
 from rig.worlds.benches.memory import slider
 from rig.worlds.benches.paths import Path, samples, through, to_and_fro
-from rig.worlds.benches.trial import Array, Form, Imposed, Trial, bent, log_uniform, whole
+from rig.worlds.benches.trial import Form, Imposed, Trial, bent, log_uniform, whole
 
 _SEAT = frozenset({"contact_seating"})
 _CURVE = frozenset({"joint_nonlinear_stiffness"})
@@ -24,9 +25,9 @@ def _drive(random: Generator, low: float) -> Path:
     return through(points, samples(random, len(points)), eased=bool(random.random() < 0.4))
 
 
-def _with_loop(random: Generator, u: Array, force: Array, share: float = 0.1) -> Array:
-    """The curve with a small loop: at most `share` of what is bent in it."""
-    most = random.uniform(0.0, share) * bent(u, force)
+def _with_loop(random: Generator, u: Array, force: Array) -> Array:
+    """The curve with a small loop: at most a tenth of what is bent in it."""
+    most = random.uniform(0.0, 0.1) * bent(u, force)
     length = random.uniform(0.02, 0.1)
     return np.asarray(force + most * slider(u / length, np.ones(len(u))))
 

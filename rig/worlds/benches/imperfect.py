@@ -13,8 +13,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from rig.arrays import Array
 from rig.worlds.benches.memory import rough
-from rig.worlds.benches.trial import Array, Trial, bent, log_uniform, whole
+from rig.worlds.benches.trial import Trial, bent, log_uniform, whole
 
 _T = TypeVar("_T", bound=np.generic)
 _MOST = 0.05  # of the effect, each

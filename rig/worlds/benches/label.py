@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.worlds.benches.rig import Rig
-from rig.worlds.benches.trial import SCALES, Array
+from rig.worlds.benches.trial import SCALES
 
 WITHIN_SD = 3.0  # what springs and gains may take of a gap
 LARGE_SPRING = 0.5  # of the effect's own gap: from here on a wrong spring may be the main cause

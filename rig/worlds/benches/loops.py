@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from rig.arrays import Array
 from rig.worlds.benches.memory import bouc_wen, lowpass, pursuit, slider, stops
 from rig.worlds.benches.paths import Path, samples, through, to_and_fro
-from rig.worlds.benches.trial import Array, Form, Trial, bent, log_uniform, whole
+from rig.worlds.benches.trial import Form, Trial, bent, log_uniform, whole
 
 _SLIDES = frozenset({"joint_yield"})
 _AS_LARGE = 0.5  # of the loop: a curve from here on may be called the main cause

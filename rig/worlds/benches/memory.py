@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.worlds.benches.trial import Array
+from rig.arrays import Array
 
 
 def stops(path: Array, limit: Array, stiff: Array) -> Array:
@@ -21,9 +21,9 @@ def stops(path: Array, limit: Array, stiff: Array) -> Array:
     return out
 
 
-def slider(path: Array, limit: Array, start: float = 0.0) -> Array:
+def slider(path: Array, limit: Array) -> Array:
     """(n,) force of one spring of stiffness 1 with a slider whose limit (n,) changes on the way."""
-    out, state = np.empty(len(path)), start
+    out, state = np.empty(len(path)), 0.0
     steps = np.diff(path, prepend=path[0]).tolist()
     for i, (step, most) in enumerate(zip(steps, limit.tolist(), strict=True)):
         state = min(max(state + step, -most), most)

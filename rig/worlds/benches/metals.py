@@ -12,9 +12,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.random import Generator
 
+from rig.arrays import Array
 from rig.worlds.benches.memory import chaboche, slider
 from rig.worlds.benches.paths import samples, through, to_and_fro
-from rig.worlds.benches.trial import Array, Form, Ints, Trial, log_uniform, whole
+from rig.worlds.benches.trial import Form, Ints, Trial, log_uniform, whole
 
 _CYCLED = frozenset({"joint_hysteresis"})
 _ONE_PULL = frozenset({"joint_nonlinear_stiffness"})

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.benches.trial import Array, Ints, log_uniform
+from rig.arrays import Array
+from rig.worlds.benches.trial import Ints, log_uniform
 
 _LEAST_A_LEG = 25
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.benches.trial import SCALES, Array, Form, Trial, log_uniform
+from rig.arrays import Array
+from rig.worlds.benches.trial import SCALES, Form, Trial, log_uniform
 
 NO_ERROR_SD = 1.2  # stated standard deviations by which the spring of a clean case may be off
 _ERROR_SD = (4.5, 15.0)  # by which it is off where that is the effect

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from rig.arrays import Array
 from rig.worlds.benches.memory import rough
 from rig.worlds.benches.rig import Rig
-from rig.worlds.benches.trial import Array, log_uniform, whole
+from rig.worlds.benches.trial import log_uniform, whole
 
 _IDLE_SHARE = (1e-4, 1e-2)  # noise of a channel that shows nothing, of its largest value
 _KNOWN, _MISJUDGED = 0.2, (0.5, 3.0)  # stated over true noise: within a fifth, or between these

@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from rig.arrays import Array
 from rig.worlds.benches.memory import bouc_wen, rough
 from rig.worlds.benches.paths import samples, through, to_and_fro
-from rig.worlds.benches.trial import Array, Form, Trial, log_uniform, whole
+from rig.worlds.benches.trial import Form, Trial, log_uniform, whole
 
 _CURVE = frozenset({"joint_nonlinear_stiffness"})
 _LOOP = frozenset({"joint_hysteresis"})

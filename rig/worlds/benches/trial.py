@@ -10,7 +10,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
+from rig.arrays import Array
+
 Ints: TypeAlias = NDArray[np.int64]
 Flags: TypeAlias = NDArray[np.bool_]
 Imposed: TypeAlias = Literal["force", "displacement"]

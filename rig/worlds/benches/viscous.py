@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from rig.arrays import Array
 from rig.worlds.benches.loops import curve_too
 from rig.worlds.benches.memory import maxwell
 from rig.worlds.benches.paths import samples, through
-from rig.worlds.benches.trial import Array, Form, Trial, log_uniform, whole
+from rig.worlds.benches.trial import Form, Trial, log_uniform, whole
 
 
 def _fading(random: Generator, time: Array) -> tuple[Array, str]:

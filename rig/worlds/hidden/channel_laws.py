@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.arm import Array, place
+from rig.arrays import Array
+from rig.worlds.arm import place
 from rig.worlds.hidden.effect import Drawn, Form, Unsuited, draw_joint
 from rig.worlds.hidden.meaning import straight_factor
 from rig.worlds.hidden.scene import Change, Scene

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.arm import Array, place
+from rig.arrays import Array
+from rig.worlds.arm import place
 
 DESIGNS = ("rich", "medium", "paper")
 _DESIGN_SHARES = (0.4, 0.35, 0.25)

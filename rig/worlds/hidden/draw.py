@@ -12,8 +12,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from rig.arrays import Array
 from rig.errors import InputError, close_to
-from rig.worlds.arm import Array
 from rig.worlds.hidden import channel_laws, joint_laws, label, outer_laws, strange_laws
 from rig.worlds.hidden.design import DESIGNS, draw_plan
 from rig.worlds.hidden.effect import Drawn, Effect, Form, Unsuited

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.scene import Change, Scene
+
+_FAIR_SHARE = 0.08  # of the elastic deflection in a setup, for a joint that an effect sits at
 
 
 @dataclass(frozen=True)
@@ -69,10 +71,10 @@ def share_of_joints(scene: Scene) -> Array:
     return np.asarray((part / part.sum(axis=1, keepdims=True)).max(axis=0))
 
 
-def draw_joint(scene: Scene, random: Generator, least: float = 0.08) -> int:
+def draw_joint(scene: Scene, random: Generator) -> int:
     """A joint (from 0) that carries a fair part of the deflection in some setup."""
     part = share_of_joints(scene)
-    able = np.flatnonzero(part > least)
+    able = np.flatnonzero(part > _FAIR_SHARE)
     return int(random.choice(able))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.scene import Change, Index, Reading, Scene, observe
 
 SPRING_BOUND = 3.0  # stated standard deviations to either side

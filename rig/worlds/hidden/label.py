@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.effect import Effect, rounded
 from rig.worlds.hidden.gap import along, displacement, rms, structural_gap, tared
 from rig.worlds.hidden.rivals import NO_CASE, accepted, left_over

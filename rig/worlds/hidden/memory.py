@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.scene import Index
 
 Backbone = Callable[[float], float]

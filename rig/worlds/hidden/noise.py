@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.gap import spring_columns
 from rig.worlds.hidden.scene import Scene
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.gap import SPRING_BOUND, zeroed
 from rig.worlds.hidden.noise import CROSSTALK, GAIN_BOUND, Q_NOISE_RAD
 from rig.worlds.hidden.scene import Change, History, Index, Reading, Scene, observe_path

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.arm import Array, place
+from rig.arrays import Array
+from rig.worlds.arm import place
 from rig.worlds.hidden.effect import Drawn, Form, Unsuited
-from rig.worlds.hidden.joint_laws import knee_path
+from rig.worlds.hidden.joint_yield import knee_path
 from rig.worlds.hidden.scene import Change, Scene
 
 # links as beams

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rig.worlds.arm import Array, place
+from rig.arrays import Array
+from rig.worlds.arm import place
 from rig.worlds.hidden.observed import Bounds, Observed, look, nuisances
 from rig.worlds.hidden.scene import Change, Scene
 from rig.worlds.hidden.textbook import FORMS, Explanation

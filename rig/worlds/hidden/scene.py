@@ -15,7 +15,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from rig.worlds.arm import GRAVITY_M_PER_S2, Array, place
+from rig.arrays import Array
+from rig.worlds.arm import GRAVITY_M_PER_S2, place
 from rig.worlds.hidden.design import Plan
 
 Index = NDArray[np.int64]

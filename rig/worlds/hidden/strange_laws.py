@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.effect import Drawn, Form
 from rig.worlds.hidden.scene import Change, Scene
 

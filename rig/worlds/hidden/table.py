@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden import gap
 from rig.worlds.hidden.noise import Noise, q_digits, to_digits
 from rig.worlds.hidden.scene import BRANCHES, Change, Scene, observe

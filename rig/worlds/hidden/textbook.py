@@ -12,7 +12,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from rig.worlds.arm import Array
+from rig.arrays import Array
 from rig.worlds.hidden.effect import share_of_joints
 from rig.worlds.hidden.memory import flows, plays, retarded_each
 from rig.worlds.hidden.observed import Bounds, Observed, tared_path

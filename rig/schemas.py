@@ -1,0 +1,15 @@
+"""Names and versions of what the commands write for programs. Files that people write, the journal
+and the data set have theirs where they are read."""
+
+ANALYSIS = "rig.analysis/1"
+BLIND = "rig.blind/1"
+CHECK = "rig.check/1"
+COUPLING = "rig.coupling/1"
+DIAGNOSIS = "rig.diagnosis/1"
+JOINTS = "rig.joints/1"
+LIST = "rig.list/1"
+PLACEMENT = "rig.placement/1"
+PLAN = "rig.plan/1"
+REPORT = "rig.report/1"
+SIMULATION = "rig.simulation/1"
+TABLE = "rig.table/1"
