@@ -36,6 +36,7 @@ from identification.gap.recording.faults import SIGNS, SILENT
 from identification.gap.recording.glitches import without_glitches
 from identification.gap.recording.ramps import ramps_told
 from identification.gap.recording.slack import without_slack
+from identification.gap.recording.stairs import numbered
 from identification.gap.search.breaks import troubles_of, with_plain_trouble
 from identification.gap.search.refine import refine
 from identification.gap.search.search import force, search
@@ -138,7 +139,7 @@ def explain_gap(
     out, forced = set(withhold), frozenset(add)
     check_words(out | forced)
     tell("preparing", 0.0)
-    bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(data)))))
+    bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(numbered(data))))))
     bench = knowing(bench, known)
     base = base_columns(bench)
     target = bench.observed - prediction(bench)

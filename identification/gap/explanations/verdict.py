@@ -58,7 +58,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         fewer = _simpler(e, ranked, kept, arm)
         said = found.foretold.get(e.words) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
-        many = (THREE_CLOSELY if closely else THREE) if _tells_of_three(said) else 1.0
+        many = (THREE_CLOSELY if closely else THREE) if arm and _tells_of_three(said) else 1.0
         for word, share in _main(_of(e, fewer.words) if fewer is said else said, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
@@ -104,9 +104,10 @@ def _explained(found: SearchResult, kept: Mapping[frozenset[str], float]) -> flo
 EXPLAINED = 1.0  # nats
 STATED = 0.1  # so much is left of `none` where what was stated does not explain the noise
 
-# What three troubles at once keep: a single one that the library lacks is likelier. A priori it has
-# 0.05, three have 0.37 * 0.05^2 (`priors`); and of 32 words that were taken away in the blind check
-# 7 were met down to the noise by three others: 0.0009 against 0.05 * 7 / 32. Where their laws need
+# What three troubles of an arm at once keep: a single one that the library lacks is likelier. A
+# priori it has 0.05, three have 0.37 * 0.05^2 (`priors`); and of 32 words that were taken away in
+# the blind check 7 were met down to the noise by three others: 0.0009 against 0.05 * 7 / 32. (A rig
+# without an arm has one spring, of which all three speak.) Where their laws need
 # no more imperfection than noise, and foretell what was withheld, that is otherwise: of 17 such
 # threes in draws of the blind check, with words taken out in half of their cases, and in five sets
 # of other people's arms, 13 were two effects and what their laws lack.

@@ -20,7 +20,9 @@ _PLAIN = 8.0  # standard uncertainties of one sample, from one level to the next
 _STEP = 0.02  # of the range: a level is not left by less
 _FEWEST = 3  # readings of a level; levels of a run
 _SHARE = 0.8  # of the samples of every run: so many stand on levels
-_GOES_ON = 0.25  # of a step: what the answer does on a level, in the middle of all levels
+# Of a step: what the answer does on a level, in the middle of all levels. Of a ramp that was read
+# coarsely it does twice as much at least as on the step between two.
+_GOES_ON = 1.0
 _SAME = 0.3  # of the smallest step: levels that lie closer are one
 _NO_LOAD = 0.02  # of the largest force
 

@@ -1,0 +1,69 @@
+"""Staircases whose steps bear no numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from identification.gap.data import Array, GapData
+from identification.gap.recording.holds import hold_ids, is_continuous
+from identification.gap.recording.ramps import ramps_told
+from identification.gap.recording.stairs import numbered
+from tests.unit.test_gap_operators import bench_data
+
+SPRING, SD = 1e-5, 0.1  # m/N; N of one sample
+LEVELS = np.array([0.0, 5.0, 15.0, 40.0, 80.0, 40.0, 0.0])
+
+
+def stairs(force: Array, response: Array | None = None, sd: float = SD) -> GapData:
+    """A recording without step numbers; response: SPRING * force, with noise."""
+    rng = np.random.default_rng(3)
+    u = SPRING * force if response is None else response
+    read, moved = (v + s * rng.standard_normal(len(v)) for v, s in ((force, sd), (u, 1e-7)))
+    data = bench_data(read, moved, step=np.full(len(force), -1))
+    return replace(data, instruments=replace(data.instruments, force=sd, displacement=1e-7))
+
+
+def test_levels_are_numbered_by_size_and_met_again() -> None:
+    data = numbered(stairs(np.repeat(LEVELS, 4)))
+    np.testing.assert_array_equal(data.step, np.repeat([0, 1, 2, 3, 4, 3, 0], 4))
+    assert not is_continuous(data, hold_ids(data))
+
+
+def test_the_way_between_two_levels_bears_the_name_of_the_one_it_leads_to() -> None:
+    ramp = np.linspace(0, 1, 4)[1:-1]
+    parts = [np.repeat(LEVELS[0], 12)]
+    for a, b in pairwise(LEVELS.tolist()):
+        parts += [a + (b - a) * ramp, np.repeat(b, 12)]
+    force = np.concatenate(parts)
+    data = numbered(stairs(force))
+    way = ~np.isin(force, LEVELS)
+    assert set(data.step[way]) <= {0, 1, 2, 3, 4}
+    assert np.mean(ramps_told(data).ways[way]) > 0.7  # the shortest drown in noise
+
+
+def test_a_displacement_that_is_set_makes_levels_on_which_the_force_relaxes() -> None:
+    level = np.repeat(np.array([1e-4, 3e-4, 6e-4, 3e-4]), 30)
+    relaxed = 1 - 0.2 * (1 - np.exp(-(np.arange(len(level)) % 30) / 10))
+    data = numbered(stairs(level / SPRING * relaxed, level))
+    np.testing.assert_array_equal(data.step, np.repeat([1, 2, 3, 2], 30))
+
+
+@pytest.mark.parametrize("what", ["a ramp", "read coarsely", "a swing", "named", "one run of two"])
+def test_what_is_no_staircase_keeps_its_names(what: str) -> None:
+    force = np.linspace(0, 80, 200)
+    if what == "read coarsely":  # the displacement goes on where the force seems to stand
+        data = stairs(np.round(force / 8) * 8, SPRING * force, 0.01)
+    elif what == "a swing":
+        data = stairs(40 * (1 - np.cos(np.linspace(0, 6 * np.pi, 200))))
+    elif what == "one run of two":
+        two = np.concatenate([np.repeat(LEVELS, 20), np.linspace(0, 80, 140)])
+        data = replace(stairs(two), run=np.repeat([0, 1], 140))
+    else:
+        data = stairs(np.repeat(LEVELS, 4) if what == "named" else force)
+    if what == "named":
+        data = replace(data, step=np.repeat([0, 1, 2, 3, 4, 3, 0], 4))
+    assert numbered(data) is data
