@@ -19,6 +19,7 @@ from identification.gap.recording.holds import (
     steadied,
 )
 from identification.gap.recording.ramps import much_to_go
+from identification.gap.recording.relaxing import relaxed
 from identification.gap.recording.turns import rises
 
 _LEVELS = 12  # force classes of a continuous recording, per sense of motion
@@ -149,6 +150,8 @@ def reduce_rows(data: GapData) -> Rows:
     coming = ramp | (much_to_go(displacement, stay, meter.displacement) & ~begins)
     still = partial(_still, bins, rest_ids(data, hold), holds, ~coming)
     steadied, steady = still(data.force, meter.force)
+    since, stands = mean(data.time), steady & ~at_zero
+    steadied = steadied * (1 + relaxed(force, displacement, since, holds, weight, stands))
     rested, rests = still(data.displacement, meter.displacement)
     return Rows(
         time=mean(data.time), session=mean(_session(data)), clock=data.session is not None, run=run,
