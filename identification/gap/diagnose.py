@@ -339,7 +339,7 @@ def _next(
 def _across(bench: Bench, chosen: Explanation) -> tuple[Note, ...]:
     """Of an effect that other readings show, and nothing moves by."""
     each = zip(chosen.parts, chosen.sizes, strict=True)
-    shown = [p for p, s in each if p.variant.info.get("shown", 0.0) > 1
+    shown = [p for p, s in each if p.variant.shown > 1
              and s < _MOVES * bench.noise.stated]  # fmt: skip
     if not shown:
         return ()

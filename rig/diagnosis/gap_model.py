@@ -84,7 +84,7 @@ def springs(result: GapResult) -> tuple[Array, Array]:
     at = len(fitted.base)
     for part in fitted.parts:
         if part.word == "joint_stiffness_error":
-            for k, j in enumerate(part.variant.info["joints"]):
+            for k, j in enumerate(part.variant.joints):
                 sums[j, at + k] = 1.0
         at += len(part.variant.columns)
     factor = np.maximum(1 + sums @ np.append(fitted.base, fitted.coefficients), _LEAST)

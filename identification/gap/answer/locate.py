@@ -116,13 +116,13 @@ def _joints(engine: Engine, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]
     for i, p in enumerate(fit.parts):
         if sizes[i] < _COUNTS * max(sizes):
             continue
-        if "joint" in p.variant.info:
-            out.append(int(p.variant.info["joint"]) + 1)
-        elif "joints" in p.variant.info and p.word == SPRINGS:
+        if p.variant.joint is not None:
+            out.append(p.variant.joint + 1)
+        elif p.word == SPRINGS:
             w, cov = fit.of(i)
             part = np.abs(w) * _size_of_each(engine, p.variant)
             shows = (np.abs(w) > 2 * np.sqrt(np.diag(cov))) & (part >= _SHOWS * part.max())
-            out += [j + 1 for j, s in zip(p.variant.info["joints"], shows, strict=True) if s]
+            out += [j + 1 for j, s in zip(p.variant.joints, shows, strict=True) if s]
     return tuple(dict.fromkeys(out))
 
 

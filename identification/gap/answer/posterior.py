@@ -161,7 +161,7 @@ class _Shapes:
 
     @property
     def _defined(self) -> float:
-        return FLOWING if self._part.variant.info.get("flow_s", 0.0) > 0 else DEFINED
+        return FLOWING if self._part.variant.flows else DEFINED
 
     @property
     def _part(self) -> Part:
@@ -171,8 +171,8 @@ class _Shapes:
 def _named(variant: Variant) -> str:
     """The joint, or the axis of the base's motion, that a variant sits at."""
     info = variant.info
-    if "joint" in info:
-        return f"joint {info['joint'] + 1}"
+    if variant.joint is not None:
+        return f"joint {variant.joint + 1}"
     if slides(info):
         return f"sliding along {ACROSS[info['axis']]}"
     return f"axis {info['axis']}" if "axis" in info else ""
@@ -321,8 +321,8 @@ def _representatives(scored: list[Scored]) -> list[tuple[Scored, float]]:
 
 def _crowds(shape: Part, rest: tuple[Part, ...]) -> bool:
     """Whether it sits in the joint of another effect."""
-    joint = shape.variant.info.get("joint")
-    return joint is not None and any(p.variant.info.get("joint") == joint for p in rest)
+    joint = shape.variant.joint
+    return joint is not None and any(p.variant.joint == joint for p in rest)
 
 
 def _levels(engine: Engine, explanation: Explanation, prior: float) -> _Weighed:

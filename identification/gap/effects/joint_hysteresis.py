@@ -341,7 +341,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     """Of the strengths that slip, which takes a load beyond them, and of those near the largest one
     the less the less they do; of friction in proportion to the load, at the largest one."""
     radius, joint = np.asarray(v.info["radius"]), int(v.info["joint"])
-    if v.info.get("other_springs"):
+    if v.other_springs:
         found = found.without_line(joint)
     largest = float(np.abs(bench.torque[:, joint]).max())
     slips = np.clip((1 - radius / max(largest, _TINY)) / _HARDLY, 0.0, 1.0)

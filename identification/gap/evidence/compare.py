@@ -114,7 +114,7 @@ def imperfect(variant: Variant) -> Array:
     linear is exact, a spring beside friction as well."""
     exact = LAW_IMPERFECTION / IMPERFECTION
     share = np.full(len(variant.columns), exact if variant.word in LINEAR else 1.0)
-    if variant.info.get("other_springs"):
+    if variant.other_springs:
         share[-1] = exact
     return share
 

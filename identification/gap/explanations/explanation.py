@@ -202,7 +202,7 @@ _PAIR, _STAYS = 2, 0.5  # effects; of the way
 def _toe_and_knee(parts: tuple[Part, ...]) -> bool:
     """A soft start and a yield, which count as they move: what a spring would hide of either the
     other shows. A seat that gets ever stiffer (a ball on a plate) ends in no spring of its own."""
-    goes_on = any(p.variant.info.get("goes_on") for p in parts)
+    goes_on = any(p.variant.goes_on for p in parts)
     return frozenset(p.word for p in parts) == TOE_AND_KNEE and not goes_on
 
 

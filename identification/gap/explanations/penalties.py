@@ -43,7 +43,7 @@ def minor_parts(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
             if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
                 continue
             akin = p.word != other.word and {p.word, other.word} <= MECHANISMS
-            if akin and joints_of(p) & joints_of(other):
+            if akin and set(p.variant.joints) & set(other.variant.joints):
                 penalty += SAME_JOINT
             share = max(sizes[i] / max(sizes[k], 1e-300), 1e-6)
             if p.word == other.word and share < LEAST_SHARE:
@@ -101,8 +101,7 @@ def unbent_curves(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> floa
     """
     noise, arm, penalty = engine.bench.noise, engine.bench.data.arm, 0.0
     for p, gap, moved in zip(parts, found.gap, found.moved, strict=True):
-        info = p.variant.info
-        line = "line" in info.get("kinds", ()) or (info.get("goes_on") and not arm)
+        line = p.variant.has_line or (p.variant.goes_on and not arm)
         if not line or not moved > 0:
             continue
         least = BENDS * moved
@@ -128,9 +127,9 @@ def within_stated(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> floa
     }
     for p, moved in zip(parts, found.moved, strict=True):
         limit = least.get(p.word, 0.0)
-        if "joint" in p.variant.info and p.word == SPRINGS:
+        if p.variant.joint is not None and p.word == SPRINGS:
             sds = engine.bench.data.compliance_relative_sd
-            limit = _SPRING_WITHIN * float(sds[p.variant.info["joint"]])
+            limit = _SPRING_WITHIN * float(sds[p.variant.joint])
         if limit > 0:
             off = max(float(moved) / _rms_of_line(engine, p), 1e-6)
             penalty += _wall(limit / off)
@@ -158,13 +157,14 @@ def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
       nothing, by how far those channels are beyond what instruments do (`shown`).
     """
     noise, seen = engine.bench.noise.stated, engine.bench.noise.seen
-    shown = np.array([float(p.variant.info.get("shown", 0.0)) for p in parts])
+    shown = np.array([p.variant.shown for p in parts])
     if seen > 0:
         sizes = np.maximum(_sizes_that_show(parts, found), shown * seen + 1e-300)
         below = _SLOPE * float(np.maximum(np.log(seen / sizes), 0.0).sum())
-        share = [1.0 if p.variant.info.get("path") == "free" else _WANDERS for p in parts]
+        share = [1.0 if p.variant.free_pieces else _WANDERS for p in parts]
         return below + sum(_wall(w * seen / float(s)) for w, s in zip(share, sizes, strict=True))
-    elsewhere = np.array([p.word in _SHOWN_ELSEWHERE and not _bends(p) for p in parts], dtype=bool)
+    hidden = [p.word in _SHOWN_ELSEWHERE and not p.variant.bends for p in parts]
+    elsewhere = np.array(hidden, dtype=bool)  # a gain that bends no spring hides
     least = (FAR_BELOW_NOISE if engine.bench.data.arm else _GUESSED) * noise
     sizes = np.where(elsewhere, found.moved, found.gap)
     sizes = np.maximum(sizes, shown * least + 1e-300)
@@ -172,11 +172,6 @@ def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
 
 
 _SLOPE = 20.0  # nats per factor e below the noise
-
-
-def _bends(part: Part) -> bool:
-    """A gain that is not the same over the range: no spring hides that."""
-    return "full" in part.variant.info or "above" in part.variant.info
 
 
 _WANDERS = 0.5  # of the noise of a sample: as far as what is slow in it goes
@@ -198,7 +193,7 @@ def _sizes_that_show(parts: tuple[Part, ...], found: Sizes) -> Array:
 def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     """Both are friction of one joint, or would be, for all that the data show; or one is the
     linear part of the other: a mechanism's law brings its own mean stiffness."""
-    same = bool(joints_of(one) & joints_of(other))
+    same = bool(set(one.variant.joints) & set(other.variant.joints))
     words = {one.word, other.word}
     holds = "joint_creep" in words and not engine.bench.course.always_moves
     bench = engine.bench  # without any return all memory is hidden; arms are let go between runs
@@ -239,7 +234,7 @@ def _on_its_own(parts: tuple[Part, ...], found: Sizes, i: int, k: int) -> bool:
     """One of them is wrong springs that move the arm far more than the mechanism beside them: no
     linear part of its law. A curve that has a line of its own has one of any size."""
     for a, b in ((i, k), (k, i)):
-        line = "line" in parts[b].variant.info.get("kinds", ())
+        line = parts[b].variant.has_line
         if parts[a].word == SPRINGS and parts[b].word not in LINEAR and not line:
             return bool(found.moved[a] > _FAR_MORE * found.moved[b])
     return False
@@ -265,9 +260,3 @@ def _by_direction(engine: Engine, part: Part) -> Array:
 
 
 _SHARED = 0.2
-
-
-def joints_of(part: Part) -> set[int]:
-    """Joints that the part sits in."""
-    info = part.variant.info
-    return set(info["joints"]) if "joints" in info else {info.get("joint", -1)}

@@ -25,9 +25,9 @@ _HOPELESS = 2000.0  # nats below, from which no other choice of shapes has been 
 def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> list[Variant]:
     """Variants of a word that may stand beside other parts: not in a joint where it is already; and
     what creeps more than in proportion in one joint does so in all."""
-    same = [p.variant.info for p in beside if p.word == word]
-    taken, bent = {i.get("joint") for i in same}, {bool(i.get("bent")) for i in same}
-    mine = (v for v in variants if v.word == word and v.info.get("joint", -1) not in taken)
+    same = [p.variant for p in beside if p.word == word]
+    taken, bent = {v.joint for v in same} - {None}, {bool(v.info.get("bent")) for v in same}
+    mine = (v for v in variants if v.word == word and v.joint not in taken)
     return [v for v in mine if not bent or bool(v.info.get("bent")) in bent]
 
 
@@ -51,8 +51,8 @@ def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) 
 def _in_one_more(
     engine: Engine, variants: list[Variant], start: Explanation, word: str
 ) -> Explanation | None:
-    others = [v for v in family_of(variants, word, start.parts) if "joint" in v.info]
-    if not others or any(p.word == word and "joint" not in p.variant.info for p in start.parts):
+    others = [v for v in family_of(variants, word, start.parts) if v.joint is not None]
+    if not others or any(p.word == word and p.variant.joint is None for p in start.parts):
         return None
     levels, energy = up_to_likeliest(engine, start.parts)
     scored = score(engine, levels, others, energy)

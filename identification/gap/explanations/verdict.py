@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.gap.explanations.explanation import LAW_REMAINDER, Explanation, SearchResult
-from identification.gap.explanations.penalties import LEAST_SHARE, joints_of
+from identification.gap.explanations.penalties import LEAST_SHARE
 from identification.gap.model.noise import UNSURE
 from identification.gap.words import LINEAR, WORDS
 
@@ -93,7 +93,7 @@ def _explained(found: SearchResult, kept: Mapping[frozenset[str], float]) -> flo
         e.log_good - EXPLAINED
         for e in found.explanations
         if e.parts
-        and not any(p.variant.info.get("path") == "free" for p in e.parts)
+        and not any(p.variant.free_pieces for p in e.parts)
         and e.good
         and e.eta <= (1.0 if bench.noise.sure else UNSURE) * bench.noise.stated
         and foresaw(kept, e.words)
@@ -157,8 +157,8 @@ def _tells_of_three(explanation: Explanation) -> bool:
     """Whether it takes three troubles; a play and a curve of the same joint are one, whose flanks
     are curved."""
     sizes = dict(explanation.troubles)
-    joints = {w: {j for p in explanation.parts if p.word == w for j in joints_of(p)} for w in sizes}
-    if sizes.keys() >= FLANKS and len(set().union(*(joints[w] for w in FLANKS))) == 1:
+    joints = {j for p in explanation.parts if p.word in FLANKS for j in p.variant.joints}
+    if sizes.keys() >= FLANKS and len(joints) == 1:
         sizes.pop(min(FLANKS, key=lambda w: sizes[w]))
     each = sorted(sizes.values(), reverse=True)
     return len(each) >= _MANY and each[2] > TELLING * each[0]

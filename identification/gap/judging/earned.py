@@ -122,7 +122,7 @@ def _kept(found: SearchResult, explanation: Explanation, fold: Ints) -> float:
 def _own_tips(engine: Engine, explanation: Explanation, fitted: Fit) -> bool:
     """Whether every run of a rig without an arm was pushed askew in its own way, which the force
     across shows and no other run foretells, and nothing else is left."""
-    if engine.bench.data.arm or not all("tips" in p.variant.info for p in explanation.parts):
+    if engine.bench.data.arm or not all(p.variant.own_tips for p in explanation.parts):
         return False
     return left_of(engine, fitted) < FAILS * noise_of(engine.bench)
 

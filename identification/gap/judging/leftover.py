@@ -146,8 +146,8 @@ FASTEST = 400e-6 / 60  # m/s
 def _free_paths(fitted: Fit, words: frozenset[str]) -> Iterator[Array]:
     """(pieces, paths) of every part of these words that takes any path."""
     for i, part in enumerate(fitted.parts):
-        if part.word in words and part.variant.info.get("path") == "free":
-            yield fitted.of(i)[0].reshape(-1, int(part.variant.info["pieces"])).T
+        if part.word in words and part.variant.free_pieces:
+            yield fitted.of(i)[0].reshape(-1, part.variant.free_pieces).T
 
 
 def _left(engine: Engine, fitted: Fit) -> float:

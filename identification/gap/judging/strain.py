@@ -19,7 +19,6 @@ from identification.gap.evidence.engine import LEVER_M, Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import REMAINDER
 from identification.gap.explanations.fit import Fit
-from identification.gap.explanations.penalties import joints_of
 from identification.gap.words import MECHANISMS, SPRINGS
 
 # Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and
@@ -83,10 +82,10 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     loose = np.divide(eta, moves, out=np.zeros(len(moves)), where=moves > 0)
     pulls = np.abs(fitted.base) / np.hypot(base.sd, loose)
     said = any(p.word == SPRINGS for p in fitted.parts)
-    own = {j for p in fitted.parts if p.word in MECHANISMS for j in joints_of(p)}
+    own = {j for p in fitted.parts if p.word in MECHANISMS for j in p.variant.joints}
     for j in range(engine.bench.data.joints) if said else own:
         pulls[base.index(f"spring{j + 1}")] = 0.0
-    played = {j for p in fitted.parts if p.word == "joint_backlash" for j in joints_of(p)}
+    played = {j for p in fitted.parts if p.word == "joint_backlash" for j in p.variant.joints}
     for i in base.index("offset"):
         if int(base.names[i].split()[-1]) - 1 in played:
             pulls[i] = 0.0
@@ -102,7 +101,7 @@ def _of_heat(engine: Engine, fitted: Fit) -> Array:
     for i, part in enumerate(fitted.parts):
         if part.word == "thermal_drift":
             out.append(np.abs(fitted.pulls_of(i)))
-            if part.variant.info.get("path") == "free":
+            if part.variant.free_pieces:
                 jumps = _jumps(engine, part, out[-1]) * LIMIT / JUMP
                 out.append(jumps * _of_the_gap(engine, fitted.contribution(engine, i)))
     return np.concatenate(out)
@@ -120,7 +119,7 @@ def _jumps(engine: Engine, part: Part, pulls: Array) -> Array:
     """The largest step (paths,) of every free path against its other ones, by the normal deviate
     that is as seldom: where steps are of one size, however large, none stands out. A steady path
     comes with a place and a rate; steps are what it turns by."""
-    pieces, first = int(part.variant.info["pieces"]), 2 * bool(part.variant.info["steady"])
+    pieces, first = part.variant.free_pieces, 2 * bool(part.variant.info["steady"])
     seen = np.any(engine.columns(part.variant.columns)[: engine.bench.rows.n] != 0, axis=0)
     out = []
     for steps, there in zip(pulls.reshape(-1, pieces), seen.reshape(-1, pieces), strict=True):

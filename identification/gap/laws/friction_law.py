@@ -45,7 +45,7 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
     if "grows_to" in v.info:
         terms = terms[0], Term("compliance", {**terms[1].shape, "grows_to": v.info["grows_to"]})
-    terms += (Term("compliance"),) if v.info.get("other_springs") else ()
+    terms += (Term("compliance"),) if v.other_springs else ()
     return Law(constants, terms), np.full(len(terms), float(bench.compliance[joint]))
 
 

@@ -23,8 +23,9 @@ class Variant:
     """columns: k indices of the pool. root (k, k): prior covariance of the coefficients is
     `s^2 root root^T` for s out of `scales`, all equally likely. positive (k,): weights of a sum of
     coefficients that physics wants above `least` (None: either sign). each (k,): coefficients that
-    may not be negative either. within (m, k): weights of further sums above zero. info: what the
-    parameters are reported from.
+    may not be negative either. within (m, k): weights of further sums above zero. info: the facts
+    of its law, by names that its own effect gives them and reports from; what others may ask of a
+    variant are the properties below.
     """
 
     word: str
@@ -39,14 +40,63 @@ class Variant:
     info: Mapping[str, Any] = field(default_factory=dict)
     prior: float = 1.0
 
+    @property
+    def joint(self) -> int | None:
+        """The one joint (from 0) that it sits in; None of what sits in several, or in none."""
+        return self.info.get("joint")
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """All joints (from 0) that it sits in; of springs, one a coefficient."""
+        return tuple(self.info.get("joints", () if self.joint is None else (self.joint,)))
+
+    @property
+    def free_pieces(self) -> int:
+        """Of a drift that may take any path in time, the pieces of every path; 0 of others."""
+        return int(self.info["pieces"]) if self.info.get("path") == "free" else 0
+
+    @property
+    def other_springs(self) -> bool:
+        """Whether its last column is a spring of its own beside it."""
+        return bool(self.info.get("other_springs"))
+
+    @property
+    def has_line(self) -> bool:
+        """Whether a straight line is one of its curves."""
+        return "line" in self.info.get("kinds", ())
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether a contact gets stiffer without an end, and has no spring of its own."""
+        return bool(self.info.get("goes_on"))
+
+    @property
+    def bends(self) -> bool:
+        """Whether a gain is not the same over its range."""
+        return "full" in self.info or "above" in self.info
+
+    @property
+    def shown(self) -> float:
+        """How far other channels that show it are beyond what instruments do, 0 where none does."""
+        return float(self.info.get("shown", 0.0))
+
+    @property
+    def own_tips(self) -> bool:
+        """Whether every run is pushed askew in a way of its own."""
+        return "tips" in self.info
+
+    @property
+    def flows(self) -> bool:
+        """Whether it gives way slowly beyond a threshold."""
+        return float(self.info.get("flow_s", 0.0)) > 0
+
     @cached_property
     def shape(self) -> tuple[object, ...]:
         """What its evidence follows from, but for the prior: of a word, variants of the same shape
         are one under several names."""
         positive = None if self.positive is None else self.positive.tobytes()
-        other_springs = bool(self.info.get("other_springs"))
         return (self.word, self.columns, self.scales, self.root.tobytes(), positive, self.least,
-                self.each, self.within.tobytes(), other_springs)  # fmt: skip
+                self.each, self.within.tobytes(), self.other_springs)  # fmt: skip
 
 
 def variant(

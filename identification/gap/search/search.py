@@ -17,7 +17,6 @@ from identification.gap.explanations.explanation import (
     explain,
     up_to_likeliest,
 )
-from identification.gap.explanations.penalties import joints_of
 from identification.gap.explanations.priors import LOG_NONE, log_unknown
 from identification.gap.explanations.several import in_more_joints, polished
 from identification.gap.explanations.verdict import with_posterior
@@ -225,8 +224,8 @@ def _elsewhere(start: Explanation, scored: list[Scored]) -> list[Scored]:
     words = start.words | {scored[0].variant.word}
     if not (SPRINGS in words and words & MECHANISMS):
         return []
-    taken = {j for p in start.parts for j in joints_of(p)}
-    apart = [s for s in scored if not taken & joints_of(Part(s.variant, s.scale))]
+    taken = {j for p in start.parts for j in p.variant.joints}
+    apart = [s for s in scored if not taken.intersection(s.variant.joints)]
     return apart if len(apart) < len(scored) else []
 
 
