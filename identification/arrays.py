@@ -1,4 +1,4 @@
-"""The type of every array of numbers here."""
+"""The types of arrays: of numbers, of whole numbers, and of what holds or does not."""
 
 from __future__ import annotations
 
@@ -6,3 +6,5 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]

@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.arrays import Array
-
-Ints = NDArray[np.int64]
+from identification.arrays import Array, Ints
 
 _RUNNING_SHARE = 0.5  # a level through which the force runs by half its range is none
 _SEVERAL, _FEWEST = 4, 5  # levels; samples of one

@@ -7,14 +7,10 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from identification.arrays import Array
+from identification.arrays import Array, Flags, Ints
 from identification.running import first_rows
-
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 SEEN = 4.0  # standard deviations
 AWAY = 0.01  # of the range: so far the outermost sample of a way has to go at least

@@ -12,11 +12,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from identification.arrays import Array, Flags, Ints
 
 ZERO, LOADING, UNLOADING, CYCLE = 0, 1, 2, 3
 BRANCH_NAMES = ("zero", "loading", "unloading", "cycle")

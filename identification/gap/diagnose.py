@@ -8,6 +8,7 @@ from math import log
 
 import numpy as np
 
+from identification.arrays import Ints
 from identification.gap.answer.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.answer.forms import Form
 from identification.gap.answer.known import knowing
@@ -15,7 +16,7 @@ from identification.gap.answer.locate import NOWHERE, Where, locate
 from identification.gap.answer.notes import FAULT, REMARK, Note, notes_of, ordered
 from identification.gap.answer.posterior import Known, settled
 from identification.gap.answer.twins import twin_of
-from identification.gap.data import GapData, Ints
+from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine, eta_levels
@@ -136,35 +137,25 @@ def explain_gap(
     """The diagnosis but for what to measure next, for who need not wait for that, and what makes it
     whole; otherwise as `diagnose_gap`."""
     tell = progress or _silent
-    out, forced = set(withhold), frozenset(add)
-    check_words(out | forced)
+    withheld, forced = set(withhold), frozenset(add)
+    check_words(withheld | forced)
     tell("preparing", 0.0)
     bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(numbered(data))))))
     bench = knowing(bench, known)
     base = base_columns(bench)
     target = bench.observed - prediction(bench)
-    variants = library(bench, [w for w in WORDS if w not in out])
+    variants = library(bench, [w for w in WORDS if w not in withheld])
     _check_shown(forced, variants)
     tell("comparing effects", 0.2)
-    etas = eta_levels(bench, base, target)
-    engine = Engine(bench, base, target, etas)
-    singles = score(engine, engine.levels, variants)
-    finer = refine(engine, singles)
-    if finer:
-        variants += finer
-        singles += score(engine, engine.levels, finer)
-    nameless = troubles_of(bench, base, target)
-    if nameless:
-        variants += nameless
-        singles += score(engine, engine.levels, nameless)
-    found = with_strangers(with_plain_trouble(search(engine, variants, singles)))
+    engine = Engine(bench, base, target, eta_levels(bench, base, target))
+    found = _searched(engine, variants)
     tell("withheld data", 0.7)
     found = earned(looked_up(found))
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     plain = chosen_of(found, verdict)
     chosen = force(engine, variants, found.explanations, plain, forced)
     chosen, each = settled(engine, variants, chosen, found.explanations)
-    result = _with_twins(_result(found, verdict, chosen, each), chosen, out)
+    result = _with_twins(_result(found, verdict, chosen, each), chosen, withheld)
     if not forced <= plain.words:
         result = replace(result, without_added=left_of(engine, fit(engine, plain)))
 
@@ -175,6 +166,19 @@ def explain_gap(
         return replace(result, next_measurement=following)
 
     return result, whole
+
+
+def _searched(engine: Engine, variants: list[Variant]) -> SearchResult:
+    """The search over explanations; the variants then hold finer ones as well, and those of
+    troubles that no word names."""
+    singles = score(engine, engine.levels, variants)
+    finer = refine(engine, singles)
+    nameless = troubles_of(engine.bench, engine.base, engine.target)
+    for fresh in (finer, nameless):
+        if fresh:
+            variants += fresh
+            singles += score(engine, engine.levels, fresh)
+    return with_strangers(with_plain_trouble(search(engine, variants, singles)))
 
 
 class NotShown(ValueError):

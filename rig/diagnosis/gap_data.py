@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arm import STANDARD_GRAVITY, Arm, tool_offset
+from identification.arrays import Array, Flags, Ints
 from identification.elastic import Beam
-from identification.gap.data import BRANCH_NAMES, Array, Flags, GapData, Instruments, Ints, Setup
+from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from rig.dataset import Dataset
 from rig.errors import InputError

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from rig.canvas import blank
 from rig.diagnosis.gap_layout import drive_label
 from rig.diagnosis.gap_points import FALLING, RISING, Points, Shown, session_clock

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.gap.answer.forms import Form, describe, lasting
-from identification.gap.data import Array
 from identification.gap.diagnose import EffectFound, GapResult
 from rig.dataset import Dataset
 from rig.diagnosis.diagnose import Diagnosis

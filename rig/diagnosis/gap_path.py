@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.arrays import Array, Ints
 from identification.gap.answer.forms import Form, realise
-from identification.gap.data import BRANCH_NAMES, Array, GapData, Instruments, Ints, Setup
+from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects import EFFECTS
 from identification.gap.laws.law import along, in_pose
 from identification.gap.model.bench import Bench, make_bench

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.arrays import Array, Ints
 from identification.gap.answer.remainder import Remainder, branches
-from identification.gap.data import BRANCH_NAMES, ZERO, Array, Ints
+from identification.gap.data import BRANCH_NAMES, ZERO
 from identification.gap.diagnose import EffectFound, GapResult
 from identification.gap.judging.heldout import HeldOut, stated_prediction
 from identification.gap.model.bench import Bench

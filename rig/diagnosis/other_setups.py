@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.arm import Arm, tool_offset
+from identification.arrays import Array
 from identification.gap.answer.designs import Elsewhere
-from identification.gap.data import Array
 from identification.inverse import solutions
 from rig.dataset import Dataset
 from rig.diagnosis.gap_data import arm_setup

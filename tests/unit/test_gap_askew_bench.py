@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
-from identification.gap.data import Array, GapData
+from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.model.bench import make_bench

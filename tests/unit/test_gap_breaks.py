@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from identification.gap.data import Array, GapData
+from identification.arrays import Array
+from identification.gap.data import GapData
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.explanations.priors import LOG_UNKNOWN, prior_of
 from identification.gap.model.base import base_columns, prediction

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
-from identification.gap.data import Array
 from identification.gap.effects import EFFECTS, joint_backlash, joint_hysteresis, library
 from identification.gap.effects.joint_hysteresis import REACHES
 from identification.gap.evidence.compare import by_word, closest, score

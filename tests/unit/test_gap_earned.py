@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, Instruments
+from identification.arrays import Array
+from identification.gap.data import Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, Sizes

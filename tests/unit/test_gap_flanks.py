@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
-from identification.gap.data import Array
 from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, part_sizes

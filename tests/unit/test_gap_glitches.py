@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData
+from identification.arrays import Array
+from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.recording.glitches import without_glitches
 from tests.unit.test_gap_operators import bench_data

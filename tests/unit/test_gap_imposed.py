@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData
+from identification.arrays import Array
+from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.model.bench import displacement_imposed, make_bench
 from identification.gap.recording.imposed import _Channel, _slides, displacement_simpler

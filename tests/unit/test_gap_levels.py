@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData, Instruments
+from identification.arrays import Array
+from identification.gap.data import GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import times

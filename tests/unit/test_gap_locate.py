@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.locate import locate
-from identification.gap.data import Array
 from identification.gap.model.bench import Bench, make_bench
 from tests.unit.test_gap_forms import arm_data
 
@@ -21,7 +21,7 @@ def bench() -> Bench:
 
 def located(bench: Bench, gap: Array, word: str = "") -> object:
     """Where a gap (n,) lies; word: of the effect that made it, none where empty."""
-    part = SimpleNamespace(word=word, variant=SimpleNamespace(info={}))
+    part = SimpleNamespace(word=word, variant=SimpleNamespace(joint=None))
     fit = SimpleNamespace(parts=(part,) if word else (), contribution=lambda engine, i: gap)
     return locate(SimpleNamespace(bench=bench), fit, [1.0], gap)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData, Instruments
+from identification.arrays import Array
+from identification.gap.data import GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.explanations.priors import prior_of

@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData
+from identification.arrays import Array
+from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import joint_hysteresis, time_lag
 from identification.gap.effects.joint_nonlinear_stiffness import _from_level_to_level

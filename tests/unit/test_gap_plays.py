@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import joint_backlash, library
 from identification.gap.effects.joint_backlash import TOOLS_KG

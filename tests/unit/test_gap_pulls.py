@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData, Instruments
+from identification.arrays import Array
+from identification.gap.data import GapData, Instruments
 from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import contact_seating, library
 from identification.gap.effects.contact_seating import refined

@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.designs import _levels
-from identification.gap.data import Array, GapData
+from identification.gap.data import GapData
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.holds import hold_ids, is_continuous, rest_ids, scatter_within
 from identification.gap.recording.ramps import _leading_on, ramps_told

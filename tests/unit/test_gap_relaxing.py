@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.recording.relaxing import relaxed
 from identification.gap.recording.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data

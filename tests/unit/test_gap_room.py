@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.parameters import parameters
-from identification.gap.data import Array, GapData
+from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part

@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.parameters import parameters
-from identification.gap.data import Array, GapData, Instruments
+from identification.gap.data import GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part

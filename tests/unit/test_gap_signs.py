@@ -12,7 +12,7 @@ from scipy.special import log_ndtr
 
 from bench.dense_model import dense
 from bench.nested_cases import case_data
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.finer import gained

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData, Instruments
+from identification.arrays import Array
+from identification.gap.data import GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.recording.slack import without_slack
 from tests.unit.test_gap_running import SPRING, running, triangle

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.parameters import parameters
-from identification.gap.data import Array, GapData, Instruments
+from identification.gap.data import GapData, Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part

@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData
+from identification.arrays import Array
+from identification.gap.data import GapData
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.ramps import ramps_told
 from identification.gap.recording.stairs import numbered

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, Instruments
+from identification.arrays import Array
+from identification.gap.data import Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import sampling_time

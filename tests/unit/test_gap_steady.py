@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import Array, GapData
+from identification.arrays import Array
+from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library, time_lag
 from identification.gap.effects.joint_backlash import variants as plays

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.answer.parameters import parameters
-from identification.gap.data import Array, Setup
+from identification.gap.data import Setup
 from identification.gap.effects import joint_hysteresis, joint_nonlinear_stiffness, library
 from identification.gap.evidence.compare import Scored, score
 from identification.gap.evidence.engine import Engine

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.recording.holds import steadied

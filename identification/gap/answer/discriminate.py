@@ -14,6 +14,7 @@ from math import log
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.gap.answer.designs import (
     Candidate,
     Design,
@@ -24,7 +25,7 @@ from identification.gap.answer.designs import (
 )
 from identification.gap.answer.forms import Form, describe, law_of, lawful, realise, rows_of
 from identification.gap.answer.twins import PLACE, twin_of
-from identification.gap.data import Array, GapData
+from identification.gap.data import GapData
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.compare import Scored, log_mean, score
 from identification.gap.evidence.engine import Engine, NoiseLevel, eta_levels

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
 from identification.gap.laws.law import Law

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.gap.answer.forms import Form, lawful, realise
-from identification.gap.data import Array
 from identification.gap.explanations.explanation import LAW_REMAINDER
 from identification.gap.model.bench import Bench, KnownEffects
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import BRANCH_NAMES, Array, Flags
+from identification.arrays import Array, Flags
+from identification.gap.data import BRANCH_NAMES
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import Fit
 from identification.gap.model.variants import Variant
-from identification.gap.words import INSTRUMENTS, LINEAR, SPRINGS
+from identification.gap.words import IN_JOINTS, INSTRUMENTS, LINEAR, SPRINGS
 
 _SHOWS = 0.15  # an effect shows where it reaches this share of its largest part
 
@@ -65,7 +66,7 @@ def _seen(engine: Engine, word: str) -> bool | None:
     none of them shows, whichever side of the gear they are on."""
     if engine.bench.data.q is None or not word or word in INSTRUMENTS:
         return None
-    if not word.startswith("joint_"):
+    if word not in IN_JOINTS | {SPRINGS}:
         return False
     return True if engine.bench.has_q else None
 

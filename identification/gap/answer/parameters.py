@@ -17,7 +17,7 @@ What they mean, whatever shape was fitted, so that shapes can be compared and mi
 
 from __future__ import annotations
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
 from identification.gap.laws.interval import NOMINAL, Coefficients, Parameter, Softer

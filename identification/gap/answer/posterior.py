@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.gap.answer.parameters import parameters
-from identification.gap.data import Array
 from identification.gap.effects import EFFECTS
 from identification.gap.effects.base_slip import ACROSS, slides
 from identification.gap.evidence.compare import Scored, logsumexp, score

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.gap.data import LOADING, UNLOADING, Array, Ints
+from identification.arrays import Array, Ints
+from identification.gap.data import LOADING, UNLOADING
 from identification.gap.evidence.engine import Engine, alike
 from identification.gap.explanations.fit import Fit
 from identification.gap.model.bench import Bench

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.gap.answer.forms import Form, law_of, rows_of
-from identification.gap.data import Array
 from identification.gap.effects.base_slip import lever_of, places
 from identification.gap.evidence.engine import LEVER_M, Engine
 from identification.gap.evidence.parts import Part

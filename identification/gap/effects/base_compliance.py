@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.curves import hinge
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.effects.base_compliance import moments
 from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect

@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws.closer import Word, closing_in
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.curves import hinge
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.gains import BENDS, SCALES, bent, factor, law_of_gain, scales

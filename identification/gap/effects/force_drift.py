@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.closer import about_springs
 from identification.gap.laws.drift import (
     FreePath,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.gains import BENDS, SCALES, bent, factor, law_of_gain, scales
 from identification.gap.laws.law import Law, Laws

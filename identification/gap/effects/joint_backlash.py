@@ -29,7 +29,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws import lost_motion_law
 from identification.gap.laws.closer import Word, closing_in, nearly_leads, places, seen
 from identification.gap.laws.effect import Effect

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws.curves import BENT_SLOPE
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter

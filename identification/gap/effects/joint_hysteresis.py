@@ -27,7 +27,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws import friction_law
 from identification.gap.laws.closer import Word, places
 from identification.gap.laws.effect import Effect

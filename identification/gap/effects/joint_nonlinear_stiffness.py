@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.engine import NEIGHBOUR
 from identification.gap.laws.closer import Word, closing_in
 from identification.gap.laws.curves import above, beyond, hinge

@@ -22,7 +22,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws import knees_closer
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.flow_back import flowing_back

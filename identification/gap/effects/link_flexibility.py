@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term

@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, Setup
+from identification.arrays import Array, Flags
+from identification.gap.data import Setup
 from identification.gap.laws.closer import about_springs
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter

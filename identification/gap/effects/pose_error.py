@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.compare import by_word, closest, marginal, score
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import conditioned

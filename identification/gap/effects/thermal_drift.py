@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.drift import (
     MEAN,
     TEMPERATURE,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.gap.data import Array, Ints
+from identification.arrays import Array, Ints
 from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.imperfection import IMPERFECTION, LAW_IMPERFECTION

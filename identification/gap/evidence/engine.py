@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.data import UNLOADING, Array, Flags, Ints
+from identification.arrays import Array, Flags, Ints
+from identification.gap.data import UNLOADING
 from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.imperfection import LOG_STEP, STEP
 from identification.gap.evidence.products import Gathered, Some, Weights, White

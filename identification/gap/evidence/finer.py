@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.compare import logsumexp
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import LOG_STEP, level_prior, log_share

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 
 IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a real mechanism
 # Elasticity, gains and leverage are laws, not families, and as exact as the springs of the base,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.compare import imperfect, logsumexp, mean_squares
 from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.factor import factor_of

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.model.growing import Growing
 
 if TYPE_CHECKING:

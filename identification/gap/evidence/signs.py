@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.data import Array, Flags, Ints
+from identification.arrays import Array, Flags, Ints
 from identification.gap.model.variants import Variant
 
 _TINY, _LOG_2 = 1e-300, log(2)

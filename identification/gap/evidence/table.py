@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, Ints
+from identification.arrays import Array, Flags, Ints
 from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.imperfection import log_level
 from identification.gap.evidence.signs import Limits, log_odds, log_odds_together, padded

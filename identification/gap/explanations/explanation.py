@@ -9,7 +9,7 @@ from math import log
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.compare import condition
 from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.imperfection import level_prior, level_priors
@@ -88,6 +88,9 @@ def _together(parts: tuple[Part, ...], sizes: Iterable[float]) -> dict[str, floa
     for p, size in zip(parts, sizes, strict=True):
         squares[p.word] = squares.get(p.word, 0.0) + float(size) ** 2
     return {w: s**0.5 for w, s in sorted(squares.items(), key=lambda i: -i[1])}
+
+
+PLAIN = 3.0  # nats that a shape must explain the gap better than anything else, to be named
 
 
 @dataclass(frozen=True)

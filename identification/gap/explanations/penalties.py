@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, Sizes
 from identification.gap.words import (

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.data import Array, Ints
+from identification.arrays import Array, Ints
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit

@@ -14,13 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, Ints
+from identification.arrays import Array, Flags, Ints
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import block
+from identification.uncertainty import coverage_factor
 
 BLOCKS = 5
 ALWAYS_IN = -1  # number of the fold of rows that are never withheld
@@ -202,8 +203,6 @@ def _interval(
     """95 % interval of the ratio from the scatter of its parts between the blocks of one setup
     (runs, or blocks of time): linearised log ratio, Student's t. So few blocks can't be
     bootstrapped, and blocks of different setups are no draws of one kind."""
-    from scipy.special import stdtrit
-
     _, number = np.unique(blocks, return_inverse=True)
     of = setup[np.unique(number, return_index=True)[1]]
     a = np.bincount(number, weights=weight * before**2)
@@ -221,5 +220,5 @@ def _interval(
             return ratio, ratio
         pieces = (np.arange(len(blocks)) * BLOCKS // len(blocks)).astype(np.int64)
         return _interval(before, after, pieces, np.zeros_like(setup), weight)
-    half = float(stdtrit(freedom, 0.975)) * variance**0.5
+    half = coverage_factor(freedom) * variance**0.5
     return ratio * float(np.exp(-half)), ratio * float(np.exp(min(half, 700.0)))

@@ -13,7 +13,7 @@ from math import log
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import STEP
 from identification.gap.explanations.explanation import (

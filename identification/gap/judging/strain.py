@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import ndtri, stdtr
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.engine import LEVER_M, Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import REMAINDER

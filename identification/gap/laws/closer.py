@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.evidence.compare import Scored, closest, marginal, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 
 BENT_SLOPE = 0.75  # of the straight line of least squares through zero of x |x|, 0 to 1
 

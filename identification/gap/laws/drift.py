@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import followed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.drift import RATES, TEMPERATURE, temperature_of
 from identification.gap.laws.law import Law, Term
 from identification.gap.model.bench import Bench

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, Ints
+from identification.arrays import Array, Flags, Ints
 from identification.gap.model.bench import Bench
+from identification.gap.model.history import beginnings
 
 BACK = (0.1, 0.2, 0.3, 0.42, 0.56)  # radii of what flows back after a reversal, of the range
 RATCHET_FROM = 0.6  # of the range
@@ -63,7 +64,7 @@ def peaks(load: Array, threshold: float, fresh: Flags) -> Ints:
     """(n,) row of the largest load before a row, -1 where nothing beyond the threshold has been
     reversed since the memory was last fresh."""
     size = np.abs(load)
-    edges = np.append(np.flatnonzero(fresh | (np.arange(len(load)) == 0)), len(load))
+    edges = np.append(np.flatnonzero(beginnings(fresh)), len(load))
     peak_of = np.full(len(load), -1)
     for a, b in pairwise(edges):
         peak = np.maximum.accumulate(size[a:b])
@@ -80,6 +81,6 @@ def ratchet(load: Array, threshold: float, fresh: Flags) -> Array:
     size = np.maximum(np.abs(load) - threshold, 0.0)
     step = np.maximum(np.diff(size, prepend=size[0]), 0.0) * np.sign(load)
     total = np.cumsum(step)
-    start = np.flatnonzero(fresh | (np.arange(len(load)) == 0))
-    group = np.cumsum(fresh | (np.arange(len(load)) == 0)) - 1
+    start = np.flatnonzero(beginnings(fresh))
+    group = np.cumsum(beginnings(fresh)) - 1
     return np.asarray(total - (total - step)[start][group])

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import flowing_play
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.curves import BENT_SLOPE, hinge
 from identification.gap.laws.interval import LEAST_FACTOR, Coefficients, Parameter
 from identification.gap.laws.law import Law, Term

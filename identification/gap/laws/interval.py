@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 
 

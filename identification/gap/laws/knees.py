@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws.flow_back import flowing_back, yielded_from
 from identification.gap.laws.specimens import softening
 from identification.gap.model.bench import Bench
+from identification.gap.model.history import beginnings
 from identification.gap.model.variants import (
     BACK_UNDER_WEIGHT,
     LASTING,
@@ -154,7 +155,7 @@ def grown(load: Array, radius: Array, fresh: Flags) -> Array:
     """(n, k): by how much the size of the load (n,) has ever been beyond the radii (k,) since the
     memory was fresh; each time with the sign that the load then had."""
     out = np.empty((len(load), len(radius)))
-    edges = np.append(np.flatnonzero(fresh | (np.arange(len(load)) == 0)), len(load))
+    edges = np.append(np.flatnonzero(beginnings(fresh)), len(load))
     for a, b in pairwise(edges):
         largest = np.maximum.accumulate(np.abs(load[a:b]))
         beyond = np.maximum(largest[:, None] - radius, 0.0)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws import flow_back
 from identification.gap.laws.flows import Flow, states
 from identification.gap.laws.knees import HARDENED, grown

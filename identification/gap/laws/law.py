@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws.flows import Flow
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant

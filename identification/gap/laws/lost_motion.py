@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.model.bench import Bench
 
 KEPT = ("kept", "kept 1/2", "jumps")  # where the push before left it

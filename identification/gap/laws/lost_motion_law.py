@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.laws.law import Law, Term
 from identification.gap.laws.lost_motion import HELD, PLACED, Play, net, resting_columns
 from identification.gap.model.bench import TOOL_KG, Bench

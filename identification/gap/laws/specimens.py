@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, block, variant
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant

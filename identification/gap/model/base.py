@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import ENCODER_OFFSET_RAD
 

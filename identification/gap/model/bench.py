@@ -14,7 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, GapData
+from identification.arrays import Array, Flags
+from identification.gap.data import GapData
 from identification.gap.model.history import moves, play, rests
 from identification.gap.model.noise import Noise, driven, estimate_noise
 from identification.gap.model.pool import Pool

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.model.bench import Bench
 
 ENOUGH = 0.3  # rms that may be left of what a straight line leaves

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 
 _AHEAD = 1.5  # of what is needed: then few additions move what is there
 

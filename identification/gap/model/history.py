@@ -14,7 +14,7 @@ from math import exp
 
 import numpy as np
 
-from identification.gap.data import Array, Flags
+from identification.arrays import Array, Flags
 from identification.gap.recording.rows import Rows
 
 _FAR = 0.2  # share of the load's range: a run that starts and ends beyond it was not unloaded
@@ -90,6 +90,11 @@ def worked_in(load: Array, fresh: Flags) -> Path:
     return Path(np.concatenate(parts), np.concatenate(begins), np.concatenate(kept))
 
 
+def beginnings(fresh: Flags) -> Flags:
+    """Rows (n,) from which a memory counts: where it is fresh (n,), and the first one."""
+    return np.asarray(fresh | (np.arange(len(fresh)) == 0))
+
+
 def bristles(
     load: Array, reach: Array, fresh: Flags, elastic: bool, weight: Array | None = None
 ) -> Array:
@@ -102,7 +107,7 @@ def bristles(
     hung = np.zeros((len(load), len(reach)))
     if weight is not None:
         hung = -np.sign(weight)[:, None] * np.expm1(-np.abs(weight)[:, None] / reach)
-    begins = fresh | (np.arange(len(load)) == 0)
+    begins = beginnings(fresh)
     step = load - np.where(begins, 0.0, np.concatenate([[0.0], load[:-1]]))
     sense, way = np.sign(step)[:, None], np.abs(step)[:, None] / reach
     if not elastic:

@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, GapData, Ints
+from identification.arrays import Array, Flags, Ints
+from identification.gap.data import GapData
 from identification.gap.model.history import half_sample
 from identification.gap.recording.holds import (
     ENOUGH,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 
 
 class Pool:

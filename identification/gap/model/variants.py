@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 
 UNDER_WEIGHT = " under weight"  # a memory that begins with the weight coming on
 BACK_UNDER_WEIGHT = " under weight, taken back"  # one that is lost between runs, but for the weight

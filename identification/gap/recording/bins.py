@@ -14,7 +14,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.data import Array, GapData, Ints
+from identification.arrays import Array, Ints
+from identification.gap.data import GapData
 from identification.gap.recording.turns import passes
 
 _ROWS_PER_PASS, _MOST_ROWS = 80, 4000  # memory needs the turning points of every cycle

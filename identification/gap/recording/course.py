@@ -11,7 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, GapData
+from identification.arrays import Array, Flags
+from identification.gap.data import GapData
 from identification.gap.recording.faults import Fault, found_in
 from identification.gap.recording.imposed import approaches, turned_alike
 from identification.gap.recording.loops import lost

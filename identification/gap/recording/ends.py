@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, GapData, Ints
+from identification.arrays import Array, Flags, Ints
+from identification.gap.data import GapData
 from identification.gap.recording.glitches import picked, when
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.turns import way_back

@@ -14,7 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from identification.gap.data import LOADING, Array, GapData
+from identification.arrays import Array
+from identification.gap.data import LOADING, GapData
 from identification.gap.recording.ends import after_break
 from identification.gap.recording.glitches import when
 from identification.gap.recording.holds import hold_ids, is_continuous

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, GapData, Ints
+from identification.arrays import Array, Flags, Ints
+from identification.gap.data import GapData
 from identification.gap.recording.holds import hold_ids, is_continuous, rest_ids, scatter_within
 from identification.gap.recording.white import white_sd
 

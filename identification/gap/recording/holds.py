@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, GapData, Ints
+from identification.arrays import Array, Flags, Ints
+from identification.gap.data import GapData
 from identification.running import first_rows, runs_through
 
 

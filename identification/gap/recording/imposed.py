@@ -16,7 +16,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import ZERO, Array, GapData, Ints
+from identification.arrays import Array, Ints
+from identification.gap.data import ZERO, GapData
 from identification.gap.recording.bins import even_path
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.turns import turns, way_back

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 from identification.gap.recording.turns import turns
 
 _PASS = 0.05  # of the range of what is driven: less is no turn

@@ -13,7 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.data import ZERO, Array, Flags, GapData, Ints
+from identification.arrays import Array, Flags, Ints
+from identification.gap.data import ZERO, GapData
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.running import first_rows
 from identification.ways import AWAY, SEEN, elsewhere, leading_on

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, Ints
+from identification.arrays import Array, Flags, Ints
 
 _PLAIN = 4.0  # standard errors
 _ALIKE = 0.5  # of the larger: so far the channels may be apart, or as far as their errors say

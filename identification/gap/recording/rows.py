@@ -8,7 +8,8 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from identification.gap.data import CYCLE, ZERO, Array, Flags, GapData, Ints
+from identification.arrays import Array, Flags, Ints
+from identification.gap.data import CYCLE, ZERO, GapData
 from identification.gap.recording.bins import Bins
 from identification.gap.recording.holds import (
     hold_ids,

@@ -13,7 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.data import Flags, GapData, Ints
+from identification.arrays import Flags, Ints
+from identification.gap.data import GapData
 from identification.gap.recording.glitches import picked, when
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.imposed import displacement_imposed

@@ -12,7 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import Array, Flags, GapData
+from identification.arrays import Array, Flags
+from identification.gap.data import GapData
 from identification.gap.recording.white import white_noise
 
 

@@ -14,7 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.gap.data import Array, GapData, Ints
+from identification.arrays import Array, Ints
+from identification.gap.data import GapData
 
 _PLAIN = 8.0  # standard uncertainties of one sample, from one level to the next
 _STEP = 0.02  # of the range: a level is not left by less

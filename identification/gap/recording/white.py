@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.gap.data import Array
+from identification.arrays import Array
 
 
 def white_sd(second: Array) -> float:

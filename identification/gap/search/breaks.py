@@ -20,8 +20,8 @@ from math import exp, lgamma, log
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
-from identification.gap.data import Array, Flags
-from identification.gap.explanations.explanation import Likeness, SearchResult
+from identification.arrays import Array, Flags
+from identification.gap.explanations.explanation import PLAIN, Likeness, SearchResult
 from identification.gap.laws.drift import free_path, path_root
 from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
@@ -62,9 +62,6 @@ def with_plain_trouble(found: SearchResult) -> SearchResult:
     if ahead < PLAIN:
         return found
     return replace(found, looks_like=Likeness(best.parts[0].word, None, best.log_weight))
-
-
-PLAIN = 3.0  # nats
 
 
 def _largest(bench: Bench) -> Array:

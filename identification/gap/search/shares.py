@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from identification.gap.data import Ints
+from identification.arrays import Ints
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import Fit, fit

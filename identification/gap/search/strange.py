@@ -18,11 +18,11 @@ from math import log
 
 import numpy as np
 
-from identification.gap.data import Array, Ints
+from identification.arrays import Array, Ints
 from identification.gap.evidence.compare import by_word, log_mean, marginal, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, part_sizes
-from identification.gap.explanations.explanation import Likeness, SearchResult
+from identification.gap.explanations.explanation import PLAIN, Likeness, SearchResult
 from identification.gap.explanations.priors import log_unknown
 from identification.gap.explanations.verdict import TAKES_TWO, with_posterior
 from identification.gap.laws.drift import by_direction, free_path, path_root, waited
@@ -74,7 +74,6 @@ def _creeps(found: SearchResult, settles: float) -> bool:
 
 
 SETTLES = "settles"
-PLAIN = 3.0  # nats that a shape must explain the gap better than none, to be told
 
 
 def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
