@@ -33,14 +33,16 @@ WORD = "joint_creep"
 SCALES = (0.02, 0.06, 0.2, 0.6)
 _OF_A_STROKE = 0.05  # what follows as closely at one rate is no slower than friction
 VISCOUS = 10.0  # times the session: what gives way as slowly flows, and does not come back
+_LONGEST = 1000.0  # samples, or seconds where samples are more frequent
 
 
 def times(bench: Bench) -> np.ndarray:
-    """Retardation times s: from one sample to a third of the session, by factors of three, and of
-    an arm one that flows; of a recording that runs on, or a bench's, to three times its length, by
-    when a viscous flow looks like a line."""
+    """(k,) retardation times s, by factors of three. From one sample to a third of the session, of
+    which no more than a thousand samples tell; of an arm one more that flows. Of a recording that
+    runs on, or of a rig without an arm, to three times its length: a viscous flow looks like a line
+    then."""
     step = row_time(bench.rows) or 1.0
-    longest = min(bench.course.session_span / 3, 1000.0 * max(step, 1.0))
+    longest = min(bench.course.session_span / 3, _LONGEST * max(step, 1.0))
     if not (bench.data.arm or bench.rows.continuous):
         step = 2 * half_sample(bench.rows)  # of rows there are the fewer, the longer it stood
     if not (bench.data.arm or bench.course.always_moves):

@@ -307,8 +307,9 @@ class _Integrated:
 
 
 def eta_levels(bench: Bench, base: Base, target: Array) -> Array:
-    """0, then sizes of imperfection by factors of `STEP`, from half the stated uncertainty to the
-    size of what the base leaves."""
+    """(l,) m: sizes of the imperfection on which evidence is computed. 0, then by factors of `STEP`
+    from half the stated uncertainty of a sample to what the base alone leaves of the target
+    (size,)."""
     start = 0.5 * bench.noise.stated
     left = structural_rms(bench, base, target)
     count = max(3, int(np.ceil(np.log(max(1.5 * left / start, 1.0)) / LOG_STEP)) + 1)

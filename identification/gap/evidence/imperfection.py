@@ -30,12 +30,13 @@ def level_prior(etas: Array, i: int, energy: float) -> float:
 
 
 def level_priors(etas: Array, energy: Array) -> Array:
-    """(l,) the same of every level; energy (l,): mean square (m^2) of the explanation at each."""
+    """log prior (l,) of every level; energy (l,): mean square (m^2) of the explanation at each."""
     return np.array([level_prior(etas, i, float(e)) for i, e in enumerate(energy)])
 
 
 def log_level(etas: Array, i: int, energy: Array) -> Array:
-    """The same for many. Levels are bins of log eta; the lowest takes all below."""
+    """log prior (...) of level i of the sizes `etas` (l,) m, for explanations of mean squares
+    (...) m^2. Levels are bins of log eta; the lowest takes all below."""
     from scipy.special import ndtr
 
     centre = _centre(energy)

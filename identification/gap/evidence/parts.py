@@ -203,9 +203,10 @@ def _energies_each(engine: Engine, parts: tuple[Part, ...]) -> Array:
 def evidence_correction(
     engine: Engine, parts: tuple[Part, ...], taken: float, joint: Array
 ) -> float:
-    """Nats by which the last part's evidence beside the others is off, if these were taken to have
-    a mean square of `taken` (m^2), as without it: what a law tries to do alone is not what it does
-    beside another one, and by that its imperfection is judged. joint (l,): `log_joints` of all."""
+    """Nats to add to the last part's evidence beside the others, which was computed as if these had
+    a mean square of `taken` (m^2), as they have without it. How imperfect laws may be goes by what
+    they do, and beside another law one does something else than alone. joint (l,): `log_joints` of
+    all parts."""
     each = _energies_each(engine, parts)
     together, alone = each.sum(axis=1), each[:, -1] + taken
     now, before = (

@@ -39,9 +39,14 @@ def trusted(
 
 
 def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) -> SearchResult:
-    """With the posterior over words as main cause. kept: words of an explanation -> share of its
-    weight that it keeps, where withheld data were looked at. What it loses, and what leaves a large
-    remainder, goes to its heir."""
+    """The result with the probability of every word to be the main cause, of `none` and `unknown`.
+
+    Every explanation gives its weight to its main effect, as far as it explains the gap (`good`)
+    and foretold withheld data. kept: words of an explanation -> share of its weight that it keeps
+    there. The rest goes to its heir: the best explanation with fewer of the same effects, else
+    `unknown`. What three effects say on an arm keeps a share (`THREE`); running recordings have
+    fewer independent rows than samples (`TEMPER`); `trusted` takes off what no posterior knows.
+    """
     ranked = found.explanations
     explained = _explained(found, kept)
     unknown = min(found.unknown, explained)

@@ -53,9 +53,12 @@ def by_direction(bench: Bench) -> dict[str, Array]:
 
 
 def own_clock(bench: Bench) -> bool:
-    """Whether time and load part company: the load comes and goes at least three times, in runs or
-    in cycles of one, or there is none at all. Else a path in time is a curve of the load, or the
-    creep under one that stands, unless that goes back."""
+    """Whether a path in time can be told from a curve of the load, or from creep under one.
+
+    It can where the load comes and goes at least three times, in runs or in cycles of one; where
+    something moves before anything is loaded; or where what the spring does not explain goes back
+    while the load waits. A weight that hangs all the time creeps, unless what is read goes back.
+    """
     if hangs(bench) and not _goes_back(bench.response):
         return False
     if bench.course.passes >= 3:
@@ -215,15 +218,15 @@ def free_variant(
 
 
 def path_root(pieces: int) -> Array:
-    """Root of a random walk's covariance over the pieces, free where it starts."""
+    """Root (pieces, pieces) of a random walk's covariance over the pieces, free where it starts."""
     at = np.linspace(0.15, 1, pieces)
     covariance = np.minimum(at[:, None], at) + 1e-9 * np.eye(len(at))
     return np.asarray(np.linalg.cholesky(covariance), dtype=float)
 
 
 def steady_root(pieces: int) -> Array:
-    """Root of the covariance of a random walk's integral over the pieces, of any place and rate
-    where it starts; of a deviation of about 1."""
+    """Root (pieces, pieces) of the covariance of a random walk's integral over the pieces, of any
+    place and rate where it starts; of a deviation of about 1."""
     t = np.linspace(0, 1, pieces)
     low, high = np.minimum(t[:, None], t), np.maximum(t[:, None], t)
     covariance = _PLACE + t[:, None] * t + _TURNS * low**2 * (high / 2 - low / 6)

@@ -46,7 +46,7 @@ class Flow:
 
 
 def states(bench: Bench, flow: Flow) -> Array:
-    """(n, k)"""
+    """(n, k) what the plays of k thresholds have slipped, in the unit of the load."""
     if flow.time == 0:
         return bench.plays(flow.load, flow.radius, flow.fresh, flow.weight)
     make(bench, [flow])

@@ -34,7 +34,8 @@ _MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): 
 
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: friction elements; with their strength where the law has one, else with a reach."""
+    """The law, and scales (k,) of its terms: friction elements, with their strength in Nm where the
+    law has one, else with the reach (Nm) over which they bend."""
     joint, law = int(v.info["joint"]), str(v.info["law"])
     key = "strength" if law in SLIP_AT_A_STRENGTH else "reach"
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}

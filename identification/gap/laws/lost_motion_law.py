@@ -13,7 +13,8 @@ from identification.gap.model.variants import Variant
 
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: width of the play, friction beside it, and where the joint lay while unloaded."""
+    """The law, and scales (k,) of its terms: width of the play (rad), friction beside it, and where
+    the joint lay while unloaded. zone, preload: Nm; tool: kg."""
     info = v.info
     constants = {
         "joint": int(info["joint"]),
