@@ -11,8 +11,8 @@ from identification.arrays import Array
 from identification.gap.data import Instruments
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.model.bench import make_bench
+from identification.gap.model.driven import driven, standing
 from identification.gap.model.history import sampling_time
-from identification.gap.model.noise import driven, standing
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.recording.white import white_noise
 from tests.unit.test_gap_operators import bench_data

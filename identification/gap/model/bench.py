@@ -16,8 +16,9 @@ import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.data import GapData
+from identification.gap.model.driven import driven
 from identification.gap.model.history import moves, play, rests
-from identification.gap.model.noise import Noise, driven, estimate_noise
+from identification.gap.model.noise import Noise, estimate_noise
 from identification.gap.model.pool import Pool
 from identification.gap.recording.course import Course
 from identification.gap.recording.imposed import displacement_imposed

@@ -19,6 +19,7 @@ from identification.gap.data import LOADING, GapData
 from identification.gap.recording.ends import after_break
 from identification.gap.recording.glitches import when
 from identification.gap.recording.holds import hold_ids, is_continuous
+from identification.gap.recording.white import QUARTILE
 from identification.running import first_rows
 
 
@@ -235,7 +236,7 @@ def bursts(data: GapData) -> bool:
     if away.size < _FEWEST_STEPS:
         return False
     away = away - pushed * float(pushed @ away) / max(float(pushed @ pushed), 1e-300)
-    usual = max(1.4826 * float(np.median(np.abs(away))), data.instruments.displacement)
+    usual = max(float(np.median(np.abs(away))) / QUARTILE, data.instruments.displacement)
     far = np.abs(away) > _BEYOND * usual
     came = np.diff(data.force[starts], prepend=0.0)[hold][1:-1][late]
     ways = np.sign(away * came)[far]

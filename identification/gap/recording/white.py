@@ -6,12 +6,14 @@ import numpy as np
 
 from identification.arrays import Array
 
+QUARTILE = 0.6745  # of a normal's standard deviations: half of its values lie within it
+
 
 def white_sd(second: Array) -> float:
     """Standard deviation of the noise behind second differences, from their median size, so that
     jumps do not count: half of a normal's values lie within 0.6745 of its standard deviations, and
     three readings weigh 1, 2 and 1 in each."""
-    return float(np.median(np.abs(second))) / 0.6745 / 6**0.5
+    return float(np.median(np.abs(second))) / QUARTILE / 6**0.5
 
 
 _WHITE = 1.5  # ratio of second differences' variances over two samples and over one: noise has 1
