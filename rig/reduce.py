@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 
 from identification.curve import Curve, Point
 from identification.running import first_rows
+from identification.stairs import steps_of_stairs
 from identification.turns import turning_points
 from identification.ways import leading_on
 from rig.arrays import Array
@@ -128,9 +129,11 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
     )
     result: dict[tuple[str, str], Curve] = {}
     for (pose, direction), taken in _setups(dataset.columns):
-        runs = [_leading_on(run, stated) for run in taken]
+        runs = [_leading_on(run, stated) for run in _numbered(taken, stated)]
         points: list[Point] = []
         notes: list[str] = []
+        if _bare(taken) and not _bare(runs):
+            notes.append("No steps are numbered; the levels at which the load stands were found.")
         held = is_held([(r.branch, r.step, r.force, r.displacement) for r in runs])
         zeros = [_plateaus(run, stated) for run in runs]
         if held:
@@ -194,6 +197,29 @@ def _run(columns: dict[str, NDArray[Any]], repetition: int, rows: NDArray[np.int
         np.asarray(columns["displacement_mm"][rows], dtype=np.float64) * M_PER_MM,
         settled,
     )
+
+
+def _bare(runs: list[_Run]) -> bool:
+    """Whether no step of any run bears a number."""
+    return all(bool(np.all(run.step < 0)) for run in runs)
+
+
+def _numbered(runs: list[_Run], stated: _Stated) -> list[_Run]:
+    """The runs with the steps of staircases numbered that bear no numbers; samples without a value
+    like the one before."""
+    there = [np.isfinite(run.force) & np.isfinite(run.displacement) for run in runs]
+    if not _bare(runs) or not all(read.any() for read in there):
+        return runs
+    values = [(r.force[read], r.displacement[read]) for r, read in zip(runs, there, strict=True)]
+    found = steps_of_stairs(values, (stated.force, stated.displacement))
+    if found is None:
+        return runs
+    out = []
+    for run, read, (step, at) in zip(runs, there, found, strict=True):
+        like = np.maximum(np.cumsum(read) - 1, 0)
+        branch = run.branch[np.flatnonzero(read)[at]]
+        out.append(replace(run, step=step[like], branch=branch[like]))
+    return out
 
 
 def _leading_on(run: _Run, stated: _Stated) -> _Run:

@@ -37,7 +37,6 @@ from identification.gap.recording.faults import SIGNS, SILENT
 from identification.gap.recording.glitches import without_glitches
 from identification.gap.recording.ramps import ramps_told
 from identification.gap.recording.slack import without_slack
-from identification.gap.recording.stairs import numbered
 from identification.gap.search.breaks import troubles_of, with_plain_trouble
 from identification.gap.search.refine import refine
 from identification.gap.search.search import force, search
@@ -140,7 +139,7 @@ def explain_gap(
     withheld, forced = set(withhold), frozenset(add)
     check_words(withheld | forced)
     tell("preparing", 0.0)
-    bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(numbered(data))))))
+    bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(data)))))
     bench = knowing(bench, known)
     base = base_columns(bench)
     target = bench.observed - prediction(bench)

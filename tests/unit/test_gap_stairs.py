@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.gap.data import GapData
+from identification.gap.data import LOADING, UNLOADING, GapData
 from identification.gap.recording.holds import hold_ids, is_continuous
-from identification.gap.recording.ramps import ramps_told
-from identification.gap.recording.stairs import numbered
+from identification.gap.recording.ramps import ramps_told, steps_numbered
 from tests.unit.test_gap_operators import bench_data
 
 SPRING, SD = 1e-5, 0.1  # m/N; N of one sample
@@ -29,7 +28,7 @@ def stairs(force: Array, response: Array | None = None, sd: float = SD) -> GapDa
 
 
 def test_levels_are_numbered_by_size_and_met_again() -> None:
-    data = numbered(stairs(np.repeat(LEVELS, 4)))
+    data = steps_numbered(stairs(np.repeat(LEVELS, 4)))
     np.testing.assert_array_equal(data.step, np.repeat([0, 1, 2, 3, 4, 3, 0], 4))
     assert not is_continuous(data, hold_ids(data))
 
@@ -40,16 +39,19 @@ def test_the_way_between_two_levels_bears_the_name_of_the_one_it_leads_to() -> N
     for a, b in pairwise(LEVELS.tolist()):
         parts += [a + (b - a) * ramp, np.repeat(b, 12)]
     force = np.concatenate(parts)
-    data = numbered(stairs(force))
+    data = steps_numbered(stairs(force))
     way = ~np.isin(force, LEVELS)
-    assert set(data.step[way]) <= {0, 1, 2, 3, 4}
+    after = np.array([next(i for i in range(k, len(force)) if not way[i]) for k in range(len(way))])
+    np.testing.assert_array_equal(data.step, data.step[after])
+    late = replace(stairs(force), branch=np.where(way, UNLOADING, LOADING))
+    assert not np.any(steps_numbered(late).branch == UNLOADING)
     assert np.mean(ramps_told(data).ways[way]) > 0.7  # the shortest drown in noise
 
 
 def test_a_displacement_that_is_set_makes_levels_on_which_the_force_relaxes() -> None:
     level = np.repeat(np.array([1e-4, 3e-4, 6e-4, 3e-4]), 30)
     relaxed = 1 - 0.2 * (1 - np.exp(-(np.arange(len(level)) % 30) / 10))
-    data = numbered(stairs(level / SPRING * relaxed, level))
+    data = steps_numbered(stairs(level / SPRING * relaxed, level))
     np.testing.assert_array_equal(data.step, np.repeat([1, 2, 3, 2], 30))
 
 
@@ -67,4 +69,4 @@ def test_what_is_no_staircase_keeps_its_names(what: str) -> None:
         data = stairs(np.repeat(LEVELS, 4) if what == "named" else force)
     if what == "named":
         data = replace(data, step=np.repeat([0, 1, 2, 3, 4, 3, 0], 4))
-    assert numbered(data) is data
+    assert steps_numbered(data) is data

@@ -212,6 +212,22 @@ def test_a_way_under_the_name_of_the_level_it_leaves_counts_to_the_next() -> Non
     assert not only(data).held
 
 
+@pytest.mark.parametrize("missing", [(), (0, 1, 100), tuple(range(45, 60))])
+def test_a_staircase_whose_steps_bear_no_numbers_has_levels(missing: tuple[int, ...]) -> None:
+    data = named_late()
+    data.columns["step"][:] = -1
+    data.columns["force_N"][list(missing)] = np.nan
+    curve = only(data)
+    assert curve.held
+    assert [p.force for p in loading(curve)] == pytest.approx([10.0, 20.0, 30.0, 60.0])
+    assert [p.step for p in loading(curve)] == [1, 2, 3, 4]
+    assert "No steps are numbered" in curve.notes[0]
+    assert "No steps" not in " ".join(only(named_late()).notes)
+    data.columns["force_N"][:] = data.columns["time_s"] / 10  # a ramp has none
+    data.columns["displacement_mm"][:] = data.columns["force_N"] / 100
+    assert not only(data).held
+
+
 def test_held_cycles_are_sorted_by_whether_the_load_grows() -> None:
     forces = (10.0, 20.0, 10.0, -10.0, -20.0, -10.0)
     rows = [

@@ -10,6 +10,7 @@ the level it leaves; it is given to the level it leads to.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from identification.arrays import Array, Flags, Ints
 from identification.gap.data import ZERO, GapData
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.running import first_rows
+from identification.stairs import steps_of_stairs
 from identification.ways import AWAY, SEEN, elsewhere, leading_on
 
 _ABOUT = 2.0  # times as much of its range as the other channel of its own
@@ -28,12 +30,26 @@ _TO_GO = 0.25  # of a step
 def ramps_told(data: GapData) -> GapData:
     """The data with ramps told; of what runs all the time, those that lead to no load. As they are
     where there are none."""
-    data = _leading_on(data)
+    data = _leading_on(steps_numbered(data))
     hold = hold_ids(data)
     moving = _moving(data, hold)
     if is_continuous(data, hold):
         moving &= data.branch == ZERO
     return replace(data, on_the_way=moving) if moving.any() else data
+
+
+def steps_numbered(data: GapData) -> GapData:
+    """The data with the steps of staircases numbered that bear no numbers; samples on their way to
+    a level are under its branch, too."""
+    if np.any(data.step >= 0):
+        return data
+    edges = [0, *(np.flatnonzero(np.diff(data.run)) + 1).tolist(), len(data.run)]
+    runs = [(data.force[a:b], data.displacement[a:b]) for a, b in pairwise(edges)]
+    found = steps_of_stairs(runs, _sd(data))
+    if found is None:
+        return data
+    at = np.concatenate([a + rows for a, (_, rows) in zip(edges, found, strict=False)])
+    return replace(data, step=np.concatenate([s for s, _ in found]), branch=data.branch[at])
 
 
 def _moving(data: GapData, hold: Ints) -> Flags:
