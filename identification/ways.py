@@ -19,6 +19,7 @@ AWAY = 0.01  # of the range: so far the outermost sample of a way has to go at l
 _STEEPER = 4.0
 _REST = 0.4  # of a hold: so long it rests, if it ever does
 _AT_REST, _ONWARD = 0.1, 0.02  # of the step to the next one
+_SCATTER, _AT_MOST = 8.0, 0.3  # standard deviations; of that step: so far readings at rest range
 
 
 def elsewhere(
@@ -55,7 +56,8 @@ def leading_on(
     level = np.bincount(hold, force * rests) / np.maximum(np.bincount(hold, rests), 1)
     for a, b in pairwise(starts.tolist()):
         there, step = force[a:b][rests[a:b]], level[hold[b]] - level[hold[a]]
-        rested = there.size > 1 and np.ptp(there) < _AT_REST * abs(step)
+        scatters = min(_SCATTER * sd[0], _AT_MOST * abs(step))
+        rested = there.size > 1 and np.ptp(there) < max(_AT_REST * abs(step), scatters)
         onward = (force[b - 1] - level[hold[a]]) * step > _ONWARD * step**2
         if rested and onward and far[b - 1] > AWAY and going[b - 1]:
             yield a + int(np.flatnonzero(~going[a:b]).max(initial=0)) + 1, b

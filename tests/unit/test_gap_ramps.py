@@ -174,17 +174,23 @@ def test_a_ramp_named_after_the_level_it_leaves_belongs_to_the_next(hardens: boo
     assert np.abs(rows.force[rows.zero]).max() < 0.5
 
 
-@pytest.mark.parametrize("ramp", [6, 9])
-def test_long_ramps_that_bear_the_name_of_the_level_left_belong_to_the_next(ramp: int) -> None:
+@pytest.mark.parametrize(("ramp", "sd"), [(6, 0.05), (9, 0.05), (9, 0.4)])
+def test_long_ramps_that_bear_the_name_of_the_level_left_belong_to_the_next(
+    ramp: int, sd: float
+) -> None:
     """Twelve samples at every level, and then the whole way to the next one under its name: no part
-    of the level, though it begins before three quarters of what bears the name."""
+    of the level, though it begins before three quarters of what bears the name. Readings of a
+    level may range over more than a tenth of the step."""
     rng, hold = np.random.default_rng(4), 12
     on = np.concatenate([np.zeros(hold), np.arange(1, ramp + 1) / (ramp + 1)])
     number = np.repeat(np.arange(5), hold + ramp)
-    force = 10.0 * (number + np.tile(on, 5)) + rng.normal(0, 0.05, len(number))
-    data = bench_data(force, SPRING * force, step=number, imposed="force")
+    load = 10.0 * (number + np.tile(on, 5))
+    data = bench_data(load + rng.normal(0, sd, len(load)), SPRING * load, step=number,
+                      imposed="force")  # fmt: skip
+    data = replace(data, instruments=replace(data.instruments, force=sd))
     way = (np.tile(on, 5) > 0) & (number < 4)
-    np.testing.assert_array_equal(_leading_on(data).step, number + way)
+    wrong = _leading_on(data).step != number + way
+    assert wrong.sum() <= (4 if sd > 0.1 else 0)  # the first of a ramp may drown
 
 
 def test_only_what_rested_leaves() -> None:
