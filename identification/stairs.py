@@ -20,9 +20,6 @@ _PLAIN = 8.0  # standard uncertainties of one sample, from one level to the next
 _STEP = 0.02  # of the range: a level is not left by less
 _FEWEST = 3  # readings of a level; levels of a run
 _SHARE = 0.6  # of the samples of every run: so many stand on levels
-# Of a step: what the answer does on a level, in the middle of all levels. Of a ramp that was read
-# coarsely it does twice as much at least as on the step between two.
-_GOES_ON = 1.0
 _SAME = 0.3  # of the smallest step: levels that lie closer are one
 _NO_LOAD = 0.02  # of the largest force
 
@@ -34,11 +31,10 @@ def steps_of_stairs(
     0 without load, and the first row (n,) of its level; samples between two levels belong to the
     one they lead to. None where a run is no staircase. sd: standard uncertainty of one sample of
     each channel."""
-    forces = [force for force, _ in runs]
-    for driven, answer, u in (
-        (forces, [moved for _, moved in runs], sd[0]),
-        ([moved for _, moved in runs], forces, sd[1]),
-    ):
+    forces, moved = [force for force, _ in runs], [moved for _, moved in runs]
+    # a displacement that jumps under a force that stands is no staircase of a rig
+    ways = [(forces, moved, sd[0]), (moved, forces, sd[1])]
+    for driven, answer, u in ways if np.ptp(np.concatenate(forces)) > 2 * _PLAIN * sd[0] else []:
         stairs = [_levels(d, a, u) for d, a in zip(driven, answer, strict=True)]
         if all(stairs):
             return _numbers(forces, driven, stairs)
@@ -51,22 +47,34 @@ def _levels(driven: Array, answer: Array, sd: float) -> list[slice]:
     least = max(_PLAIN * sd, _STEP * float(np.ptp(driven)))
     left = np.flatnonzero(np.abs(np.diff(driven)) > 0.5 * least) + 1
     found = [
-        slice(a, b)
-        for a, b in pairwise([0, *left.tolist(), len(driven)])
-        if b - a >= _FEWEST and np.ptp(driven[a:b]) < least
+        r
+        for r in _joined(driven, [0, *left.tolist(), len(driven)], 0.5 * least)
+        if r.stop - r.start >= _FEWEST and np.ptp(driven[r]) < least + _PLAIN * sd
     ]
     stands = sum(r.stop - r.start for r in found)
     if len(found) < _FEWEST or stands < _SHARE * len(driven):
         return []
     plain = np.abs(np.diff([driven[r].mean() for r in found])).min() > least
-    return found if plain and np.median(_goes_on(answer, found)) < _GOES_ON else []
+    return found if plain and not _goes_on(answer, found) else []
 
 
-def _goes_on(answer: Array, levels: list[slice]) -> Array:
-    """(k,) what the answer (n,) does on a level, of the step that led there."""
-    inside = np.array([answer[r.stop - 1] - answer[r.start] for r in levels[1:]])
-    step = np.array([answer[b.start] - answer[a.stop - 1] for a, b in pairwise(levels)])
-    return np.asarray(np.abs(inside) / np.maximum(np.abs(step), np.finfo(float).tiny))
+def _joined(values: Array, edges: list[int], least: float) -> list[slice]:
+    """Stretches between edges, neighbours joined whose means lie closer than that: in a long level
+    some reading jumps off by chance."""
+    out: list[slice] = []
+    for a, b in pairwise(edges):
+        if out and abs(values[a:b].mean() - values[out[-1]].mean()) < least:
+            out[-1] = slice(out[-1].start, b)
+        else:
+            out.append(slice(a, b))
+    return out
+
+
+def _goes_on(answer: Array, levels: list[slice]) -> bool:
+    """Whether the answer (n,) does as much on the levels as on the steps between them."""
+    inside = sum(abs(answer[r.stop - 1] - answer[r.start]) for r in levels)
+    steps = sum(abs(answer[b.start] - answer[a.stop - 1]) for a, b in pairwise(levels))
+    return bool(inside >= steps)
 
 
 def _numbers(

@@ -49,7 +49,8 @@ def steps_numbered(data: GapData) -> GapData:
     if found is None:
         return data
     at = np.concatenate([a + rows for a, (_, rows) in zip(edges, found, strict=False)])
-    return replace(data, step=np.concatenate([s for s, _ in found]), branch=data.branch[at])
+    branch, step = data.branch[at], np.concatenate([s for s, _ in found])
+    return replace(data, step=np.where(branch == ZERO, 0, step), branch=branch)
 
 
 def _moving(data: GapData, hold: Ints) -> Flags:
