@@ -193,6 +193,18 @@ def test_long_ramps_that_bear_the_name_of_the_level_left_belong_to_the_next(
     assert wrong.sum() <= (4 if sd > 0.1 else 0)  # the first of a ramp may drown
 
 
+@pytest.mark.parametrize(("late", "hold"), [(2, 5), (4, 10), (9, 20)])
+def test_holds_that_begin_at_the_level_before_keep_their_names(late: int, hold: int) -> None:
+    """The number is set before the screw is turned; the load then settles."""
+    rng, number = np.random.default_rng(8), np.repeat(np.arange(1, 9), hold)
+    since = np.tile(np.arange(hold), 8) - late
+    gone = np.where(since < 0, 0.0, 1 - 0.05 * np.exp(-np.maximum(since, 0) / 2))
+    force = 10.0 * (number - 1 + gone) + rng.normal(0, 0.02, len(number))
+    data = bench_data(force, SPRING * force, step=number, imposed="force")
+    data = replace(data, instruments=replace(data.instruments, force=0.02))
+    np.testing.assert_array_equal(_leading_on(data).step, number)
+
+
 def test_only_what_rested_leaves() -> None:
     """Neither a triangle cut into steps nor a part that creeps on at its level changes names."""
     load = np.concatenate([np.linspace(0, 60, 90), np.linspace(60, 0, 90)])

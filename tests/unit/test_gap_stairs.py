@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.gap.data import LOADING, UNLOADING, GapData
+from identification.gap.data import LOADING, UNLOADING, ZERO, GapData
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.ramps import ramps_told, steps_numbered
 from tests.unit.test_gap_operators import bench_data
@@ -55,11 +55,51 @@ def test_a_displacement_that_is_set_makes_levels_on_which_the_force_relaxes() ->
     np.testing.assert_array_equal(data.step, np.repeat([1, 2, 3, 2], 30))
 
 
-@pytest.mark.parametrize("what", ["a ramp", "read coarsely", "a swing", "named", "one run of two"])
+@pytest.mark.parametrize("readings", [3, 30, 1000])
+def test_levels_may_be_of_any_length(readings: int) -> None:
+    data = steps_numbered(stairs(np.repeat(LEVELS, readings), sd=0.4))
+    np.testing.assert_array_equal(data.step, np.repeat([0, 1, 2, 3, 4, 3, 0], readings))
+
+
+def test_no_load_is_where_the_branch_says_so_and_nothing_moves() -> None:
+    level = np.repeat([0.0, 40.0, 80.0, 40.0, 0.0], 10)
+    branch = np.where(level > 0, LOADING, ZERO)
+    drifted = stairs(level + 0.1 * np.arange(50), SPRING * level)  # by 4 N
+    data = steps_numbered(replace(drifted, branch=branch))
+    assert np.all((data.step == 0) == (level == 0))
+    named = replace(stairs(level - 40), branch=branch)  # what the branch calls zero is loaded
+    assert np.all(steps_numbered(named).step[level == 0] > 0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_answer_that_comes_a_reading_late_is_no_trouble() -> None:
+    level = np.repeat(np.array([1e-4, 3e-4, 6e-4, 3e-4]), 10)
+    late = np.concatenate([level[:1], level[:-1]]) / SPRING
+    data = bench_data(late, level, step=np.full(40, -1))
+    assert steps_numbered(data) is not None
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        "a ramp",
+        "read coarsely",
+        "both read coarsely",
+        "a swing",
+        "named",
+        "one run of two",
+        "jumps alone",
+    ],
+)
 def test_what_is_no_staircase_keeps_its_names(what: str) -> None:
     force = np.linspace(0, 80, 200)
     if what == "read coarsely":  # the displacement goes on where the force seems to stand
         data = stairs(np.round(force / 8) * 8, SPRING * force, 0.01)
+    elif what == "both read coarsely":  # the answer more so
+        up = np.concatenate([force, force[::-1]])
+        data = stairs(np.round(up / 4) * 4, np.round(SPRING * up / 1e-4) * 1e-4, 0.01)
+    elif what == "jumps alone":  # of a displacement, under a weight
+        data = stairs(np.full(140, 50.0), np.repeat(LEVELS, 20) * SPRING)
     elif what == "a swing":
         data = stairs(40 * (1 - np.cos(np.linspace(0, 6 * np.pi, 200))))
     elif what == "one run of two":

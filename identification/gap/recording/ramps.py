@@ -50,7 +50,18 @@ def steps_numbered(data: GapData) -> GapData:
         return data
     at = np.concatenate([a + rows for a, (_, rows) in zip(edges, found, strict=False)])
     branch, step = data.branch[at], np.concatenate([s for s, _ in found])
-    return replace(data, step=np.where(branch == ZERO, 0, step), branch=branch)
+    unloaded = (branch == ZERO) & (_at_level(data.displacement, at) < _NOTHING)
+    return replace(data, step=np.where(unloaded, 0, step), branch=branch)
+
+
+def _at_level(values: Array, at: Ints) -> Array:
+    """(n,) size of the mean over the level that begins at row `at` (n,), of the largest one: a
+    force that drifts away is no load where nothing moves."""
+    mean = np.bincount(at, np.abs(values), len(at)) / np.maximum(np.bincount(at, None, len(at)), 1)
+    return np.asarray(mean[at] / max(float(mean.max()), np.finfo(float).tiny))
+
+
+_NOTHING = 0.05
 
 
 def _moving(data: GapData, hold: Ints) -> Flags:
