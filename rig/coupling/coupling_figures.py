@@ -208,9 +208,9 @@ def _plain_numbers(axis: Any) -> None:
 
 def _finish(figure: Figure, model: ArmModel) -> Figure:
     """The model's name; and across the figure what must not be overlooked."""
-    return watermark(figure, marks([model.note]), Path(model.name).name)
+    return watermark(figure, marks_of_notes([model.note]), Path(model.name).name)
 
 
-def marks(notes: Sequence[str]) -> list[str]:
+def marks_of_notes(notes: Sequence[str]) -> list[str]:
     """Banners ("EMULATED", "INCOMPLETE") that a model's note begins with."""
     return [word for note in notes for word in ("EMULATED", "INCOMPLETE") if f"{word}:" in note]

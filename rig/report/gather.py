@@ -221,6 +221,6 @@ def _coupling_marks(coupling: CouplingResult | None) -> tuple[str, ...]:
     """Banners of the data that a model was identified from."""
     if coupling is None:
         return ()
-    from rig.coupling.coupling_figures import marks
+    from rig.coupling.coupling_figures import marks_of_notes
 
-    return tuple(marks([coupling.model.note]))
+    return tuple(marks_of_notes([coupling.model.note]))

@@ -23,7 +23,7 @@ from identification.maps import (
     stiffness_map,
 )
 from rig.coupling.couple import couple
-from rig.coupling.coupling_figures import draw, maps, marks, stiffness
+from rig.coupling.coupling_figures import draw, maps, marks_of_notes, stiffness
 from rig.coupling.coupling_task import best_for, between_arms_deg
 from rig.errors import InputError
 from rig.models.model import ArmModel, load_model
@@ -247,7 +247,7 @@ def test_emulated_models_are_marked(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(text)
     figure = stiffness(couple(tmp_path / "m.yaml", samples=0))
     assert "EMULATED" in [t.get_text() for t in figure.texts]
-    assert marks(["nothing", "INCOMPLETE: stopped"]) == ["INCOMPLETE"]
+    assert marks_of_notes(["nothing", "INCOMPLETE: stopped"]) == ["INCOMPLETE"]
     plain = stiffness(couple(MODELS / "F1.yaml", samples=0))
     assert "EMULATED" not in [t.get_text() for t in plain.texts]
 
