@@ -50,6 +50,7 @@ def curve(shown: Shown, points: Points) -> Figure:
     label_below(grid, drive_label(shown.imposed))
     set_title(figure, f"Measured, and simulated before and after ({shown.with_what})")
     shared_legend(figure, [axes for pair in grid for axes in pair])
+    figure.align_ylabels()
     return figure
 
 
