@@ -25,9 +25,11 @@ from identification.gap.explanations.verdict import (
     TAKES_TWO,
     THREE,
     THREE_CLOSELY,
+    UNKNOWN_DOUBT,
     _heir,
     _main,
     _tells_of_three,
+    with_a_lead,
     with_posterior,
 )
 from identification.gap.judging.choice import chosen_of, foresees
@@ -111,7 +113,8 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
     for parts, least, share in ((three, 0.3, 1 - THREE), (three, 0.05, 0.0), (three[:2], 1, 0.0)):
         sizes = (1e-5, 0.5e-5, 1e-5 * least)[: len(parts)]
         one = replace(found, explanations=(said(parts, sizes, 0.0, OFF),), unknown=-800.0, alone={})
-        assert with_posterior(one, {}).probabilities["unknown"] == pytest.approx(share)
+        left = share - UNKNOWN_DOUBT * share * max(0.0, 2 * share - 1)
+        assert with_posterior(one, {}).probabilities["unknown"] == pytest.approx(left)
         # without an arm all of them speak of one spring
         alone = replace(one, engine=of_bench.engine)
         assert with_posterior(alone, {}).probabilities["unknown"] < 0.01
@@ -213,6 +216,25 @@ def test_of_springs_beside_a_mechanism_the_better_ones_are_taken(
     assert found.parts[1].variant is springs[taken].variant
 
 
+def test_an_unknown_of_an_arm_leaves_room_for_what_explains_most() -> None:
+    given = {"joint_yield": 0.0, "base_slip": 0.0, "none": 0.1, "unknown": 0.9}
+    best = {"joint_yield": 0.75, "base_slip": 0.25}
+    out = with_a_lead(given, best)
+    assert sum(out.values()) == pytest.approx(1.0)
+    assert out["joint_yield"] == pytest.approx(3 * out["base_slip"])
+    assert out["unknown"] == pytest.approx(0.9 - UNKNOWN_DOUBT * 0.9 * 0.8)
+    even = {**given, "none": 0.5, "unknown": 0.5}  # what is no likelier than not keeps all
+    assert with_a_lead(even, best) == even
+    bench = small_bench()
+    found = search(small_engine_of(bench), library(bench, ["joint_creep"]))
+    one = said((part("joint_creep", [0]),), (1e-5,), -200.0)
+    for arm in (True, False):
+        engine = replace_bench(found.engine, replace(bench, data=replace(bench.data, arm=arm)))
+        whole = replace(found, engine=engine, explanations=(one,), unknown=0.0, alone={})
+        p = with_posterior(whole, {}).probabilities
+        assert (p["joint_creep"] == pytest.approx(UNKNOWN_DOUBT)) == arm
+
+
 def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
     bench = small_bench()
     variants = library(bench, ["joint_creep"])
@@ -220,7 +242,7 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
     law, noise = (part("joint_creep", [0]),), bench.noise.stated
     sure = 1 - 0.5 * BENCH_DOUBT  # on a bench; of two that are doubted, half comes back
     shares = ((noise, False, None), (1.6 * noise, False, None), (3 * noise, False, sure),
-              (noise, True, 1.0))  # fmt: skip
+              (noise, True, 1 - UNKNOWN_DOUBT))  # fmt: skip
     for eta, arm, unknown in shares:
         data = replace(bench.data, arm=arm)
         engine = replace_bench(found.engine, replace(bench, data=data))

@@ -75,7 +75,27 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
     if not found.engine.bench.data.arm:
         doubted, doubt = doubted | {"none", "unknown"}, BENCH_DOUBT
     probabilities = trusted({w: m / total for w, m in mass.items()}, doubted, doubt)
+    best = next((e for e in ranked if e.parts), None)
+    if arm and best is not None:
+        probabilities = with_a_lead(probabilities, _main(best, arm))
     return replace(found, probabilities=probabilities, kept=kept)
+
+
+# Of 307 verdicts `unknown` above 0.9 on arms 280 were right, on test sets of others 97 of 115; of
+# the wrong ones of these, 14 of 18 were what the best explanation says.
+UNKNOWN_DOUBT = 0.1
+
+
+def with_a_lead(probabilities: dict[str, float], best: Mapping[str, float]) -> dict[str, float]:
+    """Probabilities in which an `unknown` that is likelier than not gives up to `UNKNOWN_DOUBT` of
+    its own to what the best explanation says (word -> share), the more the surer it is: laws of
+    others' rigs differ from those of the library, and leave more than they should."""
+    unknown = probabilities["unknown"]
+    lost = UNKNOWN_DOUBT * unknown * max(0.0, 2 * unknown - 1)
+    out = {**probabilities, "unknown": unknown - lost}
+    for word, share in best.items():
+        out[word] += lost * share
+    return out
 
 
 def foresaw(kept: Mapping[frozenset[str], float], words: frozenset[str]) -> bool:
