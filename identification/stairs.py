@@ -32,9 +32,9 @@ def steps_of_stairs(
     one they lead to. None where a run is no staircase. sd: standard uncertainty of one sample of
     each channel."""
     forces, moved = [force for force, _ in runs], [moved for _, moved in runs]
-    # a displacement that jumps under a force that stands is no staircase of a rig
-    ways = [(forces, moved, sd[0]), (moved, forces, sd[1])]
-    for driven, answer, u in ways if np.ptp(np.concatenate(forces)) > 2 * _PLAIN * sd[0] else []:
+    if np.ptp(np.concatenate(forces)) <= 2 * _PLAIN * sd[0]:
+        return None  # a displacement that jumps under a force that stands is no staircase
+    for driven, answer, u in ((forces, moved, sd[0]), (moved, forces, sd[1])):
         stairs = [_levels(d, a, u) for d, a in zip(driven, answer, strict=True)]
         if all(stairs):
             return _numbers(forces, driven, stairs)
@@ -61,13 +61,16 @@ def _levels(driven: Array, answer: Array, sd: float) -> list[slice]:
 def _joined(values: Array, edges: list[int], least: float) -> list[slice]:
     """Stretches between edges, neighbours joined whose means lie closer than that: in a long level
     some reading jumps off by chance."""
-    out: list[slice] = []
+    total = np.concatenate([[0.0], np.cumsum(values)])
+
+    def mean(a: int, b: int) -> float:
+        return float(total[b] - total[a]) / (b - a)
+
+    begins = [edges[0]]
     for a, b in pairwise(edges):
-        if out and abs(values[a:b].mean() - values[out[-1]].mean()) < least:
-            out[-1] = slice(out[-1].start, b)
-        else:
-            out.append(slice(a, b))
-    return out
+        if a > begins[-1] and abs(mean(a, b) - mean(begins[-1], a)) >= least:
+            begins.append(a)
+    return [slice(a, b) for a, b in pairwise([*begins, edges[-1]])]
 
 
 def _goes_on(answer: Array, levels: list[slice]) -> bool:
@@ -94,10 +97,10 @@ def _numbers(
     number[order] = np.cumsum(np.diff(size[order], prepend=0.0) > _SAME * smallest)
     loaded = np.abs(force) > _NO_LOAD * np.abs(force).max()
     number += np.any(loaded & (number == 0))
-    out, each = [], iter(number.tolist())
-    for d, found in zip(driven, stairs, strict=True):
-        ends = np.array([r.stop for r in found])
+    out = []
+    of_run = np.split(number, np.cumsum([len(found) for found in stairs])[:-1])
+    for d, found, step in zip(driven, stairs, of_run, strict=True):
+        first, ends = np.array([(r.start, r.stop) for r in found], dtype=np.int64).T
         level = np.minimum(np.searchsorted(ends, np.arange(len(d)), "right"), len(found) - 1)
-        step = np.array([next(each) for _ in found], dtype=np.int64)
-        out.append((step[level], np.array([r.start for r in found], dtype=np.int64)[level]))
+        out.append((step[level], first[level]))
     return out

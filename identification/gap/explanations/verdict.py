@@ -28,7 +28,7 @@ def trusted(
     away, the more the surer it is; half of that goes to `unknown`, half to all doubted words
     alike."""
     given = {w: p for w, p in probabilities.items() if w in doubted}
-    lost = {w: most * p * max(0.0, 2 * p - 1) for w, p in given.items()}
+    lost = {w: _given_away(p, most) for w, p in given.items()}
     out = {w: p - lost.get(w, 0.0) for w, p in probabilities.items()}
     for word, share in lost.items():
         others = 1.0 if word == "unknown" else 0.5
@@ -36,6 +36,11 @@ def trusted(
         for w in given:
             out[w] += others * share / len(given)
     return out
+
+
+def _given_away(probability: float, most: float) -> float:
+    """Of a probability that is likelier than not, up to `most` of it, the more the surer it is."""
+    return most * probability * max(0.0, 2 * probability - 1)
 
 
 def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) -> SearchResult:
@@ -91,7 +96,7 @@ def with_a_lead(probabilities: dict[str, float], best: Mapping[str, float]) -> d
     its own to what the best explanation says (word -> share), the more the surer it is: laws of
     others' rigs differ from those of the library, and leave more than they should."""
     unknown = probabilities["unknown"]
-    lost = UNKNOWN_DOUBT * unknown * max(0.0, 2 * unknown - 1)
+    lost = _given_away(unknown, UNKNOWN_DOUBT)
     out = {**probabilities, "unknown": unknown - lost}
     for word, share in best.items():
         out[word] += lost * share

@@ -4,7 +4,7 @@ Whoever records all the time has holds that begin with the ramp that led there. 
 hold, a ramp is neither at rest nor on its way; and its scatter would pass for noise of the force.
 Its samples are told (`GapData.on_the_way`): they are holds of their own, read as they are. Where
 every sample bears the name of the level next to it, the first half of a ramp is under the name of
-the level it leaves; it is given to the level it leads to.
+the level it leaves, and all of it may be; it is given to the level it leads to.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def steps_numbered(data: GapData) -> GapData:
     a level are under its branch, too."""
     if np.any(data.step >= 0):
         return data
-    edges = [0, *(np.flatnonzero(np.diff(data.run)) + 1).tolist(), len(data.run)]
+    edges = [*first_rows(data.run).tolist(), len(data.run)]
     runs = [(data.force[a:b], data.displacement[a:b]) for a, b in pairwise(edges)]
     found = steps_of_stairs(runs, _sd(data))
     if found is None:

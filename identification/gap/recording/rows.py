@@ -151,11 +151,11 @@ def reduce_rows(data: GapData) -> Rows:
     coming = ramp | (much_to_go(displacement, stay, meter.displacement) & ~begins)
     still = partial(_still, bins, rest_ids(data, hold), holds, ~coming)
     steadied, steady = still(data.force, meter.force)
-    since, stands = mean(data.time), steady & ~at_zero
-    steadied = steadied * (1 + relaxed(force, displacement, since, holds, weight, stands))
+    time, stands = mean(data.time), steady & ~at_zero
+    steadied = steadied * (1 + relaxed(force, displacement, time, holds, weight, stands))
     rested, rests = still(data.displacement, meter.displacement)
     return Rows(
-        time=mean(data.time), session=mean(_session(data)), clock=data.session is not None, run=run,
+        time=time, session=mean(_session(data)), clock=data.session is not None, run=run,
         setup=setup, repetition=first(data.repetition), branch=branch, step=step, hold=holds,
         level=level, weight=weight, force=steadied, measured_force=force, steady=steady,
         displacement=displacement, rested=rested, rests=rests,
