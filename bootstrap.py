@@ -40,7 +40,10 @@ def _with_supported_python() -> int:
     for major, minor in reversed(SUPPORTED):
         found = shutil.which(f"python{major}.{minor}")
         # A launcher may stand in the path for a version that it doesn't have.
-        if found and subprocess.run([found, "-c", ""], capture_output=True, check=False).returncode == 0:  # fmt: skip # noqa: E501
+        if (
+            found
+            and subprocess.run([found, "-c", ""], capture_output=True, check=False).returncode == 0
+        ):
             return subprocess.call([found, *sys.argv])
     here = ".".join(map(str, sys.version_info[:3]))
     print(

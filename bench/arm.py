@@ -80,9 +80,10 @@ def main() -> None:
         print("ur-analytic-ik is not installed: no ratio")
     else:
         theirs = timed(
-            "ur-analytic-ik, pose by pose", 20_000,
+            "ur-analytic-ik, pose by pose",
+            20_000,
             lambda: [ur10e.inverse_kinematics(t) for t in T[:20_000]],
-        )  # fmt: skip
+        )
         print(f"  ratio to ur-analytic-ik: {theirs / ik:.2f}")
     points = rng.uniform([-1.2, -1.2, 0.0], [1.2, 1.2, 1.2], (100_000, 3))
     down, pair = np.array([0.0, 0.0, -1.0]), maps.Coupling(0.0)
@@ -90,14 +91,17 @@ def main() -> None:
         stance = maps.Stance(down, np.eye(4), branch=branch)
         for name, coupling in (("single", None), ("coupled", pair)):
             timed(
-                f"stiffness map, {name}, {words}, cells", len(points),
+                f"stiffness map, {name}, {words}, cells",
+                len(points),
                 lambda s=stance, c=coupling: maps.stiffness_map(arm, points, s, [1, 0, 0], c),
                 repeat=1,
-            )  # fmt: skip
+            )
     timed(
-        "Monte Carlo workspace, samples", 10_000_000,
-        lambda: workspace.monte_carlo(arm, 1.5, 10_000_000), repeat=1,
-    )  # fmt: skip
+        "Monte Carlo workspace, samples",
+        10_000_000,
+        lambda: workspace.monte_carlo(arm, 1.5, 10_000_000),
+        repeat=1,
+    )
 
 
 if __name__ == "__main__":

@@ -26,8 +26,12 @@ def run(folder: Path, case: str, withhold: tuple[str, ...] = ()) -> dict[str, An
     dataset = import_table(folder / case / "samples.csv", folder / case / "meta.yaml")
     start = time.perf_counter()
     found = diagnose(dataset, withhold=withhold)
-    return {**found.to_json(), "case": case, "seconds": time.perf_counter() - start,
-            "text": found.to_text()}  # fmt: skip
+    return {
+        **found.to_json(),
+        "case": case,
+        "seconds": time.perf_counter() - start,
+        "text": found.to_text(),
+    }
 
 
 def line(out: dict[str, Any], label: dict[str, Any]) -> str:
@@ -74,8 +78,10 @@ def main() -> None:
             times.append(result["seconds"])
             results.append(result)
     times.sort()
-    print(f"{right} of {len(cases)} right; median {times[len(times) // 2]:.1f} s, "
-          f"slowest {times[-1]:.1f} s")  # fmt: skip
+    print(
+        f"{right} of {len(cases)} right; median {times[len(times) // 2]:.1f} s, "
+        f"slowest {times[-1]:.1f} s"
+    )
     if args.json:
         args.json.write_text(json.dumps(results, indent=1))
 

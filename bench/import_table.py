@@ -93,8 +93,10 @@ def main() -> None:
             run = subprocess.run(command, capture_output=True, text=True, check=True, timeout=600)
             got = json.loads(run.stdout)
             times[way] = got["s"]
-            print(f"{way:>7}: {got['s']:6.2f} s {rows / got['s']:>12,.0f} rows/s "
-                  f"peak {got['peak_MB']:5.0f} MB")  # fmt: skip
+            print(
+                f"{way:>7}: {got['s']:6.2f} s {rows / got['s']:>12,.0f} rows/s "
+                f"peak {got['peak_MB']:5.0f} MB"
+            )
         print(f"HDF5 file: {(folder / 'out.h5').stat().st_size / 1e6:.0f} MB")
         read, both = (times["loop"] / times[way] for way in ("read", "import"))
         print(f"{read:.1f} times as fast as the loop, with the file written {both:.1f} times")

@@ -68,9 +68,12 @@ def main() -> None:
         inside = [h.ci95[0] <= true <= h.ci95[1] for h in all_held]
         width = np.median([np.log(h.ci95[1] / h.ci95[0]) for h in all_held])
         scatter = np.std([np.log(h.shrink) for h in all_held])
-        print(f"{name}: expected {true:.2f}, covered {sum(inside)} of {count}, median width "
-              f"{width:.3f} (log), scatter of the factor {scatter:.3f}: width of a right interval "
-              f"{3.92 * scatter:.3f}", flush=True)  # fmt: skip
+        print(
+            f"{name}: expected {true:.2f}, covered {sum(inside)} of {count}, median width "
+            f"{width:.3f} (log), scatter of the factor {scatter:.3f}: width of a right interval "
+            f"{3.92 * scatter:.3f}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

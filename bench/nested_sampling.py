@@ -227,9 +227,14 @@ def nested(log_likelihood: Callable[[Array], float], ndim: int, live: int) -> tu
         return np.clip(u, 1e-12, 1 - 1e-12)
 
     sampler = NestedSampler(
-        log_likelihood, inside, ndim, nlive=live, bound="multi", sample="rwalk",
+        log_likelihood,
+        inside,
+        ndim,
+        nlive=live,
+        bound="multi",
+        sample="rwalk",
         rstate=np.random.default_rng(0),
-    )  # fmt: skip
+    )
     sampler.run_nested(dlogz=0.1, print_progress=False)
     return float(sampler.results.logz[-1]), float(sampler.results.logzerr[-1])
 
@@ -321,18 +326,24 @@ def main() -> None:
         )
         lines += of_case
         for x in of_case:
-            print(f"{x.case:20s} {x.model:18s} ours {x.ours:9.2f}  sampled {x.sampled:9.2f} +- "
-                  f"{x.error:.2f}  difference {x.ours - x.sampled:+.2f}  {x.seconds:.1f} s",
-                  flush=True)  # fmt: skip
+            print(
+                f"{x.case:20s} {x.model:18s} ours {x.ours:9.2f}  sampled {x.sampled:9.2f} +- "
+                f"{x.error:.2f}  difference {x.ours - x.sampled:+.2f}  {x.seconds:.1f} s",
+                flush=True,
+            )
         words = [x.seconds for x in of_case if x.model != "none"]
         sampled_s = float(np.mean(words)) * 18  # one effect at a time, joint 1 and few forms only
         ratios.append(sampled_s / ours_s)
-        print(f"{name:20s} all probabilities: ours {ours_s:.2f} s; 18 words sampled one by one, "
-              f"few forms each, no pairs: {sampled_s:.0f} s; ratio {ratios[-1]:.0f}",
-              flush=True)  # fmt: skip
+        print(
+            f"{name:20s} all probabilities: ours {ours_s:.2f} s; 18 words sampled one by one, "
+            f"few forms each, no pairs: {sampled_s:.0f} s; ratio {ratios[-1]:.0f}",
+            flush=True,
+        )
     worst = max(lines, key=lambda x: abs(x.ours - x.sampled))
-    print(f"largest difference {worst.ours - worst.sampled:+.2f} nats ({worst.model} on "
-          f"{worst.case}); slowest ratio {min(ratios):.0f}")  # fmt: skip
+    print(
+        f"largest difference {worst.ours - worst.sampled:+.2f} nats ({worst.model} on "
+        f"{worst.case}); slowest ratio {min(ratios):.0f}"
+    )
     if args.json:
         args.json.write_text(json.dumps([vars(x) for x in lines], indent=1))
 

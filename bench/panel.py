@@ -113,9 +113,12 @@ class Audience:
 def run(folder: Path, samples: int, speed: float, *, page: bool) -> Watched:
     """One measurement, watched or not."""
     process = subprocess.Popen(
-        command(folder, samples, speed, page=page), cwd=HOME, stderr=subprocess.PIPE, text=True,
+        command(folder, samples, speed, page=page),
+        cwd=HOME,
+        stderr=subprocess.PIPE,
+        text=True,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    )  # fmt: skip
+    )
     assert process.stderr is not None
     audience = None
     if page:

@@ -41,11 +41,18 @@ def session(name: str, folder: Path) -> Path:
     meta = measured_meta(protocol, load_station("emulated"))
     path = folder / f"{name}.h5"
     made = Dataset(
-        path=path, uuid="bench", created="2026-03-01T10:00:00+01:00", origin="emulated",
-        complete=True, meta=meta, columns=columns, units={}, long_names={},
+        path=path,
+        uuid="bench",
+        created="2026-03-01T10:00:00+01:00",
+        origin="emulated",
+        complete=True,
+        meta=meta,
+        columns=columns,
+        units={},
+        long_names={},
         texts={"protocol": protocol.text, "meta": meta.model_dump_json(exclude_none=True)},
         title=protocol.title,
-    )  # fmt: skip
+    )
     write(made, path)
     return path
 
@@ -70,8 +77,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         page, pdf = folder / "page.html", folder / "page.pdf"
-        print("session             report s  diagnosis s  beyond 3 s left out  no gap s  + PDF s"
-              "  page MB")  # fmt: skip
+        print(
+            "session             report s  diagnosis s  beyond 3 s left out  no gap s  + PDF s"
+            "  page MB"
+        )
         for protocol in ("paper_xy", "load_unload_hold"):
             data = str(session(protocol, folder))
             whole = seconds(runs, "report", data, "-o", str(page))
@@ -80,8 +89,10 @@ def main() -> None:
             bare = seconds(runs, "report", data, "-o", str(page), "--no-gap")
             printed = seconds(runs, "report", data, "-o", str(page), "--no-gap", "--pdf", str(pdf))
             counted = whole - max(0.0, alone - DIAGNOSIS)
-            print(f"{protocol:<18} {whole:9.2f} {alone:12.2f} {counted:20.2f} {bare:9.2f}"
-                  f" {printed:8.2f} {size:8.2f}")  # fmt: skip
+            print(
+                f"{protocol:<18} {whole:9.2f} {alone:12.2f} {counted:20.2f} {bare:9.2f}"
+                f" {printed:8.2f} {size:8.2f}"
+            )
         print(
             f"aimed at: {SECONDS:g} s with the excess of the diagnosis left out, {MEGABYTES:g} MB"
         )

@@ -104,10 +104,20 @@ def ours(folder: Path, seconds: int) -> tuple[np.ndarray, int, Meter, float]:
     data = folder / "bench.h5"
     begin = time.monotonic()
     process = subprocess.Popen(
-        [sys.executable, "-m", "rig", "measure", str(protocol), "--station",
-         str(folder / "stations" / "bench.yaml"), "-o", str(data)],
-        cwd=HOME, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "rig",
+            "measure",
+            str(protocol),
+            "--station",
+            str(folder / "stations" / "bench.yaml"),
+            "-o",
+            str(data),
+        ],
+        cwd=HOME,
+        stderr=subprocess.DEVNULL,
+    )
     meter = Meter(psutil.Process(process.pid))
     process.wait()
     meter.stop()

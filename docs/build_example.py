@@ -41,10 +41,18 @@ def measured(path: Path) -> None:
     meta = measured_meta(protocol, load_station("emulated"))
     texts = {"protocol": protocol.text, "meta": meta.model_dump_json(exclude_none=True)}
     made = Dataset(
-        path=path, uuid=f"00000000-0000-0000-0000-{SEED:012d}",
-        created="2026-03-01T10:00:00+01:00", origin="emulated", complete=True, meta=meta,
-        columns=columns, units={}, long_names={}, texts=texts, title=protocol.title,
-    )  # fmt: skip
+        path=path,
+        uuid=f"00000000-0000-0000-0000-{SEED:012d}",
+        created="2026-03-01T10:00:00+01:00",
+        origin="emulated",
+        complete=True,
+        meta=meta,
+        columns=columns,
+        units={},
+        long_names={},
+        texts=texts,
+        title=protocol.title,
+    )
     write(made, path)
 
 

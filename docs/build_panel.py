@@ -46,8 +46,11 @@ def from_a_run() -> None:
         words += ["--speed", "10"]  # so that no slot is missed, with a browser beside it
         run = subprocess.Popen(
             [sys.executable, "-m", "rig", *words, "--panel", "-o", str(output)],
-            cwd=HOME, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
+            cwd=HOME,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
         try:
             page = Viewer(driver, _link(run))
             _answer_until(page, lambda: _is_worth_a_picture(page))

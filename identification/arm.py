@@ -228,9 +228,18 @@ class Arm:
 
 
 _ARRAYS = (
-    "d", "a", "alpha", "mass", "centre", "torque_limit", "q_min", "q_max",
-    "joint_stiffness", "joint_stiffness_relative_sd", "payload_centre",
-)  # fmt: skip
+    "d",
+    "a",
+    "alpha",
+    "mass",
+    "centre",
+    "torque_limit",
+    "q_min",
+    "q_max",
+    "joint_stiffness",
+    "joint_stiffness_relative_sd",
+    "payload_centre",
+)
 
 
 def along(compliance: Array, direction: ArrayLike) -> Array:

@@ -24,9 +24,13 @@ _SCATTER, _AT_MOST = 8.0, 0.25  # standard deviations; of a way: so far readings
 
 
 def elsewhere(
-    force: Array, displacement: Array, sd: tuple[float, float], hold: Ints, there: Flags,
+    force: Array,
+    displacement: Array,
+    sd: tuple[float, float],
+    hold: Ints,
+    there: Flags,
     about: float,
-) -> tuple[Flags, Array]:  # fmt: skip
+) -> tuple[Flags, Array]:
     """Samples (n,) at which force and displacement (n,) are both elsewhere than the mean of their
     hold (n,) over those that are there (n,), to the sides that belong together, by shares of their
     ranges of which none is more than `about` times the other; and how far (n,), the larger share.

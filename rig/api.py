@@ -241,19 +241,34 @@ def _analysis_tables(out: Answer) -> None:
     directions = out.json["directions"]
     k = [(key, d, d["stiffness_N_per_mm"]) for key, d in directions.items()]
     out._add(
-        "stiffness", "Stiffness k",
+        "stiffness",
+        "Stiffness k",
         ("direction", "pose", "k_N_per_mm", "u_N_per_mm", "ci95_low", "ci95_high", "weighting"),
-        [(key, d["pose"], q["value"], q["standard_uncertainty"], *q["ci95"], d["weighting"])
-         for key, d, q in k],
-    )  # fmt: skip
+        [
+            (key, d["pose"], q["value"], q["standard_uncertainty"], *q["ci95"], d["weighting"])
+            for key, d, q in k
+        ],
+    )
     tables = (
-        ("curves", "curve", "Means over the repetitions",
-         ("branch", "step", "force_N", "displacement_mm", "sd_mm", "n")),
-        ("pointwise", "pointwise", "Stiffness between neighbouring levels",
-         ("force_N", "stiffness_N_per_mm", "sd_N_per_mm", "n")),
-        ("uncertainty", "budget", "Uncertainty of k",
-         ("name", "type", "standard_uncertainty_N_per_mm", "degrees_of_freedom", "counted")),
-    )  # fmt: skip
+        (
+            "curves",
+            "curve",
+            "Means over the repetitions",
+            ("branch", "step", "force_N", "displacement_mm", "sd_mm", "n"),
+        ),
+        (
+            "pointwise",
+            "pointwise",
+            "Stiffness between neighbouring levels",
+            ("force_N", "stiffness_N_per_mm", "sd_N_per_mm", "n"),
+        ),
+        (
+            "uncertainty",
+            "budget",
+            "Uncertainty of k",
+            ("name", "type", "standard_uncertainty_N_per_mm", "degrees_of_freedom", "counted"),
+        ),
+    )
     for name, key, title, columns in tables:
         rows = [(d, *(row[c] for c in columns)) for d in directions for row in directions[d][key]]
         out._add(name, title, ("direction", *columns), rows)
@@ -264,19 +279,31 @@ def _joint_tables(out: Answer) -> None:
     rows = [
         (j + 1, q["value"], q["standard_uncertainty"], *q["ci95"], identified, max(share, 0.0))
         for j, (q, identified, share) in enumerate(
-            zip(found["joint_stiffness_Nm_per_rad"], found["identified"], found["share_of_data"],
-                strict=True)
+            zip(
+                found["joint_stiffness_Nm_per_rad"],
+                found["identified"],
+                found["share_of_data"],
+                strict=True,
+            )
         )
-    ]  # fmt: skip
-    names = ("joint", "c_Nm_per_rad", "u_Nm_per_rad", "ci95_low", "ci95_high", "identified",
-             "share_of_data")  # fmt: skip
+    ]
+    names = (
+        "joint",
+        "c_Nm_per_rad",
+        "u_Nm_per_rad",
+        "ci95_low",
+        "ci95_high",
+        "identified",
+        "share_of_data",
+    )
     out._add("joints", "Joint torsional stiffness", names, rows)
     proposals = [
         (", ".join(f"{q:.3f}" for q in p["q_rad"]), str(p["direction"]), p["force_N"], p["why"])
         for p in found["next_poses"]
     ]
-    out._add("next_poses", "What to measure next", ("q_rad", "direction", "force_N", "why"),
-             proposals)  # fmt: skip
+    out._add(
+        "next_poses", "What to measure next", ("q_rad", "direction", "force_N", "why"), proposals
+    )
 
 
 def _gap_tables(out: Answer) -> None:
@@ -287,13 +314,30 @@ def _gap_tables(out: Answer) -> None:
     ranked = sorted(found["probabilities"].items(), key=lambda item: -item[1])
     out._add("probabilities", "Of being the main cause", ("word", "probability"), ranked)
     rows = [
-        (e["name"], e["probability"], e["share_of_gap"], name, p["value"], *p["ci95"], p["unit"],
-         ", ".join(e["indistinguishable_from"]))
+        (
+            e["name"],
+            e["probability"],
+            e["share_of_gap"],
+            name,
+            p["value"],
+            *p["ci95"],
+            p["unit"],
+            ", ".join(e["indistinguishable_from"]),
+        )
         for e in found["effects"]
         for name, p in (e["parameters"] or {"": _NO_PARAMETER}).items()
-    ]  # fmt: skip
-    names = ("effect", "probability", "share_of_gap", "parameter", "value", "ci95_low", "ci95_high",
-             "unit", "indistinguishable_from")  # fmt: skip
+    ]
+    names = (
+        "effect",
+        "probability",
+        "share_of_gap",
+        "parameter",
+        "value",
+        "ci95_low",
+        "ci95_high",
+        "unit",
+        "indistinguishable_from",
+    )
     out._add("effects", "Effects in the explanation", names, rows)
     for name, title, table in (
         ("gap", "How far the gap shrinks", held_table(shown(r))),

@@ -59,10 +59,13 @@ class Check:
     def to_json(self) -> dict[str, object]:
         """The same for programs."""
         devices = {
-            d.name: {"ready": d.error is None, "identity": d.identity,
-                     "problem": None if d.error is None else str(d.error)}
+            d.name: {
+                "ready": d.error is None,
+                "identity": d.identity,
+                "problem": None if d.error is None else str(d.error),
+            }
             for d in self.devices
-        }  # fmt: skip
+        }
         return {
             "schema": schemas.CHECK,
             "station": self.station,

@@ -186,8 +186,22 @@ def equal(first: Dataset, second: Dataset) -> bool:
     if first.columns.keys() != second.columns.keys():
         return False
     same = all(_same(first.columns[n], second.columns[n]) for n in first.columns)
-    fields = ("uuid", "created", "origin", "complete", "meta", "units", "long_names", "events",
-              "texts", "devices", "calibration", "software", "stop_reason", "title")  # fmt: skip
+    fields = (
+        "uuid",
+        "created",
+        "origin",
+        "complete",
+        "meta",
+        "units",
+        "long_names",
+        "events",
+        "texts",
+        "devices",
+        "calibration",
+        "software",
+        "stop_reason",
+        "title",
+    )
     return same and all(getattr(first, f) == getattr(second, f) for f in fields)
 
 

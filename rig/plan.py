@@ -96,9 +96,12 @@ class Plan:
             f"{counted(self.repetitions, 'time')}; "
             f"at least {self.samples} samples",
             f"Duration: about {_time(self.duration_s)}"
-            + (f"; at {self.speed:g} times real time {_time(self.duration_s / self.speed)}"
-               if self.speed > 1 else ""),
-        ]  # fmt: skip
+            + (
+                f"; at {self.speed:g} times real time {_time(self.duration_s / self.speed)}"
+                if self.speed > 1
+                else ""
+            ),
+        ]
         lines += [f"  {text}" for text in self.assumptions]
         lines += ["", *(f"Warning: {text}" for text in self.warnings)] if self.warnings else []
         return "\n".join(lines)
@@ -275,12 +278,19 @@ def _table(runs: Sequence[PlannedRun]) -> list[str]:
     for n, run in enumerate(runs, start=1):
         j = run.worst_joint
         hold, limit = abs(run.hold_torque_Nm[j]), run.torque_limit_Nm[j]
-        rows.append((
-            f"{n}", run.pose, run.direction, f"{run.steps}",
-            f"{run.forces_N[0]:g} to {run.forces_N[-1]:g}", f"{run.stiffness_N_per_mm:.1f}",
-            f"{run.displacement_mm:.2f}", f"J{j + 1} {hold:.0f} of {limit:g}",
-            _time(run.duration_s),
-        ))  # fmt: skip
+        rows.append(
+            (
+                f"{n}",
+                run.pose,
+                run.direction,
+                f"{run.steps}",
+                f"{run.forces_N[0]:g} to {run.forces_N[-1]:g}",
+                f"{run.stiffness_N_per_mm:.1f}",
+                f"{run.displacement_mm:.2f}",
+                f"J{j + 1} {hold:.0f} of {limit:g}",
+                _time(run.duration_s),
+            )
+        )
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
     left = (1, 2, 7)
     return [

@@ -53,8 +53,10 @@ def limit_warnings(
 ) -> Iterator[str]:
     """A limit that no reading can reach."""
     force = protocol.limits.force_N
-    reach = min((allowed / part for _, part, allowed in _full_scales(run, station) if part > 0),
-                default=np.inf)  # fmt: skip
+    reach = min(
+        (allowed / part for _, part, allowed in _full_scales(run, station) if part > 0),
+        default=np.inf,
+    )
     if force is not None and force.max > reach:
         yield (
             f"{name_of(run)}: limits.force_N.max is {force.max:g} N, but the dynamometer's full "
@@ -133,9 +135,10 @@ def time_warnings(protocol: MeasurementProtocol, runs: Sequence[PlannedRun]) -> 
                 "Fewer steps or shorter holds."
             )
     unwatched = [
-        key for key in ("force_N", "displacement_mm")
+        key
+        for key in ("force_N", "displacement_mm")
         if (limit := getattr(protocol.limits, key)) is None or limit.at != "stop"
-    ]  # fmt: skip
+    ]
     for key in unwatched:
         yield f"limits.{key} does not stop the measurement."
 

@@ -37,8 +37,17 @@ def watermark(
     """Across the figure, `turn` deg, what must not be overlooked: it may leave the text that says
     so. name: as in `named`."""
     if words := marks(banners):
-        figure.text(0.5, 0.5, " · ".join(words), fontsize=size, color="0.5", alpha=0.25,
-                    ha="center", va="center", rotation=turn)  # fmt: skip
+        figure.text(
+            0.5,
+            0.5,
+            " · ".join(words),
+            fontsize=size,
+            color="0.5",
+            alpha=0.25,
+            ha="center",
+            va="center",
+            rotation=turn,
+        )
     return named(figure, name)
 
 

@@ -12,10 +12,14 @@ from rig.protocolfile import Settle
 
 # Where no earlier protocol says what counts as settled.
 _SETTLE = Settle(
-    window_s=SETTLE_S, force_slope_N_per_s=0.05, force_spread_N=0.3,
-    displacement_slope_mm_per_s=0.002, displacement_spread_mm=0.01, deadline_s=60,
+    window_s=SETTLE_S,
+    force_slope_N_per_s=0.05,
+    force_spread_N=0.3,
+    displacement_slope_mm_per_s=0.002,
+    displacement_spread_mm=0.01,
+    deadline_s=60,
     at_deadline="record",
-)  # fmt: skip
+)
 
 
 _ANGLE_DIGITS = 6  # of degrees: a hundredth of a micrometre at a metre

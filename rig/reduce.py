@@ -29,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,52 +41,11 @@ from identification.turns import turning_points
 from identification.ways import leading_on
 from rig.arrays import Array
 from rig.digits import counted
+from rig.measurements import Measurements
 from rig.passes import TURN, binned, is_held
 from rig.units import M_PER_MM
 
 MOST_REPETITIONS = 50  # into which the cycles of a recording are gathered
-
-
-class _ForceInstrument(Protocol):
-    @property
-    def standard_uncertainty_N(self) -> float: ...
-    @property
-    def gain_relative_sd(self) -> float: ...
-
-
-class _DisplacementInstrument(Protocol):
-    @property
-    def standard_uncertainty_mm(self) -> float: ...
-    @property
-    def gain_relative_sd(self) -> float: ...
-
-
-class _Instruments(Protocol):
-    @property
-    def force(self) -> _ForceInstrument: ...
-    @property
-    def displacement(self) -> _DisplacementInstrument: ...
-
-
-class _Meta(Protocol):
-    @property
-    def directions(self) -> Any: ...
-    @property
-    def instruments(self) -> _Instruments: ...
-    @property
-    def datum(self) -> str: ...
-
-
-class Measurements(Protocol):
-    """What is asked of a data set; `rig.dataset.Dataset` has it."""
-
-    @property
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """Name -> (n,)."""
-
-    @property
-    def meta(self) -> _Meta:
-        """Directions, instruments, datum."""
 
 
 @dataclass(frozen=True)

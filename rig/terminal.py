@@ -57,6 +57,12 @@ def _fold(line: str, width: int) -> str:
     if len(line) <= width or len(deeper) > width // 2:
         return line
     return textwrap.fill(
-        inside, width, initial_indent=indent, subsequent_indent=deeper, replace_whitespace=False,
-        expand_tabs=False, break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
+        inside,
+        width,
+        initial_indent=indent,
+        subsequent_indent=deeper,
+        replace_whitespace=False,
+        expand_tabs=False,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

@@ -113,6 +113,10 @@ class GapData:
         """(n,) samples on the way, none where no ramp was told."""
         return np.zeros(len(self.run), bool) if self.on_the_way is None else self.on_the_way
 
+    def outside_of(self, setup: Ints) -> Array:
+        """(n,) m/N: compliance outside the springs, of the setups of rows (n,)."""
+        return np.array([s.outside for s in self.setups])[setup]
+
     @property
     def joints(self) -> int:
         """Number of elastic elements."""

@@ -187,8 +187,10 @@ class NotShown(ValueError):
 def _check_shown(forced: frozenset[str], variants: list[Variant]) -> None:
     shown = dict.fromkeys(v.word for v in variants)
     for word in sorted(forced - shown.keys()):
-        raise NotShown(f"{word} is nothing that these data could show; they could: "
-                       f"{', '.join(shown) or 'no effect'}")  # fmt: skip
+        raise NotShown(
+            f"{word} is nothing that these data could show; they could: "
+            f"{', '.join(shown) or 'no effect'}"
+        )
 
 
 def _silent(_: str, __: float) -> None:
@@ -245,8 +247,9 @@ def _likeness(found: SearchResult, verdict: str) -> Likeness | None:
 def _effects(
     found: SearchResult, chosen: Explanation, known: list[Known]
 ) -> tuple[EffectFound, ...]:
-    weights = np.array([e.log_good + log(found.kept.get(e.words, 1.0) + 1e-300)
-                        for e in found.explanations])  # fmt: skip
+    weights = np.array(
+        [e.log_good + log(found.kept.get(e.words, 1.0) + 1e-300) for e in found.explanations]
+    )
     share = np.exp(weights - weights.max())
     total = float(share.sum())
     squares = np.array(chosen.sizes) ** 2 if chosen.sizes else np.zeros(0)
@@ -342,8 +345,7 @@ def _next(
 def _across(bench: Bench, chosen: Explanation) -> tuple[Note, ...]:
     """Of an effect that other readings show, and nothing moves by."""
     each = zip(chosen.parts, chosen.sizes, strict=True)
-    shown = [p for p, s in each if p.variant.shown > 1
-             and s < _MOVES * bench.noise.stated]  # fmt: skip
+    shown = [p for p, s in each if p.variant.shown > 1 and s < _MOVES * bench.noise.stated]
     if not shown:
         return ()
     text = (

@@ -13,7 +13,8 @@ from identification.estimate import WEIGHTINGS, Weighting
 from identification.uncertainty import Contribution, Quantity
 from rig import schemas
 from rig.errors import InputError, close_to
-from rig.reduce import Measurements, curves
+from rig.measurements import Measurements
+from rig.reduce import curves
 from rig.units import MM_PER_M, N_PER_MM
 
 AUTO: Literal["auto"] = "auto"

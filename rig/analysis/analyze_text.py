@@ -106,10 +106,16 @@ def _excluded(excluded: Sequence[Exclusion]) -> Iterator[str]:
 
 def _tables(r: Stiffness) -> Iterator[str]:
     levels = [
-        (p.branch, str(p.step), number(p.force), number(p.displacement * MM_PER_M),
-         number(p.sd * MM_PER_M, 2), str(p.n))
+        (
+            p.branch,
+            str(p.step),
+            number(p.force),
+            number(p.displacement * MM_PER_M),
+            number(p.sd * MM_PER_M, 2),
+            str(p.n),
+        )
         for p in r.levels
-    ]  # fmt: skip
+    ]
     yield from _table(
         "Curve (means over the repetitions)",
         ("branch", "step", "force N", "displacement mm", "sd mm", "n"),
@@ -127,10 +133,14 @@ def _tables(r: Stiffness) -> Iterator[str]:
         words=0,
     )
     budget = [
-        (c.name if c.counted else f"({c.name})", c.kind, number(c.u * N_PER_MM, 3),
-         "-" if math.isinf(c.dof) else number(c.dof, 1))
+        (
+            c.name if c.counted else f"({c.name})",
+            c.kind,
+            number(c.u * N_PER_MM, 3),
+            "-" if math.isinf(c.dof) else number(c.dof, 1),
+        )
         for c in r.budget
-    ]  # fmt: skip
+    ]
     yield from _table(
         "Uncertainty of k (dof: degrees of freedom; in brackets: within another line)",
         ("contribution", "type", "u N/mm", "dof"),
@@ -138,10 +148,14 @@ def _tables(r: Stiffness) -> Iterator[str]:
         words=2,
     )
     rivals = [
-        (_short(a.choice.label)[0], "all" if a.after_knee else "as above",
-         number(a.value * N_PER_MM), number(a.u * N_PER_MM, 2))
+        (
+            _short(a.choice.label)[0],
+            "all" if a.after_knee else "as above",
+            number(a.value * N_PER_MM),
+            number(a.u * N_PER_MM, 2),
+        )
         for a in r.alternatives
-    ]  # fmt: skip
+    ]
     header = ("weighting and origin", "steps", "k N/mm", "u N/mm")
     yield from _table("k under other choices", header, rivals, words=2)
     meanings = dict.fromkeys(_short(a.choice.label)[1] for a in r.alternatives)

@@ -58,8 +58,13 @@ def pointwise(analysis: Analysis) -> Figure:
         )
         k = direction.result.k
         if k is not None:
-            axes.axhline(k.value * N_PER_MM, color=colour, linestyle="--", linewidth=1,
-                         label=f"{key}: k = {number(k.value * N_PER_MM)} N/mm")  # fmt: skip
+            axes.axhline(
+                k.value * N_PER_MM,
+                color=colour,
+                linestyle="--",
+                linewidth=1,
+                label=f"{key}: k = {number(k.value * N_PER_MM)} N/mm",
+            )
     axes.set_title("Stiffness between neighbouring levels: mean and standard deviation")
     return _finish(figure, axes, analysis)
 
@@ -100,22 +105,35 @@ def _curve(axes: Any, direction: Direction, key: str, colour: str, marker: str) 
         )
     crossed = [p for p in r.levels if p.branch == "loading" and p.step in left_out]
     if crossed:
-        axes.plot([p.force for p in crossed], [p.displacement * MM_PER_M for p in crossed], "x",
-                  color="black", markersize=9, label=f"{key}: not counted towards k")  # fmt: skip
+        axes.plot(
+            [p.force for p in crossed],
+            [p.displacement * MM_PER_M for p in crossed],
+            "x",
+            color="black",
+            markersize=9,
+            label=f"{key}: not counted towards k",
+        )
     if r.k is not None:
         counted = [p.force for p in r.levels if p.step not in left_out]
         ends = np.array([min([0.0, *counted]), max([0.0, *counted])])
         u = (r.intercept + ends / r.k.value) * MM_PER_M
-        axes.plot(ends, u, color=colour, linestyle="--", linewidth=1,
-                  label=f"{key}: k = {number(r.k.value * N_PER_MM)} N/mm")  # fmt: skip
+        axes.plot(
+            ends,
+            u,
+            color=colour,
+            linestyle="--",
+            linewidth=1,
+            label=f"{key}: k = {number(r.k.value * N_PER_MM)} N/mm",
+        )
 
 
 def _finish(figure: Figure, axes: Any, analysis: Analysis) -> Figure:
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         order = sorted(range(len(labels)), key=lambda i: labels[i].split(":")[0])
-        axes.legend([handles[i] for i in order], [labels[i] for i in order],
-                    frameon=False, fontsize=8)  # fmt: skip
+        axes.legend(
+            [handles[i] for i in order], [labels[i] for i in order], frameon=False, fontsize=8
+        )
     else:
         axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center")
     return watermark(figure, analysis.banners, analysis.name)

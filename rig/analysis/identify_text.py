@@ -62,12 +62,15 @@ def model_text(result: IdentifyResult) -> str:
         f"# Identified from {', '.join(Path(d).name for d in result.datasets)}",
         *([f"note: {json.dumps(note)}"] if note else []),
         *arm_lines(
-            result.arm.name, result.observations[0].q.tolist(), result.tool_xyz, fit.stiffness,
+            result.arm.name,
+            result.observations[0].q.tolist(),
+            result.tool_xyz,
+            fit.stiffness,
             fit.stiffness * fit.relative_sd,
         ),
         "effects: []",
         *coupling_lines(),
-    ]  # fmt: skip
+    ]
     return "\n".join(lines) + "\n"
 
 

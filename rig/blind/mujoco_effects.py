@@ -75,8 +75,11 @@ def _yield(rig: Rig, random: Random) -> Hidden:
     hinge = spring(rig, j, share * rig.springs[j], friction_Nm=threshold, reference=rig.springs[j])
     returned = bool(random.random() < 0.5)
     # there is no gravity: what slips feels the load alone
-    facts = {"threshold_of_load_Nm": threshold, "spring_beside_over_elastic": share,
-             "taken_back": returned}  # fmt: skip
+    facts = {
+        "threshold_of_load_Nm": threshold,
+        "spring_beside_over_elastic": share,
+        "taken_back": returned,
+    }
     return Hidden(
         "joint_yield", "friction_in_series", "foreign", facts, (j + 1,), (hinge,), returned=returned
     )
@@ -100,10 +103,15 @@ def _backlash(rig: Rig, random: Random) -> Hidden:
     width = float(np.exp(random.uniform(np.log(6e-5), np.log(4e-4))))
     friction = float(random.uniform(0.1, 0.6))
     hinge = spring(
-        rig, 0, 0.0, stop_stiffness=float(20 * rig.springs[0]), stop_rad=width / 2,
-        friction_Nm=friction, damping=float(rig.springs[0] / SWING / 5),
+        rig,
+        0,
+        0.0,
+        stop_stiffness=float(20 * rig.springs[0]),
+        stop_rad=width / 2,
+        friction_Nm=friction,
+        damping=float(rig.springs[0] / SWING / 5),
         reference=float(rig.springs[0]),
-    )  # fmt: skip
+    )
     facts = {"width_rad": width, "friction_Nm": friction}
     return Hidden("joint_backlash", "stops_with_friction", "foreign", facts, (1,), (hinge,))
 
@@ -162,8 +170,12 @@ def _base_slip(rig: Rig, random: Random) -> Hidden:
     threshold = float(random.uniform(0.45, 0.8) * rig.moment[a])
     k = float(np.exp(random.uniform(np.log(3e4), np.log(3e5))))
     hinge = Hinge("base", axis, at, k, friction_Nm=threshold, reference=float(rig.springs[0]))
-    facts = {"threshold_Nm": threshold, "stiffness_after_Nm_per_rad": k,
-             "axis": axis.tolist(), "axis_depth_m": depth}  # fmt: skip
+    facts = {
+        "threshold_Nm": threshold,
+        "stiffness_after_Nm_per_rad": k,
+        "axis": axis.tolist(),
+        "axis_depth_m": depth,
+    }
     form = "yaw_friction" if a == 2 else "tilt_friction"
     return Hidden("base_slip", form, "foreign", facts, hinges=(hinge,), seen=False)
 
@@ -180,9 +192,13 @@ def _links(rig: Rig, random: Random) -> Hidden:
         hinges += [Hinge(name, axis, at, k) for axis in (across, np.cross(along, across))]
     facts = {"hinge_Nm_per_rad": sizes}
     return Hidden(
-        "link_flexibility", "hinge_in_the_middle", "foreign", facts, hinges=tuple(hinges),
+        "link_flexibility",
+        "hinge_in_the_middle",
+        "foreign",
+        facts,
+        hinges=tuple(hinges),
         seen=False,
-    )  # fmt: skip
+    )
 
 
 _DRAW: dict[str, Callable[[Rig, Random], Hidden]] = {

@@ -113,8 +113,16 @@ def _across(h: Hinge, number: int, along: Array, at: Array) -> Hinge:
 class _Run:
     """One repetition: zero, up, down, zero."""
 
-    def __init__(self, design: Design, arm: MujocoArm, pose: str, direction: str,
-                 repetition: int, clock: float, hidden: Hidden | None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        design: Design,
+        arm: MujocoArm,
+        pose: str,
+        direction: str,
+        repetition: int,
+        clock: float,
+        hidden: Hidden | None,
+    ) -> None:
         self._design, self._arm, self._hidden = design, arm, hidden
         self._place = (pose, direction, repetition)
         self._start = self.clock = clock
@@ -149,8 +157,18 @@ class _Run:
             self.clock += 1.0
             if self._hidden is not None and self._hidden.creeps:
                 self._arm.hold(1.0)
-            row = Row(self.clock - self._start, self.clock, pose, direction, repetition, branch,
-                      step, force, self._arm.displacement(), self._joints())  # fmt: skip
+            row = Row(
+                self.clock - self._start,
+                self.clock,
+                pose,
+                direction,
+                repetition,
+                branch,
+                step,
+                force,
+                self._arm.displacement(),
+                self._joints(),
+            )
             out.append(row)
         return out
 

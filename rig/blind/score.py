@@ -36,13 +36,17 @@ def report(campaign: Campaign) -> dict[str, Any]:
         "summary": summary(clear, judged),
         "tables": tables(clear, judged),
         "failures": [
-            {"name": c.outcome.name, "status": c.outcome.reply.status,
-             "reason": c.outcome.reply.reason}
-            for c in judged if c.outcome.reply.status != "answered"
+            {
+                "name": c.outcome.name,
+                "status": c.outcome.reply.status,
+                "reason": c.outcome.reply.reason,
+            }
+            for c in judged
+            if c.outcome.reply.status != "answered"
         ],
         "undrawn": [{"number": n, "reason": reason} for n, reason in campaign.undrawn],
         "cases": [j.case_json(c) for c in judged],
-    }  # fmt: skip
+    }
 
 
 def summary(clear: list[Judged], judged: list[Judged]) -> dict[str, Any]:
@@ -141,9 +145,11 @@ def _mixtures(cases: list[Judged]) -> dict[str, Any]:
         "f1": _f1(counts),
         "f1_exact_words": _f1(exact),
         "main_cause_right": rate(c.right for c in cases),
-        "both_named": rate(hit == len(c.label["truth"]) and not extra
-                           for c, (hit, extra, _) in zip(cases, counts, strict=True)),
-    }  # fmt: skip
+        "both_named": rate(
+            hit == len(c.label["truth"]) and not extra
+            for c, (hit, extra, _) in zip(cases, counts, strict=True)
+        ),
+    }
 
 
 def _f1(counts: list[tuple[int, int, int]]) -> float | None:
@@ -240,10 +246,11 @@ def _gap(cases: list[Judged]) -> dict[str, Any]:
         "fitted_over_noise": dict(zip(names, quantiles(fitted, 0.5, 0.9), strict=True)),
         "withheld_over_noise": dict(zip(names, quantiles(held, 0.5, 0.9), strict=True)),
         "withheld_over_fitted": dict(zip(names, quantiles(ratio, 0.5, 0.9), strict=True)),
-        "shrink_withheld": dict(zip(("p10", *names), quantiles(shrink, 0.1, 0.5, 0.9),
-                                    strict=True)),
+        "shrink_withheld": dict(
+            zip(("p10", *names), quantiles(shrink, 0.1, 0.5, 0.9), strict=True)
+        ),
         "beats_wrong_runners_up": rate(wins),
-    }  # fmt: skip
+    }
 
 
 def _wins(c: Judged, after_mm: float) -> list[bool]:

@@ -81,8 +81,9 @@ MEASURES = (
     Measure("fitted / noise, median", "gap.fitted_over_noise.median"),
     Measure("fitted / noise, 90th percentile", "gap.fitted_over_noise.p90"),
     Measure("withheld / noise, median", "gap.withheld_over_noise.median", 1.05, at_least=False),
-    Measure("withheld / noise, 90th percentile", "gap.withheld_over_noise.p90", 1.3,
-            at_least=False),
+    Measure(
+        "withheld / noise, 90th percentile", "gap.withheld_over_noise.p90", 1.3, at_least=False
+    ),
     Measure("withheld / fitted, median", "gap.withheld_over_fitted.median", 1.1, at_least=False),
     Measure("withheld / fitted, 90th percentile", "gap.withheld_over_fitted.p90"),
     Measure("gap shrinks by (withheld), median", "gap.shrink_withheld.median"),
@@ -90,7 +91,7 @@ MEASURES = (
     Measure("time a case, median, s", "time.median_s", 2.0, at_least=False),
     Measure("time a case, 95th percentile, s", "time.p95_s", 5.0, at_least=False),
     Measure("crashed, refused or late", "crashed_or_late"),
-)  # fmt: skip
+)
 
 
 def lines(summary: dict[str, Any]) -> list[Line]:

@@ -95,9 +95,13 @@ def diagnose(
 
             check_arm(measured)
         result = run_diagnose(
-            measured, model=model, simulation=simulation,
-            add=add or (), withhold=withhold or (), progress=progress,
-        )  # fmt: skip
+            measured,
+            model=model,
+            simulation=simulation,
+            add=add or (),
+            withhold=withhold or (),
+            progress=progress,
+        )
     give(result, json_file)
     if not (model or simulation or add or withhold):
         from rig.catalogue import remember_result

@@ -54,9 +54,13 @@ def couple(
     with terminal_progress() as progress:
         told = lambda share: progress("sampling the workspace", share)  # noqa: E731
         result = run_couple(
-            model, samples=samples, path=path, dead_band=dead_band, best_placement=best_placement,
+            model,
+            samples=samples,
+            path=path,
+            dead_band=dead_band,
+            best_placement=best_placement,
             progress=told,
-        )  # fmt: skip
+        )
     give(result, json_file)
     if figures is not None:
         from rig.coupling.coupling_figures import draw

@@ -120,10 +120,14 @@ def compare(result: CouplingResult) -> list[Beside]:
             Beside(f"single {axis}", "N/mm", stated, None, float(single[i])),
             Beside(f"coupled {axis}", "N/mm", coupled, None, float(pair[i]), 1),
             Beside(
-                f"gain {axis}", "%", PUBLISHED_GAIN_PERCENT[i], 100 * (times - 1),
-                100 * (gain - 1), 0,
+                f"gain {axis}",
+                "%",
+                PUBLISHED_GAIN_PERCENT[i],
+                100 * (times - 1),
+                100 * (gain - 1),
+                0,
             ),
-        ]  # fmt: skip
+        ]
         if axis == "y":
             rows.append(Beside("gain y", "times", PUBLISHED_TIMES_Y, times, gain))
     space = result.workspaces[0]

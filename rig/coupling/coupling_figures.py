@@ -62,15 +62,32 @@ def stiffness(result: CouplingResult) -> Figure:
         bars.append(("coupled, published", np.array(PUBLISHED_COUPLED), None, "white", COLOURS[1]))
     colours = {"rigid": COLOURS[1], "compliant": COLOURS[2], "point": COLOURS[3]}
     for kind, k in result.pair.items():
-        bars.append((f"coupled, {kind}", k[:2] * N_PER_MM, result.u_pair[kind][:2] * N_PER_MM,
-                     colours[kind], ""))  # fmt: skip
+        bars.append(
+            (
+                f"coupled, {kind}",
+                k[:2] * N_PER_MM,
+                result.u_pair[kind][:2] * N_PER_MM,
+                colours[kind],
+                "",
+            )
+        )
     width = 0.8 / len(bars)
     for i, (label, values, u, fill, edge) in enumerate(bars):
         at = np.arange(2) + (i - (len(bars) - 1) / 2) * width
-        drawn = axes.bar(at, values, 0.92 * width, yerr=u, color=fill, edgecolor=edge or fill,
-                         hatch="//" if edge else None, capsize=3, label=label)  # fmt: skip
-        axes.bar_label(drawn, [f"{v:.1f}" if v < 1000 else f"{v:.0f}" for v in values],
-                       fontsize=7.5, padding=2)  # fmt: skip
+        drawn = axes.bar(
+            at,
+            values,
+            0.92 * width,
+            yerr=u,
+            color=fill,
+            edgecolor=edge or fill,
+            hatch="//" if edge else None,
+            capsize=3,
+            label=label,
+        )
+        axes.bar_label(
+            drawn, [f"{v:.1f}" if v < 1000 else f"{v:.0f}" for v in values], fontsize=7.5, padding=2
+        )
     axes.set_yscale("log")
     axes.margins(y=0.12)
     axes.set_ylabel(_LABEL)
@@ -127,9 +144,14 @@ def _map_panel(figure: Figure, axes: Any, x: Array, y: Array, k: Array) -> None:
     # the few cells beside a singularity would take all colours
     low, high = np.quantile(known, [0.01, 0.97]) if known.size else (1.0, 10.0)
     image = axes.pcolormesh(
-        x, y, k, norm=LogNorm(low, max(high, 1.01 * low)), cmap="viridis", shading="nearest",
+        x,
+        y,
+        k,
+        norm=LogNorm(low, max(high, 1.01 * low)),
+        cmap="viridis",
+        shading="nearest",
         rasterized=True,
-    )  # fmt: skip
+    )
     # as high as the map, whose height follows from its width, and beside it, not the next one
     beside = axes.inset_axes((1.04, 0.0, 0.045, 1.0))
     beside.grid(visible=False)
@@ -150,15 +172,29 @@ def place(result: TaskResult) -> Figure:
     margins = best.margins.T
     known = margins[np.isfinite(margins)]
     low, high = np.quantile(known, [0.01, 0.99])
-    image = axes.pcolormesh(x, y, margins, norm=LogNorm(low, max(high, 1.01 * low)),
-                            cmap="viridis", shading="nearest", rasterized=True)  # fmt: skip
+    image = axes.pcolormesh(
+        x,
+        y,
+        margins,
+        norm=LogNorm(low, max(high, 1.01 * low)),
+        cmap="viridis",
+        shading="nearest",
+        rasterized=True,
+    )
     bar = figure.colorbar(image, ax=axes, label="Reached over required stiffness", extend="both")
     _plain_numbers(bar.ax.yaxis)
     if known.min() < 1 < known.max():
         lines = axes.contour(x, y, margins, levels=[1.0], colors="white", linewidths=1.5)
         axes.clabel(lines, fmt={1.0: "just met"}, fontsize=8)
-    axes.plot(MM_PER_M * best.base_distance, np.rad2deg(best.beta), "*", color="white",
-              markeredgecolor="black", markersize=15, label="best")  # fmt: skip
+    axes.plot(
+        MM_PER_M * best.base_distance,
+        np.rad2deg(best.beta),
+        "*",
+        color="white",
+        markeredgecolor="black",
+        markersize=15,
+        label="best",
+    )
     axes.set_xlabel("Base distance in mm")
     axes.set_ylabel("beta in deg")
     needs = ", ".join(f"{n.name} {n.stiffness * N_PER_MM:g} N/mm" for n in result.model.required)
@@ -185,8 +221,15 @@ def schedule(result: CouplingResult) -> Figure:
             colour, word, hatch = shades[interval.state]
             # a label that begins with _ stays out of the legend: each state is named once
             label = f"_{word}" if word in named else f"state: {word}"
-            axes.axvspan(interval.start, interval.end, color=colour, alpha=0.15, lw=0,
-                         hatch=hatch, label=label)  # fmt: skip
+            axes.axvspan(
+                interval.start,
+                interval.end,
+                color=colour,
+                alpha=0.15,
+                lw=0,
+                hatch=hatch,
+                label=label,
+            )
             named.add(word)
     axes.set_yscale("log")
     _plain_numbers(axes.yaxis)

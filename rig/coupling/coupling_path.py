@@ -105,13 +105,23 @@ def _check_rows(model: ArmModel, path: Path6, q: Array) -> None:
     back = np.diff(path.time, prepend=path.time[0]) < 0
     outside = (q < arm.q_min) | (q > arm.q_max)
     checks: list[tuple[NDArray[np.bool_], Callable[[int], str]]] = [
-        (path.required < 0, lambda i: f"required_N_per_mm is {path.required[i] * N_PER_MM:g} N/mm; "
-         "wanted: at least 0 N/mm"),
+        (
+            path.required < 0,
+            lambda i: (
+                f"required_N_per_mm is {path.required[i] * N_PER_MM:g} N/mm; "
+                "wanted: at least 0 N/mm"
+            ),
+        ),
         (back, lambda i: f"time_s goes back to {path.time[i]:g} s; wanted: rows in order of time"),
-        (np.abs(length - 1) > 1e-3, lambda i: f"direction_x, _y, _z have length {length[i]:.6g}; "
-         "wanted: a unit vector in the base frame"),
+        (
+            np.abs(length - 1) > 1e-3,
+            lambda i: (
+                f"direction_x, _y, _z have length {length[i]:.6g}; "
+                "wanted: a unit vector in the base frame"
+            ),
+        ),
         (np.asarray(outside.any(axis=1)), lambda i: _outside(arm, q[i])),
-    ]  # fmt: skip
+    ]
     for broken, says in checks:
         if broken.any():
             i = int(np.argmax(broken))

@@ -258,9 +258,14 @@ def _remainder(r: GapResult) -> dict[str, Any]:
     largest = None
     if rest.largest is not None:
         at = rest.largest
-        largest = {"pose": at.pose, "direction": at.direction, "branch": BRANCH_NAMES[at.branch],
-                   "force_N": at.force, "mean_mm": at.mean * MM_PER_M,
-                   "sd_mm": at.sd * MM_PER_M}  # fmt: skip
+        largest = {
+            "pose": at.pose,
+            "direction": at.direction,
+            "branch": BRANCH_NAMES[at.branch],
+            "force_N": at.force,
+            "mean_mm": at.mean * MM_PER_M,
+            "sd_mm": at.sd * MM_PER_M,
+        }
     return {
         "rms_mm": rest.rms * MM_PER_M,
         "ci95": [v * MM_PER_M for v in rest.ci95],

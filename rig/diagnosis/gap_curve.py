@@ -68,19 +68,42 @@ def _curve_panel(shown: Shown, points: Points, axes: Any, setup: int) -> None:
     for sense, label, edge, fill, marker in SENSES:
         here = mine & (points.sense == sense)
         if here.any():
-            axes.plot(x[here], y[here], marker, color=edge, markerfacecolor=fill,
-                      markersize=1.5 if many else 4, markeredgewidth=0.5 if many else 0.9,
-                      label=f"measured, {label}", rasterized=many, zorder=2)  # fmt: skip
+            axes.plot(
+                x[here],
+                y[here],
+                marker,
+                color=edge,
+                markerfacecolor=fill,
+                markersize=1.5 if many else 4,
+                markeredgewidth=0.5 if many else 0.9,
+                label=f"measured, {label}",
+                rasterized=many,
+                zorder=2,
+            )
     zero = mine & (points.sense == 0)
     if zero.any():
         axes.plot(x[zero], y[zero], "x", color=GREY, markersize=4, label="measured, zero load")
     order = np.flatnonzero(mine)[np.argsort(x[mine], kind="stable")]
-    axes.plot(x[order], (points.before * scale)[order], "--", color="black", linewidth=1.2,
-              label="simulated before", zorder=3)  # fmt: skip
+    axes.plot(
+        x[order],
+        (points.before * scale)[order],
+        "--",
+        color="black",
+        linewidth=1.2,
+        label="simulated before",
+        zorder=3,
+    )
     for i, leg in enumerate(legs(points, x, setup)):
-        axes.plot(x[leg], (points.after * scale)[leg], "-" if len(leg) > 1 else ".", color=GREEN,
-                  linewidth=1.1, markersize=4, zorder=3,
-                  label="_" if i else "simulated after (each run)")  # fmt: skip
+        axes.plot(
+            x[leg],
+            (points.after * scale)[leg],
+            "-" if len(leg) > 1 else ".",
+            color=GREEN,
+            linewidth=1.1,
+            markersize=4,
+            zorder=3,
+            label="_" if i else "simulated after (each run)",
+        )
     told = np.concatenate([y[mine], (points.after * scale)[mine]])
     low, high = float(told.min()), float(told.max())
     if np.ptp((points.before * scale)[mine]) > _BEYOND * (high - low) > 0:

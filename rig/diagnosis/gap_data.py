@@ -240,9 +240,14 @@ def _setup(
 
 
 def arm_setup(
-    arm: Arm, pose: str, q: Array, tcp: Array, direction: str, n: Array,
+    arm: Arm,
+    pose: str,
+    q: Array,
+    tcp: Array,
+    direction: str,
+    n: Array,
     model: ArmModel | None = None,
-) -> Setup:  # fmt: skip
+) -> Setup:
     """The setup of an arm: q (6,) rad, point of load tcp (3,) m in the flange frame, direction n
     (3,) of length 1; model: whose links and mounting are simulated, by default none."""
     tool, tangents = tool_offset(tcp), _tangents(n)
@@ -264,15 +269,17 @@ def arm_setup(
         turned_lever=_turned(arm, q, tool, n),
         moment=np.cross(point, n),
         links=np.array(
-            [[_link(arm, link, q, tool, n) for link in links]
-             for links in (arm.links, [_joint_to_joint(arm, link) for link in arm.links])]
+            [
+                [_link(arm, link, q, tool, n) for link in links]
+                for links in (arm.links, [_joint_to_joint(arm, link) for link in arm.links])
+            ]
         ).reshape(2, -1, len(STRAINS)),
         gravity=-arm.gravity_torques(q),  # what the weight does, not what holds it
         tool_gravity=J.T @ np.array(STANDARD_GRAVITY),
         bent_lever=_bent(arm, q, tool, n),
         turned_offset=_turned_offset(axes, n) @ R,
         outside=0.0 if model is None else model.outside(q, tool, n),
-    )  # fmt: skip
+    )
 
 
 def _bench_setup(dataset: Dataset, direction: str, n: Array, tangents: Array) -> Setup:

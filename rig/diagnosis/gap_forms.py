@@ -132,9 +132,11 @@ def _word(entry: Mapping[str, Any]) -> str:
 
 
 def _term(
-    grammar: Grammar, constants: Mapping[str, Any], one: Mapping[str, Any],
+    grammar: Grammar,
+    constants: Mapping[str, Any],
+    one: Mapping[str, Any],
     place: tuple[str | int, ...],
-) -> tuple[Term, Key]:  # fmt: skip
+) -> tuple[Term, Key]:
     """The kind of term whose keys these are."""
     for coefficient, shape in kinds(grammar, constants):
         key = coefficient_key(coefficient, constants)

@@ -131,16 +131,29 @@ _COEFFICIENTS: dict[str, Key] = {
     "share": Key("share"),
     "shift": Key("shift_mm", factor=MM_PER_M),
 }
-_DRIFTS = {"drift": "", "drift_rate": "_per_s", "drift_per_root": "_per_sqrt_s", "drift_knot": "",
-           "drift_per_kelvin": "_per_K"}  # fmt: skip
+_DRIFTS = {
+    "drift": "",
+    "drift_rate": "_per_s",
+    "drift_per_root": "_per_sqrt_s",
+    "drift_knot": "",
+    "drift_per_kelvin": "_per_K",
+}
 for _name, _unit in _DRIFTS.items():
     _stem = "drift_at" if _name == "drift_knot" else "drift"
     _COEFFICIENTS[f"{_name} force"] = Key(f"{_stem}_N{_unit}")
     _COEFFICIENTS[f"{_name} displacement"] = Key(f"{_stem}_mm{_unit}", factor=MM_PER_M)
 
 
-MAY_BE_MISSING = ("measured_to", "about", "tool", "flow_exponent", "placed", "forgets",
-                  "only_in", "unread")  # fmt: skip
+MAY_BE_MISSING = (
+    "measured_to",
+    "about",
+    "tool",
+    "flow_exponent",
+    "placed",
+    "forgets",
+    "only_in",
+    "unread",
+)
 
 
 @dataclass(frozen=True)
@@ -250,8 +263,13 @@ def coefficient_key(name: str, constants: Mapping[str, Any]) -> Key:
     return _COEFFICIENTS.get(name) or _COEFFICIENTS[f"{name} {constants['quantity']}"]
 
 
-_PATH_OF = {"drift": "exponential", "drift_rate": "linear", "drift_per_root": "root",
-            "drift_knot": "free", "drift_per_kelvin": "temperature"}  # fmt: skip
+_PATH_OF = {
+    "drift": "exponential",
+    "drift_rate": "linear",
+    "drift_per_root": "root",
+    "drift_knot": "free",
+    "drift_per_kelvin": "temperature",
+}
 
 
 def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -42,12 +42,18 @@ def panels(setups: int, *, below: bool = False) -> tuple[Figure, list[list[Any]]
     shown = list(range(min(setups, _MOST_PANELS)))
     columns = min(len(shown), 3 if len(shown) > 4 or len(shown) == 3 else 2)
     lines = -(-len(shown) // columns)
-    figure = blank(7.5 if columns == 1 else 4.2 * columns + 0.6,
-                     1.4 + (4.4 if below else 3.3) * lines)  # fmt: skip
+    figure = blank(
+        7.5 if columns == 1 else 4.2 * columns + 0.6, 1.4 + (4.4 if below else 3.3) * lines
+    )
     heights = [3.0, 1.6] * lines if below else None
     deep = 2 if below else 1
-    axes = figure.subplots(lines * deep, columns, squeeze=False, height_ratios=heights,
-                           sharey=False if below else "all")  # fmt: skip
+    axes = figure.subplots(
+        lines * deep,
+        columns,
+        squeeze=False,
+        height_ratios=heights,
+        sharey=False if below else "all",
+    )
     grid = []
     for i in range(lines * columns):
         line, column = divmod(i, columns)
@@ -90,8 +96,14 @@ def shared_legend(figure: Figure, everywhere: list[Any]) -> None:
     if found:
         # about 13 characters an inch at that size, six for the handle and the space between
         fitting = int(13 * figure.get_size_inches()[0] / (max(map(len, found)) + 6))
-        figure.legend(list(found.values()), list(found), loc="outside lower center", frameon=False,
-                      fontsize=8, ncols=max(1, min(len(found), fitting)))  # fmt: skip
+        figure.legend(
+            list(found.values()),
+            list(found),
+            loc="outside lower center",
+            frameon=False,
+            fontsize=8,
+            ncols=max(1, min(len(found), fitting)),
+        )
 
 
 def noise_axis(axes: Any, noise: float, most: float) -> None:

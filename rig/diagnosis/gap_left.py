@@ -67,10 +67,17 @@ def _residual_points(shown: Shown, points: Points, axes: Any, x: Any) -> None:
             if not here.any():
                 continue
             colour = COLOURS[setup % len(COLOURS)]
-            axes.plot(x[here], points.gap_after[here], marker, color=colour,
-                      markerfacecolor=colour if sense == RISING else "white",
-                      markersize=2 if many else 4, markeredgewidth=0.6 if many else 0.9,
-                      label=f"{shown.setup_name(setup)}: {label}", rasterized=many)  # fmt: skip
+            axes.plot(
+                x[here],
+                points.gap_after[here],
+                marker,
+                color=colour,
+                markerfacecolor=colour if sense == RISING else "white",
+                markersize=2 if many else 4,
+                markeredgewidth=0.6 if many else 0.9,
+                label=f"{shown.setup_name(setup)}: {label}",
+                rasterized=many,
+            )
     zero = points.sense == 0
     if zero.any():
         axes.plot(x[zero], points.gap_after[zero], "x", color=GREY, markersize=4, label="zero load")
@@ -90,8 +97,15 @@ def remaining(shown: Shown, points: Points, rest: Remainder) -> Figure:
                 continue
             x = rest.displacement[here] * MM_PER_M if shown.imposed else rest.load[here]
             mean, sd = rest.mean[here] * MM_PER_M, rest.sd[here] * MM_PER_M
-            axes.plot(x, rest.residual[here] * MM_PER_M, marker, color=edge, markerfacecolor=fill,
-                      markersize=4, label=f"{label}: mean")  # fmt: skip
+            axes.plot(
+                x,
+                rest.residual[here] * MM_PER_M,
+                marker,
+                color=edge,
+                markerfacecolor=fill,
+                markersize=4,
+                label=f"{label}: mean",
+            )
             axes.fill_between(x, mean - 2 * sd, mean + 2 * sd, color=edge, alpha=0.2, linewidth=0)
             axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
         axes.set_title(shown.setup_name(setup), fontsize=10)
@@ -112,8 +126,17 @@ def _left_by_runs(
         path = (points.run == run) & (points.sense == sense)
         # a running recording would join the ends of its cycles
         style = "." if shown.continuous else "-"
-        axes.plot(x[path], points.gap_after[path], style, color=colour, linewidth=0.7, markersize=2,
-                  alpha=0.45, label=label, rasterized=np.count_nonzero(path) > MANY)  # fmt: skip
+        axes.plot(
+            x[path],
+            points.gap_after[path],
+            style,
+            color=colour,
+            linewidth=0.7,
+            markersize=2,
+            alpha=0.45,
+            label=label,
+            rasterized=np.count_nonzero(path) > MANY,
+        )
 
 
 def _of_sense(rest: Remainder, sense: int) -> Any:

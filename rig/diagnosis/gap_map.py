@@ -95,9 +95,14 @@ def _strips(
                 boxes.append([(low, top), (up, top), (up, top + high), (low, top + high)])
                 colours.append(value)
     image = PolyCollection(
-        boxes, array=np.array(colours), cmap=_COLOURS, norm=norm, edgecolors="face",
-        linewidths=0.2, rasterized=len(boxes) > 2000,
-    )  # fmt: skip
+        boxes,
+        array=np.array(colours),
+        cmap=_COLOURS,
+        norm=norm,
+        edgecolors="face",
+        linewidths=0.2,
+        rasterized=len(boxes) > 2000,
+    )
     axes.add_collection(image)
     axes.autoscale_view()
     axes.set_facecolor("0.93")
@@ -130,8 +135,17 @@ def _cells(x: Array, gap: Array, span: float) -> list[tuple[float, float, float]
 
 def _over_time(r: Shown, p: Points, axes: Any, gap: Array, norm: Any) -> None:
     time, unit = session_clock(p)
-    axes.scatter(time, _driven(r, p), c=gap, cmap=_COLOURS, norm=norm, s=14, linewidths=0.3,
-                 edgecolors="0.5", rasterized=len(time) > 1000)  # fmt: skip
+    axes.scatter(
+        time,
+        _driven(r, p),
+        c=gap,
+        cmap=_COLOURS,
+        norm=norm,
+        s=14,
+        linewidths=0.3,
+        edgecolors="0.5",
+        rasterized=len(time) > 1000,
+    )
     axes.set_facecolor("0.93")
     axes.set_xlabel(f"Time in the session in {unit}")
     if axes.get_subplotspec().is_first_col():

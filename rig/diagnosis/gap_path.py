@@ -90,11 +90,15 @@ def _by_hold(bench: Bench, moved: Array) -> PlannedPath:
 
     datum = np.array([moved[int(np.argmax(rows.setup == s))] for s in np.unique(rows.setup)])
     return PlannedPath(
-        setup=rows.setup[edges], repetition=rows.repetition[edges],
-        branch=tuple(BRANCH_NAMES[b] for b in rows.branch[edges]), step=rows.step[edges],
-        session=mean(rows.session), force=mean(rows.force), springs=mean(rows.displacement),
+        setup=rows.setup[edges],
+        repetition=rows.repetition[edges],
+        branch=tuple(BRANCH_NAMES[b] for b in rows.branch[edges]),
+        step=rows.step[edges],
+        session=mean(rows.session),
+        force=mean(rows.force),
+        springs=mean(rows.displacement),
         displacement=mean(moved - datum[rows.setup]),
-    )  # fmt: skip
+    )
 
 
 def planned_data(model: ArmModel, procedure: MeasurementProtocol) -> GapData:
@@ -107,20 +111,35 @@ def planned_data(model: ArmModel, procedure: MeasurementProtocol) -> GapData:
     poses = procedure.poses
     setups = tuple(
         arm_setup(
-            model.arm, run.pose, np.array(poses[run.pose].q_rad),
-            np.array(poses[run.pose].tcp_xyz_mm) / MM_PER_M, run.direction,
-            np.array(procedure.directions[run.direction]), model,
+            model.arm,
+            run.pose,
+            np.array(poses[run.pose].q_rad),
+            np.array(poses[run.pose].tcp_xyz_mm) / MM_PER_M,
+            run.direction,
+            np.array(procedure.directions[run.direction]),
+            model,
         )
         for run in procedure.runs
-    )  # fmt: skip
+    )
     return GapData(
-        arm=True, setups=setups, time=time, session=session, run=np.cumsum(new).astype(whole) - 1,
-        setup=setup.astype(whole), repetition=repetition.astype(whole),
-        branch=branch.astype(whole), step=step.astype(whole), force=force.astype(float),
-        displacement=np.zeros(len(force)), compliance=1 / model.arm.joint_stiffness,
-        compliance_relative_sd=model.arm.joint_stiffness_relative_sd, instruments=_ANY,
-        output_encoder=procedure.joint_encoder == "output", tare="run", imposed="force",
-    )  # fmt: skip
+        arm=True,
+        setups=setups,
+        time=time,
+        session=session,
+        run=np.cumsum(new).astype(whole) - 1,
+        setup=setup.astype(whole),
+        repetition=repetition.astype(whole),
+        branch=branch.astype(whole),
+        step=step.astype(whole),
+        force=force.astype(float),
+        displacement=np.zeros(len(force)),
+        compliance=1 / model.arm.joint_stiffness,
+        compliance_relative_sd=model.arm.joint_stiffness_relative_sd,
+        instruments=_ANY,
+        output_encoder=procedure.joint_encoder == "output",
+        tare="run",
+        imposed="force",
+    )
 
 
 class _Walk:
@@ -170,8 +189,11 @@ _CHANCE = {
     "rest": "where it lies in its play when it is sent to a pose",
 }
 _OF_RUNS = "what single runs had to themselves"
-_WORDS = {"zero_shift": "jumps of the datum", "force_drift": "how the amplifier drifted",
-          "thermal_drift": "how it drifted with time and temperature"}  # fmt: skip
+_WORDS = {
+    "zero_shift": "jumps of the datum",
+    "force_drift": "how the amplifier drifted",
+    "thermal_drift": "how it drifted with time and temperature",
+}
 
 
 def left_out(forms: Sequence[Form]) -> tuple[str, ...]:
@@ -206,12 +228,16 @@ def _beyond(bench: Bench, forms: Sequence[Form]) -> tuple[str, ...]:
             one_sense = f.word == "load_misalignment"
             sides = [along(bench, v) for v, _ in where]
             known = np.any(
-                [((s > 0) if one_sense else (s != 0)) & in_pose(bench, pose)
-                 for s, (_, pose) in zip(sides, where, strict=True)], axis=0,
-            )  # fmt: skip
+                [
+                    ((s > 0) if one_sense else (s != 0)) & in_pose(bench, pose)
+                    for s, (_, pose) in zip(sides, where, strict=True)
+                ],
+                axis=0,
+            )
             by_pose = any(pose is not None for _, pose in where)
-            blind = sorted({_called(bench.data.setups[s], by_pose)
-                            for s in bench.rows.setup[~known]})  # fmt: skip
+            blind = sorted(
+                {_called(bench.data.setups[s], by_pose) for s in bench.rows.setup[~known]}
+            )
             if blind:
                 out.append(f"{f.word}: not measured along {', '.join(blind)}; left out there.")
     return tuple(out)

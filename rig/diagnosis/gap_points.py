@@ -100,11 +100,19 @@ def shown(r: GapResult) -> Shown:
     """Of a diagnosis."""
     rows = r.bench.rows
     return Shown(
-        setups=tuple((s.pose, s.direction) for s in r.bench.data.setups), imposed=r.bench.imposed,
-        clock=rows.clock, continuous=rows.continuous, verdict=r.verdict,
-        probabilities=r.probabilities, effects=r.effects, noise=r.noise, before=r.before,
-        after=r.after, held_out=r.held_out, runners_up=r.runners_up,
-    )  # fmt: skip
+        setups=tuple((s.pose, s.direction) for s in r.bench.data.setups),
+        imposed=r.bench.imposed,
+        clock=rows.clock,
+        continuous=rows.continuous,
+        verdict=r.verdict,
+        probabilities=r.probabilities,
+        effects=r.effects,
+        noise=r.noise,
+        before=r.before,
+        after=r.after,
+        held_out=r.held_out,
+        runners_up=r.runners_up,
+    )
 
 
 def points(r: GapResult) -> Points:
@@ -122,14 +130,21 @@ def points(r: GapResult) -> Points:
     precision = np.bincount(number, weights=1 / r.engine.sigma[: rows.n] ** 2)
     noise = np.sqrt(1 / precision + bench.noise.hold[first] ** 2)
     return Points(
-        setup=rows.setup[first], run=rows.run[first], repetition=rows.repetition[first],
-        branch=rows.branch[first], sense=_sense(bench)[first], step=rows.step[first],
-        session=mean(rows.session), force=mean(rows.measured_force),
-        displacement=mean(rows.displacement) * MM_PER_M, measured=response * MM_PER_M,
+        setup=rows.setup[first],
+        run=rows.run[first],
+        repetition=rows.repetition[first],
+        branch=rows.branch[first],
+        sense=_sense(bench)[first],
+        step=rows.step[first],
+        session=mean(rows.session),
+        force=mean(rows.measured_force),
+        displacement=mean(rows.displacement) * MM_PER_M,
+        measured=response * MM_PER_M,
         before=mean(stated_prediction(r.engine)) * MM_PER_M,
         after=(response - mean(left)) * MM_PER_M,
-        stated=mean(bench.stated_slope) * MM_PER_M, noise=noise * MM_PER_M,
-    )  # fmt: skip
+        stated=mean(bench.stated_slope) * MM_PER_M,
+        noise=noise * MM_PER_M,
+    )
 
 
 def _sense(bench: Bench) -> Ints:
@@ -167,8 +182,12 @@ def point_table(r: Shown, p: Points) -> Table:
     else:
         table["simulated_before_mm"] = p.before
         table["simulated_after_mm"] = p.after
-    return {**table, "gap_before_mm": p.gap_before, "gap_after_mm": p.gap_after,
-            "noise_sd_mm": p.noise}  # fmt: skip
+    return {
+        **table,
+        "gap_before_mm": p.gap_before,
+        "gap_after_mm": p.gap_after,
+        "noise_sd_mm": p.noise,
+    }
 
 
 def remainder_table(r: Shown, m: Remainder) -> Table:
@@ -198,8 +217,14 @@ def held_table(r: Shown) -> Table:
             (f"withheld {main.fold}", word, main.before, after, nan, nan)
             for word, after in r.runners_up.items()
         ]
-    names = ("judged_on", "explanation", "before_rms_mm", "after_rms_mm",
-             "shrink_ci95_low", "shrink_ci95_high")  # fmt: skip
+    names = (
+        "judged_on",
+        "explanation",
+        "before_rms_mm",
+        "after_rms_mm",
+        "shrink_ci95_low",
+        "shrink_ci95_high",
+    )
     table = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
     for key in ("before_rms_mm", "after_rms_mm"):
         table[key] = [v * MM_PER_M for v in table[key]]

@@ -26,19 +26,31 @@ def probabilities(shown: Shown) -> Figure:
     axes = figure.add_subplot()
     for i, (word, chance) in enumerate(chances.items()):
         chosen = word == shown.verdict
-        axes.barh(i, chance, 0.7, color=BLUE if chosen else "0.75", linewidth=0,
-                  hatch="//" if word in alike else None, edgecolor="white")  # fmt: skip
+        axes.barh(
+            i,
+            chance,
+            0.7,
+            color=BLUE if chosen else "0.75",
+            linewidth=0,
+            hatch="//" if word in alike else None,
+            edgecolor="white",
+        )
         note = "  verdict" if chosen else "  can't be told from it here" if word in alike else ""
-        axes.text(chance + 0.01, i, f"{likely(chance)}{note}", va="center", fontsize=9,
-                  fontweight="bold" if chosen else "normal")  # fmt: skip
+        axes.text(
+            chance + 0.01,
+            i,
+            f"{likely(chance)}{note}",
+            va="center",
+            fontsize=9,
+            fontweight="bold" if chosen else "normal",
+        )
     axes.set_yticks(range(len(chances)), list(chances))
     axes.set_ylim(max(len(chances), 3) - 0.4, -0.6)
     axes.set_xlim(0, 1)  # the labels find room beside it
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("Probability of being the main cause")
     rest = 1 - sum(chances.values())
-    axes.set_title(f"Which effect causes the gap (all others together {likely(rest)})",
-                   fontsize=11)  # fmt: skip
+    axes.set_title(f"Which effect causes the gap (all others together {likely(rest)})", fontsize=11)
     return figure
 
 
@@ -56,15 +68,29 @@ def withheld(shown: Shown) -> Figure:
         entries.append((f"withheld {held.fold}", held.before, held.after, text, GREEN))
     for word, after in shown.runners_up.items():
         main = shown.held_out[0]
-        entries.append((f"withheld {main.fold},\nwith {word} instead", main.before, after,
-                        change(main.before, after), COLOURS[3]))  # fmt: skip
+        entries.append(
+            (
+                f"withheld {main.fold},\nwith {word} instead",
+                main.before,
+                after,
+                change(main.before, after),
+                COLOURS[3],
+            )
+        )
     figure = blank(8.5, 1.9 + 0.5 * len(entries))
     axes = figure.add_subplot()
     for i, (_, before, after, _, colour) in enumerate(entries):
         b, a = before * MM_PER_M, after * MM_PER_M
         axes.plot([a, b], [i, i], "-", color="0.7", linewidth=2, zorder=1)
-        axes.plot(b, i, "o", color="black", markerfacecolor="white", markersize=8,
-                  label="_" if i else "before")  # fmt: skip
+        axes.plot(
+            b,
+            i,
+            "o",
+            color="black",
+            markerfacecolor="white",
+            markersize=8,
+            label="_" if i else "before",
+        )
         axes.plot(a, i, "o", color=colour, markersize=8)
     axes.plot([], [], "o", color=GREEN, label=f"after, {shown.with_what}")
     if shown.runners_up:
@@ -101,5 +127,6 @@ def _above(axes: Any, x: float, y: float, text: str) -> None:
     low, high = np.log(axes.get_xlim())
     share = (np.log(x) - low) / (high - low)
     side = "right" if share > 0.75 else "left" if share < 0.25 else "center"
-    axes.annotate(text, (x, y), xytext=(0, 7), textcoords="offset points", ha=side, va="bottom",
-                  fontsize=8)  # fmt: skip
+    axes.annotate(
+        text, (x, y), xytext=(0, 7), textcoords="offset points", ha=side, va="bottom", fontsize=8
+    )

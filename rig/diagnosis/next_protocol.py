@@ -123,12 +123,16 @@ def _old_protocol(dataset: Dataset) -> MeasurementProtocol | None:
 
 
 def _lines(
-    proposal: NextMeasurement, design: Design, dataset: Dataset,
-    old: MeasurementProtocol | None, station: str,
-) -> Iterator[str]:  # fmt: skip
+    proposal: NextMeasurement,
+    design: Design,
+    dataset: Dataset,
+    old: MeasurementProtocol | None,
+    station: str,
+) -> Iterator[str]:
     one, other = proposal.separates
-    yield from (f"# {line}" for line in textwrap.wrap(f"To tell {one} from {other}. "
-                                                      f"{proposal.text}", 96))  # fmt: skip
+    yield from (
+        f"# {line}" for line in textwrap.wrap(f"To tell {one} from {other}. {proposal.text}", 96)
+    )
     for banner in dataset.banners():
         yield f"# Derived from data that are {banner}"
     meta = dataset.meta
@@ -160,9 +164,11 @@ def _lines(
     yield ""
     allowed = None if old is None else old.limits.force_N
     yield from limit_lines(
-        top, f"{stop:g}", "  displacement_rate_mm_per_s: {max: 3, at: warn}",
+        top,
+        f"{stop:g}",
+        "  displacement_rate_mm_per_s: {max: 3, at: warn}",
         most_N=math.inf if allowed is None else allowed.max,
-    )  # fmt: skip
+    )
 
 
 def _sense(design: Design, direction: str) -> float:

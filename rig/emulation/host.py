@@ -107,8 +107,9 @@ class EmulationHost:
             )
         known = self.emulators[device].faults
         if kind not in known:
-            raise InputError(f'{place}: the {device} has no fault "{kind}".'
-                             f"{did_you_mean(kind, known)}")  # fmt: skip
+            raise InputError(
+                f'{place}: the {device} has no fault "{kind}".{did_you_mean(kind, known)}'
+            )
 
     def _check_schedule(self, faults: Sequence[FaultPlan]) -> None:
         for number, fault in enumerate(faults):

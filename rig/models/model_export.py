@@ -43,19 +43,31 @@ def mujoco_xml(arm: Arm, q: ArrayLike, tool: ArrayLike | None = None) -> str:
     outer = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="base", gravcomp="1")
     for i, place in enumerate(_places(arm)[:JOINTS]):
         body = ET.SubElement(
-            outer, "body", name=f"link{i + 1}", gravcomp="1",
-            pos=_numbers(place[:3, 3]), quat=_numbers(_quaternion(place[:3, :3])),
-        )  # fmt: skip
+            outer,
+            "body",
+            name=f"link{i + 1}",
+            gravcomp="1",
+            pos=_numbers(place[:3, 3]),
+            quat=_numbers(_quaternion(place[:3, :3])),
+        )
         ET.SubElement(
-            body, "joint", name=f"joint{i + 1}", type="hinge", axis="0 0 1",
-            stiffness=_numbers(arm.joint_stiffness[i]), springref=_numbers(rest[i]),
+            body,
+            "joint",
+            name=f"joint{i + 1}",
+            type="hinge",
+            axis="0 0 1",
+            stiffness=_numbers(arm.joint_stiffness[i]),
+            springref=_numbers(rest[i]),
             range=_numbers([arm.q_min[i], arm.q_max[i]]),
-        )  # fmt: skip
+        )
         mass, centre, inertia = _inertia(arm, i)
         ET.SubElement(
-            body, "inertial", mass=_numbers(mass), pos=_numbers(centre),
+            body,
+            "inertial",
+            mass=_numbers(mass),
+            pos=_numbers(centre),
             diaginertia=_numbers([inertia] * 3),
-        )  # fmt: skip
+        )
         outer = body
     flange = _places(arm)[JOINTS]
     for name, T in (("flange", flange), ("tool", flange @ _tool(tool))):
@@ -90,11 +102,17 @@ def urdf(arm: Arm, q: ArrayLike, tool: ArrayLike | None = None) -> str:
         joint = _urdf_joint(root, f"joint{i + 1}", "revolute", parent, f"link{i + 1}", places[i])
         ET.SubElement(joint, "axis", xyz="0 0 1")
         ET.SubElement(
-            joint, "limit", lower=_numbers(arm.q_min[i]), upper=_numbers(arm.q_max[i]),
-            effort=_numbers(_finite(arm.torque_limit[i])), velocity=_numbers(np.pi),
-        )  # fmt: skip
-    for name, parent, T in (("flange", f"link{JOINTS}", places[JOINTS]),
-                            ("tool", "flange", _tool(tool))):  # fmt: skip
+            joint,
+            "limit",
+            lower=_numbers(arm.q_min[i]),
+            upper=_numbers(arm.q_max[i]),
+            effort=_numbers(_finite(arm.torque_limit[i])),
+            velocity=_numbers(np.pi),
+        )
+    for name, parent, T in (
+        ("flange", f"link{JOINTS}", places[JOINTS]),
+        ("tool", "flange", _tool(tool)),
+    ):
         ET.SubElement(root, "link", name=name)
         _urdf_joint(root, f"{name}_fixed", "fixed", parent, name, T)
     for i in range(JOINTS):

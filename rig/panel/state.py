@@ -60,8 +60,15 @@ CommandName = Literal[
     "take_over",  # become the operator; needs the operator's token, as all commands do
 ]
 COMMANDS: tuple[CommandName, ...] = (
-    "pause", "resume", "redo", "redo_repetition", "skip", "abort", "answer", "take_over",
-)  # fmt: skip
+    "pause",
+    "resume",
+    "redo",
+    "redo_repetition",
+    "skip",
+    "abort",
+    "answer",
+    "take_over",
+)
 STALE_S = 1.0  # older values must not look live
 BRANCHES = ("zero", "loading", "unloading")
 

@@ -45,9 +45,19 @@ def open_devices(
 
 # What an operator wants to see of a device on one line; the data set keeps everything.
 _TELLING = (
-    "model", "device", "serial_number", "controller_version", "robot_mode", "safety_status",
-    "daq_product_type", "range_mm", "output_rate_Hz", "averaging", "channels", "source",
-)  # fmt: skip
+    "model",
+    "device",
+    "serial_number",
+    "controller_version",
+    "robot_mode",
+    "safety_status",
+    "daq_product_type",
+    "range_mm",
+    "output_rate_Hz",
+    "averaging",
+    "channels",
+    "source",
+)
 
 
 def in_short(identity: Mapping[str, str]) -> str:

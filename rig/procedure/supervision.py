@@ -79,10 +79,22 @@ class Supervision:
         self._moving = False
         self._prompts = 0
         self.view = LiveView(
-            phase="idle", pose="", direction="", repetition=0, repetitions=repetitions, step=0,
-            steps=0, force_N=nan, target_N=nan, band_N=0.0, displacement_mm=nan,
-            stiffness_N_per_mm=nan, settle_remaining_s=0.0, samples=0, samples_wanted=0,
-        )  # fmt: skip
+            phase="idle",
+            pose="",
+            direction="",
+            repetition=0,
+            repetitions=repetitions,
+            step=0,
+            steps=0,
+            force_N=nan,
+            target_N=nan,
+            band_N=0.0,
+            displacement_mm=nan,
+            stiffness_N_per_mm=nan,
+            settle_remaining_s=0.0,
+            samples=0,
+            samples_wanted=0,
+        )
 
     def now(self) -> float:
         """Seconds of the session clock."""

@@ -24,9 +24,15 @@ from rig.units import N_PER_MM
 
 LEVEL = 0.05
 _IDENTITY = (
-    "serial_number", "daq_serial_number", "serial", "model", "device", "full_scale_N",
-    "sensitivity_pC_per_N", "range_mm",
-)  # fmt: skip
+    "serial_number",
+    "daq_serial_number",
+    "serial",
+    "model",
+    "device",
+    "full_scale_N",
+    "sensitivity_pC_per_N",
+    "range_mm",
+)
 
 
 @dataclass(frozen=True)

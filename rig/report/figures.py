@@ -40,8 +40,15 @@ def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
     prior = sets[0][1]["prior"]
     middle = KNM * np.array(prior["joint_stiffness_Nm_per_rad"])
     spread = np.exp(TWO_SIDED * np.array(prior["relative_sd"]))
-    axes.bar(x, middle * (spread - 1 / spread), 0.8, bottom=middle / spread, color="0.88",
-             label="prior, 95 %", zorder=1)  # fmt: skip
+    axes.bar(
+        x,
+        middle * (spread - 1 / spread),
+        0.8,
+        bottom=middle / spread,
+        color="0.88",
+        label="prior, 95 %",
+        zorder=1,
+    )
     step = 0.5 / max(1, len(sets))
     for i, (label, result) in enumerate(sets):
         quantities = result["joint_stiffness_Nm_per_rad"]
@@ -49,13 +56,27 @@ def joints(sets: Sequence[tuple[str, Json]], banners: Sequence[str]) -> Figure:
         ci = KNM * np.array([q["ci95"] for q in quantities])
         at = x + (i - (len(sets) - 1) / 2) * step
         colour, known = COLOURS[i % len(COLOURS)], np.array(result["identified"], dtype=bool)
-        axes.errorbar(at, value, (value - ci[:, 0], ci[:, 1] - value), fmt="none", color=colour,
-                      capsize=4, zorder=3)  # fmt: skip
+        axes.errorbar(
+            at,
+            value,
+            (value - ci[:, 0], ci[:, 1] - value),
+            fmt="none",
+            color=colour,
+            capsize=4,
+            zorder=3,
+        )
         for which, fill, word in ((known, colour, "identified"), (~known, "white", "not to 5 %")):
             if which.any():
-                axes.plot(at[which], value[which], MARKERS[i % len(MARKERS)], color=colour,
-                          markerfacecolor=fill, markersize=7, zorder=4,
-                          label=f"{label}: {word}")  # fmt: skip
+                axes.plot(
+                    at[which],
+                    value[which],
+                    MARKERS[i % len(MARKERS)],
+                    color=colour,
+                    markerfacecolor=fill,
+                    markersize=7,
+                    zorder=4,
+                    label=f"{label}: {word}",
+                )
     axes.set_yscale("log")
     plain_numbers(axes.yaxis)
     axes.set_xticks(x)
@@ -142,9 +163,15 @@ def _plateaus(axes: Any, dataset: Dataset, zeros: Sequence[RunZeros], what: str)
         # what begins with _ stays out of the legend: every setup is named once
         label = f"_{label}" if (run.pose, run.direction) in named else label.lstrip("_")
         named.add((run.pose, run.direction))
-        axes.plot(at, [getattr(p, what) for p in run.plateaus], color=COLOURS[i % len(COLOURS)],
-                  marker=MARKERS[i % len(MARKERS)], markersize=4, linewidth=1,
-                  label=label)  # fmt: skip
+        axes.plot(
+            at,
+            [getattr(p, what) for p in run.plateaus],
+            color=COLOURS[i % len(COLOURS)],
+            marker=MARKERS[i % len(MARKERS)],
+            markersize=4,
+            linewidth=1,
+            label=label,
+        )
 
 
 def _temperature(axes: Any, dataset: Dataset, _: Sequence[RunZeros]) -> None:
@@ -152,8 +179,9 @@ def _temperature(axes: Any, dataset: Dataset, _: Sequence[RunZeros]) -> None:
     for joint in range(1, 7):
         column = dataset.columns.get(f"temperature{joint}_C")
         if column is not None:
-            axes.plot(minutes, column[rows], color=COLOURS[joint - 1], linewidth=1,
-                      label=f"joint {joint}")  # fmt: skip
+            axes.plot(
+                minutes, column[rows], color=COLOURS[joint - 1], linewidth=1, label=f"joint {joint}"
+            )
     axes.set_ylabel("Temperature,\n°C", fontsize=8)
     axes.legend(frameon=False, fontsize=7, ncols=6, loc="best")
 
@@ -173,8 +201,16 @@ def compared_k(sets: Sequence[tuple[str, Analysis]], banners: Sequence[str]) -> 
                 value.append(k.value * N_PER_MM)
                 low.append((k.value - k.interval[0]) * N_PER_MM)
                 high.append((k.interval[1] - k.value) * N_PER_MM)
-        axes.errorbar(at, value, (low, high), fmt=MARKERS[i % len(MARKERS)], capsize=4,
-                      color=COLOURS[i % len(COLOURS)], markersize=6, label=label)  # fmt: skip
+        axes.errorbar(
+            at,
+            value,
+            (low, high),
+            fmt=MARKERS[i % len(MARKERS)],
+            capsize=4,
+            color=COLOURS[i % len(COLOURS)],
+            markersize=6,
+            label=label,
+        )
     axes.set_xticks(range(len(names)), list(names))
     axes.set_xlim(-0.6, len(names) - 0.4)
     axes.grid(visible=False, axis="x")
@@ -199,12 +235,19 @@ def compared_curves(
             levels = [] if direction is None else direction.result.levels
             mine = [p for p in levels if p.branch == branch]
             if mine:
-                axes.errorbar([p.force for p in mine], [p.displacement * MM_PER_M for p in mine],
-                              np.nan_to_num([p.sd * MM_PER_M for p in mine]), linestyle=line,
-                              marker=MARKERS[i % len(MARKERS)], capsize=3,
-                              markersize=4 + 3 * min(2, len(sets) - 1 - i), markerfacecolor="none",
-                              color=COLOURS[i % len(COLOURS)], linewidth=1,
-                              label=f"{label}: {branch}")  # fmt: skip
+                axes.errorbar(
+                    [p.force for p in mine],
+                    [p.displacement * MM_PER_M for p in mine],
+                    np.nan_to_num([p.sd * MM_PER_M for p in mine]),
+                    linestyle=line,
+                    marker=MARKERS[i % len(MARKERS)],
+                    capsize=3,
+                    markersize=4 + 3 * min(2, len(sets) - 1 - i),
+                    markerfacecolor="none",
+                    color=COLOURS[i % len(COLOURS)],
+                    linewidth=1,
+                    label=f"{label}: {branch}",
+                )
     axes.set_title(f"Direction {name}", fontsize=10)
     axes.legend(frameon=False, fontsize=8)
     return watermark(figure, banners)

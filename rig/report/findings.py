@@ -45,10 +45,17 @@ def _direction(d: Node) -> Iterator[Block]:
     else:
         u = k["standard_uncertainty"].number(2, unit="N/mm")
         yield Paragraph(
-            ("k = ", *k["value"].number(unit="N/mm"), ", standard uncertainty ", *u,
-             ", 95 % from ", *k["ci95"].interval(), " N/mm."),
+            (
+                "k = ",
+                *k["value"].number(unit="N/mm"),
+                ", standard uncertainty ",
+                *u,
+                ", 95 % from ",
+                *k["ci95"].interval(),
+                " N/mm.",
+            ),
             "answer",
-        )  # fmt: skip
+        )
         if d["status_text"].value:
             yield Paragraph((d["status_text"].text(),), "warning")
         yield Facts(tuple(_line(d)))
@@ -72,10 +79,20 @@ def _line(d: Node) -> Iterator[tuple[str, Cell]]:
     knee = d["knee"]
     if knee:
         before, after = knee["slope_before_N_per_mm"], knee["slope_after_N_per_mm"]
-        yield "Knee", (
-            "at ", *quantity(knee["force_N"]), " N, ", *quantity(knee["displacement_mm"]),
-            " mm; the slope falls from ", *before.number(), " to ", *after.number(), " N/mm",
-        )  # fmt: skip
+        yield (
+            "Knee",
+            (
+                "at ",
+                *quantity(knee["force_N"]),
+                " N, ",
+                *quantity(knee["displacement_mm"]),
+                " mm; the slope falls from ",
+                *before.number(),
+                " to ",
+                *after.number(),
+                " N/mm",
+            ),
+        )
     loop = d["hysteresis"]
     if loop:
         share = loop["share_of_work"]
@@ -98,29 +115,51 @@ def _stiffness_tables(d: Node) -> Iterator[Table]:
         caption = "Uncertainty of k (in brackets: contained in another line)"
         yield Table(caption, columns, budget, 2)
     curve = tuple(
-        (p["branch"].text(), str(p["step"].value), p["force_N"].number(),
-         p["displacement_mm"].number(), p["sd_mm"].number(2), p["n"].number())
+        (
+            p["branch"].text(),
+            str(p["step"].value),
+            p["force_N"].number(),
+            p["displacement_mm"].number(),
+            p["sd_mm"].number(2),
+            p["n"].number(),
+        )
         for p in d["curve"]
-    )  # fmt: skip
+    )
     if curve:
         header = ("branch", "step", "force N", "displacement mm", "sd mm", "n")
         yield Table("Curve: means over the repetitions", header, curve, 2)
     pointwise = tuple(
-        (p["force_N"].number(), p["stiffness_N_per_mm"].number(), p["sd_N_per_mm"].number(2),
-         p["n"].number())
+        (
+            p["force_N"].number(),
+            p["stiffness_N_per_mm"].number(),
+            p["sd_N_per_mm"].number(2),
+            p["n"].number(),
+        )
         for p in d["pointwise"]
-    )  # fmt: skip
+    )
     if pointwise:
-        yield Table("Pointwise stiffness between neighbouring levels",
-                    ("force N", "k N/mm", "sd N/mm", "n"), pointwise, 0)  # fmt: skip
+        yield Table(
+            "Pointwise stiffness between neighbouring levels",
+            ("force N", "k N/mm", "sd N/mm", "n"),
+            pointwise,
+            0,
+        )
     rivals = tuple(
-        (a["weighting"].text(), a["steps"].text(), a["stiffness_N_per_mm"].number(),
-         a["standard_uncertainty_N_per_mm"].number(2))
+        (
+            a["weighting"].text(),
+            a["steps"].text(),
+            a["stiffness_N_per_mm"].number(),
+            a["standard_uncertainty_N_per_mm"].number(2),
+        )
         for a in d["alternatives"]
-    )  # fmt: skip
+    )
     if rivals:
-        yield Table("k under other choices", ("weighting and origin", "steps", "k N/mm", "u N/mm"),
-                    rivals, 2)  # fmt: skip
+        yield Table(
+            "k under other choices",
+            ("weighting and origin", "steps", "k N/mm", "u N/mm"),
+            rivals,
+            2,
+        )
 
 
 def joints(session: Session, data: Node, pictures: Pictures) -> Section:
@@ -134,14 +173,22 @@ def joints(session: Session, data: Node, pictures: Pictures) -> Section:
     free = found["null_dimension"]
     blocks: list[Block] = [
         Paragraph(
-            ("These data determine ", *found["rank"].number(), " of 6 combinations of springs; ",
-             *free.number(), " stays" if free.value == 1 else " stay", " free (", *size, ")."),
+            (
+                "These data determine ",
+                *found["rank"].number(),
+                " of 6 combinations of springs; ",
+                *free.number(),
+                " stays" if free.value == 1 else " stay",
+                " free (",
+                *size,
+                ").",
+            ),
             "answer",
         ),
         pictures.joints([session]),
         _joint_table(found),
         Paragraph(("Prior: ", found["prior"]["source"].text(), "."), "note"),
-    ]  # fmt: skip
+    ]
     notes = tuple(n.text() for n in found["notes"])
     blocks += [Bullets(notes)] if notes else []
     blocks += _next_poses(found)
@@ -162,8 +209,16 @@ def _joint_table(found: Node) -> Table:
         )
         for j, q in enumerate(found["joint_stiffness_Nm_per_rad"])
     )
-    header = ("joint", "what the data say", "kNm/rad", "u", "95 % from", "to", "from data",
-              "at least")  # fmt: skip
+    header = (
+        "joint",
+        "what the data say",
+        "kNm/rad",
+        "u",
+        "95 % from",
+        "to",
+        "from data",
+        "at least",
+    )
     return Table("Torsional stiffness in kNm/rad", header, rows, words=2)
 
 

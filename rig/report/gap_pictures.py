@@ -27,20 +27,39 @@ def gap_figures(view: GapView, names: Sequence[str]) -> Iterator[Figure]:
     """Curve, map, withheld data, remainder, as far as they are named."""
     r, p, rest = view.shown, view.points, view.rest
     known: dict[str, tuple[str, Callable[[], Plot], Callable[[], Table]]] = {
-        "curve": ("Measurement, and the simulation before and after the effects.",
-                  lambda: curve(r, p), lambda: point_table(r, p)),
-        "map": ("Where the gap lies, before and after: over force and over time.",
-                lambda: gap_map(r, p), lambda: point_table(r, p)),
-        "withheld": ("How far the gap shrinks: fitted, and on data that were withheld.",
-                     lambda: withheld(r), lambda: held_table(r)),
-        "remainder": ("What repeats and stays unexplained, with its uncertainty.",
-                      lambda: remaining(r, p, rest), lambda: remainder_table(r, rest)),
-    }  # fmt: skip
+        "curve": (
+            "Measurement, and the simulation before and after the effects.",
+            lambda: curve(r, p),
+            lambda: point_table(r, p),
+        ),
+        "map": (
+            "Where the gap lies, before and after: over force and over time.",
+            lambda: gap_map(r, p),
+            lambda: point_table(r, p),
+        ),
+        "withheld": (
+            "How far the gap shrinks: fitted, and on data that were withheld.",
+            lambda: withheld(r),
+            lambda: held_table(r),
+        ),
+        "remainder": (
+            "What repeats and stays unexplained, with its uncertainty.",
+            lambda: remaining(r, p, rest),
+            lambda: remainder_table(r, rest),
+        ),
+    }
     for name in names:
         caption, plot, table = known[name]
         header, rows = _columns(table())
-        yield draw(f"{view.stem}_gap_{name}", caption, caption, _marked(plot, view.banners),
-                   header=header, rows=rows, png=view.png)  # fmt: skip
+        yield draw(
+            f"{view.stem}_gap_{name}",
+            caption,
+            caption,
+            _marked(plot, view.banners),
+            header=header,
+            rows=rows,
+            png=view.png,
+        )
 
 
 def _marked(plot: Callable[[], Plot], banners: tuple[str, ...]) -> Callable[[], Plot]:

@@ -58,8 +58,12 @@ def _where(found: Node) -> list[Block]:
     rows: list[tuple[str, Cell]] = [
         (f"Force, direction {d}", (*ends.interval(), " N")) for d, ends in where["force_N"].items()
     ]
-    for key, name in (("poses", "Poses"), ("branches", "Branches"), ("repetitions", "Repetitions"),
-                      ("joints", "Joints")):  # fmt: skip
+    for key, name in (
+        ("poses", "Poses"),
+        ("branches", "Branches"),
+        ("repetitions", "Repetitions"),
+        ("joints", "Joints"),
+    ):
         words = ", ".join(str(v) for v in where[key].value if v != "")
         if words:
             rows.append((name, words))
@@ -78,13 +82,21 @@ def _effects(found: Node) -> list[Block]:
         name, empty = e["name"].text(), (NOTHING,)
         if words.count(name) > 1:  # one mechanism in several joints
             name = ", ".join([name, *list(e["places"].value)[:1]])
-        head: tuple[Cell, ...] = (Word(name, "strong"), e["probability"].probability(),
-                                  e["share_of_gap"].percent())  # fmt: skip
+        head: tuple[Cell, ...] = (
+            Word(name, "strong"),
+            e["probability"].probability(),
+            e["share_of_gap"].percent(),
+        )
         parameters = [
-            (key, p["unit"].text(), p["value"].number(), p["ci95"][0].number(),
-             p["ci95"][1].number())
+            (
+                key,
+                p["unit"].text(),
+                p["value"].number(),
+                p["ci95"][0].number(),
+                p["ci95"][1].number(),
+            )
             for key, p in _told(e["parameters"])
-        ] or [("", "", empty, empty, empty)]  # fmt: skip
+        ] or [("", "", empty, empty, empty)]
         for i, (key, unit, *numbers) in enumerate(parameters):
             lead = head if i == 0 else ("", "", "")
             rows.append((lead[0], key, "" if unit == "1" else unit, *numbers, *lead[1:]))

@@ -83,24 +83,40 @@ def _protocol(asked: Node) -> Iterator[Block]:
     if not asked:
         return
     words: Rich = (
-        *asked["repetitions"].number(), " repetitions, ", _BRANCHES[asked["branches"].text()],
-        "; ", _ORDERS[asked["order"].text()],
-    )  # fmt: skip
+        *asked["repetitions"].number(),
+        " repetitions, ",
+        _BRANCHES[asked["branches"].text()],
+        "; ",
+        _ORDERS[asked["order"].text()],
+    )
     samples: Rich = (
-        "at least ", *asked["samples_per_step"].number(), " a level at ",
-        *asked["rate_Hz"].stated(), " Hz, after settling; holds of at least ",
-        *asked["hold_s"].stated(), " s",
-    )  # fmt: skip
+        "at least ",
+        *asked["samples_per_step"].number(),
+        " a level at ",
+        *asked["rate_Hz"].stated(),
+        " Hz, after settling; holds of at least ",
+        *asked["hold_s"].stated(),
+        " s",
+    )
     zeros: Rich = (
-        *asked["zero_before_s"].stated(), " s before and ", *asked["zero_after_s"].stated(),
-        " s after each repetition, then ", *asked["rest_s"].stated(), " s of rest",
-    )  # fmt: skip
+        *asked["zero_before_s"].stated(),
+        " s before and ",
+        *asked["zero_after_s"].stated(),
+        " s after each repetition, then ",
+        *asked["rest_s"].stated(),
+        " s of rest",
+    )
     yield Facts((("Procedure", words), ("Samples", samples), ("Without load", zeros)))
     rows = tuple(
-        row(run["pose"].text(), run["direction"].text(), run["levels"].number(),
-            run["from_N"].stated(), run["to_N"].stated())
+        row(
+            run["pose"].text(),
+            run["direction"].text(),
+            run["levels"].number(),
+            run["from_N"].stated(),
+            run["to_N"].stated(),
+        )
         for run in asked["runs"]
-    )  # fmt: skip
+    )
     yield Table("Runs asked for", ("pose", "direction", "levels", "from N", "to N"), rows, 2)
 
 
@@ -151,13 +167,21 @@ def _instruments(meta: Node) -> Table:
         "Standard uncertainties as stated: one sample, and the gain that all samples share",
         ("instrument", "unit", "one sample", "gain in %"),
         (
-            row("force", "N", force["standard_uncertainty_N"].stated(),
-                force["gain_relative_sd"].stated(100)),
-            row("displacement", "mm", laser["standard_uncertainty_mm"].stated(),
-                laser["gain_relative_sd"].stated(100)),
+            row(
+                "force",
+                "N",
+                force["standard_uncertainty_N"].stated(),
+                force["gain_relative_sd"].stated(100),
+            ),
+            row(
+                "displacement",
+                "mm",
+                laser["standard_uncertainty_mm"].stated(),
+                laser["gain_relative_sd"].stated(100),
+            ),
         ),
         words=2,
-    )  # fmt: skip
+    )
 
 
 def _simulation(meta: Node) -> Iterator[Block]:

@@ -39,15 +39,25 @@ def coupling(gathered: Gathered, data: Node, pictures: Pictures) -> Section:
         row(name, *(g[a].number(3) for a in "xyz")) for name, g in data["gain"].items() if g
     )
     blocks: list[Block] = [
-        Facts((("Model", data["model"].text()), ("Coupling", data["kind"].text()),
-               ("Coupled loads along", f"{data['load_axes'].text()} axes"))),
+        Facts(
+            (
+                ("Model", data["model"].text()),
+                ("Coupling", data["kind"].text()),
+                ("Coupled loads along", f"{data['load_axes'].text()} axes"),
+            )
+        ),
         pictures.coupling(gathered),
-        Table("Stiffness in N/mm, with standard uncertainties",
-              ("state", "x", "u", "y", "u", "z", "u"), rows),
+        Table(
+            "Stiffness in N/mm, with standard uncertainties",
+            ("state", "x", "u", "y", "u", "z", "u"),
+            rows,
+        ),
         Table("How many times stiffer than one arm", ("coupling", "x", "y", "z"), gains),
-        _workspace(data), *_decisions(data), *_published(data),
+        _workspace(data),
+        *_decisions(data),
+        *_published(data),
         *_bullets(data["notes"]),
-    ]  # fmt: skip
+    ]
     return Section("coupling", "Two coupled arms", tuple(blocks), _coupling_banners(gathered))
 
 
@@ -62,10 +72,9 @@ def _coupling_banners(gathered: Gathered) -> tuple[str, ...]:
 def _workspace(data: Node) -> Table:
     volumes = [data["workspace_m3"], *data["workspace_others_m3"]]
     rows = tuple(
-        (w["definition"].text(), w["single"].number(), w["coupled"].number(),
-         w["ratio"].percent(4))
+        (w["definition"].text(), w["single"].number(), w["coupled"].number(), w["ratio"].percent(4))
         for w in volumes
-    )  # fmt: skip
+    )
     return Table("Workspace", ("definition", "single m³", "coupled m³", "ratio"), rows)
 
 
@@ -80,10 +89,15 @@ def _decisions(data: Node) -> list[Block]:
 
 def _published(data: Node) -> list[Block]:
     rows = tuple(
-        (r["quantity"].text(), r["unit"].text(), r["stated"].number(), r["follows"].number(),
-         r["model"].number())
+        (
+            r["quantity"].text(),
+            r["unit"].text(),
+            r["stated"].number(),
+            r["follows"].number(),
+            r["model"].number(),
+        )
         for r in data["published"]
-    )  # fmt: skip
+    )
     if not rows:
         return []
     caption = "Published (doi 10.3390/jmmp10020054) beside this model; shown, never judged by"
@@ -167,8 +181,19 @@ def _tested(gathered: Gathered, pairs: Sequence[Node]) -> Table:
         )
         for p in pairs
     )
-    header = ("direction", "data set", "k against the first", "difference N/mm", "95 % from", "to",
-              "ratio", "95 % from", "to", "p", "p adjusted")  # fmt: skip
+    header = (
+        "direction",
+        "data set",
+        "k against the first",
+        "difference N/mm",
+        "95 % from",
+        "to",
+        "ratio",
+        "95 % from",
+        "to",
+        "p",
+        "p adjusted",
+    )
     caption = (
         f"Difference of k to {gathered.sessions[0].label}, at 5 % for all comparisons together"
     )
@@ -187,10 +212,12 @@ def _remarks(gathered: Gathered, pairs: Sequence[Node]) -> list[Block]:
 def _how_tested(pairs: Sequence[Node]) -> list[Block]:
     shared = [p["same_instruments"].value for p in pairs]
     gains = (
-        "the gains cancel, since the instruments are the same" if all(shared)
+        "the gains cancel, since the instruments are the same"
+        if all(shared)
         else "the gains count on both sides, since the instruments are not known to be the same"
-        if not any(shared) else "the gains cancel where the instruments are the same"
-    )  # fmt: skip
+        if not any(shared)
+        else "the gains cancel where the instruments are the same"
+    )
     words = (
         f"Student's t on the scatter between repetitions (Welch-Satterthwaite); {gains}; p "
         "adjusted after Holm. Mounting arm or instruments anew is not in the scatter of one "

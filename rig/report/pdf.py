@@ -88,14 +88,22 @@ def _block(block: Block) -> dict[str, Any]:
         case Table():
             return _table(block)
         case Figure():
-            return {"kind": "figure", "file": _file(block), "caption": _clean(block.caption),
-                    "alt": _clean(block.alt), "width": _width(block.svg)}  # fmt: skip
+            return {
+                "kind": "figure",
+                "file": _file(block),
+                "caption": _clean(block.caption),
+                "alt": _clean(block.alt),
+                "width": _width(block.svg),
+            }
         case Verbatim():
             return {"kind": "verbatim", "title": _clean(block.title), "text": _clean(block.text)}
         case Section():
-            return {"kind": "section", "title": _clean(block.title),
-                    "banners": [_clean(b) for b in block.banners],
-                    "blocks": [_block(b) for b in block.blocks]}  # fmt: skip
+            return {
+                "kind": "section",
+                "title": _clean(block.title),
+                "banners": [_clean(b) for b in block.banners],
+                "blocks": [_block(b) for b in block.blocks],
+            }
 
 
 def _table(table: Table) -> dict[str, Any]:

@@ -54,25 +54,40 @@ class Pictures:
             words = "One spring a direction: force and displacement are taken along it."
             plot = lambda: marked(setup_drawing.bench_setup(loads))  # noqa: E731
         caption = f"{words} Distances of screw and laser are schematic."
-        return self._draw(f"setup_{pose}" if pose else "setup", session, caption, words, plot,
-                          header, rows)  # fmt: skip
+        return self._draw(
+            f"setup_{pose}" if pose else "setup", session, caption, words, plot, header, rows
+        )
 
     def curves(self, session: Session) -> Iterator[Figure]:
         """Displacement over force with standard deviations, as the published Figure 6."""
         header = ("direction", "branch", "step", "force_N", "displacement_mm", "sd_mm", "n")
         for name, part in _parts(session.analysis):
             rows = tuple(
-                (key, p["branch"], p["step"], p["force_N"], p["displacement_mm"], p["sd_mm"],
-                 p["n"])
+                (
+                    key,
+                    p["branch"],
+                    p["step"],
+                    p["force_N"],
+                    p["displacement_mm"],
+                    p["sd_mm"],
+                    p["n"],
+                )
                 for key, d in part.to_json()["directions"].items()
                 for p in d["curve"]
-            )  # fmt: skip
+            )
             caption = (
                 "Displacement over force: means over the repetitions with their standard "
                 "deviation; dashed: the line of k; crosses: levels that do not count towards it."
             )
-            yield self._draw(f"curve{name}", session, caption, "Displacement over force.",
-                             partial(analysis_figures.curve, part), header, rows)  # fmt: skip
+            yield self._draw(
+                f"curve{name}",
+                session,
+                caption,
+                "Displacement over force.",
+                partial(analysis_figures.curve, part),
+                header,
+                rows,
+            )
 
     def pointwise(self, session: Session) -> Iterator[Figure]:
         """Stiffness between neighbouring levels, as the published Figure 7."""
@@ -89,8 +104,15 @@ class Pictures:
                 "Stiffness between neighbouring levels: mean and standard deviation over the "
                 "repetitions; dashed: k."
             )
-            yield self._draw(f"pointwise{name}", session, caption, "Pointwise stiffness.",
-                             partial(analysis_figures.pointwise, part), header, rows)  # fmt: skip
+            yield self._draw(
+                f"pointwise{name}",
+                session,
+                caption,
+                "Pointwise stiffness.",
+                partial(analysis_figures.pointwise, part),
+                header,
+                rows,
+            )
 
     def joints(self, sessions: Sequence[Session]) -> Figure:
         """Joint stiffnesses of one or several data sets beside the prior."""
@@ -137,9 +159,16 @@ class Pictures:
         kinds = {"single": json["single_N_per_mm"], **json["coupled_N_per_mm"]}
         rows = tuple((name, *(k[a] for a in "xyz")) for name, k in kinds.items() if k)
         caption = "Stiffness of one arm and of the coupled pair; bars: standard uncertainties."
-        return self._draw("coupling", None, caption, caption, lambda: stiffness(plain),
-                          ("state", "x_N_per_mm", "y_N_per_mm", "z_N_per_mm"), rows,
-                          mathematics=True)  # fmt: skip
+        return self._draw(
+            "coupling",
+            None,
+            caption,
+            caption,
+            lambda: stiffness(plain),
+            ("state", "x_N_per_mm", "y_N_per_mm", "z_N_per_mm"),
+            rows,
+            mathematics=True,
+        )
 
     def compared(self, gathered: Gathered) -> Iterator[Figure]:
         """k of all data sets, then the curves of each direction over each other."""
@@ -177,8 +206,16 @@ class Pictures:
     ) -> Figure:
         stem = self._free(name if session is None else f"{session.stem}_{name}")
         if stem not in self._drawn:
-            self._drawn[stem] = draw(stem, caption, alt, plot, header=header, rows=rows,
-                                     png=self.png, mathematics=mathematics)  # fmt: skip
+            self._drawn[stem] = draw(
+                stem,
+                caption,
+                alt,
+                plot,
+                header=header,
+                rows=rows,
+                png=self.png,
+                mathematics=mathematics,
+            )
         return self._drawn[stem]
 
     def _free(self, wanted: str) -> str:

@@ -76,8 +76,16 @@ def bench_setup(loads: Sequence[Load]) -> Figure:
 
 
 def _arm(axes: Any, x: Array, y: Array) -> None:
-    axes.plot(x[:7], y[:7], color=_ARM, linewidth=7, solid_capstyle="round",
-              solid_joinstyle="round", alpha=0.45, zorder=2)  # fmt: skip
+    axes.plot(
+        x[:7],
+        y[:7],
+        color=_ARM,
+        linewidth=7,
+        solid_capstyle="round",
+        solid_joinstyle="round",
+        alpha=0.45,
+        zorder=2,
+    )
     axes.plot(x[:7], y[:7], "o", color=_ARM, markersize=5, zorder=3)
     if np.hypot(x[7] - x[6], y[7] - y[6]) > 1:
         axes.plot(x[6:], y[6:], color=_ARM, linewidth=3, zorder=2)
@@ -110,23 +118,38 @@ def _load(axes: Any, at: Array, vector: Array, view: tuple[int, int], colour: st
         axes.plot(*at, "." if towards else "x", color=colour, markersize=9, zorder=7)
         return _Spot((at[0], at[1]), (12.0, 12.0), "left")
     tail, laser = at - 250 * inside, at + 250 * inside
-    axes.annotate("", xy=at - 18 * inside, xytext=tail, zorder=5,
-                  arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.5})  # fmt: skip
+    axes.annotate(
+        "",
+        xy=at - 18 * inside,
+        xytext=tail,
+        zorder=5,
+        arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.5},
+    )
     block, head = at - 290 * inside, at + 280 * inside
     axes.plot(*block, "s", color=colour, markersize=10, zorder=5)
     axes.plot([at[0], laser[0]], [at[1], laser[1]], ":", color=_LASER, linewidth=1.6, zorder=4)
     axes.plot(*head, "D", color=_LASER, markersize=8, zorder=4)  # behind an opposite screw
     upright = abs(inside[1]) > abs(inside[0])  # never on the line of its own arrow
-    return _Spot((block[0], block[1]), *(((10.0, 0.0), "left") if upright
-                                         else ((0.0, 13.0), "center")))  # fmt: skip
+    return _Spot(
+        (block[0], block[1]), *(((10.0, 0.0), "left") if upright else ((0.0, 13.0), "center"))
+    )
 
 
 def _label(axes: Any, spot: _Spot, above: int, name: str, colour: str) -> None:
     """Above: names that stand at that spot already."""
     right, up = spot.step
-    axes.annotate(name, spot.at, xytext=(right, up + _LINE_POINTS * above), color=colour,
-                  textcoords="offset points", ha=spot.align, va="center", fontsize=10,
-                  fontweight="bold", zorder=8)  # fmt: skip
+    axes.annotate(
+        name,
+        spot.at,
+        xytext=(right, up + _LINE_POINTS * above),
+        color=colour,
+        textcoords="offset points",
+        ha=spot.align,
+        va="center",
+        fontsize=10,
+        fontweight="bold",
+        zorder=8,
+    )
 
 
 def _same_scale(panels: Sequence[Any]) -> None:
@@ -142,17 +165,29 @@ def _legend(figure: Figure, loads: Sequence[Load]) -> None:
     from matplotlib.lines import Line2D
 
     marks = [
-        Line2D([], [], color=COLOURS[i % len(COLOURS)], marker="s", markersize=8, linewidth=2.5,
-               label=f"screw with dynamometer, pushes along {load.name}")
+        Line2D(
+            [],
+            [],
+            color=COLOURS[i % len(COLOURS)],
+            marker="s",
+            markersize=8,
+            linewidth=2.5,
+            label=f"screw with dynamometer, pushes along {load.name}",
+        )
         for i, load in enumerate(loads)
-    ]  # fmt: skip
+    ]
     marks += [
         Line2D([], [], color="black", marker="s", linestyle="", markersize=9, label="base"),
         Line2D([], [], color=_LASER, marker="D", linestyle=":", label="laser"),
         Line2D([], [], color="white", marker="o", markeredgecolor="black", label="point of load"),
     ]
-    figure.legend(handles=marks, loc="outside lower center", ncols=min(3, len(marks)),
-                  frameon=False, fontsize=8)  # fmt: skip
+    figure.legend(
+        handles=marks,
+        loc="outside lower center",
+        ncols=min(3, len(marks)),
+        frameon=False,
+        fontsize=8,
+    )
 
 
 def _spring(axes: Any, y: float, load: Load, colour: str) -> None:
@@ -163,7 +198,12 @@ def _spring(axes: Any, y: float, load: Load, colour: str) -> None:
     axes.plot(x, zigzag, color=_ARM, linewidth=1.5)
     axes.plot([4.0, 4.6], [y, y], color=_ARM, linewidth=1.5)
     axes.plot(4.8, y, "s", color=_ARM, markersize=13)
-    axes.annotate("", xy=(6.8, y), xytext=(5.1, y),
-                  arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.5})  # fmt: skip
-    axes.text(6.95, y, f"{load.name}: force and displacement", va="center", color=colour,
-              fontsize=9)  # fmt: skip
+    axes.annotate(
+        "",
+        xy=(6.8, y),
+        xytext=(5.1, y),
+        arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.5},
+    )
+    axes.text(
+        6.95, y, f"{load.name}: force and displacement", va="center", color=colour, fontsize=9
+    )

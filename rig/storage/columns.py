@@ -57,13 +57,27 @@ def _all_columns() -> list[Column]:
         Column("step", "", "force step, 0 for zero load, -1 for continuous", "count"),
     ]
     measured = [
-        Column("force_N", "N", "force along the direction",
-               required=True, finite=True, largest=LARGEST_N),
-        *(Column(f"force_{a}_N", "N", f"force along {a} of the base frame", largest=LARGEST_N)
-          for a in AXES),
-        Column("displacement_mm", "mm", "displacement along the direction",
-               required=True, finite=True, largest=LARGEST_MM),
-    ]  # fmt: skip
+        Column(
+            "force_N",
+            "N",
+            "force along the direction",
+            required=True,
+            finite=True,
+            largest=LARGEST_N,
+        ),
+        *(
+            Column(f"force_{a}_N", "N", f"force along {a} of the base frame", largest=LARGEST_N)
+            for a in AXES
+        ),
+        Column(
+            "displacement_mm",
+            "mm",
+            "displacement along the direction",
+            required=True,
+            finite=True,
+            largest=LARGEST_MM,
+        ),
+    ]
     arm = [
         *(Column(f"q{j}_rad", "rad", f"position of joint {j}") for j in JOINTS),
         *(Column(f"temperature{j}_C", "degC", f"temperature of joint {j}") for j in JOINTS),
@@ -82,8 +96,23 @@ KNOWN: dict[str, Column] = {c.name: c for c in _all_columns()}
 TABLE_COLUMNS = tuple(n for n in KNOWN if n not in ("target_N", "segment", "number", "lateness_s"))
 
 _UNITS = (
-    "N", "Nm", "m", "mm", "um", "s", "ms", "Hz", "rad", "deg", "C", "K", "V", "A", "Pa", "MPa",
-)  # fmt: skip
+    "N",
+    "Nm",
+    "m",
+    "mm",
+    "um",
+    "s",
+    "ms",
+    "Hz",
+    "rad",
+    "deg",
+    "C",
+    "K",
+    "V",
+    "A",
+    "Pa",
+    "MPa",
+)
 _UNIT = re.compile(r"_(?P<first>{0})(?:_per_(?P<second>{0}))?$".format("|".join(_UNITS)))
 
 

@@ -65,10 +65,18 @@ def _parse_fast(
     numbers = [i for i in names if i not in words]
     try:
         frame = pd.read_csv(
-            BytesIO(raw), header=None, names=names, index_col=False, dtype=dtype, engine="c",
-            na_values={i: list(MISSING) for i in numbers}, keep_default_na=False,
-            skipinitialspace=True, low_memory=False, **_exact_floats(pd.__version__),
-        )  # fmt: skip
+            BytesIO(raw),
+            header=None,
+            names=names,
+            index_col=False,
+            dtype=dtype,
+            engine="c",
+            na_values={i: list(MISSING) for i in numbers},
+            keep_default_na=False,
+            skipinitialspace=True,
+            low_memory=False,
+            **_exact_floats(pd.__version__),
+        )
     except (ValueError, OverflowError, TypeError):
         return None
     if len(frame) != len(block.lines):

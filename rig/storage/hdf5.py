@@ -154,9 +154,14 @@ def _put_column(group: h5py.Group, name: str, values: Values) -> h5py.Dataset:
         column = group.create_dataset(name, data=data, dtype=dtype)
     else:
         column = group.create_dataset(
-            name, data=data, chunks=(min(len(data), _CHUNK_ROWS),),
-            compression="gzip", compression_opts=1, shuffle=True, fletcher32=True,
-        )  # fmt: skip
+            name,
+            data=data,
+            chunks=(min(len(data), _CHUNK_ROWS),),
+            compression="gzip",
+            compression_opts=1,
+            shuffle=True,
+            fletcher32=True,
+        )
     if values.dtype.kind == "b":
         column.attrs["kind"] = "flag"
     return column

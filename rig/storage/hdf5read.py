@@ -86,9 +86,11 @@ class _Reading:
             software=str(root["software"]),
             stop_reason=str(root["stop_reason"]),
             title=str(root["title"]).removeprefix("EMULATED: "),
-            **{k: json.loads(self._text(f"entry/record/{k}"))
-               for k in ("events", "devices", "calibration")},
-        )  # fmt: skip
+            **{
+                k: json.loads(self._text(f"entry/record/{k}"))
+                for k in ("events", "devices", "calibration")
+            },
+        )
 
     def _check_schema(self, root: dict[str, Any]) -> None:
         if root.get("schema") != SCHEMA:

@@ -17,8 +17,18 @@ from rig.storage.files import ENDINGS, neighbours
 SCHEMA = "rig.dataset"
 SEAL = b"\n# rig.dataset sha256 "
 # What h5py raises on files that are damaged in one way or another.
-BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError,
-          OverflowError, MemoryError, RecursionError)  # fmt: skip
+BROKEN = (
+    OSError,
+    RuntimeError,
+    KeyError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    IndexError,
+    OverflowError,
+    MemoryError,
+    RecursionError,
+)
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 

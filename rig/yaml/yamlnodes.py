@@ -36,8 +36,11 @@ _CORE_TAGS = frozenset(
 # Part of the parser's sentence -> what it means to somebody who writes these files.
 _SYNTAX = (
     ("'\\t'", "a tab stands here; indent with spaces"),
-    ("mapping values are not allowed", "a colon where none can stand; check the indentation of "
-     "this line and the one above, or quote the text"),
+    (
+        "mapping values are not allowed",
+        "a colon where none can stand; check the indentation of "
+        "this line and the one above, or quote the text",
+    ),
     ("could not find expected ':'", "a key without a colon and value"),
     ("did not find expected key", "the indentation of this line fits no line above"),
     ("expected <block end>", "the indentation of this line fits no line above"),
@@ -47,7 +50,7 @@ _SYNTAX = (
     ("undefined alias", "an alias (*name) without an anchor (&name) before it"),
     ("a single document", "a second document (---) begins; one file holds one document"),
     ("cannot start any token", "a character that cannot start a value; quote the text"),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, order=True)

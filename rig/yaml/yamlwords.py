@@ -9,9 +9,30 @@ Path = tuple[str | int, ...]
 Schema = Mapping[str, object]
 
 _UNITS = (
-    "N", "Nm", "m", "mm", "um", "s", "min", "Hz", "kHz", "rad", "deg", "C", "K", "V", "A",
-    "kg", "m3", "pC", "Pa", "GPa", "percent", "s2", "kgm2",
-)  # fmt: skip
+    "N",
+    "Nm",
+    "m",
+    "mm",
+    "um",
+    "s",
+    "min",
+    "Hz",
+    "kHz",
+    "rad",
+    "deg",
+    "C",
+    "K",
+    "V",
+    "A",
+    "kg",
+    "m3",
+    "pC",
+    "Pa",
+    "GPa",
+    "percent",
+    "s2",
+    "kgm2",
+)
 _UNIT = re.compile(r"(?:^|[_0-9])(?P<first>{0})(?:_per_(?P<second>{0}))?$".format("|".join(_UNITS)))
 _SPELLED = {"C": "deg C", "percent": "%", "s2": "s^2", "m3": "m^3", "kgm2": "kg m^2"}
 

@@ -165,10 +165,18 @@ def samples(count: int, repetitions: int = 3, up_to: float = 1.0) -> list[dict[s
                 moved = displacement_mm(force + noise, repetition)
                 time_s = 30.0 * step + n
                 sample = Sample(
-                    row, "P1", "x", repetition, step, "loading", settled=True,
-                    force_N=force + noise, displacement_mm=moved,
-                    time_s=time_s, session_s=400.0 * (repetition - 1) + time_s,
-                )  # fmt: skip
+                    row,
+                    "P1",
+                    "x",
+                    repetition,
+                    step,
+                    "loading",
+                    settled=True,
+                    force_N=force + noise,
+                    displacement_mm=moved,
+                    time_s=time_s,
+                    session_s=400.0 * (repetition - 1) + time_s,
+                )
                 items.append(_item("sample", sample))
     return items
 

@@ -321,9 +321,14 @@ def test_dangerous_names_show_as_text(page: Viewer, feed: Feed) -> None:
     feed.items.append({"log": {"session_s": 0.0, "level": "info", "text": EVIL}})
     feed.state = replace(
         scenes.prompting(replace(scenes.PAUSED, text=EVIL)),
-        protocol=EVIL, robot=EVIL, banner=EVIL, message=EVIL,
-        run=run, devices=(device,), limits=(limit,),
-    )  # fmt: skip
+        protocol=EVIL,
+        robot=EVIL,
+        banner=EVIL,
+        message=EVIL,
+        run=run,
+        devices=(device,),
+        limits=(limit,),
+    )
     for name in ("title", "place", "emulated", "alarms", "devices", "limits", "prompt-text", "log"):
         page.wait_for(name, EVIL)
     assert page.script("return document.title") == "Stiffness measurement"

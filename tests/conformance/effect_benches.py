@@ -36,8 +36,15 @@ PAIRS = [
 WITHOUT_ARM = [(w, d) for w, d in PAIRS if d not in ARMS]
 IN_JOINTS = tuple(w for w in WORDS if w.startswith("joint_"))
 # What the laser sees and no joint: readings stay as they are.
-OUTSIDE = ("link_flexibility", "base_compliance", "base_slip", "contact_seating",
-           "displacement_scale", "thermal_drift", "zero_shift")  # fmt: skip
+OUTSIDE = (
+    "link_flexibility",
+    "base_compliance",
+    "base_slip",
+    "contact_seating",
+    "displacement_scale",
+    "thermal_drift",
+    "zero_shift",
+)
 
 
 def module(word: str) -> ModuleType:

@@ -80,11 +80,18 @@ def table(design: Design) -> pd.DataFrame:
                     time += 0.0 if design.continuous else 7.0
                     for _ in range(hold):
                         time += 1.0
-                        rows.append({
-                            "time_s": time, "session_s": session + time, "pose": pose,
-                            "direction": direction, "repetition": repetition, "branch": branch,
-                            "step": step, "force_N": TOP_N[direction] * share,
-                        })  # fmt: skip
+                        rows.append(
+                            {
+                                "time_s": time,
+                                "session_s": session + time,
+                                "pose": pose,
+                                "direction": direction,
+                                "repetition": repetition,
+                                "branch": branch,
+                                "step": step,
+                                "force_N": TOP_N[direction] * share,
+                            }
+                        )
                 session += time + REST_S
     return pd.DataFrame(rows)
 

@@ -59,9 +59,9 @@ def seen_turned(rows: pd.DataFrame, axis: int, angle: float) -> Array:
 def test_columns_of_a_turned_base_are_exact_where_it_is(axis: int) -> None:
     bench = make_bench(linear("medium"))
     turn = 0.2 * np.eye(3)[axis]
-    rows = pd.DataFrame({
-        "pose": "P1", "direction": [bench.data.setups[s].direction for s in bench.rows.setup]
-    })  # fmt: skip
+    rows = pd.DataFrame(
+        {"pose": "P1", "direction": [bench.data.setups[s].direction for s in bench.rows.setup]}
+    )
     there, force = seen_turned(rows, axis, 0.2), bench.load[:, None]
     moved = (there**2 - bench.lever**2) @ bench.compliance * bench.load
     column = 0.2 * turned(bench, turn, bench.compliance)[axis]
@@ -103,8 +103,10 @@ def sticking(rows: pd.DataFrame) -> Array:
     """(n, 2) N: a tip that holds on to its pad until the load has gone back by a third of it."""
     out, held = np.zeros(len(rows)), 0.0
     top = rows.groupby("direction")["force_N"].transform("max").to_numpy()
-    fresh = (rows[["pose", "direction", "repetition"]].shift() != rows[
-        ["pose", "direction", "repetition"]]).any(axis=1)  # fmt: skip
+    fresh = (
+        rows[["pose", "direction", "repetition"]].shift()
+        != rows[["pose", "direction", "repetition"]]
+    ).any(axis=1)
     for i, force in enumerate(rows["force_N"]):
         reach = 0.15 * top[i]
         held = 0.0 if fresh.iloc[i] else held
@@ -190,10 +192,14 @@ def test_a_vibration_that_the_samples_follow_is_no_noise_of_the_instruments() ->
 
 def test_without_components_nothing_is_said_to_drag() -> None:
     labels = [
-        [v.label for v in load_misalignment.variants(make_bench(gap_data(imported(
-            noisy(replace(MEDIUM, components=c)), meta(MEDIUM)))))]
+        [
+            v.label
+            for v in load_misalignment.variants(
+                make_bench(gap_data(imported(noisy(replace(MEDIUM, components=c)), meta(MEDIUM))))
+            )
+        ]
         for c in (False, True)
-    ]  # fmt: skip
+    ]
     assert not any("dragging" in label for label in labels[0])
     assert any("dragging" in label for label in labels[1])
 

@@ -57,10 +57,13 @@ def plain(bench: Bench, **changes: Array | float) -> Array:
     base = load_robot("ur10e").fk(np.array(Q["P1"]), tool_offset(np.array(TCP_MM) * 1e-3))
     offset = base[:3, :3].T @ np.asarray(changes.get("offset", none)) * 1e3
     return forward(
-        force, bench.rows.setup, STATED * (1 + np.asarray(changes.get("stiffness", np.zeros(6)))),
-        np.array(TCP_MM) + offset, np.asarray(changes.get("turn", np.zeros(6))),
+        force,
+        bench.rows.setup,
+        STATED * (1 + np.asarray(changes.get("stiffness", np.zeros(6)))),
+        np.array(TCP_MM) + offset,
+        np.asarray(changes.get("turn", np.zeros(6))),
         np.asarray(changes.get("tilt", none)),
-    )  # fmt: skip
+    )
 
 
 def derivative(bench: Bench, name: str, unit: Array | float) -> Array:
@@ -156,5 +159,6 @@ def test_derivative_of_a_base_that_turns(axis: int, depth: float) -> None:
         moment = a @ np.cross(r, n)  # per newton
         mine = bench.rows.setup == s
         expected[mine] = n @ np.cross(moment * a, r) * bench.rows.force[mine]
-    np.testing.assert_allclose(columns[: bench.rows.n, v.columns[axis]], expected, rtol=1e-9,
-                               atol=1e-12)  # fmt: skip
+    np.testing.assert_allclose(
+        columns[: bench.rows.n, v.columns[axis]], expected, rtol=1e-9, atol=1e-12
+    )

@@ -152,8 +152,16 @@ def recovered(word: str, design: str) -> str:
 
 
 # The others are found on data of other laws in recovery/test_gap_effects.py.
-QUICK = ("joint_backlash", "joint_hysteresis", "link_flexibility", "base_compliance",
-         "load_misalignment", "force_drift", "displacement_scale", "pose_error")  # fmt: skip
+QUICK = (
+    "joint_backlash",
+    "joint_hysteresis",
+    "link_flexibility",
+    "base_compliance",
+    "load_misalignment",
+    "force_drift",
+    "displacement_scale",
+    "pose_error",
+)
 
 
 def marks(word: str, design: str) -> tuple[pytest.MarkDecorator, ...]:

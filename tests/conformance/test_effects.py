@@ -204,9 +204,13 @@ def more_newtons(data: GapData, a: float) -> GapData:
         for s in data.setups
     )
     return replace(
-        data, force=data.force * a, compliance=data.compliance / a, instruments=meter,
-        setups=setups, tangential=None if data.tangential is None else data.tangential * a,
-    )  # fmt: skip
+        data,
+        force=data.force * a,
+        compliance=data.compliance / a,
+        instruments=meter,
+        setups=setups,
+        tangential=None if data.tangential is None else data.tangential * a,
+    )
 
 
 def prior_columns(columns: Array, v: Variant) -> Array:
@@ -229,9 +233,11 @@ def test_another_unit_of_force_changes_nothing_but_units(word: str, design: str)
         assert v.columns == w.columns
         expected = prior_columns(columns, v) * force[:, None] * grows
         np.testing.assert_allclose(
-            prior_columns(scaled, w), expected, rtol=1e-9,
+            prior_columns(scaled, w),
+            expected,
+            rtol=1e-9,
             atol=1e-12 * (np.abs(expected).max() or 1.0),
-        )  # fmt: skip
+        )
 
 
 @pytest.mark.parametrize(("word", "design"), WITHOUT_ARM)
@@ -249,6 +255,8 @@ def test_another_unit_of_length_changes_nothing_but_units(word: str, design: str
     for v, w in zip(variants, others, strict=True):
         expected = prior_columns(columns, v) * length[:, None]
         np.testing.assert_allclose(
-            prior_columns(np.column_stack(other.columns), w), expected, rtol=1e-9,
+            prior_columns(np.column_stack(other.columns), w),
+            expected,
+            rtol=1e-9,
             atol=1e-12 * (np.abs(expected).max() or 1.0),
-        )  # fmt: skip
+        )

@@ -48,10 +48,17 @@ def test_they_agree_on_levels_whose_ramps_were_recorded_too(rests: bool) -> None
     before = np.concatenate([np.zeros(14), level[:-14]])
     coming = (np.arange(98) % 14 + 1) / (3 if rests else 14)
     force = before + (level - before) * np.minimum(1.0, coming)
-    rows = pd.DataFrame({
-        "time_s": np.arange(98.0), "direction": "x", "repetition": 1, "branch": "cycle",
-        "step": np.repeat(np.arange(1, 8), 14), "force_N": force, "displacement_mm": force / 95,
-    })  # fmt: skip
+    rows = pd.DataFrame(
+        {
+            "time_s": np.arange(98.0),
+            "direction": "x",
+            "repetition": 1,
+            "branch": "cycle",
+            "step": np.repeat(np.arange(1, 8), 14),
+            "force_N": force,
+            "displacement_mm": force / 95,
+        }
+    )
     assert agreed(imported(rows, meta(design))) is rests
 
 
@@ -64,12 +71,17 @@ def test_ramps_under_the_names_of_their_levels_cost_no_stiffness(way: float, top
     before = np.concatenate([np.zeros(20), level[:-20]])
     within = (np.arange(220) % 20 + 1) / 20
     force = before + (level - before) * np.minimum(1.0, within / way)
-    rows = pd.DataFrame({
-        "time_s": np.arange(220.0), "direction": "x", "repetition": 1,
-        "branch": np.where(level > 0, "loading", "zero"), "step": np.repeat(np.arange(11), 20),
-        "force_N": force + np.random.default_rng(3).normal(0, 0.02, 220),
-        "displacement_mm": force / 80,
-    })  # fmt: skip
+    rows = pd.DataFrame(
+        {
+            "time_s": np.arange(220.0),
+            "direction": "x",
+            "repetition": 1,
+            "branch": np.where(level > 0, "loading", "zero"),
+            "step": np.repeat(np.arange(11), 20),
+            "force_N": force + np.random.default_rng(3).normal(0, 0.02, 220),
+            "displacement_mm": force / 80,
+        }
+    )
     dataset = imported(rows, meta(DESIGNS["bench"]))
     assert agreed(dataset)
     (curve,) = curves(dataset).values()

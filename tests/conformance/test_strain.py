@@ -97,8 +97,12 @@ def test_no_single_step_of_a_warming_path_stands_out(largest: float, stands_out:
     pulls = np.zeros(len(found.pulls))
     pulls[len(found.base) :] = np.where(np.arange(len(seen)) % 2, 0.3, -0.3) * seen
     pulls[len(found.base) + int(np.flatnonzero(seen)[4])] = largest
-    odd = replace(found, pulls=pulls, base=np.zeros(len(found.base)),
-                  coefficients=1e-5 * v.root @ pulls[len(found.base) :])  # fmt: skip
+    odd = replace(
+        found,
+        pulls=pulls,
+        base=np.zeros(len(found.base)),
+        coefficients=1e-5 * v.root @ pulls[len(found.base) :],
+    )
     engine.structural = 1e-9
     assert (strain(engine, odd, 0.0) > LIMIT) is stands_out
     engine.structural = 1e-2  # a little heat beside something else may mop up what that leaves

@@ -51,33 +51,64 @@ def test_effects_come_in_the_order_of_the_words_and_under_their_own() -> None:
 # --- subsets: a new word goes to one of the two sides ------------------------------------------
 
 ALIKE_WITHOUT_ARM = {  # said in words that speak of no joint and no laser
-    "load_misalignment", "force_drift", "force_scale", "thermal_drift", "zero_shift", "time_lag",
-}  # fmt: skip
+    "load_misalignment",
+    "force_drift",
+    "force_scale",
+    "thermal_drift",
+    "zero_shift",
+    "time_lag",
+}
 NO_HINGE = {  # instruments, drifts and seats, which the other engine has no part for
-    "contact_seating", "load_misalignment", "force_drift", "force_scale", "displacement_scale",
-    "thermal_drift", "zero_shift", "time_lag", "pose_error",
-}  # fmt: skip
+    "contact_seating",
+    "load_misalignment",
+    "force_drift",
+    "force_scale",
+    "displacement_scale",
+    "thermal_drift",
+    "zero_shift",
+    "time_lag",
+    "pose_error",
+}
 
 # Declarations that an effect may leave empty by mistake: who has none is named.
 NO_LENGTH = {  # in newtons, seconds, angles that springs give, or of an instrument
-    "link_flexibility", "base_compliance", "load_misalignment", "force_drift", "force_scale",
-    "displacement_scale", "thermal_drift", "zero_shift", "time_lag", "pose_error",
+    "link_flexibility",
+    "base_compliance",
+    "load_misalignment",
+    "force_drift",
+    "force_scale",
+    "displacement_scale",
+    "thermal_drift",
+    "zero_shift",
+    "time_lag",
+    "pose_error",
     "joint_stiffness_error",
-}  # fmt: skip
+}
 EITHER_SIGN = {  # all its numbers, or factors, which stand above zero by themselves
-    "joint_nonlinear_stiffness", "link_flexibility", "base_compliance", "contact_seating",
-    "load_misalignment", "force_drift", "force_scale", "displacement_scale", "thermal_drift",
-    "zero_shift", "pose_error", "joint_stiffness_error",
-}  # fmt: skip
+    "joint_nonlinear_stiffness",
+    "link_flexibility",
+    "base_compliance",
+    "contact_seating",
+    "load_misalignment",
+    "force_drift",
+    "force_scale",
+    "displacement_scale",
+    "thermal_drift",
+    "zero_shift",
+    "pose_error",
+    "joint_stiffness_error",
+}
 
 SIDES: dict[str, tuple[Collection[str], set[str], Collection[str]]] = {
     "meanings without an arm": (
-        diagnose_text._OF_ONE_SPRING, ALIKE_WITHOUT_ARM, set(WORDS) - NEED_ARM,
+        diagnose_text._OF_ONE_SPRING,
+        ALIKE_WITHOUT_ARM,
+        set(WORDS) - NEED_ARM,
     ),
     "drawn for the other engine": (mujoco_effects.EFFECTS, NO_HINGE, WORDS),
     "lengths": ([w for w, e in EFFECTS.items() if e.lengths], NO_LENGTH, WORDS),
     "not negative": ([w for w, e in EFFECTS.items() if e.not_negative], EITHER_SIGN, WORDS),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", SIDES)

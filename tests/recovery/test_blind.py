@@ -189,8 +189,14 @@ def test_the_worker_knows_no_world_and_no_generator() -> None:
         "import sys, rig.blind.worker, rig.diagnosis.diagnose, rig.dataset\n"
         "print([m for m in sys.modules if m.startswith(('rig.worlds', 'rig.blind.'))])"
     )
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
-                          cwd=Path(__file__).parents[2], timeout=60)  # fmt: skip
+    said = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[2],
+        timeout=60,
+    )
     assert said.stdout.strip() == "['rig.blind.worker']"
 
 
@@ -231,9 +237,10 @@ def test_ctrl_c_reports_what_was_scored_and_ends_with_130(
     monkeypatch.setattr(command, "generator", lambda _: (interrupted, EFFECTS))
     monkeypatch.setattr("rig.blind.campaign.Diagnoser", Instant)
     monkeypatch.setattr(
-        sys, "argv",
+        sys,
+        "argv",
         ["rig", "blind", "--cases", "9", "--jobs", "1", "--json", str(tmp_path / "r.json")],
-    )  # fmt: skip
+    )
     with pytest.raises(SystemExit) as ended:
         cli.main()
     assert ended.value.code == 130

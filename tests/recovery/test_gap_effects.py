@@ -29,8 +29,10 @@ from rig.models.robot import load_robot
 from rig.tables import import_table
 from tests.conformance.gap_designs import linear
 
-Q = {"P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],
-     "P2": [0.054, -1.480, -1.948, -1.284, 1.571, -1.336]}  # fmt: skip
+Q = {
+    "P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],
+    "P2": [0.054, -1.480, -1.948, -1.284, 1.571, -1.336],
+}
 STIFFNESS = np.array([36000.0, 57000, 18500, 7300, 7400, 8000])
 TOP = {"x": 200.0, "y": 90.0}
 META = """robot: ur10e
@@ -79,14 +81,31 @@ def walk(poses: tuple[str, ...], hold: int = 4, steps: int = 8) -> list[Sample]:
                     for i in range(hold):
                         time += 1.0
                         force = TOP[direction] * step / steps
-                        out.append(Sample(pose, direction, repetition, branch, step, time,
-                                          session + time, force, i == 0))  # fmt: skip
+                        out.append(
+                            Sample(
+                                pose,
+                                direction,
+                                repetition,
+                                branch,
+                                step,
+                                time,
+                                session + time,
+                                force,
+                                i == 0,
+                            )
+                        )
                 session += time + 200.0
     return out
 
 
-def measure(tmp: Path, law: Law, poses: tuple[str, ...] = ("P1",), seed: int = 0,
-            drop: tuple[str, ...] = (), noise: float = 1.0) -> Dataset:  # fmt: skip
+def measure(
+    tmp: Path,
+    law: Law,
+    poses: tuple[str, ...] = ("P1",),
+    seed: int = 0,
+    drop: tuple[str, ...] = (),
+    noise: float = 1.0,
+) -> Dataset:
     """A data set in which `law` acts: (samples, torques, levers) -> (joint deflections, more m)."""
     rng = np.random.default_rng(seed)
     arm, samples = load_robot("ur10e"), walk(poses)
@@ -103,14 +122,26 @@ def measure(tmp: Path, law: Law, poses: tuple[str, ...] = ("P1",), seed: int = 0
     u += rng.normal(0, 0.0015 * noise, len(u))
     q = torque / STIFFNESS + joints + rng.normal(0, 1e-5 * noise, joints.shape)
     f = force + rng.normal(0, 0.05 * noise, len(u))
-    lines = ["time_s,session_s,pose,direction,repetition,branch,step,force_N,displacement_mm,"
-             + ",".join(f"q{j}_rad" for j in range(1, 7))]  # fmt: skip
+    lines = [
+        "time_s,session_s,pose,direction,repetition,branch,step,force_N,displacement_mm,"
+        + ",".join(f"q{j}_rad" for j in range(1, 7))
+    ]
     datum: dict[tuple[str, str], float] = {}
     for i, s in enumerate(samples):
         zero = datum.setdefault((s.pose, s.direction), u[i])
         angles = np.array(Q[s.pose]) + q[i]
-        values = [s.time, s.session, s.pose, s.direction, s.repetition, s.branch, s.step, f[i],
-                  u[i] - zero, *angles]  # fmt: skip
+        values = [
+            s.time,
+            s.session,
+            s.pose,
+            s.direction,
+            s.repetition,
+            s.branch,
+            s.step,
+            f[i],
+            u[i] - zero,
+            *angles,
+        ]
         lines.append(",".join(str(v) for v in values))
     if "q" in drop:
         lines = [",".join(line.split(",")[:9]) for line in lines]
@@ -220,13 +251,19 @@ def lags(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> Any:
 
 
 CASES: dict[str, tuple[Law, str]] = {
-    "none": (nothing, "none"), "yield": (yields, "joint_yield"), "creep": (creeps, "joint_creep"),
-    "harden": (hardens, "joint_nonlinear_stiffness"), "drift": (drifts, "thermal_drift"),
-    "jump": (jumps, "zero_shift"), "seat": (seats, "contact_seating"),
-    "slip": (slips, "base_slip"), "ripple": (ripples, "unknown"),
-    "lag": (lags, "time_lag"), "wander": (wanders, "thermal_drift"),
+    "none": (nothing, "none"),
+    "yield": (yields, "joint_yield"),
+    "creep": (creeps, "joint_creep"),
+    "harden": (hardens, "joint_nonlinear_stiffness"),
+    "drift": (drifts, "thermal_drift"),
+    "jump": (jumps, "zero_shift"),
+    "seat": (seats, "contact_seating"),
+    "slip": (slips, "base_slip"),
+    "ripple": (ripples, "unknown"),
+    "lag": (lags, "time_lag"),
+    "wander": (wanders, "thermal_drift"),
     "bend": (bends, "displacement_scale"),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
@@ -444,8 +481,9 @@ def test_a_million_samples_of_friction_on_a_bench() -> None:
         state = min(f + 60, max(f - 60, state))
         path.append(state)
     u = np.array(path) * 1e-5 + rng.normal(0, 1e-6, n)
-    data = bench_data(force + rng.normal(0, 0.1, n), u, time=t, step=np.full(n, -1),
-                      branch=np.full(n, 3))  # fmt: skip
+    data = bench_data(
+        force + rng.normal(0, 0.1, n), u, time=t, step=np.full(n, -1), branch=np.full(n, 3)
+    )
     found = diagnose_gap(data)
     assert found.verdict == "joint_hysteresis"
     friction, share = (

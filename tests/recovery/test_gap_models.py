@@ -52,10 +52,17 @@ def dataset_of(procedure: Any, columns: dict[str, Any], path: Path | None = None
     meta = measured_meta(procedure, load_station("emulated"))
     texts = {"protocol": procedure.text, "meta": meta.model_dump_json(exclude_none=True)}
     out = Dataset(
-        path=path, uuid="00000000-0000-0000-0000-000000000007",
-        created="2026-03-01T10:00:00+01:00", origin="emulated", complete=True, meta=meta,
-        columns=columns, units={}, long_names={}, texts=texts,
-    )  # fmt: skip
+        path=path,
+        uuid="00000000-0000-0000-0000-000000000007",
+        created="2026-03-01T10:00:00+01:00",
+        origin="emulated",
+        complete=True,
+        meta=meta,
+        columns=columns,
+        units={},
+        long_names={},
+        texts=texts,
+    )
     if path is not None:
         write(out, path)
     return out
@@ -72,14 +79,21 @@ def as_planned(tmp: Path) -> tuple[Path, Dataset]:
     lever = np.stack([s.lever for s in data.setups])[data.setup]
     rng = np.random.default_rng(5)
     moved = np.sum(lever**2 * data.compliance, axis=1) * data.force * 1e3
-    return path, dataset_of(procedure, {
-        "time_s": data.time, "session_s": data.session,
-        "pose": np.array([s.pose for s in data.setups])[data.setup],
-        "direction": np.array([s.direction for s in data.setups])[data.setup],
-        "repetition": data.repetition, "branch": BRANCHES[data.branch], "step": data.step,
-        "force_N": data.force + 0.0, "displacement_mm": moved + rng.normal(0, 1e-3, len(moved)),
-        **{f"temperature{j}_C": 26 + data.session / 1e3 for j in range(1, 7)},
-    })  # fmt: skip
+    return path, dataset_of(
+        procedure,
+        {
+            "time_s": data.time,
+            "session_s": data.session,
+            "pose": np.array([s.pose for s in data.setups])[data.setup],
+            "direction": np.array([s.direction for s in data.setups])[data.setup],
+            "repetition": data.repetition,
+            "branch": BRANCHES[data.branch],
+            "step": data.step,
+            "force_N": data.force + 0.0,
+            "displacement_mm": moved + rng.normal(0, 1e-3, len(moved)),
+            **{f"temperature{j}_C": 26 + data.session / 1e3 for j in range(1, 7)},
+        },
+    )
 
 
 @pytest.fixture(scope="module")
@@ -102,15 +116,20 @@ def with_effect(result: GapResult, word: str, pick: int) -> tuple[GapResult, np.
         w = 0.1 / (1 + np.arange(len(v.columns)))
     law, _ = law_of(bench, v)
     laws = EFFECTS[word].laws
-    kept = np.array([
-        laws.lasts and t.coefficient not in laws.of_session and "run" not in t.shape
-        for t in law.terms
-    ])  # fmt: skip
+    kept = np.array(
+        [
+            laws.lasts and t.coefficient not in laws.of_session and "run" not in t.shape
+            for t in law.terms
+        ]
+    )
     base, b = result.fit.base, len(result.fit.base)
     fitted: Fit = replace(
-        result.fit, parts=(Part(v, 1.0),), coefficients=w, covariance=np.diag(w**2) * 1e-4,
+        result.fit,
+        parts=(Part(v, 1.0),),
+        coefficients=w,
+        covariance=np.diag(w**2) * 1e-4,
         joint_covariance=np.diag(np.append(np.full(b, 1e-6), w**2 * 1e-4)),
-    )  # fmt: skip
+    )
     effect = EffectFound(word, v.label, 1.0, {}, {}, (), 1.0, 1e-4)
     found = replace(result, verdict=word, effects=(effect,), fit=fitted)
     changes = np.zeros(bench.layout.size)
@@ -362,6 +381,7 @@ def test_other_places_are_where_they_say(paper: tuple[Dataset, Diagnosis]) -> No
     np.testing.assert_allclose(near[:3, :3], here[:3, :3], atol=1e-9)
     np.testing.assert_allclose(turned, here, atol=1e-9)
     assert found["P1_turned"][2] * q[2] < 0
-    data_bench = make_bench(planned_data(load_model(MODELS / "F1.yaml"), load_protocol(
-        PROTOCOLS / "paper_xy.yaml")))  # fmt: skip
+    data_bench = make_bench(
+        planned_data(load_model(MODELS / "F1.yaml"), load_protocol(PROTOCOLS / "paper_xy.yaml"))
+    )
     assert data_bench.data.setups[1].lever[0] == pytest.approx(0.75, rel=1e-3)

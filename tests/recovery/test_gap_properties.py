@@ -143,9 +143,14 @@ def test_units_of_force_and_displacement_do_not_matter() -> None:
         displacement=data.instruments.displacement * b,
     )
     other = diagnose_gap(
-        replace(data, force=data.force * a, displacement=data.displacement * b,
-                compliance=data.compliance * b / a, instruments=meter)
-    )  # fmt: skip
+        replace(
+            data,
+            force=data.force * a,
+            displacement=data.displacement * b,
+            compliance=data.compliance * b / a,
+            instruments=meter,
+        )
+    )
     alike(bench_result(), other)
     assert other.after == pytest.approx(bench_result().after * b, rel=1e-6)
     depth, first = (r.effects[0].parameters["depth"].value for r in (other, bench_result()))

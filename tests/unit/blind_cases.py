@@ -43,9 +43,13 @@ def draw(seed: int, number: int, *, word: str | None = None) -> FakeCase:
         "design": "medium",
         "where": None
         if word == "none"
-        else {"directions": ["x", "y"], "main_direction": "y", "joints": [],
-              "seen_by_encoders": None},
-    }  # fmt: skip
+        else {
+            "directions": ["x", "y"],
+            "main_direction": "y",
+            "joints": [],
+            "seen_by_encoders": None,
+        },
+    }
     return FakeCase(f"fake{seed}-{number}", columns, _meta(), label)
 
 
@@ -67,9 +71,17 @@ def _columns(random: np.random.Generator, shift_mm: float) -> dict[str, Any]:
     levers = arm.levers(arm.tool(np.zeros(3)))
     springs = SPRINGS * (1 + 0.05 * random.standard_normal(6))
     rows: dict[str, list[Any]] = {
-        n: [] for n in ("time_s", "direction", "repetition", "branch", "step", "force_N",
-                        "displacement_mm")
-    }  # fmt: skip
+        n: []
+        for n in (
+            "time_s",
+            "direction",
+            "repetition",
+            "branch",
+            "step",
+            "force_N",
+            "displacement_mm",
+        )
+    }
     for d, vector in DIRECTIONS.items():
         compliance = 1e3 * float(np.sum((levers @ np.array(vector)) ** 2 / springs))
         for repetition in (1, 2, 3):
@@ -79,9 +91,15 @@ def _columns(random: np.random.Generator, shift_mm: float) -> dict[str, Any]:
                 for k in range(4):
                     force = 15.0 * step
                     u = compliance * force + (shift_mm if repetition == 2 else 0.0)
-                    row = (20.0 * i + k, d, repetition, branch, step,
-                           force + 0.05 * random.standard_normal(),
-                           u + NOISE_MM * random.standard_normal())  # fmt: skip
+                    row = (
+                        20.0 * i + k,
+                        d,
+                        repetition,
+                        branch,
+                        step,
+                        force + 0.05 * random.standard_normal(),
+                        u + NOISE_MM * random.standard_normal(),
+                    )
                     for name, value in zip(rows, row, strict=True):
                         rows[name].append(value)
     return {name: np.array(values) for name, values in rows.items()}

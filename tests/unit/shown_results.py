@@ -99,15 +99,28 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
 def explained() -> Diagnosis:
     """Two effects, one of which another word explains as well."""
     yields = EffectFound(
-        "joint_yield", "joint 1", 0.994,
-        {"threshold_Nm": Parameter(67.31, 66.82, 67.9, "Nm"),
-         "stiffness_ratio_above": Parameter(0.0213, 0.0185, 0.0241, "1")},
-        {"joint 1": 0.62, "joint 5": 0.38}, ("base_slip",), 0.93, 1.2e-4,
-    )  # fmt: skip
+        "joint_yield",
+        "joint 1",
+        0.994,
+        {
+            "threshold_Nm": Parameter(67.31, 66.82, 67.9, "Nm"),
+            "stiffness_ratio_above": Parameter(0.0213, 0.0185, 0.0241, "1"),
+        },
+        {"joint 1": 0.62, "joint 5": 0.38},
+        ("base_slip",),
+        0.93,
+        1.2e-4,
+    )
     drifts = EffectFound(
-        "force_drift", "", 0.871, {"rate": Parameter(-0.002, -0.0031, -0.0009, "N/s")}, {}, (),
-        0.05, 4e-6,
-    )  # fmt: skip
+        "force_drift",
+        "",
+        0.871,
+        {"rate": Parameter(-0.002, -0.0031, -0.0009, "N/s")},
+        {},
+        (),
+        0.05,
+        4e-6,
+    )
     options = (
         Option("poses", "the same in another pose", 12.4, 31.0),
         Option("cycles", "small cycles", 4.1, 12.0),
@@ -117,19 +130,36 @@ def explained() -> Diagnosis:
         "joint_yield",
         0.962,
         effects=(yields, drifts),
-        where=Where(("y",), ("P1",), {"y": (74.8, 82.0)}, ("loading", "unloading"), (1, 2, 3),
-                    (1,), True, 0.93),
+        where=Where(
+            ("y",),
+            ("P1",),
+            {"y": (74.8, 82.0)},
+            ("loading", "unloading"),
+            (1, 2, 3),
+            (1,),
+            True,
+            0.93,
+        ),
         before=1.3417e-4,
         after=4.62e-6,
-        held_out=(HeldOut("repetition", 1.342e-4, 5.71e-6, (18.2, 27.9)),
-                  HeldOut("direction", 1.342e-4, 3.2e-5, (3.3, 5.2))),
+        held_out=(
+            HeldOut("repetition", 1.342e-4, 5.71e-6, (18.2, 27.9)),
+            HeldOut("direction", 1.342e-4, 3.2e-5, (3.3, 5.2)),
+        ),
         runners_up={"base_slip": 2.04e-5},
-        next_measurement=NextMeasurement("Measure y in pose P2, loading and unloading.",
-                                         ("joint_yield", "base_slip"), "poses", 12.4, 31.0,
-                                         options),
-        said=(Note(ASIDE, "3 of 240 readings jump off and come back at once: set aside."),
-              Note(UNDECIDED, "Nothing was unloaded: lasting and elastic deflection look alike.")),
-    )  # fmt: skip
+        next_measurement=NextMeasurement(
+            "Measure y in pose P2, loading and unloading.",
+            ("joint_yield", "base_slip"),
+            "poses",
+            12.4,
+            31.0,
+            options,
+        ),
+        said=(
+            Note(ASIDE, "3 of 240 readings jump off and come back at once: set aside."),
+            Note(UNDECIDED, "Nothing was unloaded: lasting and elastic deflection look alike."),
+        ),
+    )
     return Diagnosis("id", result, (EMULATED,), ({"name": "contact_seating"},))
 
 
@@ -146,11 +176,22 @@ def without_arm(found: Diagnosis) -> Diagnosis:
 
 def unexplained() -> Diagnosis:
     """A gap that no word explains."""
-    where = Where(("x", "y"), (), {"x": (-20.0, 40.0), "y": (0.0, 1234.5)}, ("loading",), (2,),
-                  (), False, 0.4)  # fmt: skip
+    where = Where(
+        ("x", "y"), (), {"x": (-20.0, 40.0), "y": (0.0, 1234.5)}, ("loading",), (2,), (), False, 0.4
+    )
     swings = Likeness("swings", 121.4, -80.0)
-    return Diagnosis("id", _gap("unknown", 0.731, where=where, remainder=3.417e-5, before=8e-5,
-                                after=2.75e-5, looks_like=swings))  # fmt: skip
+    return Diagnosis(
+        "id",
+        _gap(
+            "unknown",
+            0.731,
+            where=where,
+            remainder=3.417e-5,
+            before=8e-5,
+            after=2.75e-5,
+            looks_like=swings,
+        ),
+    )
 
 
 SPEC = CouplingSpec(1.5, np.deg2rad(36.5), "mirror", "compliant", None, "beam, steel, 30 mm")
@@ -167,34 +208,57 @@ def coupled() -> CouplingResult:
     return CouplingResult(
         model=_model(),
         spec=SPEC,
-        workspaces=(Workspace(3.4312, 1.0567, "sampled joint positions, cells of 40 mm"),
-                    Workspace(4.6014, 1.8034, "half balls of the nominal reach")),
+        workspaces=(
+            Workspace(3.4312, 1.0567, "sampled joint positions, cells of 40 mm"),
+            Workspace(4.6014, 1.8034, "half balls of the nominal reach"),
+        ),
         single=np.array([95.94e3, 57.42e3, 301.2e3]),
         u_single=np.array([3.1e3, 2.04e3, 14.7e3]),
-        pair={"rigid": np.array([212.3e3, 2950.4e3, 640.0e3]),
-              "compliant": np.array([190.1e3, 410.7e3, 512.6e3])},
-        u_pair={"rigid": np.array([9.0e3, 141.2e3, 30.1e3]),
-                "compliant": np.array([8.1e3, 22.0e3, 25.5e3])},
-        decisions=(Decision("x", 150e3, 95.94e3, 212.3e3, "couple"),
-                   Decision("y", 5e6, 57.42e3, 2950.4e3, "infeasible")),
+        pair={
+            "rigid": np.array([212.3e3, 2950.4e3, 640.0e3]),
+            "compliant": np.array([190.1e3, 410.7e3, 512.6e3]),
+        },
+        u_pair={
+            "rigid": np.array([9.0e3, 141.2e3, 30.1e3]),
+            "compliant": np.array([8.1e3, 22.0e3, 25.5e3]),
+        },
+        decisions=(
+            Decision("x", 150e3, 95.94e3, 212.3e3, "couple"),
+            Decision("y", 5e6, 57.42e3, 2950.4e3, "infeasible"),
+        ),
         schedule=Schedule(time, time, time, time, ("single", "couple", "couple", "couple")),
         notes=("the beam's own weight is left out.",),
-    )  # fmt: skip
+    )
 
 
 def placed() -> TaskResult:
     """Where the second arm would stand best."""
     grid = np.array([1.5])
-    best = Placement(1.62, np.deg2rad(41.0), Q, "shoulder left, elbow up, wrist 1",
-                     np.array([231e3, 97.2e3]), 1.08, grid, grid, np.ones((1, 1)))  # fmt: skip
+    best = Placement(
+        1.62,
+        np.deg2rad(41.0),
+        Q,
+        "shoulder left, elbow up, wrist 1",
+        np.array([231e3, 97.2e3]),
+        1.08,
+        grid,
+        grid,
+        np.ones((1, 1)),
+    )
     task = Task(0.5, Stance(X, np.eye(4)), (Need(X, 150e3), Need(Y, 90e3)))
     return TaskResult(_model(), SPEC, task, best, 0.97, ("found on a grid of 25 mm and 2 deg.",))
 
 
 def predicted() -> Simulation:
     """One curve of springs, one with effects along its path, one that does not give way."""
-    levels = PredictedCurve("P1", "x", np.array([0.0, 60.0, 220.0]),
-                            np.array([0.0, 6.2539e-4, 2.29309e-3]), 95940.0, 0.0312)  # fmt: skip
+    levels = PredictedCurve(
+        "P1",
+        "x",
+        np.array([0.0, 60.0, 220.0]),
+        np.array([0.0, 6.2539e-4, 2.29309e-3]),
+        95940.0,
+        0.0312,
+    )
     path = CurvePath(
         repetition=(1, 1, 1, 2, 3, 3),
         branch=("zero", "loading", "unloading", "loading", "loading", "unloading"),
@@ -206,20 +270,50 @@ def predicted() -> Simulation:
     moved = np.array([0.0, 1.4e-3, 1.55e-3, 1.61e-3, 1.63e-3, 1.7e-3])
     bent = PredictedCurve("P2", "y", force, moved, 57420.0, 0.0355, path)
     stiff = PredictedCurve("P2", "z", np.array([0.0, 10.0]), np.zeros(2), np.inf, 0.0)
-    return Simulation("F1.yaml", "paper_xy.yaml", "Published procedure", (levels, bent, stiff),
-                      ("links are stiff.",), ("joint_yield",))  # fmt: skip
+    return Simulation(
+        "F1.yaml",
+        "paper_xy.yaml",
+        "Published procedure",
+        (levels, bent, stiff),
+        ("links are stiff.",),
+        ("joint_yield",),
+    )
 
 
 def checked() -> Check:
     """Two devices that are ready, one that is not."""
-    run = PlannedRun("P1", "x", (1.0, 0.0, 0.0), (20.0, 40.0), 2, 95.9, 0.417, (1.0,) * 6,
-                     (2.0, 40.0, 20.0, 3.0, 1.0, 0.1), (330.0, 330.0, 150.0, 56.0, 56.0, 56.0),
-                     211.0)  # fmt: skip
-    asked = Plan("Two levels", "ur10e", "ur10e_lab", (run,), 3, 1, 39, 933.0, 1.0, 0.1,
-                 ("5 min to set up a pose or direction (1 time)",),
-                 ("joint 4 holds 0.95 of what is allowed.",))  # fmt: skip
-    refused = CannotConnect("laser", "nothing answers on /dev/ttyUSB0 within 5 s",
-                            "Plug the converter in and switch the laser on")  # fmt: skip
+    run = PlannedRun(
+        "P1",
+        "x",
+        (1.0, 0.0, 0.0),
+        (20.0, 40.0),
+        2,
+        95.9,
+        0.417,
+        (1.0,) * 6,
+        (2.0, 40.0, 20.0, 3.0, 1.0, 0.1),
+        (330.0, 330.0, 150.0, 56.0, 56.0, 56.0),
+        211.0,
+    )
+    asked = Plan(
+        "Two levels",
+        "ur10e",
+        "ur10e_lab",
+        (run,),
+        3,
+        1,
+        39,
+        933.0,
+        1.0,
+        0.1,
+        ("5 min to set up a pose or direction (1 time)",),
+        ("joint 4 holds 0.95 of what is allowed.",),
+    )
+    refused = CannotConnect(
+        "laser",
+        "nothing answers on /dev/ttyUSB0 within 5 s",
+        "Plug the converter in and switch the laser on",
+    )
     states = (
         DeviceState("robot", {"model": "UR10e", "serial_number": "20195500001"}),
         DeviceState("dynamometer", {"model": "9257B", "serial_number": "1234567"}),

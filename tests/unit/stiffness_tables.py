@@ -9,8 +9,16 @@ from typing import Any
 import numpy as np
 
 Row = tuple[float, str, str, int, str, int, float, float]
-NAMES = ("time_s", "pose", "direction", "repetition", "branch", "step", "force_N",
-         "displacement_mm")  # fmt: skip
+NAMES = (
+    "time_s",
+    "pose",
+    "direction",
+    "repetition",
+    "branch",
+    "step",
+    "force_N",
+    "displacement_mm",
+)
 
 
 def meta(directions: Sequence[str] = ("x", "y"), datum: str = "setup") -> Any:
@@ -64,8 +72,18 @@ def run(
     def hold(branch: str, step: int, force: float, displacement: float, n: int) -> None:
         for _ in range(n):
             t = float(len(rows))
-            rows.append((t, pose, direction, repetition, branch, step, force + zero_N(t),
-                         displacement + datum_mm))  # fmt: skip
+            rows.append(
+                (
+                    t,
+                    pose,
+                    direction,
+                    repetition,
+                    branch,
+                    step,
+                    force + zero_N(t),
+                    displacement + datum_mm,
+                )
+            )
 
     hold("zero", 0, 0.0, 0.0, zeros[0])
     for step, force in enumerate(levels, start=1):

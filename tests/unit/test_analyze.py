@@ -160,9 +160,17 @@ def test_an_unknown_weighting_is_named_with_a_suggestion() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(95.9277, "95.93"), (1234567.0, "1234567"), (0.000123456, "0.0001235"), (1.2e-7, "1.200e-07"),
-     (0.0, "0"), (math.nan, "-"), (-3.14159, "-3.142"), (3.2e9, "3.200e+09")],
-)  # fmt: skip
+    [
+        (95.9277, "95.93"),
+        (1234567.0, "1234567"),
+        (0.000123456, "0.0001235"),
+        (1.2e-7, "1.200e-07"),
+        (0.0, "0"),
+        (math.nan, "-"),
+        (-3.14159, "-3.142"),
+        (3.2e9, "3.200e+09"),
+    ],
+)
 def test_numbers_read_well_at_any_scale(value: float, text: str) -> None:
     assert number(value) == text
 
@@ -192,8 +200,11 @@ def test_thousands_are_written_out() -> None:
 def test_figures_are_written_twice_and_alike(analysis: Analysis, tmp_path: Path) -> None:
     files = draw(analysis, tmp_path / "new")
     assert [f.name for f in files] == [
-        "curve.png", "curve.svg", "pointwise.png", "pointwise.svg",
-    ]  # fmt: skip
+        "curve.png",
+        "curve.svg",
+        "pointwise.png",
+        "pointwise.svg",
+    ]
     assert all(f.stat().st_size > 5000 for f in files)
     again = draw(analysis, tmp_path / "again")
     assert files[1].read_bytes() == again[1].read_bytes()

@@ -232,11 +232,25 @@ def test_dead_band_stops_chatter() -> None:
     wobble = [90, 101, 99, 101, 99, 101, 94, 99]
     plain, steady = CouplingRule(), CouplingRule(dead_band=0.05)
     assert [plain.update(r, 100, 300) for r in wobble] == [
-        "single", "couple", "single", "couple", "single", "couple", "single", "single",
-    ]  # fmt: skip
+        "single",
+        "couple",
+        "single",
+        "couple",
+        "single",
+        "couple",
+        "single",
+        "single",
+    ]
     assert [steady.update(r, 100, 300) for r in wobble] == [
-        "single", "couple", "couple", "couple", "couple", "couple", "single", "single",
-    ]  # fmt: skip
+        "single",
+        "couple",
+        "couple",
+        "couple",
+        "couple",
+        "couple",
+        "single",
+        "single",
+    ]
 
 
 def test_schedule_along_a_path(f1: ArmModel) -> None:
@@ -245,9 +259,12 @@ def test_schedule_along_a_path(f1: ArmModel) -> None:
     q = np.broadcast_to(f1.q, (6, 6))
     plan = schedule(f1.arm, time, q, np.tile([1.0, 0, 0], (6, 1)), required, beta=0.0)
     assert [(i.start, i.end, i.state) for i in plan.intervals()] == [
-        (0, 1, "single"), (1, 3, "couple"), (3, 4, "infeasible"), (4, 5, "couple"),
+        (0, 1, "single"),
+        (1, 3, "couple"),
+        (3, 4, "infeasible"),
+        (4, 5, "couple"),
         (5, 5, "single"),
-    ]  # fmt: skip
+    ]
     with pytest.raises(ValueError, match="row 2"):
         schedule(f1.arm, [0, -1], q[:2], np.tile([1.0, 0, 0], (2, 1)), [1, 1], beta=0.0)
 
@@ -256,10 +273,14 @@ def test_schedule_along_a_path(f1: ArmModel) -> None:
 
 
 def test_couple_json(tmp_path: Path) -> None:
-    text = (MODELS / "F2.yaml").read_text().replace(
-        "kind: rigid",
-        "kind: {beam: {material: steel, diameter_mm: 30, half_length_mm: 50}}",
-    )  # fmt: skip
+    text = (
+        (MODELS / "F2.yaml")
+        .read_text()
+        .replace(
+            "kind: rigid",
+            "kind: {beam: {material: steel, diameter_mm: 30, half_length_mm: 50}}",
+        )
+    )
     (tmp_path / "m.yaml").write_text(text)
     out = json.loads(json.dumps(couple(tmp_path / "m.yaml", samples=0).to_json(), allow_nan=False))
     assert out["schema"] == "rig.coupling/1"
@@ -271,8 +292,10 @@ def test_couple_json(tmp_path: Path) -> None:
     assert out["gain"]["rigid"]["y"] == pytest.approx(2950 / 56.05, rel=5e-3)
     assert [d["state"] for d in out["decision"]] == ["couple", "couple"]
     assert out["decision"][1] == {
-        "required_N_per_mm": 1000.0, "direction": "y", "state": "couple",
-    }  # fmt: skip
+        "required_N_per_mm": 1000.0,
+        "direction": "y",
+        "state": "couple",
+    }
 
 
 def test_couple_text_shows_the_published_numbers() -> None:

@@ -214,10 +214,14 @@ def test_beam_coupling_against_chains_of_springs() -> None:
     for i in range(pieces):
         spring = np.diag(
             [
-                piece / section.axial, 0, 0,
-                piece / section.torsion, piece / section.bending_y, piece / section.bending_z,
+                piece / section.axial,
+                0,
+                0,
+                piece / section.torsion,
+                piece / section.bending_y,
+                piece / section.bending_z,
             ]
-        )  # fmt: skip
+        )
         A = transport(np.array([(pieces - i - 0.5) * piece, 0, 0]))
         C += A @ spring @ A.T
     np.testing.assert_allclose(C, cantilever(section, length), rtol=1e-4, atol=1e-16)

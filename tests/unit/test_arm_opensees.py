@@ -50,9 +50,28 @@ class Frame:
         self.ops.uniaxialMaterial("Elastic", hard, RIGID_HINGE)
         across = np.eye(3)[np.argmin(np.abs(axis))]
         self.ops.element(
-            "zeroLength", element, inner, outer, "-mat", hard, hard, hard, soft, hard, hard,
-            "-dir", 1, 2, 3, 4, 5, 6, "-orient", *map(float, axis), *map(float, across),
-        )  # fmt: skip
+            "zeroLength",
+            element,
+            inner,
+            outer,
+            "-mat",
+            hard,
+            hard,
+            hard,
+            soft,
+            hard,
+            hard,
+            "-dir",
+            1,
+            2,
+            3,
+            4,
+            5,
+            6,
+            "-orient",
+            *map(float, axis),
+            *map(float, across),
+        )
         return outer
 
     def beam(self, first: int, second: int, EA: float, EI: float, GJ: float) -> None:

@@ -79,8 +79,10 @@ def test_cases_are_as_mixed_as_benches_are(cases: list[BenchCase]) -> None:
     samples = [c.label["samples"] for c in cases]
     assert min(samples) < 300
     assert max(samples) > 10_000
-    off = [c.meta["simulation"]["stiffness_N_per_mm"]["x"] / c.label["true_stiffness_N_per_mm"]
-           for c in cases]  # fmt: skip
+    off = [
+        c.meta["simulation"]["stiffness_N_per_mm"]["x"] / c.label["true_stiffness_N_per_mm"]
+        for c in cases
+    ]
     assert min(off) < 0.4
     assert max(off) > 2.5
 
@@ -123,8 +125,10 @@ def test_the_blind_check_scores_them(cases: list[BenchCase]) -> None:
     assert set(words) < set(OF_AN_ARM)
     assert draw(31, 3).label == cases[3].label
     plan = Plan(cases=60, seed=31, generator="benches")
-    outcomes = [Outcome(k, c.name, c.label, None, Reply("answered", 1.0, _said(c)))
-                for k, c in enumerate(cases)]  # fmt: skip
+    outcomes = [
+        Outcome(k, c.name, c.label, None, Reply("answered", 1.0, _said(c)))
+        for k, c in enumerate(cases)
+    ]
     out = report(Campaign(plan, outcomes))
     assert out["summary"]["right_all_kinds"]["hits"] == len(cases)
     assert out["summary"]["where"]["main_direction"]["n"] > 0
@@ -134,8 +138,12 @@ def test_the_blind_check_scores_them(cases: list[BenchCase]) -> None:
 
 def _said(case: BenchCase) -> dict[str, Any]:
     word = case.label["truth"][0]
-    return {"verdict": word, "probabilities": {word: 1.0}, "effects": [],
-            "where": {"directions": ["x"], "joints": []}}  # fmt: skip
+    return {
+        "verdict": word,
+        "probabilities": {word: 1.0},
+        "effects": [],
+        "where": {"directions": ["x"], "joints": []},
+    }
 
 
 # ------------------------------------------------------------------------------------- answers
@@ -205,8 +213,9 @@ def test_noise_is_what_departs_from_the_response_without_it() -> None:
     random = np.random.default_rng(4)
     trial = _line(5.0)
     for imposed in ("force", "displacement"):
-        rig = _rig(Trial(trial.time, trial.force, trial.displacement, imposed, 5.0),
-                   Stated(5.0, 0.1, 0, 0))  # fmt: skip
+        rig = _rig(
+            Trial(trial.time, trial.force, trial.displacement, imposed, 5.0), Stated(5.0, 0.1, 0, 0)
+        )
         readings = read(rig, 1e-3, random)
         assert 0.5e-3 < noise_rms_mm(rig, readings) < 2e-3
         off = readings.displacement - readings.force / 5.0
@@ -226,8 +235,9 @@ def test_a_pause_tells_the_drift_of_the_cell_and_cycles_alone_do_not() -> None:
 def test_a_late_displacement_is_a_dashpot_and_a_late_force_is_none() -> None:
     for k in range(8):
         trial = channels.late_channel(np.random.default_rng(k))
-        done = float(np.sum(0.5 * (trial.force[1:] + trial.force[:-1])
-                            * np.diff(trial.displacement)))  # fmt: skip
+        done = float(
+            np.sum(0.5 * (trial.force[1:] + trial.force[:-1]) * np.diff(trial.displacement))
+        )
         lossy = trial.imposed == "force"
         assert (done > 0) == lossy == ("joint_creep" in trial.accept)
 

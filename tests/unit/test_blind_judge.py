@@ -26,19 +26,28 @@ def label(*truth: str, **more: Any) -> dict[str, Any]:
         "snr_each": [10.0 - i for i in range(n)],
         "noise_rms_mm": 0.002,
         "design": "rich",
-        "where": {"directions": ["x", "y"], "main_direction": "y", "joints": [1],
-                  "seen_by_encoders": True},
+        "where": {
+            "directions": ["x", "y"],
+            "main_direction": "y",
+            "joints": [1],
+            "seen_by_encoders": True,
+        },
         **more,
-    }  # fmt: skip
+    }
 
 
 def said(verdict: str, *found: str, p: float = 0.8, **more: Any) -> dict[str, Any]:
     words = found or ((verdict,) if verdict not in ("none", "unknown") else ())
     effects = [
-        {"name": w, "probability": 0.9, "parameters": {}, "indistinguishable_from": [],
-         "share_of_gap": 1.0}
+        {
+            "name": w,
+            "probability": 0.9,
+            "parameters": {},
+            "indistinguishable_from": [],
+            "share_of_gap": 1.0,
+        }
         for w in words
-    ]  # fmt: skip
+    ]
     other = "unknown" if verdict != "unknown" else "none"
     return {
         "verdict": verdict,
@@ -91,8 +100,11 @@ def test_a_withheld_word_is_unknown_or_what_stands_in() -> None:
     answers = label("joint_yield", accept=["joint_yield", "base_slip"])
     unknown = judge(outcome(answers, said("unknown"), "joint_yield"))
     assert (unknown.kind, unknown.main, unknown.right, unknown.exact) == (
-        "unknown", "unknown", True, True,
-    )  # fmt: skip
+        "unknown",
+        "unknown",
+        True,
+        True,
+    )
     assert judge(outcome(answers, said("base_slip"), "joint_yield")).right
     assert not judge(outcome(answers, said("joint_creep"), "joint_yield")).right
     # withheld from a case that does not hold it: nothing changes but what may stand in
@@ -139,13 +151,17 @@ def test_the_main_cause_of_a_mixture_is_the_larger_effect() -> None:
 def test_where() -> None:
     judged = judge(outcome(label("joint_yield"), said("joint_yield")))
     assert (joint_right(judged), direction_right(judged), encoders_right(judged)) == (
-        True, True, True,
-    )  # fmt: skip
+        True,
+        True,
+        True,
+    )
     where = {"directions": ["x"], "joints": [1, 2], "seen_by_encoders": None}
     wrong = judge(outcome(label("joint_yield"), said("joint_yield", where=where)))
     assert (joint_right(wrong), direction_right(wrong), encoders_right(wrong)) == (
-        False, False, False,
-    )  # fmt: skip
+        False,
+        False,
+        False,
+    )
     assert joint_right(judge(outcome(label("zero_shift"), said("zero_shift")))) is None
 
 
@@ -193,10 +209,19 @@ def campaign() -> Campaign:
 
 def test_summary_by_hand() -> None:
     s = report(campaign())["summary"]
-    counted = {k: (s[k]["hits"], s[k]["n"]) for k in (
-        "right", "exact", "right_all_kinds", "confident_errors", "false_alarms", "unknown_recall",
-        "known_called_unknown", "crashed_or_late",
-    )}  # fmt: skip
+    counted = {
+        k: (s[k]["hits"], s[k]["n"])
+        for k in (
+            "right",
+            "exact",
+            "right_all_kinds",
+            "confident_errors",
+            "false_alarms",
+            "unknown_recall",
+            "known_called_unknown",
+            "crashed_or_late",
+        )
+    }
     assert counted == {
         "right": (1, 4),  # the one with 2 times the noise is not counted
         "exact": (1, 4),

@@ -30,9 +30,13 @@ def test_ctrl_c_lets_the_command_end_in_its_own_way() -> None:
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.exit(bootstrap._call([sys.executable, '-c', {COMMAND!r}]))"""
     started = subprocess.Popen(
-        [sys.executable, "-c", code], cwd=HOME, text=True, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+        [sys.executable, "-c", code],
+        cwd=HOME,
+        text=True,
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
     assert started.stdout is not None
     assert started.stdout.readline() == "ready\n"
     os.killpg(started.pid, signal.SIGINT)

@@ -54,15 +54,21 @@ def test_bad_input_is_status_2_and_one_message(
     [
         ("measure --resume d.h5 --station nope", "--station nope: a measurement that is resumed"),
         ("measure --resume d.h5 -o e.h5", "-o e.h5: a measurement that is resumed"),
-        ("diagnose d.h5 --add joint_yield --withhold joint_yield",
-         "--add joint_yield, --withhold joint_yield: exclude each other."),
-        ("diagnose d.h5 --add joint_yeld",
-         '--add: "joint_yeld" is no effect. Did you mean "joint_yield"?'),
-        ("diagnose d.h5 --withhold time_lag --withhold zeroshift",
-         '--withhold: "zeroshift" is no effect. Did you mean "zero_shift"?'),
+        (
+            "diagnose d.h5 --add joint_yield --withhold joint_yield",
+            "--add joint_yield, --withhold joint_yield: exclude each other.",
+        ),
+        (
+            "diagnose d.h5 --add joint_yeld",
+            '--add: "joint_yeld" is no effect. Did you mean "joint_yield"?',
+        ),
+        (
+            "diagnose d.h5 --withhold time_lag --withhold zeroshift",
+            '--withhold: "zeroshift" is no effect. Did you mean "zero_shift"?',
+        ),
         ("diagnose d.h5 --add xyz", '--add: "xyz" is no effect. Known: base_compliance, base_slip'),
     ],
-)  # fmt: skip
+)
 def test_options_that_contradict_each_other_are_refused(
     rig: Rig, files: Path, words: str, says: str
 ) -> None:
@@ -86,10 +92,14 @@ def test_a_full_disk_behind_standard_output_is_no_bug(
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     with Path("/dev/full").open("w") as full:
         ended = subprocess.run(
-            [sys.executable, "-m", "rig", "analyze", "d.h5", *words], cwd=files, stdout=full,
-            stderr=subprocess.PIPE, text=True, check=False,
+            [sys.executable, "-m", "rig", "analyze", "d.h5", *words],
+            cwd=files,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
             env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
-        )  # fmt: skip
+        )
     said = f"standard output: cannot be written: {os.strerror(errno.ENOSPC)}.\n"
     assert (ended.returncode, ended.stderr) == (2, said)
 
@@ -156,9 +166,13 @@ def test_a_bug_is_status_1_and_a_file_for_the_report(tmp_path: Path) -> None:
         "from rig.cli import main; main()\n"
     )
     result = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False,
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
         env={"PYTHONPATH": str(HOME), "TMPDIR": str(tmp_path)},
-    )  # fmt: skip
+    )
     assert result.returncode == 1
     assert "Traceback" not in result.stderr
     assert "This is a bug in rig (RuntimeError: unforeseen)" in result.stderr
@@ -246,10 +260,14 @@ def test_a_reader_that_has_left_is_no_bug(
     reader, pipe = os.pipe()
     os.close(reader)
     ended = subprocess.run(
-        [sys.executable, "-m", "rig", *words.split()], cwd=files, stdout=pipe, text=True,
-        stderr=pipe if both else subprocess.PIPE, check=False,
+        [sys.executable, "-m", "rig", *words.split()],
+        cwd=files,
+        stdout=pipe,
+        text=True,
+        stderr=pipe if both else subprocess.PIPE,
+        check=False,
         env={**os.environ, "PYTHONPATH": str(HOME), "TMPDIR": str(files)},
-    )  # fmt: skip
+    )
     os.close(pipe)
     assert (ended.returncode, ended.stderr) == (ends, None if both else "")
     assert not list(files.glob("rig-bug-*"))

@@ -95,8 +95,15 @@ def test_simulate_writes_the_curves_that_diagnose_reads(rig: Rig, files: Path) -
     assert header == "pose,direction,force_N,displacement_mm"
 
 
-@pytest.mark.parametrize("words", [["couple", "m.yaml"], ["simulate", "m.yaml", "p.yaml"],
-                                   ["identify", "t.csv"], ["identify", "gone.h5"]])  # fmt: skip
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["couple", "m.yaml"],
+        ["simulate", "m.yaml", "p.yaml"],
+        ["identify", "t.csv"],
+        ["identify", "gone.h5"],
+    ],
+)
 def test_wrong_models_and_data_are_refused_by_name(rig: Rig, files: Path, words: list[str]) -> None:
     status, _, err = rig(*words)
     assert status == 2
@@ -107,8 +114,16 @@ def test_wrong_models_and_data_are_refused_by_name(rig: Rig, files: Path, words:
 def test_a_protocol_without_proposals_is_refused_before_anything_is_written(
     rig: Rig, files: Path
 ) -> None:
-    status, _, err = rig("identify", "d.h5", "--proposals", "0", "--write-model", "new.yaml",
-                         "--write-protocol", "next.yaml")  # fmt: skip
+    status, _, err = rig(
+        "identify",
+        "d.h5",
+        "--proposals",
+        "0",
+        "--write-model",
+        "new.yaml",
+        "--write-protocol",
+        "next.yaml",
+    )
     assert status == 2
     assert err.endswith("Give --proposals 1 or more, or leave --write-protocol out.\n")
     assert not (files / "new.yaml").exists()
@@ -152,10 +167,13 @@ def test_a_path_that_is_not_there(rig: Rig, files: Path) -> None:
     ("option", "said"),
     [
         ("--write-model", "A model file holds an arm; write the diagnosis with --json."),
-        ("--next", "A protocol file is for an arm; leave --next out, and the diagnosis itself "
-                   "says what to measure next."),
+        (
+            "--next",
+            "A protocol file is for an arm; leave --next out, and the diagnosis itself "
+            "says what to measure next.",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_become_a_file_is_said_before_the_work(
     rig: Rig, files: Path, option: str, said: str
 ) -> None:
@@ -198,13 +216,15 @@ def test_check_names_every_device_that_is_not_ready(
     rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = Check(
-        plan(load_protocol(files / "p.yaml")), "ur10e_lab", False,
+        plan(load_protocol(files / "p.yaml")),
+        "ur10e_lab",
+        False,
         (
             DeviceState("robot", {}, CannotConnect("robot", "no answer", "Switch it on.")),
             DeviceState("dynamometer", {"model": "9257B"}),
             DeviceState("laser", {}, ReadTimeout("laser", "it is silent", "Check its cable.")),
         ),
-    )  # fmt: skip
+    )
     monkeypatch.setattr("rig.check.check", lambda *_: found)
     status, out, err = rig("check", "p.yaml")
     assert status == 3

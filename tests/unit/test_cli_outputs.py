@@ -15,12 +15,18 @@ from tests.unit.cli_bench import HOME, TABLE, Rig
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("analyze no.h5 --json no/such/r.json",
-         "--json no/such/r.json: the folder no/such does not exist. Create it"),
-        ("analyze no.h5 --json .",
-         "--json .: is a folder. Give the name of a file, or - for stdout."),
-        ("analyze no.h5 --json shut/r.json",
-         "--json shut/r.json: nothing may be written into the folder shut."),
+        (
+            "analyze no.h5 --json no/such/r.json",
+            "--json no/such/r.json: the folder no/such does not exist. Create it",
+        ),
+        (
+            "analyze no.h5 --json .",
+            "--json .: is a folder. Give the name of a file, or - for stdout.",
+        ),
+        (
+            "analyze no.h5 --json shut/r.json",
+            "--json shut/r.json: nothing may be written into the folder shut.",
+        ),
         ("diagnose no.h5 --figures m.yaml", "--figures m.yaml: m.yaml is a file, no folder."),
         ("diagnose no.h5 --figures m.yaml/f", "--figures m.yaml/f: m.yaml is a file, no folder."),
         ("diagnose no.h5 --figures shut/f", "--figures shut/f: nothing may be written into the"),
@@ -29,7 +35,7 @@ from tests.unit.cli_bench import HOME, TABLE, Rig
         ("export no.h5 -o .", "--output .: is a folder. Give the name of a file."),
         ("export no.h5 -o -", "--output -: this one goes to a file only. Give its name."),
     ],
-)  # fmt: skip
+)
 def test_places_that_could_not_be_written_to_are_said_before_the_work(
     rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch, words: str, says: str
 ) -> None:

@@ -29,19 +29,30 @@ WHOLE = "allowed: a whole number, "
         ("blind --cases", "--cases: its value is missing. Wanted: --cases N."),
         ("measure p.yaml --speed", "--speed: its value is missing. Wanted: --speed 0.01 to 1000."),
         ("export d.h5", "--output: is missing. Give -o or --output FILE.csv|.parquet."),
-        ("measure p.yaml --speed 2 --speed 3",
-         "--speed 3: --speed is given before, too. Leave one of them out."),
-        ("export d.h5 -o a.csv --output b.csv",
-         "--output b.csv: --output is given before, too. Leave one of them out."),
-        ("analyze d.h5 --intercept --through-origin",
-         "--intercept/--through-origin: is given more than once. Leave one out."),
-        ("measure p.yaml --resume d.h5",
-         "rig measure: p.yaml, --resume d.h5: give a PROTOCOL.yaml, or --resume DATASET.h5."),
+        (
+            "measure p.yaml --speed 2 --speed 3",
+            "--speed 3: --speed is given before, too. Leave one of them out.",
+        ),
+        (
+            "export d.h5 -o a.csv --output b.csv",
+            "--output b.csv: --output is given before, too. Leave one of them out.",
+        ),
+        (
+            "analyze d.h5 --intercept --through-origin",
+            "--intercept/--through-origin: is given more than once. Leave one out.",
+        ),
+        (
+            "measure p.yaml --resume d.h5",
+            "rig measure: p.yaml, --resume d.h5: give a PROTOCOL.yaml, or --resume DATASET.h5.",
+        ),
         ("lst", 'rig lst: no such command. Did you mean "list"?'),
-        ("frobnicate", "rig frobnicate: no such command. Known: analyze, blind, check, couple, "
-         "diagnose, emulate, export, identify, import, list, measure, report, simulate."),
+        (
+            "frobnicate",
+            "rig frobnicate: no such command. Known: analyze, blind, check, couple, "
+            "diagnose, emulate, export, identify, import, list, measure, report, simulate.",
+        ),
     ],
-)  # fmt: skip
+)
 def test_says_which_word_and_what_is_allowed(rig: Rig, files: Path, words: str, said: str) -> None:
     status, out, err = rig(*words.split())
     assert (status, out) == (2, "")
@@ -64,10 +75,12 @@ def test_options_that_may_be_repeated_still_are(rig: Rig, files: Path) -> None:
     ("words", "said"),
     [
         (["analyze", "dd.h5"], 'dd.h5: cannot be read: no such file. Did you mean "d.h5"?'),
-        (["import", "tt.csv", "m.yaml", "-o", "x.h5"],
-         'tt.csv: cannot be read: no such file. Did you mean "t.csv"?'),
+        (
+            ["import", "tt.csv", "m.yaml", "-o", "x.h5"],
+            'tt.csv: cannot be read: no such file. Did you mean "t.csv"?',
+        ),
     ],
-)  # fmt: skip
+)
 def test_of_a_missing_file_its_neighbours_are_told(
     rig: Rig, files: Path, words: list[str], said: str
 ) -> None:

@@ -249,9 +249,13 @@ def test_a_disk_that_fills_up_is_one_error(tmp_path: Path) -> None:
     write(example.dataset(1000), tmp_path / "a.h5")
     assert (tmp_path / "a.h5").stat().st_size > 60_000
     ended = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False,
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
-    )  # fmt: skip
+    )
     assert ended.stderr == ""
     reason = os.strerror(errno.EFBIG)
     assert ended.stdout.startswith(f"b.h5: cannot be written: {reason}. Choose another folder")

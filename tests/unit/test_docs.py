@@ -59,8 +59,9 @@ def test_commands_and_options_exist(page: Path) -> None:
 
 def test_the_check_sees_what_is_wrong() -> None:
     assert commands("a `rig list .` and\n```\n$ rig check x.yaml  # plan\n```\n") == [
-        "rig check x.yaml", "rig list .",
-    ]  # fmt: skip
+        "rig check x.yaml",
+        "rig list .",
+    ]
     assert complaint("rig diagnose a.h5 --figurs out") == "no option --figurs"
     assert complaint("rig diagnos a.h5") == "no command diagnos"
     assert complaint("rig measure --resume a.h5 -o b.h5") == ""

@@ -35,10 +35,16 @@ def pressed(
     run = np.repeat(np.arange(RUNS), n // RUNS)
     moved = 1e-5 * (load + gives * across) + bends * 1e-5 * load**2 / top
     return bench_data(
-        load + rng.normal(0, 0.1, n), moved + rng.normal(0, 1e-6, n), step=step, branch=branch,
-        run=run, repetition=run + 1, session=np.arange(n, dtype=float), imposed="force",
+        load + rng.normal(0, 0.1, n),
+        moved + rng.normal(0, 1e-6, n),
+        step=step,
+        branch=branch,
+        run=run,
+        repetition=run + 1,
+        session=np.arange(n, dtype=float),
+        imposed="force",
         tangential=np.column_stack([across, 0.3 * across]) + rng.normal(0, 0.1, (n, 2)),
-    )  # fmt: skip
+    )
 
 
 def test_a_slant_that_turns_is_seen_by_the_force_across() -> None:
@@ -110,5 +116,6 @@ def test_its_law_makes_the_same_columns() -> None:
     for v in every:
         law, unit = law_of(bench, v)
         columns: Array = np.column_stack([bench.columns[c] for c in v.columns])
-        np.testing.assert_allclose(rows_of(bench, v.word, law) * unit, columns,
-                                   atol=1e-9 * np.abs(columns).max())  # fmt: skip
+        np.testing.assert_allclose(
+            rows_of(bench, v.word, law) * unit, columns, atol=1e-9 * np.abs(columns).max()
+        )

@@ -25,17 +25,21 @@ def askew() -> GapData:
     rng = np.random.default_rng(4)
     n = len(data.force)
     return replace(
-        data, displacement=np.sum(lever * q, axis=1) + rng.normal(0, 1e-6, n),
+        data,
+        displacement=np.sum(lever * q, axis=1) + rng.normal(0, 1e-6, n),
         q=q + rng.normal(0, 1e-5, q.shape),
         tangential=ANGLES[data.setup] * data.force[:, None] + rng.normal(0, 0.1, (n, 2)),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("recorded", ["both", "force across", "joint readings"])
 def test_what_is_set_up_anew_in_every_pose_may_be_askew_otherwise_there(recorded: str) -> None:
     data = askew()
-    data = replace(data, tangential=None if recorded == "joint readings" else data.tangential,
-                   q=None if recorded == "force across" else data.q)  # fmt: skip
+    data = replace(
+        data,
+        tangential=None if recorded == "joint readings" else data.tangential,
+        q=None if recorded == "force across" else data.q,
+    )
     found = diagnose_gap(data)
     assert found.verdict == "load_misalignment"
     assert found.fit.parts[0].variant.label.startswith("each pose")

@@ -63,6 +63,15 @@ def test_rows_of_jumps_are_found_one_after_the_other() -> None:
     assert abs(rows[0] - first[1]) <= 1  # the largest
 
 
+def test_columns_that_say_the_same_twice_move_no_jump() -> None:
+    """What rounding leaves of the second is no direction, or the processor would choose it."""
+    bench = make_bench(running(breaking_fibres(), STROKE, imposed="displacement"))
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    smooth = base.columns * np.linspace(0.3, 3.0, base.columns.shape[1])
+    twice = replace(base, columns=np.column_stack([base.columns, smooth]))
+    assert jump_rows(bench, twice, target, 12) == jump_rows(bench, base, target, 12)
+
+
 def test_where_a_stroke_turns_the_force_of_friction_jumps_and_nothing_jerked() -> None:
     sense = np.where(np.arange(N) % 100 < 50, 1.0, -1.0)  # of each stroke of 50 readings
     bench, rows = looked_for(pulled(SPRING * (STROKE + 4e-5 * sense)))
@@ -168,9 +177,13 @@ def test_what_stays_when_the_load_is_gone_does_not_only_soften(stays: float) -> 
     """Rubber comes back; under a tip most of the way is left."""
     left = stays * np.maximum.accumulate(STROKE)
     force = SPRING * np.maximum(STROKE - left, 0.0)
-    bench = make_bench(running(np.append(force[:-20], np.zeros(20)),
-                               np.append(STROKE[:-20], np.full(20, left[-1])),
-                               imposed="displacement"))  # fmt: skip
+    bench = make_bench(
+        running(
+            np.append(force[:-20], np.zeros(20)),
+            np.append(STROKE[:-20], np.full(20, left[-1])),
+            imposed="displacement",
+        )
+    )
     target = bench.observed - prediction(bench)
     found = {v.word for v in troubles_of(bench, base_columns(bench), target)}
     assert (SOFTENING in found) is (stays == 0.0)

@@ -72,8 +72,9 @@ def test_a_specimens_spectrum_has_strengths_between_the_strengths() -> None:
     spectrum = next(v for v in grid if v.label == "joint 1 spectrum")
     finer = joint_hysteresis.closer(bench, spectrum)
     assert [v.label for v in finer] == [
-        "joint 1 spectrum fine", "joint 1 spectrum fine, other springs"
-    ]  # fmt: skip
+        "joint 1 spectrum fine",
+        "joint 1 spectrum fine, other springs",
+    ]
     before, after = (v.info["radius"] for v in (spectrum, finer[0]))
     assert set(before) < set(after)
     assert len(after) == 2 * len(before) - 2  # between what never slips and the rest there is none
@@ -83,8 +84,9 @@ def test_a_specimens_spectrum_has_strengths_between_the_strengths() -> None:
 def test_friction_may_outlast_the_way_to_another_pose() -> None:
     """A knee may: what does not is no reason to call all friction that does a yield."""
     bench = make_bench(arm_data())
-    lost = next(v for v in library(bench, ["joint_hysteresis"])
-                if v.label == "joint 1 spectrum that slips")  # fmt: skip
+    lost = next(
+        v for v in library(bench, ["joint_hysteresis"]) if v.label == "joint 1 spectrum that slips"
+    )
     lasting = joint_hysteresis.outlasting(bench, lost)
     kept = lasting[1]
     assert kept.label == "joint 1 lasting spectrum that slips"
@@ -203,8 +205,14 @@ def test_what_shows_nothing_is_not_looked_at_closely(word: str) -> None:
 
     def told(share: float, beside: float) -> int:
         """Closer shapes of the word where it brings so much."""
-        alone = [s._replace(log_evidence=none + share * (first - none) if s.variant.word == word
-                            else s.log_evidence) for s in singles]  # fmt: skip
+        alone = [
+            s._replace(
+                log_evidence=none + share * (first - none)
+                if s.variant.word == word
+                else s.log_evidence
+            )
+            for s in singles
+        ]
         mine = [s for s in alone if s.variant.word == word][:1]
         families = {w: [s for s in alone if s.variant.word == w] for w in words}
         lead = closest(families[words[0]]).log_evidence
@@ -262,8 +270,9 @@ def test_looks_move_on_until_the_best_stays(monkeypatch: pytest.MonkeyPatch) -> 
         ]
 
     monkeypatch.setattr("identification.gap.laws.closer.scored_beside", scored)
-    word = SimpleNamespace(engine=SimpleNamespace(extend=lambda: None, bench=None),
-                           families={}, ranked=[])  # fmt: skip
+    word = SimpleNamespace(
+        engine=SimpleNamespace(extend=lambda: None, bench=None), families={}, ranked=[]
+    )
     start = SimpleNamespace(variant=variant("joint_backlash", "start", [0], (1.0,), at=0.0))
     finer = closing_in(word, refined, [start], (0.5, 0.1))  # type: ignore[arg-type, list-item]
     best = min((float(v.info["at"]) for v in finer), key=lambda at: abs(at - 3.2))

@@ -46,8 +46,10 @@ def engine(extra: Array, datum: str = "setup", zeros: bool = True) -> Engine:
     data = bench_data(force, u, step=step, run=run, repetition=run + 1, branch=branch)
     bench = make_bench(replace(data, datum=datum))
     target = bench.observed - prediction(bench)
-    mine = [(bench.rows.repetition == r + 1) * np.exp(-(((bench.load - 80) / 25) ** 2))
-            for r in range(REPETITIONS)]  # fmt: skip
+    mine = [
+        (bench.rows.repetition == r + 1) * np.exp(-(((bench.load - 80) / 25) ** 2))
+        for r in range(REPETITIONS)
+    ]
     bench.add(bench.stacked(np.sum(mine, axis=0)))
     for m in mine:
         bench.add(bench.stacked(m))
@@ -167,9 +169,14 @@ def test_repetitions_that_no_setup_has_twice_are_no_fold() -> None:
     force = np.tile(np.repeat(20.0 * np.arange(8), 4), 2)
     run = np.repeat([0, 1], 32)
     data = bench_data(
-        force, 1e-5 * force, step=np.tile(np.repeat(np.arange(8), 4), 2), run=run, setup=run,
-        repetition=run + 1, setups=(setup, replace(setup, direction="y")),
-    )  # fmt: skip
+        force,
+        1e-5 * force,
+        step=np.tile(np.repeat(np.arange(8), 4), 2),
+        run=run,
+        setup=run,
+        repetition=run + 1,
+        setups=(setup, replace(setup, direction="y")),
+    )
     bench = make_bench(data)
     bench.add(bench.stacked(np.ones(bench.rows.n)))
     e = Engine(
@@ -206,8 +213,9 @@ def test_a_second_effect_is_named_only_if_it_brings_something(worth: float, name
     e = engine(np.full(REPETITIONS, BUMP))
     one = explained([0], "joint_nonlinear_stiffness", 0.0)
     spring = explained([1], "joint_stiffness_error", 0.0)
-    two = replace(one, parts=one.parts + spring.parts, sizes=(BUMP / 3, 0.0),
-                  log_weight=worth, log_good=worth)  # fmt: skip
+    two = replace(
+        one, parts=one.parts + spring.parts, sizes=(BUMP / 3, 0.0), log_weight=worth, log_good=worth
+    )
     both = found(e, one, two)
     assert len(chosen_of(both, "joint_nonlinear_stiffness").parts) == named
     # one that withheld data refuse is no simpler choice
@@ -244,8 +252,10 @@ def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: b
     assert spoken is (None if needed or second == "thermal_drift" else bump)
     assert chosen_of(after, "joint_nonlinear_stiffness" if spoken else second) is (spoken or both)
     spoken_for = with_posterior(replace(after, foretold={both.words: bump}), {})
-    for result, word in ((with_posterior(replace(after, foretold={}), {}), second),
-                         (spoken_for, "joint_nonlinear_stiffness")):  # fmt: skip
+    for result, word in (
+        (with_posterior(replace(after, foretold={}), {}), second),
+        (spoken_for, "joint_nonlinear_stiffness"),
+    ):
         assert result.probabilities[word] > 0.7
 
 
@@ -263,8 +273,10 @@ def test_of_two_that_foretell_alike_the_one_that_explains_more_speaks(
     monkeypatch: pytest.MonkeyPatch, bump_after: float, speaks: str
 ) -> None:
     e = engine(np.full(REPETITIONS, BUMP))
-    one = {"bump": explained([0], "joint_nonlinear_stiffness", -40.0),
-           "creep": explained([1], "joint_creep", -60.0)}  # fmt: skip
+    one = {
+        "bump": explained([0], "joint_nonlinear_stiffness", -40.0),
+        "creep": explained([1], "joint_creep", -60.0),
+    }
     parts = one["creep"].parts + one["bump"].parts
     both = Explanation(parts, 0.0, 0.0, (BUMP / 3, BUMP / 3), 0.0)
     after = {both.words: 2.0, one["bump"].words: bump_after, one["creep"].words: 1.0}
@@ -280,10 +292,20 @@ def test_of_two_that_foretell_alike_the_one_that_explains_more_speaks(
 def test_a_third_effect_that_hardly_moves_anything_is_not_named(share: float, named: int) -> None:
     e = engine(np.full(REPETITIONS, BUMP))
     one = explained([0], "joint_nonlinear_stiffness", 0.0)
-    two = replace(one, parts=one.parts + explained([1], "time_lag", 0.0).parts, sizes=(1e-6, 8e-7),
-                  log_weight=10.0, log_good=10.0)  # fmt: skip
-    three = replace(two, parts=two.parts + explained([2], "load_misalignment", 0.0).parts,
-                    sizes=(*two.sizes, share * 1e-6), log_weight=500.0, log_good=500.0)  # fmt: skip
+    two = replace(
+        one,
+        parts=one.parts + explained([1], "time_lag", 0.0).parts,
+        sizes=(1e-6, 8e-7),
+        log_weight=10.0,
+        log_good=10.0,
+    )
+    three = replace(
+        two,
+        parts=two.parts + explained([2], "load_misalignment", 0.0).parts,
+        sizes=(*two.sizes, share * 1e-6),
+        log_weight=500.0,
+        log_good=500.0,
+    )
     assert len(chosen_of(found(e, one, two, three), "joint_nonlinear_stiffness").parts) == named
     # it has to bring more than a second one, however large it is
     for worth, kept in ((WORTH_OF_THIRD - 1, min(2, named)), (WORTH_OF_THIRD + 1, named)):
@@ -306,8 +328,14 @@ def test_readings_that_scatter_in_spells_are_explained_by_no_law(
     ringing = np.isin(step, [6, 7])
     u = 1e-5 * 20.0 * step + rng.normal(0, 1.5e-7, len(step))
     u += height * ringing * rng.standard_normal(len(step))
-    data = bench_data(20.0 * step, u, step=step, run=run, repetition=run + 1,
-                      instruments=Instruments(0.1, 2e-7, 0.005, 0.003))  # fmt: skip
+    data = bench_data(
+        20.0 * step,
+        u,
+        step=step,
+        run=run,
+        repetition=run + 1,
+        instruments=Instruments(0.1, 2e-7, 0.005, 0.003),
+    )
     assert bursts(data) is spells
     result = diagnose_gap(data)
     p = result.probabilities
@@ -350,9 +378,13 @@ def test_a_drift_that_comes_and_goes_is_no_drift(cycles: float, swings: bool) ->
 
 @pytest.mark.parametrize(
     ("word", "size", "clock", "kept"),
-    [("thermal_drift", 5e-4, True, True), ("thermal_drift", 1e-3, True, False),
-     ("thermal_drift", 1e-3, False, True), ("force_drift", 1e-3, True, True)],
-)  # fmt: skip
+    [
+        ("thermal_drift", 5e-4, True, True),
+        ("thermal_drift", 1e-3, True, False),
+        ("thermal_drift", 1e-3, False, True),
+        ("force_drift", 1e-3, True, True),
+    ],
+)
 def test_nothing_warms_up_in_a_moment(word: str, size: float, clock: bool, kept: bool) -> None:
     """By 0.3 and 0.6 mm a minute; without a clock nobody knows; an amplifier may."""
     wave = size * np.sin(2 * np.pi * np.arange(640) / 640)
@@ -365,8 +397,15 @@ def believed(wave: Array, word: str, clock: bool = True) -> bool:
     n, pieces = 640, 32
     force = np.tile(np.repeat([0.0, 40.0, 80.0, 40.0], 4), 40)
     step, run = np.arange(n) // 4, np.arange(n) // 16
-    data = bench_data(force, 1e-5 * force + wave, step=step, run=run, repetition=run + 1,
-                      branch=np.where(force > 0, 1, 0), session=np.arange(float(n)))  # fmt: skip
+    data = bench_data(
+        force,
+        1e-5 * force + wave,
+        step=step,
+        run=run,
+        repetition=run + 1,
+        branch=np.where(force > 0, 1, 0),
+        session=np.arange(float(n)),
+    )
     bench = make_bench(replace(data, arm=True))
     bench = replace(bench, rows=replace(bench.rows, clock=clock))
     hats = free_path(bench, pieces)
@@ -427,9 +466,13 @@ def test_of_a_withheld_run_the_datum_and_the_forces_across_stay_in() -> None:
     assert layout.tangential.stop > layout.tangential.start
 
 
-@pytest.mark.parametrize(("eta", "weight", "creeps"), [
-    (0.0, -10.0, True), (1e-4, -10.0, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("eta", "weight", "creeps"),
+    [
+        (0.0, -10.0, True),
+        (1e-4, -10.0, False),
+    ],
+)
 def test_creep_that_leaves_nothing_is_not_something_that_settles(
     eta: float, weight: float, creeps: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -34,9 +34,10 @@ def test_a_knee_elsewhere_begins_at_the_same_load_of_the_rig(word: str, flow_s: 
     sharp = [v for v in library(bench, [word]) if v.info["knee"] == "sharp" and v.label[-1] == "k"]
     sharp = [v for v in sharp if "weight" not in v.info and v.info["memory"] == ""]
     found = next(
-        v for v in knees_closer.refined(bench, sharp[0])
+        v
+        for v in knees_closer.refined(bench, sharp[0])
         if v.info["flow_s"] == flow_s and v.label.endswith("flows back")
-    )  # fmt: skip
+    )
     others = {place_of(v): v for v in reversed(sharp)}
     moved = {k: elsewhere(bench, found, v) for k, v in others.items()}
     made = {k: v for k, v in moved.items() if v is not None}
@@ -200,6 +201,17 @@ def test_on_an_arm_what_gives_way_bit_by_bit_does_not_flow_back() -> None:
 
 def _first_pose(data: object) -> dict[str, np.ndarray]:
     keep = np.asarray(data.setup) < 2  # type: ignore[attr-defined]
-    names = ("time", "session", "run", "setup", "repetition", "branch", "step", "force",
-             "displacement", "tangential", "temperature")  # fmt: skip
+    names = (
+        "time",
+        "session",
+        "run",
+        "setup",
+        "repetition",
+        "branch",
+        "step",
+        "force",
+        "displacement",
+        "tangential",
+        "temperature",
+    )
     return {n: getattr(data, n)[keep] for n in names}

@@ -125,10 +125,13 @@ def test_levels_that_are_not_looked_at_add_nothing(monkeypatch: pytest.MonkeyPat
     shapes = [
         variant(word, word, columns, (3.0, 30.0), positive=positive)
         for word, columns, positive in (
-            ("joint_creep", [0], True), ("joint_yield", [1], True), ("base_slip", [0, 1], False),
-            ("time_lag", [0], -np.ones(1)), ("contact_seating", [0, 1], np.array([1.0, -1.0])),
+            ("joint_creep", [0], True),
+            ("joint_yield", [1], True),
+            ("base_slip", [0, 1], False),
+            ("time_lag", [0], -np.ones(1)),
+            ("contact_seating", [0, 1], np.array([1.0, -1.0])),
         )
-    ]  # fmt: skip
+    ]
     looked, look = [], EvidenceTable.look
     monkeypatch.setattr(
         EvidenceTable, "look", lambda self: (look(self), looked.append(self.logs))[0]
@@ -187,10 +190,16 @@ def test_shapes_of_different_sizes_score_together_as_alone() -> None:
     mixed = [
         variant("joint_yield", "four", [0, 1, 2, 3], (0.5, 2.0), np.diag([1.0, 0.5, 0.2, 0.1])),
         variant("base_slip", "five", [0, 1, 2, 3, 4], (0.1, 1.0, 9.0), least=0.3, each=True),
-        variant("joint_yield", "three and a sum", [2, 3, 4], (1.0,), positive=np.ones(3),
-                within=np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]])),
+        variant(
+            "joint_yield",
+            "three and a sum",
+            [2, 3, 4],
+            (1.0,),
+            positive=np.ones(3),
+            within=np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]]),
+        ),
         variant("joint_yield", "either sense", [1, 2, 3, 4, 0], (1.0, 3.0), positive=False),
-    ]  # fmt: skip
+    ]
     together = score(engine, engine.levels, mixed)
     engine.stacks.clear()
     for v, found in zip(mixed, together, strict=True):

@@ -145,8 +145,11 @@ def test_nothing_answers_a_stroke_of_a_bench(n: int, times: float) -> None:
 
 def test_nothing_answers_the_levels_of_a_load() -> None:
     noise = np.random.default_rng(2).normal(0, 1e-6, 100)
-    for step, imposed, quiet in ((np.arange(100) // 30, None, ("x",)), (np.zeros(100), None, ()),
-                                 (np.zeros(100), "force", ("x",))):  # fmt: skip
+    for step, imposed, quiet in (
+        (np.arange(100) // 30, None, ("x",)),
+        (np.zeros(100), None, ()),
+        (np.zeros(100), "force", ("x",)),
+    ):
         data = bench_data(np.linspace(0, 200, 100), noise, step=step.astype(int), imposed=imposed)
         assert silent(data, "displacement") == quiet
 

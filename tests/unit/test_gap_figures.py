@@ -142,9 +142,10 @@ def test_labels_over_short_changes_touch_no_marker(slipped: Diagnosis) -> None:
     (axes,), point = figure.axes, figure.dpi / 72
     markers = [
         (x, y, (line.get_markersize() / 2 + line.get_markeredgewidth() / 2) * point)
-        for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata())
+        for line in axes.lines
+        if line.get_marker() == "o" and len(line.get_xdata())
         for x, y in axes.transData.transform(line.get_xydata())
-    ]  # fmt: skip
+    ]
     for box in (text.get_window_extent() for text in axes.texts):
         for x, y, radius in markers:
             beside = x + radius < box.x0 or x - radius > box.x1
@@ -165,10 +166,14 @@ def test_without_an_arm_a_spring_is_called_by_its_direction(tmp_path: Path) -> N
 
 @pytest.mark.parametrize(
     ("label", "said"),
-    [("joint 2", "direction y"), ("joints 1 and 2", "directions x and y"),
-     ("all joints", "all directions"), ("all joints but 2", "all directions but y"),
-     ("joint 1 T 1.5 s", "direction x T 1.5 s")],
-)  # fmt: skip
+    [
+        ("joint 2", "direction y"),
+        ("joints 1 and 2", "directions x and y"),
+        ("all joints", "all directions"),
+        ("all joints but 2", "all directions but y"),
+        ("joint 1 T 1.5 s", "direction x T 1.5 s"),
+    ],
+)
 def test_shapes_name_directions_where_there_are_no_joints(
     slipped: Diagnosis, label: str, said: str
 ) -> None:
@@ -191,8 +196,11 @@ def test_every_figure_is_written_with_its_numbers(slipped: Diagnosis, tmp_path: 
     names = {p.name for p in written}
     assert {f"gap_{f}.{kind}" for f in FIGURES for kind in ("png", "svg")} <= names
     assert {p for p in names if p.endswith(".csv")} == {
-        "gap_points.csv", "gap_probabilities.csv", "gap_withheld.csv", "gap_remainder.csv",
-    }  # fmt: skip
+        "gap_points.csv",
+        "gap_probabilities.csv",
+        "gap_withheld.csv",
+        "gap_remainder.csv",
+    }
     assert all(p.stat().st_size > 100 for p in written)
     lines = (tmp_path / "new/gap_probabilities.csv").read_text().splitlines()
     assert lines[0] == f"# rig diagnose slip.h5: {slipped.result.verdict}"

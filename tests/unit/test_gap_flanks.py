@@ -15,7 +15,7 @@ from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, part_sizes
 from identification.gap.explanations.penalties import minor_parts
-from identification.gap.laws.lost_motion import PLACED
+from identification.gap.laws.lost_motion import MOST_RUB, PLACED
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.flanks import Flanks, _crossed, placed
@@ -47,9 +47,13 @@ def a_bench(force: Array, moved: Array, imposed: str) -> Bench:
     data = bench_data(
         TOP * (force + 1e-4 * rng.standard_normal(N)),
         TOP / K * (moved + 1e-4 * rng.standard_normal(N)),
-        time=np.arange(N) * 1.0, step=np.full(N, -1), branch=np.full(N, 3),
-        run=np.zeros(N, dtype=np.int64), repetition=np.ones(N, dtype=np.int64), imposed=imposed,
-    )  # fmt: skip
+        time=np.arange(N) * 1.0,
+        step=np.full(N, -1),
+        branch=np.full(N, 3),
+        run=np.zeros(N, dtype=np.int64),
+        repetition=np.ones(N, dtype=np.int64),
+        imposed=imposed,
+    )
     known = replace(data.instruments, force=1e-4 * TOP, displacement=1e-4 * TOP / K)
     return make_bench(replace(data, instruments=known))
 
@@ -161,10 +165,17 @@ def one_sided() -> Bench:
 
 @pytest.mark.parametrize(
     "bench",
-    [a_curve("displacement"), a_curve("force"), a_loop("displacement"), a_loop("force"),
-     slips("displacement"), one_sided(), a_bench(to_and_fro(), to_and_fro(), "force")],
+    [
+        a_curve("displacement"),
+        a_curve("force"),
+        a_loop("displacement"),
+        a_loop("force"),
+        slips("displacement"),
+        one_sided(),
+        a_bench(to_and_fro(), to_and_fro(), "force"),
+    ],
     ids=["curve, stroke", "curve, load", "loop, stroke", "loop, load", "slips", "one side", "line"],
-)  # fmt: skip
+)
 def test_no_play_is_placed_where_there_is_none(bench: Bench) -> None:
     assert placed(bench, bench.torque[:, 0]) is None
 
@@ -197,12 +208,15 @@ def test_friction_beside_a_play_is_the_lesser_part() -> None:
     for v in joint_backlash.variants(replace(teeth(0.05), columns=Pool())):
         assert v.positive is not None
         share = np.zeros(len(v.columns))
-        share[:2] = 1.0, 0.9 * joint_backlash.MOST_RUB
+        share[:2] = 1.0, 0.9 * MOST_RUB
         assert v.positive @ share > 0
-        share[1] = 1.1 * joint_backlash.MOST_RUB
+        share[1] = 1.1 * MOST_RUB
         assert v.positive @ share < 0
-    inside = [v for v in joint_backlash.variants(replace(gap(0.2), columns=Pool()))
-              if v.info["kind"] == "gap"]  # fmt: skip
+    inside = [
+        v
+        for v in joint_backlash.variants(replace(gap(0.2), columns=Pool()))
+        if v.info["kind"] == "gap"
+    ]
     assert inside
     assert all(v.positive is not None and v.positive[1] == 0 for v in inside)
 

@@ -31,8 +31,10 @@ def arm_data(seed: int = 0, stretch: float = 1.0, directions: str = "xy") -> Gap
     from rig.models.robot import load_robot
 
     arm, rng = load_robot("ur10e"), np.random.default_rng(seed)
-    poses = {"P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],
-             "P2": [0.554, -1.480, -1.948, -1.284, 1.371, -1.036]}  # fmt: skip
+    poses = {
+        "P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],
+        "P2": [0.554, -1.480, -1.948, -1.284, 1.371, -1.036],
+    }
     setups = tuple(
         arm_setup(arm, name, np.array(q), np.array([0, 0, 0.1]), d, n)
         for name, q in poses.items()
@@ -54,14 +56,24 @@ def arm_data(seed: int = 0, stretch: float = 1.0, directions: str = "xy") -> Gap
     force = (40.0 * step + rng.normal(0, 0.02, n)) * stretch
     run = (2 * setup + repetition - 1).astype(whole)
     return GapData(
-        arm=True, setups=setups, time=time * stretch, session=session * stretch, run=run,
-        setup=setup.astype(whole), repetition=repetition.astype(whole),
-        branch=branch.astype(whole), step=step.astype(whole), force=force,
-        displacement=1.1e-5 * force + rng.normal(0, 1e-6, n), compliance=1 / arm.joint_stiffness,
-        compliance_relative_sd=np.full(6, 0.1), tangential=rng.normal(0, 0.1, (n, 2)),
-        instruments=replace(bench_data(force, force).instruments), q=rng.normal(0, 1e-5, (n, 6)),
+        arm=True,
+        setups=setups,
+        time=time * stretch,
+        session=session * stretch,
+        run=run,
+        setup=setup.astype(whole),
+        repetition=repetition.astype(whole),
+        branch=branch.astype(whole),
+        step=step.astype(whole),
+        force=force,
+        displacement=1.1e-5 * force + rng.normal(0, 1e-6, n),
+        compliance=1 / arm.joint_stiffness,
+        compliance_relative_sd=np.full(6, 0.1),
+        tangential=rng.normal(0, 0.1, (n, 2)),
+        instruments=replace(bench_data(force, force).instruments),
+        q=rng.normal(0, 1e-5, (n, 6)),
         temperature=26 + np.outer(session / session.max(), np.arange(1, 7)),
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -88,10 +100,17 @@ def test_an_arms_friction_takes_off_its_spring_or_comes_on_top(bench: Bench) -> 
 def bench_without_arm(imposed: str | None = None) -> Bench:
     t = np.arange(240.0)
     force = 100 * np.sin(t / 15) * np.minimum(1, t / 100)
-    data = bench_data(force, 1.05e-5 * force, time=t, session=t, step=np.full(240, -1),
-                      branch=np.full(240, 3), run=np.repeat([0, 1, 2], 80).astype(np.int64),
-                      repetition=np.repeat([1, 2, 3], 80).astype(np.int64),
-                      imposed=imposed)  # fmt: skip
+    data = bench_data(
+        force,
+        1.05e-5 * force,
+        time=t,
+        session=t,
+        step=np.full(240, -1),
+        branch=np.full(240, 3),
+        run=np.repeat([0, 1, 2], 80).astype(np.int64),
+        repetition=np.repeat([1, 2, 3], 80).astype(np.int64),
+        imposed=imposed,
+    )
     return make_bench(data)
 
 
@@ -100,8 +119,15 @@ def pulled(imposed: str) -> Bench:
     t = np.arange(240.0)
     way = np.abs(np.sin(t / 25)) * (1 + np.floor(t / 78.5))
     force = 100 * np.minimum(np.maximum(way - 0.3, 0.0), 1.5) + 2.0
-    data = bench_data(force, 1e-3 * way, time=t, session=t, step=np.full(240, -1),
-                      branch=np.full(240, 3), imposed=imposed)  # fmt: skip
+    data = bench_data(
+        force,
+        1e-3 * way,
+        time=t,
+        session=t,
+        step=np.full(240, -1),
+        branch=np.full(240, 3),
+        imposed=imposed,
+    )
     return make_bench(data)
 
 
@@ -233,8 +259,10 @@ def test_a_threshold_stays_where_it_was_when_the_loads_are_others() -> None:
 
 
 def test_a_time_constant_is_seconds_on_any_clock() -> None:
-    law = Law({"path": "exponential", "quantity": "displacement"},
-              (Term("drift", {"time_constant": 500.0, "along": (0.0, 1.0, 0.0)}),))  # fmt: skip
+    law = Law(
+        {"path": "exponential", "quantity": "displacement"},
+        (Term("drift", {"time_constant": 500.0, "along": (0.0, 1.0, 0.0)}),),
+    )
     for stretch in (1.0, 3.0):
         bench = make_bench(arm_data(stretch=stretch))
         made = realise(bench, one("thermal_drift", law, 4e-5))[: bench.rows.n]
@@ -253,8 +281,11 @@ def test_a_drift_counts_the_other_way_against_its_direction(bench: Bench) -> Non
 
 
 def test_what_belongs_to_a_session_is_left_behind(bench: Bench) -> None:
-    terms = (Term("width"), Term("rub"), Term("place", {"pose": "P1", "direction": "x",
-                                                        "first": True}))  # fmt: skip
+    terms = (
+        Term("width"),
+        Term("rub"),
+        Term("place", {"pose": "P1", "direction": "x", "first": True}),
+    )
     law = Law({"joint": 0, "zone": 2.0, "crossing": "load", "kind": "free"}, terms)
     form = Form("joint_backlash", law, np.array([1e-4, 0.0, 5e-5]), np.diag([1.0, 2.0, 3.0]))
     kept = lawful(form)
@@ -284,9 +315,11 @@ def test_a_variant_that_says_too_little_is_named(bench: Bench) -> None:
 
 YIELD = one(
     "joint_yield",
-    Law({"joint": 0, "memory": "kept", "flow_time": 0.0},
-        (Term("compliance", {"threshold": 30.0}),)), 3e-5,
-)  # fmt: skip
+    Law(
+        {"joint": 0, "memory": "kept", "flow_time": 0.0}, (Term("compliance", {"threshold": 30.0}),)
+    ),
+    3e-5,
+)
 DRIFT = one(
     "force_drift", Law({"path": "linear", "quantity": "force"}, (Term("drift_rate"),)), 1e-3
 )
@@ -376,8 +409,10 @@ def test_yield_of_joint_1_and_slip_about_the_vertical_are_twins_without_readings
 def test_a_knee_under_weight_may_be_tried_in_the_mounting(bench: Bench) -> None:
     """As a twin: the mounting's moment is counted without the arm's weight."""
     hung, kept = (
-        Law({"axis": "z", "depth": 0.0, "memory": memory, "flow_time": 0.0},
-            (Term("compliance", {"threshold": 30.0}),))
+        Law(
+            {"axis": "z", "depth": 0.0, "memory": memory, "flow_time": 0.0},
+            (Term("compliance", {"threshold": 30.0}),),
+        )
         for memory in (HUNG, KEPT)
-    )  # fmt: skip
+    )
     assert np.array_equal(rows_of(bench, "base_slip", hung), rows_of(bench, "base_slip", kept))

@@ -88,9 +88,16 @@ def measured(name: str, by_force: bool, n: int = N, seed: int = 1, unit: float =
     driven = driven + NOISE * rng.standard_normal(n)
     answer = answer + NOISE * rng.standard_normal(n)
     force, moved = (driven, answer) if by_force else (answer, driven)
-    data = bench_data(unit * 8.0 * force, 2**-10 * moved, time=t, session=t,
-                      step=np.full(n, -1), branch=np.full(n, 3), run=np.zeros(n, dtype=np.int64),
-                      repetition=np.ones(n, dtype=np.int64))  # fmt: skip
+    data = bench_data(
+        unit * 8.0 * force,
+        2**-10 * moved,
+        time=t,
+        session=t,
+        step=np.full(n, -1),
+        branch=np.full(n, 3),
+        run=np.zeros(n, dtype=np.int64),
+        repetition=np.ones(n, dtype=np.int64),
+    )
     known = replace(data.instruments, force=unit * 8.0 * NOISE, displacement=2**-10 * NOISE)
     return replace(data, instruments=known)
 
@@ -139,10 +146,19 @@ def test_samples_that_were_not_kept_leave_gaps_on_the_clock_of_every_run() -> No
     kept = np.random.default_rng(6).random(N) < 0.15
     kept[np.searchsorted(run, [0, 1, 2])] = True
     anew = np.arange(N) - np.searchsorted(run, run)
-    few = {k: v[kept] for k, v in {"step": data.step, "branch": data.branch, "run": run,
-                                   "repetition": run + 1, "time": 1.0 * anew}.items()}  # fmt: skip
-    data = replace(bench_data(data.force[kept], data.displacement[kept], **few),
-                   instruments=data.instruments)  # fmt: skip
+    few = {
+        k: v[kept]
+        for k, v in {
+            "step": data.step,
+            "branch": data.branch,
+            "run": run,
+            "repetition": run + 1,
+            "time": 1.0 * anew,
+        }.items()
+    }
+    data = replace(
+        bench_data(data.force[kept], data.displacement[kept], **few), instruments=data.instruments
+    )
     assert displacement_simpler(data)
 
 
@@ -200,10 +216,13 @@ def weight_on_and_off(t: Array) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize(
     ("rig", "costs", "driven"),
-    [(damper, (-6.5, -4.9), True), (damper, (-8.0, -4.9), False),
-     (lambda t: (triangle(t, 3), triangle(t, 3) ** 3), (-5.0, -4.9), False)],
+    [
+        (damper, (-6.5, -4.9), True),
+        (damper, (-8.0, -4.9), False),
+        (lambda t: (triangle(t, 3), triangle(t, 3) ** 3), (-5.0, -4.9), False),
+    ],
     ids=["slides", "slides, but the force is far simpler", "springs"],
-)  # fmt: skip
+)
 def test_of_two_paths_about_as_simple_a_rig_that_slides_drove_its_stroke(
     rig: Callable[[Array], tuple[Array, Array]],
     costs: tuple[float, float],
@@ -305,8 +324,9 @@ def test_a_ramp_is_no_vibration() -> None:
     """An arm whose load runs has no holds about which it could swing."""
     data = arm_data()
     ramp = np.abs(1 - (2 * data.time / data.time.max()) % 2)
-    runs_on = replace(data, step=np.full(len(data.step), -1), force=160 * ramp,
-                      displacement=160 * 1.1e-5 * ramp)  # fmt: skip
+    runs_on = replace(
+        data, step=np.full(len(data.step), -1), force=160 * ramp, displacement=160 * 1.1e-5 * ramp
+    )
     noise = make_bench(runs_on).noise
     assert noise.swings == 0
     assert not noise.misjudged

@@ -52,10 +52,17 @@ def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
     engine = small_engine(bench)
     common = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0}
     low, high = (
-        Variant("joint_yield", f"at {c}", (0,), (1.0,), np.eye(1),
-                info={**common, "centre": c, "joint": j}, prior=0.5)
+        Variant(
+            "joint_yield",
+            f"at {c}",
+            (0,),
+            (1.0,),
+            np.eye(1),
+            info={**common, "centre": c, "joint": j},
+            prior=0.5,
+        )
         for c, j in ((30.0, 0), (60.0, 1))
-    )  # fmt: skip
+    )
     chosen = Explanation((Part(low, 1.0),), 0.0, 0.0, (0.0,), 0.0)
     found = known_of(engine, [low, high], chosen)[0].parameters["threshold"]
     assert found.value == pytest.approx(30.0, rel=0.01)  # where the explanation says
@@ -83,12 +90,20 @@ def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> No
     engine = small_engine(bench)
     common = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
     many = [
-        Variant("joint_yield", f"at {k}", (0,), (1.0,), np.eye(1), info={**common, "joint": 0},
-                prior=0.5 / 40)
+        Variant(
+            "joint_yield",
+            f"at {k}",
+            (0,),
+            (1.0,),
+            np.eye(1),
+            info={**common, "joint": 0},
+            prior=0.5 / 40,
+        )
         for k in range(40)
-    ]  # fmt: skip
-    one = Variant("joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**common, "joint": 4},
-                  prior=0.5)  # fmt: skip
+    ]
+    one = Variant(
+        "joint_yield", "at 30", (0,), (1.0,), np.eye(1), info={**common, "joint": 4}, prior=0.5
+    )
     chosen = Explanation((Part(many[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
     found = known_of(engine, [*many, one], chosen)[0].places
     assert found == {"joint 1": pytest.approx(0.5), "joint 5": pytest.approx(0.5)}
@@ -117,9 +132,19 @@ def test_an_effect_does_not_move_to_a_joint_where_it_would_do_nothing() -> None:
         Variant("joint_yield", "at 30", (k,), (1.0,), np.eye(1), info={**info, "joint": j})
         for k, j in ((0, 0), (idle, 4))
     )
-    curve = Variant("joint_nonlinear_stiffness", "bend", (0,), (1.0,), np.eye(1), info={
-        "joint": 0, "kinds": ("cubic",), "torque": 1.0, "hinges": (),
-    })  # fmt: skip
+    curve = Variant(
+        "joint_nonlinear_stiffness",
+        "bend",
+        (0,),
+        (1.0,),
+        np.eye(1),
+        info={
+            "joint": 0,
+            "kinds": ("cubic",),
+            "torque": 1.0,
+            "hinges": (),
+        },
+    )
     parts = (Part(here, 1.0), Part(curve, 1.0))
     said, known = settled(
         engine, [here, there, curve], Explanation(parts, 0.0, 0.0, (0.0,) * 2, 0.0)
@@ -134,11 +159,23 @@ def test_where_the_grid_decides_the_step_of_the_grid_is_in_the_interval() -> Non
     engine = small_engine(bench)
     engine.target = engine.target + 4.0 * engine.bench.columns[0]
     family = [
-        Variant("joint_yield", f"at {c}", (k,), (1.0,), np.eye(1), prior=prior, info={
-            "radius": np.array([c]), "load": bench.load, "flow_s": 0.0, "centre": c, "joint": 0,
-        })
+        Variant(
+            "joint_yield",
+            f"at {c}",
+            (k,),
+            (1.0,),
+            np.eye(1),
+            prior=prior,
+            info={
+                "radius": np.array([c]),
+                "load": bench.load,
+                "flow_s": 0.0,
+                "centre": c,
+                "joint": 0,
+            },
+        )
         for k, c, prior in ((0, 30.0, 1.0), (1, 36.0, 1e-12))
-    ]  # fmt: skip
+    ]
     chosen = Explanation((Part(family[0], 1.0),), 0.0, 0.0, (0.0,), 0.0)
     alone = known_of(engine, family[:1], chosen)[0].parameters["threshold"]
     found = known_of(engine, family, chosen)[0].parameters["threshold"]
@@ -173,10 +210,17 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
     """Beside it, two shapes of another word that the data leave alike take more or less from it."""
     engine = small_engine(small_bench())
     bench = engine.bench
-    mine = Variant("joint_stiffness_error", "joint 1", (0,), (10.0,), np.eye(1),
-                   info={"joints": [0], "joint": 0})  # fmt: skip
-    rival = Variant("joint_creep", "T 3", (1,), (1.0,), np.eye(1),
-                    info={"joint": 0, "times_s": [3.0]})  # fmt: skip
+    mine = Variant(
+        "joint_stiffness_error",
+        "joint 1",
+        (0,),
+        (10.0,),
+        np.eye(1),
+        info={"joints": [0], "joint": 0},
+    )
+    rival = Variant(
+        "joint_creep", "T 3", (1,), (1.0,), np.eye(1), info={"joint": 0, "times_s": [3.0]}
+    )
     place = bench.add(bench.columns[1] + 0.2 * bench.columns[0])
     twice = replace(rival, label="T 4", columns=(place,))
     engine.target = engine.target + 4.0 * bench.columns[0] + 2.0 * bench.columns[1]

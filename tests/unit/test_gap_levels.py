@@ -41,8 +41,14 @@ def creeping(n: int = 200) -> tuple[Array, Array]:
 def one_hold(t: Array, u: Array) -> dict[str, Array]:
     n = len(t)
     on = (t > 0).astype(np.int64)
-    return {"time": t, "step": on, "branch": on, "force": 100.0 * on, "displacement": u,
-            "run": np.zeros(n, dtype=np.int64)}  # fmt: skip
+    return {
+        "time": t,
+        "step": on,
+        "branch": on,
+        "force": 100.0 * on,
+        "displacement": u,
+        "run": np.zeros(n, dtype=np.int64),
+    }
 
 
 def test_rows_of_a_hold_follow_its_clock_when_samples_grow_seldom() -> None:
@@ -82,8 +88,9 @@ def test_a_table_without_a_clock_says_nothing_of_lags_and_creep(
     branches = ["zero", *["loading"] * 3, *["unloading"] * 2, "zero"]
     lines = [("time_s," if clock else "") + HEAD]
     for i, (f, b) in enumerate(zip(forces, branches, strict=True)):
-        lines += [(f"{7 * i + k}," if clock else "") + f"x,1,{b},{i},{f},{f / 90}"
-                  for k in range(3)]  # fmt: skip
+        lines += [
+            (f"{7 * i + k}," if clock else "") + f"x,1,{b},{i},{f},{f / 90}" for k in range(3)
+        ]
     (tmp_path / "t.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     (tmp_path / "m.yaml").write_text(META, encoding="utf-8")
     import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
@@ -103,8 +110,11 @@ def test_one_reading_a_level_in_a_single_pull_shows_no_creep() -> None:
     once = make_bench(bench_data(force, 1e-5 * force))
     assert once.course.never_held
     assert not library(once, ["joint_creep"])
-    twice = make_bench(bench_data(np.repeat(force, 2), 1e-5 * np.repeat(force, 2),
-                                  step=np.repeat(np.arange(10), 2) + 1))  # fmt: skip
+    twice = make_bench(
+        bench_data(
+            np.repeat(force, 2), 1e-5 * np.repeat(force, 2), step=np.repeat(np.arange(10), 2) + 1
+        )
+    )
     assert not twice.course.never_held
     assert library(twice, ["joint_creep"])
 
@@ -119,8 +129,14 @@ def test_steps_to_and_fro_of_one_number_are_other_holds_and_levels() -> None:
     first = rows.level[rows.hold_starts]
     assert len(set(first[1:7].tolist())) == 6  # coming and going, on both sides
     twice = np.concatenate([force, force])
-    again = bench_data(twice, twice / 1e5, step=np.tile(step, 2), branch=np.full(48, 3),
-                       run=np.repeat([0, 1], 24), repetition=np.repeat([1, 2], 24))  # fmt: skip
+    again = bench_data(
+        twice,
+        twice / 1e5,
+        step=np.tile(step, 2),
+        branch=np.full(48, 3),
+        run=np.repeat([0, 1], 24),
+        repetition=np.repeat([1, 2], 24),
+    )
     rows = reduce_rows(again)
     first = rows.level[rows.hold_starts]
     assert first[:8].tolist() == first[8:].tolist()  # and the same in every repetition
@@ -129,8 +145,12 @@ def test_steps_to_and_fro_of_one_number_are_other_holds_and_levels() -> None:
 def test_noise_about_no_load_ends_no_hold() -> None:
     force = np.tile([1.0, -1.0], 12)
     for step, u, holds in ((0, 0.01, 1), (1, 0.25, 1), (1, 0.01, 24)):  # four of noise
-        data = bench_data(force, force / 1e5, step=np.full(24, step),
-                          instruments=Instruments(u, 1e-6, 0.005, 0.003))  # fmt: skip
+        data = bench_data(
+            force,
+            force / 1e5,
+            step=np.full(24, step),
+            instruments=Instruments(u, 1e-6, 0.005, 0.003),
+        )
         assert hold_ids(data)[-1] + 1 == holds
 
 
@@ -149,8 +169,10 @@ CLOCKS = "time_s,session_s,repetition,branch,step,force_N,displacement_mm\n"
 def test_a_run_whose_clock_stands_goes_by_the_session(tmp_path: Path) -> None:
     rows = [
         f"{7 * s + k if r == 1 else 21},{100 * r + 7 * s + k},{r},loading,{s},{20 * s},{0.2 * s}"
-        for r in (1, 2) for s in range(4) for k in range(3)
-    ]  # fmt: skip
+        for r in (1, 2)
+        for s in range(4)
+        for k in range(3)
+    ]
     (tmp_path / "t.csv").write_text(CLOCKS + "\n".join(rows) + "\n", encoding="utf-8")
     (tmp_path / "m.yaml").write_text(META, encoding="utf-8")
     import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
@@ -235,8 +257,9 @@ def test_what_is_stated_and_holds_do_not_show_may_differ_from_hold_to_hold() -> 
     rng = np.random.default_rng(6)
     step = np.repeat(np.arange(1, 9), 12)
     load = 10.0 * step
-    data = bench_data(load + rng.normal(0, 0.1, 96), 1e-5 * load + rng.normal(0, 1e-6, 96),
-                      step=step, arm=True)  # fmt: skip
+    data = bench_data(
+        load + rng.normal(0, 0.1, 96), 1e-5 * load + rng.normal(0, 1e-6, 96), step=step, arm=True
+    )
     slow = []
     for stated in (1e-6, 2e-6, 4e-6):
         meter = replace(data.instruments, force=2 * stated / 1e-5, displacement=stated)
@@ -258,13 +281,15 @@ def test_what_is_stated_and_holds_do_not_show_may_differ_from_hold_to_hold() -> 
 def test_an_arm_whose_force_is_stated_far_too_uncertain_is_none(stated: float) -> None:
     """Nothing is wrong, and the noise that could be there reaches beyond all that was seen."""
     data = linear("medium")
-    assert diagnose_gap(
-        replace(data, instruments=replace(data.instruments, force=stated))
-    ).verdict == "none"  # fmt: skip
+    assert (
+        diagnose_gap(replace(data, instruments=replace(data.instruments, force=stated))).verdict
+        == "none"
+    )
 
 
-@pytest.mark.parametrize(("gain", "verdict"), [(1.2, "none"), (1.38, "force_scale"),
-                                               (0.8, "none"), (0.7, "force_scale")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("gain", "verdict"), [(1.2, "none"), (1.38, "force_scale"), (0.8, "none"), (0.7, "force_scale")]
+)
 def test_a_gain_beyond_three_of_its_stated_deviations_is_off(gain: float, verdict: str) -> None:
     """Of a cell that is stated to a tenth, by what it reads or by what of that is too much."""
     up = np.arange(6)
@@ -272,10 +297,13 @@ def test_a_gain_beyond_three_of_its_stated_deviations_is_off(gain: float, verdic
     branch = np.repeat(np.concatenate([np.minimum(up, 1), [2, 2, 2, 2, 0]]), 3)
     rng = np.random.default_rng(1)
     data = bench_data(
-        20.0 * step * gain + rng.normal(0, 0.1, 33), 2e-4 * step + rng.normal(0, 1e-6, 33),
-        step=step, branch=branch, compliance_relative_sd=np.array([0.005]),
+        20.0 * step * gain + rng.normal(0, 0.1, 33),
+        2e-4 * step + rng.normal(0, 1e-6, 33),
+        step=step,
+        branch=branch,
+        compliance_relative_sd=np.array([0.005]),
         instruments=Instruments(0.1, 1e-6, 0.1, 0.003),
-    )  # fmt: skip
+    )
     assert diagnose_gap(data).verdict == verdict
 
 
@@ -291,16 +319,26 @@ def of_three(sd: float, goes_on: float = 0.0, arm: bool = False) -> GapData:
     up = np.tile(np.repeat(np.arange(19) < 10, 3), 3)
     noise = sd * rng.standard_normal(n)
     force = load + rng.normal(0, 0.1, n)
-    return bench_data(force, 1e-5 * force + late + noise, step=step, branch=np.where(up, 1, 2),
-                      run=run, repetition=run + 1, imposed="force", arm=arm)  # fmt: skip
+    return bench_data(
+        force,
+        1e-5 * force + late + noise,
+        step=step,
+        branch=np.where(up, 1, 2),
+        run=run,
+        repetition=run + 1,
+        imposed="force",
+        arm=arm,
+    )
 
 
 def test_three_readings_of_a_level_show_their_noise() -> None:
     """What was stated of a bench's sensor was a guess; of an arm's it is known. Not where they
     still go on."""
     for sd, goes_on, arm, found in (
-        (3e-6, 0.0, False, 3e-6), (3e-6, 5e-6, False, 1e-6), (3e-6, 0.0, True, 1e-6),
-    ):  # fmt: skip
+        (3e-6, 0.0, False, 3e-6),
+        (3e-6, 5e-6, False, 1e-6),
+        (3e-6, 0.0, True, 1e-6),
+    ):
         data = of_three(sd, goes_on, arm)
         assert make_bench(data).noise.response[0] == pytest.approx(found, rel=0.15)
     assert diagnose_gap(of_three(3e-6)).verdict == "none"

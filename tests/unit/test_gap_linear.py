@@ -45,16 +45,23 @@ def charged(v: Variant, w: list[float], sd: float = 0.01) -> float:
     return float(log_odds(limits, np.zeros(1, int), before, rows @ np.array(w), sd * rows)[0])
 
 
-@pytest.mark.parametrize(("word", "label", "good", "bad"), [
-    ("base_compliance", "axes 0.3 m below", [1.0, 0.2, 0.5], [1.0, -0.2, 0.5]),
-    ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, 0.7], [1, 0.5, -0.2, 0.7]),
-    ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, 0.7], [1, 0.5, 0.2, 0.9]),
-    ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, -0.7], [1, 0.5, 0.2, -0.9]),
-    ("link_flexibility", "segment 1", [1, 1, 1, 0.3], [1, 1, 1, -0.3]),
-    ("link_flexibility", "segment 1", [0.2, 1, 0.2, 0.3], [-0.2, 1, 0.2, 0.3]),
-    ("link_flexibility", "both arms", [1, 1, 1, 0.3, 0.5, 0.5, 0.5, 0.1],
-     [1, 1, 1, 0.3, 0.5, -0.5, 0.5, 0.1]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("word", "label", "good", "bad"),
+    [
+        ("base_compliance", "axes 0.3 m below", [1.0, 0.2, 0.5], [1.0, -0.2, 0.5]),
+        ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, 0.7], [1, 0.5, -0.2, 0.7]),
+        ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, 0.7], [1, 0.5, 0.2, 0.9]),
+        ("base_compliance", "turned axes 0.3 m below", [1, 0.5, 0.2, -0.7], [1, 0.5, 0.2, -0.9]),
+        ("link_flexibility", "segment 1", [1, 1, 1, 0.3], [1, 1, 1, -0.3]),
+        ("link_flexibility", "segment 1", [0.2, 1, 0.2, 0.3], [-0.2, 1, 0.2, 0.3]),
+        (
+            "link_flexibility",
+            "both arms",
+            [1, 1, 1, 0.3, 0.5, 0.5, 0.5, 0.1],
+            [1, 1, 1, 0.3, 0.5, -0.5, 0.5, 0.1],
+        ),
+    ],
+)
 def test_what_bends_gives_way_under_load_in_every_part(
     bench: Bench, word: str, label: str, good: list[float], bad: list[float]
 ) -> None:
@@ -67,8 +74,9 @@ def test_axes_are_turned_where_both_that_lie_are_seen() -> None:
     """Pushed all but along y, far out: about y next to nothing turns the stand."""
     data = arm_data(directions="y")
     n = np.array([0.0012, 1.0, 0.0]) / np.hypot(0.0012, 1.0)
-    setups = tuple(replace(s, unit_vector=n, moment=np.array([-0.7, 0.0008, 0.3]))
-                   for s in data.setups)  # fmt: skip
+    setups = tuple(
+        replace(s, unit_vector=n, moment=np.array([-0.7, 0.0008, 0.3])) for s in data.setups
+    )
     bench = make_bench(replace(data, setups=setups))
     m = moments(bench, 0.0)[0]
     assert abs(m[1]) < 1e-3 < abs(2 * m[0] * m[1])
@@ -215,11 +223,15 @@ def test_gains_of_a_bench_may_be_far_off_where_little_is_stated_of_them() -> Non
     load = 20.0 * step
     for force_gain, verdict in ((0.15, "force_scale"), (0.001, "joint_stiffness_error")):
         data = bench_data(
-            0.55 * load + rng.normal(0, 0.1, 48), 1e-5 * load + rng.normal(0, 1e-6, 48), step=step,
-            run=run, repetition=run + 1, imposed="force",
+            0.55 * load + rng.normal(0, 0.1, 48),
+            1e-5 * load + rng.normal(0, 1e-6, 48),
+            step=step,
+            run=run,
+            repetition=run + 1,
+            imposed="force",
             instruments=Instruments(0.1, 1e-6, force_gain, 0.002),
             compliance_relative_sd=np.array([0.01]),
-        )  # fmt: skip
+        )
         assert diagnose_gap(data).verdict == verdict
 
 

@@ -89,11 +89,16 @@ def test_nothing_is_said_of_other_loads(what: str) -> None:
         data = recording(u, rubbed(u) - 40.0)
     elif what == "two runs":
         half = (np.arange(len(u)) >= len(u) // 2).astype(np.int64)
-        data = running(data.force, u, imposed="displacement", instruments=METER, run=half,
-                       repetition=half + 1)  # fmt: skip
+        data = running(
+            data.force, u, imposed="displacement", instruments=METER, run=half, repetition=half + 1
+        )
     elif what == "seats":  # by so little that anything may
-        data = running(SPRING * u + 3.0 * (np.arange(len(u)) < 120), u, imposed="displacement",
-                       instruments=METER)  # fmt: skip
+        data = running(
+            SPRING * u + 3.0 * (np.arange(len(u)) < 120),
+            u,
+            imposed="displacement",
+            instruments=METER,
+        )
     elif what == "flows and rubs":
         u, force = flowed(strokes(4, growing=True))
         data = recording(u, force + 6.0 * (np.diff(u, prepend=-1.0) >= 0))
@@ -165,9 +170,13 @@ def strained(uncertainty_N: float) -> GapData:
     rng = np.random.default_rng(1)
     force = 100 * metal(strain) + rng.normal(0, 0.6 * uncertainty_N, 1000)
     moved = 0.05 * strain + rng.normal(0, 8e-7, 1000)
-    return running(force, moved, instruments=Instruments(uncertainty_N, 2e-6, 0.005, 0.003),
-                   compliance=np.array([1 / 3.57e8]),
-                   compliance_relative_sd=np.array([0.05]))  # fmt: skip
+    return running(
+        force,
+        moved,
+        instruments=Instruments(uncertainty_N, 2e-6, 0.005, 0.003),
+        compliance=np.array([1 / 3.57e8]),
+        compliance_relative_sd=np.array([0.05]),
+    )
 
 
 @pytest.mark.parametrize("uncertainty_N", [30.0, 100.0])

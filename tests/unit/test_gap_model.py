@@ -38,9 +38,12 @@ from tests.unit.test_gap_forms import arm_data, pulled
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 F1 = (MODELS / "F1.yaml").read_text()
 YIELD: dict[str, Any] = {
-    "name": "joint_yield", "joint": 1, "memory": "kept", "flow_time_s": 0,
+    "name": "joint_yield",
+    "joint": 1,
+    "memory": "kept",
+    "flow_time_s": 0,
     "terms": [{"threshold_Nm": 40.0, "compliance_rad_per_Nm": 1e-4}],
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
@@ -114,9 +117,12 @@ def test_a_file_says_units_and_counts_joints_from_one() -> None:
         Form("joint_yield", law, np.array([3e-4]), np.array([[1e-10]])), {"name": "joint_yield"}
     )
     assert entry == {
-        "name": "joint_yield", "joint": 1, "memory": "kept", "flow_time_s": 0.0,
+        "name": "joint_yield",
+        "joint": 1,
+        "memory": "kept",
+        "flow_time_s": 0.0,
         "terms": [{"threshold_Nm": 56.0, "compliance_rad_per_Nm": 3e-4, "sd": 1e-5}],
-    }  # fmt: skip
+    }
     seat = Law({}, (Term("depth", {"law": "exponential", "force_scale": 8.0}),))
     entry = to_entry(Form("contact_seating", seat, np.array([4e-5]), np.array([[1e-12]])), {})
     assert entry["terms"][0]["depth_mm"] == pytest.approx(0.04)
@@ -132,14 +138,23 @@ BAD: list[tuple[dict[str, Any], tuple[str | int, ...], str]] = [
     ({"flow_time": 0}, ("flow_time",), 'the key "flow_time" is not known here.'),
     ({"terms": []}, ("terms",), "wants a list of terms."),
     ({"terms": [3]}, ("terms", 0), "a term is a mapping"),
-    ({"terms": [{"threshold_Nm": 3}]}, ("terms", 0),
-     "has the keys threshold_Nm; wanted: (threshold_Nm, compliance_rad_per_Nm)"),
-    ({"terms": [{"threshold_Nm": -3, "compliance_rad_per_Nm": 1e-4}]}, ("terms", 0, "threshold_Nm"),
-     "-3 is not allowed; allowed: above 0."),
-    ({"terms": [{"threshold_Nm": float("nan"), "compliance_rad_per_Nm": 1e-4}]},
-     ("terms", 0, "threshold_Nm"), "nan is not allowed"),
+    (
+        {"terms": [{"threshold_Nm": 3}]},
+        ("terms", 0),
+        "has the keys threshold_Nm; wanted: (threshold_Nm, compliance_rad_per_Nm)",
+    ),
+    (
+        {"terms": [{"threshold_Nm": -3, "compliance_rad_per_Nm": 1e-4}]},
+        ("terms", 0, "threshold_Nm"),
+        "-3 is not allowed; allowed: above 0.",
+    ),
+    (
+        {"terms": [{"threshold_Nm": float("nan"), "compliance_rad_per_Nm": 1e-4}]},
+        ("terms", 0, "threshold_Nm"),
+        "nan is not allowed",
+    ),
     ({"covariance": [[1, 2]]}, ("covariance",), "wants 1 rows of 1 numbers"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("change", "place", "what"), BAD)
@@ -159,12 +174,21 @@ def test_a_missing_key_is_named(missing: str) -> None:
 
 
 def test_terms_go_with_the_law_of_their_effect() -> None:
-    drift = {"name": "force_drift", "path": "linear", "quantity": "force",
-             "terms": [{"time_constant_s": 3, "drift_N": 1}]}  # fmt: skip
+    drift = {
+        "name": "force_drift",
+        "path": "linear",
+        "quantity": "force",
+        "terms": [{"time_constant_s": 3, "drift_N": 1}],
+    }
     with pytest.raises(FormError, match=r"wanted: \(drift_N_per_s\)"):
         from_entry(drift)
-    friction = {"name": "joint_hysteresis", "joint": 1, "law": "Dahl", "memory": "kept",
-                "terms": [{"friction_Nm": 3, "compliance_rad_per_Nm": 1e-6}]}  # fmt: skip
+    friction = {
+        "name": "joint_hysteresis",
+        "joint": 1,
+        "law": "Dahl",
+        "memory": "kept",
+        "terms": [{"friction_Nm": 3, "compliance_rad_per_Nm": 1e-6}],
+    }
     with pytest.raises(FormError, match=r"wanted: \(reach_Nm, compliance_rad_per_Nm\)"):
         from_entry(friction)
 
@@ -180,9 +204,14 @@ def test_all_problems_of_a_file_come_at_once(tmp_path: Path) -> None:
 
 
 JUNK = st.one_of(
-    st.none(), st.booleans(), st.integers(-10, 10), st.floats(), st.text(max_size=5),
-    st.lists(st.integers(-3, 3), max_size=6), st.dictionaries(st.text(max_size=3), st.integers()),
-)  # fmt: skip
+    st.none(),
+    st.booleans(),
+    st.integers(-10, 10),
+    st.floats(),
+    st.text(max_size=5),
+    st.lists(st.integers(-3, 3), max_size=6),
+    st.dictionaries(st.text(max_size=3), st.integers()),
+)
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -257,8 +286,11 @@ def test_the_text_says_that_repetitions_are_left_out(tmp_path: Path) -> None:
 
 
 def test_creep_needs_the_time_that_the_procedure_gives_it(tmp_path: Path) -> None:
-    creep = {"name": "joint_creep", "joint": 1,
-             "terms": [{"retardation_time_s": 30, "compliance_rad_per_Nm": 1e-5}]}  # fmt: skip
+    creep = {
+        "name": "joint_creep",
+        "joint": 1,
+        "terms": [{"retardation_time_s": 30, "compliance_rad_per_Nm": 1e-5}],
+    }
     short = simulate(model(tmp_path, creep), procedure(tmp_path))
     long = simulate(model(tmp_path, creep), procedure(tmp_path, **{"hold_s: 0": "hold_s: 120"}))
     extra = []
@@ -287,9 +319,7 @@ def test_a_gain_that_bends_follows_the_reading(tmp_path: Path) -> None:
     bends = {"at_mm": 2.0, "excess_share_of_reading": excess}
     laser = {"name": "displacement_scale"}
     nothing = {"excess_share_of_reading": 0.0}
-    found = simulate(
-        model(tmp_path, {**laser, "terms": [nothing, above]}), procedure(tmp_path)
-    )  # fmt: skip
+    found = simulate(model(tmp_path, {**laser, "terms": [nothing, above]}), procedure(tmp_path))
     _, moved, springs = levels(found, "loading", 1)
     true, knee = springs, range_mm * 1e-3
     assert true[0] < knee < true[-1]
@@ -302,12 +332,22 @@ def test_a_gain_that_bends_follows_the_reading(tmp_path: Path) -> None:
 
 def test_what_cannot_be_foretold_is_left_out_and_said(tmp_path: Path) -> None:
     shift = {"name": "zero_shift", "terms": [{"run": 2, "lasts": True, "shift_mm": 0.03}]}
-    warm = {"name": "thermal_drift", "path": "exponential", "quantity": "displacement",
-            "terms": [{"along": [1, 0, 0], "time_constant_s": 900, "drift_mm": 0.05}]}  # fmt: skip
-    bend = {"name": "joint_nonlinear_stiffness", "joint": 1, "measured_to_Nm": 20,
-            "terms": [{"compliance_rad_per_Nm3": 1e-10}]}  # fmt: skip
-    askew = {"name": "load_misalignment",
-             "terms": [{"along": [1, 0, 0], "across": [0, 1, 0], "tangent": 0.01}]}  # fmt: skip
+    warm = {
+        "name": "thermal_drift",
+        "path": "exponential",
+        "quantity": "displacement",
+        "terms": [{"along": [1, 0, 0], "time_constant_s": 900, "drift_mm": 0.05}],
+    }
+    bend = {
+        "name": "joint_nonlinear_stiffness",
+        "joint": 1,
+        "measured_to_Nm": 20,
+        "terms": [{"compliance_rad_per_Nm3": 1e-10}],
+    }
+    askew = {
+        "name": "load_misalignment",
+        "terms": [{"along": [1, 0, 0], "across": [0, 1, 0], "tangent": 0.01}],
+    }
     found = simulate(model(tmp_path, shift, warm, bend, askew), procedure(tmp_path))
     assert found.effects == ("joint_nonlinear_stiffness", "load_misalignment")
     notes = " ".join(found.notes)
@@ -339,10 +379,18 @@ def test_a_load_that_was_askew_in_one_pose_is_so_in_that_pose(tmp_path: Path) ->
 
 def test_drifts_of_a_session_are_in_no_prediction_of_the_next(tmp_path: Path) -> None:
     """Files that were written with them are read as before; what is predicted is the arm."""
-    drift = {"name": "force_drift", "path": "linear", "quantity": "force",
-             "terms": [{"drift_N_per_s": 1e-3}]}  # fmt: skip
-    warm = {"name": "thermal_drift", "path": "exponential", "quantity": "displacement",
-            "terms": [{"along": [0, 1, 0], "time_constant_s": 900, "drift_mm": 0.05}]}  # fmt: skip
+    drift = {
+        "name": "force_drift",
+        "path": "linear",
+        "quantity": "force",
+        "terms": [{"drift_N_per_s": 1e-3}],
+    }
+    warm = {
+        "name": "thermal_drift",
+        "path": "exponential",
+        "quantity": "displacement",
+        "terms": [{"along": [0, 1, 0], "time_constant_s": 900, "drift_mm": 0.05}],
+    }
     term = {"along": [0, 1, 0], "across": [1, 0, 0], "tangent": 0.01, "run": 1}
     each = {"name": "load_misalignment", "terms": [term]}
     plain = simulate(model(tmp_path), procedure(tmp_path))
@@ -350,8 +398,10 @@ def test_drifts_of_a_session_are_in_no_prediction_of_the_next(tmp_path: Path) ->
     assert found.effects == ()
     np.testing.assert_array_equal(found.curves[0].displacement, plain.curves[0].displacement)
     assert [n.split(":")[0] for n in found.notes if n.endswith("session; left out.")] == [
-        "force_drift", "thermal_drift", "load_misalignment"
-    ]  # fmt: skip
+        "force_drift",
+        "thermal_drift",
+        "load_misalignment",
+    ]
     with_arm = simulate(model(tmp_path, YIELD, drift), procedure(tmp_path))
     alone = simulate(model(tmp_path, YIELD), procedure(tmp_path))
     for mine, other in zip(with_arm.curves, alone.curves, strict=True):
@@ -359,8 +409,11 @@ def test_drifts_of_a_session_are_in_no_prediction_of_the_next(tmp_path: Path) ->
 
 
 def test_numbers_that_stand_in_the_springs_count_once(tmp_path: Path) -> None:
-    entry = {"name": "joint_stiffness_error", "contained_in": "joint_stiffness_Nm_per_rad",
-             "terms": [{"joint": 1, "compliance_rad_per_Nm": 1e-5}]}  # fmt: skip
+    entry = {
+        "name": "joint_stiffness_error",
+        "contained_in": "joint_stiffness_Nm_per_rad",
+        "terms": [{"joint": 1, "compliance_rad_per_Nm": 1e-5}],
+    }
     found = simulate(model(tmp_path, entry), procedure(tmp_path))
     assert found.effects == ("joint_stiffness_error",)
     assert found.curves[0].path is None

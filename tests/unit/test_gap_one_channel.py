@@ -12,8 +12,7 @@ from identification.arrays import Array
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import joint_hysteresis, time_lag
-from identification.gap.effects.joint_nonlinear_stiffness import _from_level_to_level
-from identification.gap.laws.curves import hinge
+from identification.gap.laws.curves import from_level_to_level, hinge
 from identification.gap.model.bench import make_bench
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import running
@@ -27,9 +26,11 @@ def held(read: Array, level: Array, seed: int = 3) -> GapData:
     rng = np.random.default_rng(seed)
     n = len(level)
     data = bench_data(
-        read + rng.normal(0, 0.02, n), SPRING * level + rng.normal(0, 1e-7, n),
-        step=np.repeat(np.arange(n // HOLD), HOLD), imposed="force",
-    )  # fmt: skip
+        read + rng.normal(0, 0.02, n),
+        SPRING * level + rng.normal(0, 1e-7, n),
+        step=np.repeat(np.arange(n // HOLD), HOLD),
+        imposed="force",
+    )
     return replace(data, instruments=replace(data.instruments, force=0.02, displacement=1e-7))
 
 
@@ -61,8 +62,9 @@ def cycling(of_force: Array | float = 0.0, of_laser: Array | float = 0.0) -> Gap
     rng = np.random.default_rng(5)
     return running(
         force + of_force + rng.normal(0, 0.1, 1600),
-        SPRING * force + of_laser + rng.normal(0, 1e-6, 1600), imposed="force",
-    )  # fmt: skip
+        SPRING * force + of_laser + rng.normal(0, 1e-6, 1600),
+        imposed="force",
+    )
 
 
 @pytest.mark.parametrize("drifts", ["force", "displacement"])
@@ -81,8 +83,7 @@ def pulled(knee: bool, imposed: str = "force") -> GapData:
     """A specimen loaded from one side, further each time. knee: it holds 60 N and then gives way;
     else friction of strengths from 5 to 90 N slips, one after the other."""
     ends = [0.0, 40.0, 10.0, 75.0, 20.0, 100.0, 0.0]
-    force = np.concatenate([np.linspace(a, b, 60, endpoint=False)
-                            for a, b in pairwise(ends)])  # fmt: skip
+    force = np.concatenate([np.linspace(a, b, 60, endpoint=False) for a, b in pairwise(ends)])
     radii = np.array([60.0]) if knee else np.linspace(5, 90, 18)
     weight = np.full(len(radii), 1.5 / len(radii) if not knee else 1.5)
     slips, state = np.zeros(len(force)), np.zeros(len(radii))
@@ -91,8 +92,11 @@ def pulled(knee: bool, imposed: str = "force") -> GapData:
         slips[i] = weight @ state
     rng = np.random.default_rng(6)
     n = len(force)
-    return running(force + rng.normal(0, 0.1, n),
-                   SPRING * (force + slips) + rng.normal(0, 1e-6, n), imposed=imposed)  # fmt: skip
+    return running(
+        force + rng.normal(0, 0.1, n),
+        SPRING * (force + slips) + rng.normal(0, 1e-6, n),
+        imposed=imposed,
+    )
 
 
 @pytest.mark.parametrize("imposed", ["force", "displacement"])
@@ -148,11 +152,11 @@ def test_a_table_that_scatters_is_no_curve() -> None:
     assert diagnose_gap(data).verdict == "unknown"
 
 
-def test_the_curve_from_level_to_level_is_as_rough_everywhere() -> None:
+def test_the_curvefrom_level_to_level_is_as_rough_everywhere() -> None:
     """Simulated from its prior, line and hinges give `exp(-|dx|/0.25)` between any two places."""
     places = np.array([0.0, 0.05, 0.2, 0.5, 0.6, 1.0])
     basis = np.column_stack([places, *(hinge(places, b) for b in places[1:-1])])
-    curve = basis @ _from_level_to_level(places)
+    curve = basis @ from_level_to_level(places)
     covariance = curve @ curve.T
     between = np.diag(covariance)[:, None] + np.diag(covariance) - 2 * covariance
     expected = 2 * (1 - np.exp(-np.abs(places[:, None] - places) / 0.25))

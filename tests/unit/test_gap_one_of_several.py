@@ -67,8 +67,13 @@ def test_an_arm_that_stands_elsewhere_in_one_pose_or_unread(
     off[1] = 0.035
     there = np.array([s.pose in poses for s in data.setups])
     tool = tool_offset(np.array(TCP_MM) * 1e-3)
-    true = of_each(data, [arm.jacobian(np.array(Q[s.pose]) + p * off, tool)[:3].T @ s.unit_vector
-                          for s, p in zip(data.setups, there, strict=True)])  # fmt: skip
+    true = of_each(
+        data,
+        [
+            arm.jacobian(np.array(Q[s.pose]) + p * off, tool)[:3].T @ s.unit_vector
+            for s, p in zip(data.setups, there, strict=True)
+        ],
+    )
     lever = of_each(data, [s.lever for s in data.setups])
     torque = true * data.force[:, None]
     moved = (true * torque - lever**2 * data.force[:, None]) @ (1 / TRUE)
@@ -95,9 +100,12 @@ def test_faces_that_seat_one_after_the_other() -> None:
 
 @pytest.mark.parametrize(
     ("design", "until", "label"),
-    [("rich", "setup", "some stays"), ("bench", "setup", "some stays"),
-     ("rich", "run", "some stays until the next run")],
-)  # fmt: skip
+    [
+        ("rich", "setup", "some stays"),
+        ("bench", "setup", "some stays"),
+        ("rich", "run", "some stays until the next run"),
+    ],
+)
 def test_what_is_bedded_in_may_stay_so(design: str, until: str, label: str) -> None:
     """Half of a seat comes back, half of it is pressed flat for good, or until the screw is set on
     anew for the next run; of an arm in every direction anew."""
@@ -118,8 +126,12 @@ def test_what_is_bedded_in_may_stay_so(design: str, until: str, label: str) -> N
 def test_no_seat_stays_where_nothing_comes_back() -> None:
     """A pull whose force trembles."""
     force = np.linspace(0.0, 60.0, 300) + np.random.default_rng(1).normal(0, 0.6, 300)
-    labels = [v.label for v in library(make_bench(running(force, force / SPRING, imposed="force")),
-                                       ["contact_seating"])]  # fmt: skip
+    labels = [
+        v.label
+        for v in library(
+            make_bench(running(force, force / SPRING, imposed="force")), ["contact_seating"]
+        )
+    ]
     assert labels
     assert not any("stays" in label for label in labels)
 
@@ -171,8 +183,12 @@ def test_a_joint_that_hardens_alike_in_both_senses_gives_way_to_new_loads_only()
 def test_what_no_joint_does_no_reading_shows(encoder: str, seen: bool | None) -> None:
     data = linear("rich")
     depth = 3e-5 * np.sign(data.force) * (1 - np.exp(-np.abs(data.force) / 6))
-    data = replace(data, displacement=data.displacement + depth,
-                   output_encoder=encoder == "output", q=data.q if encoder else None)  # fmt: skip
+    data = replace(
+        data,
+        displacement=data.displacement + depth,
+        output_encoder=encoder == "output",
+        q=data.q if encoder else None,
+    )
     found = diagnose_gap(data)
     assert found.verdict == "contact_seating"
     assert found.where.seen_by_encoders is seen

@@ -26,17 +26,35 @@ def bench_data(force: np.ndarray, displacement: np.ndarray, **changes: object) -
     """A bench without an arm: one spring of 1e5 N/m."""
     n = len(force)
     setup = Setup(
-        "", "x", np.array([1.0, 0, 0]), np.ones(1), np.eye(3)[1:], np.zeros((2, 1)),
-        np.zeros((1, 3)), np.zeros((1, 1)), np.zeros(3), np.zeros(0), np.zeros(1),
-    )  # fmt: skip
+        "",
+        "x",
+        np.array([1.0, 0, 0]),
+        np.ones(1),
+        np.eye(3)[1:],
+        np.zeros((2, 1)),
+        np.zeros((1, 3)),
+        np.zeros((1, 1)),
+        np.zeros(3),
+        np.zeros(0),
+        np.zeros(1),
+    )
     zeros = np.zeros(n, dtype=np.int64)
     values: dict[str, object] = {
-        "arm": False, "setups": (setup,), "time": np.arange(n, dtype=float), "session": None,
-        "run": zeros, "setup": zeros, "repetition": zeros + 1, "branch": zeros + 1,
-        "step": np.arange(n, dtype=np.int64) + 1, "force": force, "displacement": displacement,
-        "compliance": np.array([1e-5]), "compliance_relative_sd": np.array([0.1]),
+        "arm": False,
+        "setups": (setup,),
+        "time": np.arange(n, dtype=float),
+        "session": None,
+        "run": zeros,
+        "setup": zeros,
+        "repetition": zeros + 1,
+        "branch": zeros + 1,
+        "step": np.arange(n, dtype=np.int64) + 1,
+        "force": force,
+        "displacement": displacement,
+        "compliance": np.array([1e-5]),
+        "compliance_relative_sd": np.array([0.1]),
         "instruments": Instruments(0.1, 1e-6, 0.005, 0.003),
-    }  # fmt: skip
+    }
     return GapData(**(values | changes))  # type: ignore[arg-type]
 
 
@@ -138,9 +156,13 @@ def test_slow_flow_follows_a_staircase_of_thinned_holds(square: bool) -> None:
         state += beyond * 1e-3 / 4.0 * (abs(beyond) / 8.0 if square else 1.0)
         y[i] = state
     both = flowing_play(
-        rows.force, np.array([8.0, 8.0]), np.array([4.0, 4.0]), rows, fresh(rows.n),
+        rows.force,
+        np.array([8.0, 8.0]),
+        np.array([4.0, 4.0]),
+        rows,
+        fresh(rows.n),
         square=np.array([square, False]),
-    )  # fmt: skip
+    )
     assert both[:, 0] == pytest.approx(np.interp(rows.time, grid, y), abs=0.15)  # four parts a ramp
     alone = flowing_play(rows.force, np.array([8.0]), np.array([4.0]), rows, fresh(rows.n))
     assert both[:, 1] == pytest.approx(alone[:, 0], abs=1e-12)  # whatever flows beside it

@@ -47,8 +47,10 @@ def outside(folder: Path) -> dict[str, float]:
     q = np.array(Q["P1"])
     whole = read.arm.compliance(q, tool, links=read.links, base=read.mounting)
     springs = read.arm.compliance(q, tool)
-    return {d: float(1 / along(whole, n) - 1 / along(springs, n))
-            for d, n in zip("xyz", np.eye(3), strict=True)}  # fmt: skip
+    return {
+        d: float(1 / along(whole, n) - 1 / along(springs, n))
+        for d, n in zip("xyz", np.eye(3), strict=True)
+    }
 
 
 @cache

@@ -55,11 +55,15 @@ def up_and_down() -> Bench:
     force = np.tile(level[step], 2)
     return make_bench(
         bench_data(
-            force, force * 1e-5, time=np.tile(time, 2), step=np.tile(step, 2).astype(np.int64),
-            run=np.repeat([0, 1], 32), repetition=np.repeat([1, 2], 32),
+            force,
+            force * 1e-5,
+            time=np.tile(time, 2),
+            step=np.tile(step, 2).astype(np.int64),
+            run=np.repeat([0, 1], 32),
+            repetition=np.repeat([1, 2], 32),
             branch=np.tile(np.where(step == 0, 0, np.where(step > 4, 2, 1)), 2),
         )
-    )  # fmt: skip
+    )
 
 
 def of(bench: Bench, word: str, wanted: str) -> Variant:
@@ -364,9 +368,10 @@ def test_a_threshold_about_a_lying_axis_is_as_uncertain_as_its_depth() -> None:
     spread = {}
     for axis, depth in (("x", 0.7), ("z", 0.0)):
         v = next(
-            v for v in library(bench, ["base_slip"])
+            v
+            for v in library(bench, ["base_slip"])
             if (v.info["axis"], v.info["depth_m"]) == (axis, depth) and v.info["knee"] == "sharp"
-        )  # fmt: skip
+        )
         k = len(v.columns)
         found = parameters(bench, Part(v, 1.0), np.ones(k), 1e-9 * np.eye(k), NOMINAL)["threshold"]
         spread[axis] = sd(found) / found.value

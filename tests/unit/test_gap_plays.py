@@ -199,9 +199,13 @@ def test_what_is_slack_and_smooth_under_a_load_from_one_side_is_a_seat(pulled: b
     assert ({"soft", "slow", "arctan"} <= kinds) == pulled
 
 
-@pytest.mark.parametrize(("softer", "verdict"), [
-    (1.7, "joint_nonlinear_stiffness"), (8.0, "joint_backlash"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("softer", "verdict"),
+    [
+        (1.7, "joint_nonlinear_stiffness"),
+        (8.0, "joint_backlash"),
+    ],
+)
 def test_a_stage_of_a_gear_is_no_play(softer: float, verdict: str) -> None:
     """Soft about no load, a fifth of the range wide: a play gives way there by far more."""
     load = 60 * np.sin(np.arange(1200) / 60)
@@ -214,8 +218,10 @@ def test_a_stage_of_a_gear_is_no_play(softer: float, verdict: str) -> None:
 def test_a_play_is_soft_beside_the_spring_of_its_own_direction() -> None:
     soft, stiff = 3e-5, 1e-6
     there: Any = SimpleNamespace(
-        data=SimpleNamespace(arm=False), imposed=False,
-        lever=np.repeat(np.eye(2), 5, axis=0), line_slope=np.repeat([soft, stiff], 5),
-    )  # fmt: skip
+        data=SimpleNamespace(arm=False),
+        imposed=False,
+        lever=np.repeat(np.eye(2), 5, axis=0),
+        line_slope=np.repeat([soft, stiff], 5),
+    )
     for joint, slope in ((0, soft), (1, stiff)):
         assert joint_backlash._least(there, joint, 4.0) == pytest.approx(1.5 * 8.0 * slope)

@@ -224,8 +224,12 @@ def test_nobody_is_surer_of_the_unknown_than_of_a_word() -> None:
 def approached(travel: float = 2e-3, faster: float = 5.0, n: int = 160) -> tuple[Array, Array]:
     """Displacement m and force N: a platen comes nearer for a quarter of the readings, faster than
     it presses afterwards; forces are noise before."""
-    u = np.concatenate([np.linspace(0.0, travel, n // 4, endpoint=False),
-                        travel + np.linspace(0.0, 3 * travel / faster, 3 * n // 4)])  # fmt: skip
+    u = np.concatenate(
+        [
+            np.linspace(0.0, travel, n // 4, endpoint=False),
+            travel + np.linspace(0.0, 3 * travel / faster, 3 * n // 4),
+        ]
+    )
     return u, SPRING * np.maximum(u - travel, 0.0)
 
 
@@ -328,10 +332,13 @@ def pulled_and_pressed(again: bool = False) -> GapData:
     force = np.concatenate([pull, push])
     rng = np.random.default_rng(4)
     return bench_data(
-        force, np.concatenate(u) + rng.normal(0, 2e-5, 34), run=np.repeat([0, 1], 17),
-        repetition=np.repeat([1, 2], 17), compliance=np.array([4e-4]),
+        force,
+        np.concatenate(u) + rng.normal(0, 2e-5, 34),
+        run=np.repeat([0, 1], 17),
+        repetition=np.repeat([1, 2], 17),
+        compliance=np.array([4e-4]),
         instruments=Instruments(0.1, 2e-5, 0.005, 0.003),
-    )  # fmt: skip
+    )
 
 
 def test_pull_and_press_may_each_have_a_curve_of_its_own() -> None:

@@ -98,8 +98,9 @@ def test_levels_to_both_sides_are_levels_whatever_leads_to_them() -> None:
 
 
 def test_of_what_runs_only_the_way_to_no_load_is_told() -> None:
-    force = np.concatenate([np.zeros(20), np.linspace(0, 100, 60), np.linspace(99, 0, 40),
-                            np.zeros(20)])  # fmt: skip
+    force = np.concatenate(
+        [np.zeros(20), np.linspace(0, 100, 60), np.linspace(99, 0, 40), np.zeros(20)]
+    )
     branch = np.repeat([0, 1, 0], [20, 60, 60])
     data = bench_data(force, SPRING * force, step=np.full(140, -1), branch=branch)
     told = ramps_told(data)
@@ -150,9 +151,12 @@ def named_late(hardens: bool = False) -> tuple[GapData, Array, Array]:
         late[i] = late[i - 1] + (0.05 * u[i] - late[i - 1]) / 15.0
     rng = np.random.default_rng(4)
     data = bench_data(
-        force + rng.normal(0, 0.02, len(u)), u + late + rng.normal(0, 1e-6, len(u)),
-        step=steps, branch=np.where(steps == 0, 0, 1), imposed="force",
-    )  # fmt: skip
+        force + rng.normal(0, 0.02, len(u)),
+        u + late + rng.normal(0, 1e-6, len(u)),
+        step=steps,
+        branch=np.where(steps == 0, 0, 1),
+        imposed="force",
+    )
     at_rest = np.abs(force - to) < 1e-9
     return replace(data, instruments=replace(data.instruments, force=0.02)), to, at_rest
 
@@ -185,8 +189,9 @@ def test_long_ramps_that_bear_the_name_of_the_level_left_belong_to_the_next(
     on = np.concatenate([np.zeros(hold), np.arange(1, ramp + 1) / (ramp + 1)])
     number = np.repeat(np.arange(5), hold + ramp)
     load = 10.0 * (number + np.tile(on, 5))
-    data = bench_data(load + rng.normal(0, sd, len(load)), SPRING * load, step=number,
-                      imposed="force")  # fmt: skip
+    data = bench_data(
+        load + rng.normal(0, sd, len(load)), SPRING * load, step=number, imposed="force"
+    )
     data = replace(data, instruments=replace(data.instruments, force=sd))
     way = (np.tile(on, 5) > 0) & (number < 4)
     wrong = _leading_on(data).step != number + way

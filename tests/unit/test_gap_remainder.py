@@ -38,9 +38,12 @@ def left(
     if extra is not None:
         u = u + extra[repetition] * force
     data = bench_data(
-        force + rng.normal(0, 0.02, len(step)), u, step=step, repetition=repetition + 1,
+        force + rng.normal(0, 0.02, len(step)),
+        u,
+        step=step,
+        repetition=repetition + 1,
         run=repetition,
-    )  # fmt: skip
+    )
     bench = make_bench(data)
     target = bench.observed - prediction(bench)
     bench.add(bench.stacked(np.ones(bench.rows.n)))

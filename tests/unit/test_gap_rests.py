@@ -29,8 +29,12 @@ def levels(scatter: float, readings: int = 3, seed: int = 0) -> GapData:
     random = np.random.default_rng(seed)
     off = random.standard_normal(len(force)) * scatter * 1e-6
     branch = np.where(force == 0, 0, 1 + np.append(0, np.diff(force) < 0))
-    each = {"force": force, "displacement": 1e-5 * force + off, "branch": branch.astype(np.int64),
-            "step": np.arange(len(force))}  # fmt: skip
+    each = {
+        "force": force,
+        "displacement": 1e-5 * force + off,
+        "branch": branch.astype(np.int64),
+        "step": np.arange(len(force)),
+    }
     given = {k: np.repeat(v, readings) for k, v in each.items()}
     moved = given.pop("displacement")
     moved = moved + random.standard_normal(len(moved)) * 0.3e-6
@@ -75,8 +79,12 @@ def test_levels_that_make_a_smooth_curve_are_a_spring(off: float, rough: bool) -
     force = np.concatenate([np.arange(0.0, 130, 10), np.arange(110.0, -1, -10)])
     own = dict(zip(np.unique(force), np.random.default_rng(3).normal(0, off, 13), strict=True))
     moved = 2e-3 * (np.log1p(force / 100) + np.array([own[f] for f in force]))
-    held = {"force": force, "displacement": moved, "step": np.arange(25),
-            "branch": np.append(0, np.ones(24, dtype=np.int64))}  # fmt: skip
+    held = {
+        "force": force,
+        "displacement": moved,
+        "step": np.arange(25),
+        "branch": np.append(0, np.ones(24, dtype=np.int64)),
+    }
     each = {k: np.repeat(v, 12) for k, v in held.items()}
     data = bench_data(each.pop("force"), each.pop("displacement"), **each)
     few = picked(data, np.isin(data.force, [0.0, 40.0, 80.0, 120.0]))
@@ -122,8 +130,14 @@ def under_a_weight(moved: Array, every_s: float = 1.0) -> GapData:
     """What was read beside a weight that hangs all the time, as is stated."""
     n = len(moved)
     trembles = 0.1 * np.random.default_rng(5).standard_normal(n)
-    return bench_data(80.0 + trembles, moved, step=np.full(n, -1), time=every_s * np.arange(n),
-                      session=every_s * np.arange(n), imposed="force")  # fmt: skip
+    return bench_data(
+        80.0 + trembles,
+        moved,
+        step=np.full(n, -1),
+        time=every_s * np.arange(n),
+        session=every_s * np.arange(n),
+        imposed="force",
+    )
 
 
 @pytest.mark.parametrize(("back", "drifts"), [(0.0, False), (0.3, True)])

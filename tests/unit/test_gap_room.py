@@ -25,8 +25,13 @@ def hung(moved: Array, every_s: float, **changes: object) -> GapData:
     n = len(moved)
     on = (np.arange(n) >= 8).astype(np.int64)
     noise = 0.1 * np.random.default_rng(5).standard_normal(n)
-    given = {"step": on, "branch": on, "time": every_s * np.arange(n),
-             "session": every_s * np.arange(n), "imposed": "force"}  # fmt: skip
+    given = {
+        "step": on,
+        "branch": on,
+        "time": every_s * np.arange(n),
+        "session": every_s * np.arange(n),
+        "imposed": "force",
+    }
     force = 80.0 * on + noise
     return bench_data(force, 1e-5 * force + moved, **(given | changes))
 
@@ -65,8 +70,13 @@ def test_what_is_late_is_behind_at_the_end_and_as_likely_as_what_is_not() -> Non
     """And no lag is looked for that a few rows can't tell."""
     n = 400
     warm = np.linspace(0.0, 5.0, n)
-    data = bench_data(80.0 * (np.arange(n) % 50), np.zeros(n), temperature=warm[:, None],
-                      step=np.full(n, -1), session=np.arange(n, dtype=float))  # fmt: skip
+    data = bench_data(
+        80.0 * (np.arange(n) % 50),
+        np.zeros(n),
+        temperature=warm[:, None],
+        step=np.full(n, -1),
+        session=np.arange(n, dtype=float),
+    )
     bench = make_bench(data)
     found = [v for v in library(bench, ["thermal_drift"]) if v.info.get("sensor") == "1"]
     late = [v for v in found if "lags_s" in v.info]
@@ -116,10 +126,11 @@ def test_swings_that_come_again_and_again_may_be_small_and_quick() -> None:
 def test_bins_of_long_holds_are_a_small_part_of_the_recording() -> None:
     """Those of short ones, and of many, are as they were: 1, 1, 2, 4 ... samples."""
     for n, holds, wanted in (
-        (64, 1, [1, 1, 2, 4, 8, 16, 32]), (80, 1, [1, 1, 2, 4, *[8] * 9]),
+        (64, 1, [1, 1, 2, 4, 8, 16, 32]),
+        (80, 1, [1, 1, 2, 4, *[8] * 9]),
         (20_000, 1, [1, 1, 2, 4, 8, 16, 8, *[40] * 499]),
         (3000, 30, [1, 1, 2, 4, 8, 16, 32, 36] * 30),
-    ):  # fmt: skip
+    ):
         hold = np.repeat(np.arange(holds), n // holds)
         bins = Bins.of(bench_data(np.zeros(n), np.zeros(n)), hold, running=False)
         assert bins.count.tolist() == wanted

@@ -33,9 +33,13 @@ SPRING = 1e5  # N/m
 def running(force: Array, displacement: Array, **changes: object) -> GapData:
     n = len(force)
     return bench_data(
-        force, displacement, step=np.full(n, -1), branch=np.full(n, 3),
-        session=np.arange(n, dtype=float), **changes,
-    )  # fmt: skip
+        force,
+        displacement,
+        step=np.full(n, -1),
+        branch=np.full(n, 3),
+        session=np.arange(n, dtype=float),
+        **changes,
+    )
 
 
 def triangle(n: int, cycles: float) -> Array:
@@ -127,10 +131,16 @@ def test_a_stiffening_specimen_that_relaxes_creeps() -> None:
         force[i:] += memory * (elastic[i] - elastic[i - 1])
     force += rng.normal(0, 0.02, t.size)
     data = bench_data(
-        force, u, step=np.full(t.size, -1), branch=np.full(t.size, 3), session=t, time=t,
+        force,
+        u,
+        step=np.full(t.size, -1),
+        branch=np.full(t.size, 3),
+        session=t,
+        time=t,
         instruments=Instruments(0.02, 1e-6, 0.005, 0.003),
-        compliance=np.array([1e-3 / 8]), imposed="displacement",
-    )  # fmt: skip
+        compliance=np.array([1e-3 / 8]),
+        imposed="displacement",
+    )
     found = diagnose_gap(data)
     assert found.verdict in ("joint_creep", "joint_nonlinear_stiffness")
     assert "joint_creep" in {e.name for e in found.effects}
@@ -142,9 +152,13 @@ def test_a_pull_whose_force_falls_is_not_said_to_be_elastic(falls: bool) -> None
     rng = np.random.default_rng(8)
     x = np.linspace(0, 1, 200)
     force = 25 * np.sin(2.2 * np.pi * x) if falls else 60 * x / (1 + x)
-    data = running(force + rng.normal(0, 0.02, 200), 1e-3 * x, imposed="displacement",
-                   instruments=Instruments(0.02, 1e-6, 0.005, 0.003),
-                   compliance=np.array([1e-3 / force[10] * x[10]]))  # fmt: skip
+    data = running(
+        force + rng.normal(0, 0.02, 200),
+        1e-3 * x,
+        imposed="displacement",
+        instruments=Instruments(0.02, 1e-6, 0.005, 0.003),
+        compliance=np.array([1e-3 / force[10] * x[10]]),
+    )
     found = diagnose_gap(data)
     assert found.verdict == ("unknown" if falls else "joint_nonlinear_stiffness")
 
@@ -196,8 +210,13 @@ def test_one_factor_is_shared_as_calibrations_are_stated() -> None:
     moved = 1.3 * force / SPRING + rng.normal(0, 1e-6, 600)
     for gain, sure in ((0.005, "joint_stiffness_error"), (0.1, "force_scale")):
         meter = Instruments(0.1, 1e-6, gain, 0.003)
-        data = running(force, moved, imposed="force", instruments=meter,
-                       compliance_relative_sd=np.array([0.05]))  # fmt: skip
+        data = running(
+            force,
+            moved,
+            imposed="force",
+            instruments=meter,
+            compliance_relative_sd=np.array([0.05]),
+        )
         p = diagnose_gap(data).probabilities
         others = {"joint_stiffness_error", "force_scale", "displacement_scale"} - {sure}
         assert p[sure] > max(p[w] for w in others)
@@ -300,8 +319,14 @@ def test_a_bench_spring_is_neither_gone_nor_negative() -> None:
 
 
 def test_turns_are_where_the_load_goes_back_by_a_quarter() -> None:
-    path = np.concatenate([np.linspace(0, 10, 50), np.linspace(10, 8, 10), np.linspace(8, 12, 20),
-                           np.linspace(12, 0, 60)])  # fmt: skip
+    path = np.concatenate(
+        [
+            np.linspace(0, 10, 50),
+            np.linspace(10, 8, 10),
+            np.linspace(8, 12, 20),
+            np.linspace(12, 0, 60),
+        ]
+    )
     assert turns(path) == [79]  # the small way back is none
     assert passes(path) == 2
     assert turns(np.linspace(0, 1, 30)) == []
@@ -311,8 +336,15 @@ def test_turns_are_where_the_load_goes_back_by_a_quarter() -> None:
 def test_passes_that_go_about_as_fast_go_at_one_rate(slower: float, one: bool) -> None:
     force = 100 * triangle(400, 4)
     seconds = np.where(np.arange(400) < 200, 1.0, slower).cumsum()
-    data = bench_data(force, force / SPRING, step=np.full(400, -1), branch=np.full(400, 3),
-                      session=seconds, time=seconds, imposed="force")  # fmt: skip
+    data = bench_data(
+        force,
+        force / SPRING,
+        step=np.full(400, -1),
+        branch=np.full(400, 3),
+        session=seconds,
+        time=seconds,
+        imposed="force",
+    )
     bench = make_bench(data)
     assert bench.course.one_rate is one
     # there, creep in proportion to anything would be a loop of any shape
@@ -330,10 +362,15 @@ def test_what_was_held_goes_at_no_rate() -> None:
 
 def test_a_stroke_that_hardly_comes_back_has_come_back() -> None:
     """Metal under an indenter: the force goes to and fro, nearly all of the depth stays."""
-    depth = np.concatenate([np.linspace(0, 1, 100), np.linspace(1, 0.98, 50),
-                            np.linspace(0.98, 1.5, 80)]) * 1e-3  # fmt: skip
-    force = np.concatenate([np.linspace(0, 50, 100), np.linspace(50, 10, 50),
-                            np.linspace(10, 70, 80)])  # fmt: skip
+    depth = (
+        np.concatenate(
+            [np.linspace(0, 1, 100), np.linspace(1, 0.98, 50), np.linspace(0.98, 1.5, 80)]
+        )
+        * 1e-3
+    )
+    force = np.concatenate(
+        [np.linspace(0, 50, 100), np.linspace(50, 10, 50), np.linspace(10, 70, 80)]
+    )
     meter = Instruments(0.1, 1e-7, 0.005, 0.003)
     assert not make_bench(
         running(force, depth, imposed="displacement", instruments=meter)
@@ -386,10 +423,16 @@ def test_a_melt_that_flows_on_creeps_however_far() -> None:
     force = np.where(t > 0, 10.0, 0.0)
     moved = np.where(t > 0, 1e-6 * (1 + 3 * t**0.4 + 0.8 * t), 0.0)
     data = bench_data(
-        force + rng.normal(0, 0.02, t.size), moved + rng.normal(0, 2e-7, t.size),
-        step=np.full(t.size, -1), branch=np.full(t.size, 3), session=t, time=t, imposed="force",
-        instruments=Instruments(0.02, 2e-7, 0.005, 0.003), compliance=np.array([1e-7]),
-    )  # fmt: skip
+        force + rng.normal(0, 0.02, t.size),
+        moved + rng.normal(0, 2e-7, t.size),
+        step=np.full(t.size, -1),
+        branch=np.full(t.size, 3),
+        session=t,
+        time=t,
+        imposed="force",
+        instruments=Instruments(0.02, 2e-7, 0.005, 0.003),
+        compliance=np.array([1e-7]),
+    )
     bench = make_bench(data)
     creep = library(bench, ["joint_creep"])
     assert max(v.info["times_s"].max() for v in creep) > 3000
@@ -471,9 +514,10 @@ def test_what_goes_through_friction_is_told_with_what_it_is_counted_against(
         running(
             100 * force + rng.normal(0, 0.1, len(way)),
             1e-3 * u + rng.normal(0, 1e-6, len(way)),
-            imposed=imposed, instruments=meter,
+            imposed=imposed,
+            instruments=meter,
         )
-    )  # fmt: skip
+    )
     assert found.verdict == "joint_hysteresis"
     share = found.effects[0].parameters["share_through_friction"]
     assert share.value == pytest.approx(0.5, abs=0.05)

@@ -82,8 +82,10 @@ def test_only_sets_that_matter_are_measured_and_the_largest_comes_first() -> Non
     knee = 1e-5 * np.maximum(engine.bench.load - 50, 0) / 30
     jump = 1e-5 * (engine.bench.rows.run % 2)
     engine = engine_with(knee, jump)
-    two = (Part(variant("joint_yield", "", [0], (1.0,)), 1.0),
-           Part(variant("zero_shift", "", [1], (1.0,)), 1.0))  # fmt: skip
+    two = (
+        Part(variant("joint_yield", "", [0], (1.0,)), 1.0),
+        Part(variant("zero_shift", "", [1], (1.0,)), 1.0),
+    )
     said = Explanation(two, 0.0, 0.0, (2.0, 1.0), 0.0)
     poor, single = replace(said, log_weight=-99.0), Explanation(two[:1], 0.0, 0.0, (2.0,), 0.0)
     found = measured(engine, [said, single, poor])

@@ -158,9 +158,13 @@ def test_parts_are_asked_what_they_keep_together(monkeypatch: pytest.MonkeyPatch
 def minimum(mean: Array, covariance: Array) -> float:
     """Mahalanobis distance of the mean from the positive orthant, by another way."""
     precision = np.linalg.inv(covariance)
-    best = minimize(lambda w: (w - mean) @ precision @ (w - mean), np.ones(3),
-                    jac=lambda w: 2 * precision @ (w - mean), bounds=[(0, None)] * 3,
-                    options={"ftol": 1e-15, "gtol": 1e-12})  # fmt: skip
+    best = minimize(
+        lambda w: (w - mean) @ precision @ (w - mean),
+        np.ones(3),
+        jac=lambda w: 2 * precision @ (w - mean),
+        bounds=[(0, None)] * 3,
+        options={"ftol": 1e-15, "gtol": 1e-12},
+    )
     return float(best.fun**0.5)
 
 

@@ -19,9 +19,7 @@ def pressed(force: Array, path: Array, seed: int = 3, **changes: object) -> GapD
     rng = np.random.default_rng(seed)
     n = len(force)
     given = {"imposed": "displacement", "instruments": METER} | changes
-    return running(
-        force + rng.normal(0, METER.force, n), path + rng.normal(0, 1e-7, n), **given
-    )  # fmt: skip
+    return running(force + rng.normal(0, METER.force, n), path + rng.normal(0, 1e-7, n), **given)
 
 
 def strokes(n: int = 600, cycles: float = 4.0) -> Array:

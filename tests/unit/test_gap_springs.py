@@ -62,9 +62,11 @@ def slanted(data: GapData, tangent: float) -> GapData:
     q = np.repeat(total[layout.q].reshape(data.joints, -1).T, holds, axis=0)
     across = np.repeat(total[layout.tangential].reshape(2, -1).T, holds, axis=0)
     return replace(
-        data, displacement=np.repeat(total[: rows.n], count) + noise,
-        q=data.q + q, tangential=data.tangential + across,
-    )  # fmt: skip
+        data,
+        displacement=np.repeat(total[: rows.n], count) + noise,
+        q=data.q + q,
+        tangential=data.tangential + across,
+    )
 
 
 def test_a_load_askew_on_springs_that_are_off_is_met_by_a_finer_shape() -> None:
@@ -101,8 +103,10 @@ def test_amplifiers_that_drift_alike_are_no_second_free_path() -> None:
         bench = make_bench(data if one_way else replace(data, setups=(first, turned, *others[1:])))
         columns = [v.columns for v in library(bench, ["force_drift"])]
         assert len(set(columns)) == len(columns)
-        assert any(v.label.endswith("all components")
-                   for v in library(bench, ["force_drift"])) is not one_way  # fmt: skip
+        assert (
+            any(v.label.endswith("all components") for v in library(bench, ["force_drift"]))
+            is not one_way
+        )
 
 
 def test_every_amplifier_may_drift_at_several_rates_of_its_own() -> None:
@@ -148,8 +152,15 @@ def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
     u, run = 20.0 * step / SPRING / times, np.arange(len(step)) // 36
     noise = 1e-3 * float(u.max())
     read = u + np.random.default_rng(0).normal(0, noise, len(u))
-    data = bench_data(20.0 * step, read, step=step, branch=np.where(step > 0, 1, 0),
-                      repetition=1 + run, run=run, imposed="force")  # fmt: skip
+    data = bench_data(
+        20.0 * step,
+        read,
+        step=step,
+        branch=np.where(step > 0, 1, 0),
+        repetition=1 + run,
+        run=run,
+        imposed="force",
+    )
     data = replace(data, instruments=replace(data.instruments, displacement=noise))
     (effect,) = diagnose_gap(data).effects
     key, told = ("factor_x", times) if times > 1 else ("factor", 1 / times)
@@ -160,10 +171,15 @@ def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
 
 @pytest.mark.parametrize(
     ("times", "sd", "word"),
-    [(1.38, 0.1, "joint_stiffness_error"), (0.7, 0.1, "joint_stiffness_error"),
-     (1.1, 0.1, "none"), (0.9, 0.1, "none"), (5.0, 0.4, "joint_stiffness_error"),
-     (1.6, 0.4, "none")],
-)  # fmt: skip
+    [
+        (1.38, 0.1, "joint_stiffness_error"),
+        (0.7, 0.1, "joint_stiffness_error"),
+        (1.1, 0.1, "none"),
+        (0.9, 0.1, "none"),
+        (5.0, 0.4, "joint_stiffness_error"),
+        (1.6, 0.4, "none"),
+    ],
+)
 def test_nothing_is_wrong_as_long_as_a_spring_is_about_as_stiff_as_stated(
     times: float, sd: float, word: str
 ) -> None:
@@ -172,8 +188,15 @@ def test_nothing_is_wrong_as_long_as_a_spring_is_about_as_stiff_as_stated(
     step = np.tile(np.repeat(np.arange(9), 4), 3)
     u, run = 20.0 * step / SPRING / times, np.arange(len(step)) // 36
     read = u + np.random.default_rng(0).normal(0, 1e-3 * float(u.max()), len(u))
-    data = bench_data(20.0 * step, read, step=step, branch=np.where(step > 0, 1, 0),
-                      repetition=1 + run, run=run, imposed="force")  # fmt: skip
+    data = bench_data(
+        20.0 * step,
+        read,
+        step=step,
+        branch=np.where(step > 0, 1, 0),
+        repetition=1 + run,
+        run=run,
+        imposed="force",
+    )
     meter = replace(data.instruments, displacement=1e-3 * float(u.max()))
     stated = replace(data, instruments=meter, compliance_relative_sd=np.array([sd]))
     assert diagnose_gap(stated).verdict == word

@@ -37,10 +37,16 @@ def measured(drift: Array, seed: int = 2) -> GapData:
     run = np.repeat(np.arange(RUNS), LENGTH)
     rests = np.tile(np.arange(LENGTH) < 50, RUNS)
     return bench_data(
-        force + rng.normal(0, 0.05, n), 1e-5 * force + drift + rng.normal(0, NOISE, n),
-        time=session() - run * GAP, session=session(), run=run, repetition=run + 1,
-        branch=np.where(rests, 0, 3), step=np.full(n, -1), imposed="force",
-    )  # fmt: skip
+        force + rng.normal(0, 0.05, n),
+        1e-5 * force + drift + rng.normal(0, NOISE, n),
+        time=session() - run * GAP,
+        session=session(),
+        run=run,
+        repetition=run + 1,
+        branch=np.where(rests, 0, 3),
+        step=np.full(n, -1),
+        imposed="force",
+    )
 
 
 def wave(rise: float = 12.0) -> Array:
@@ -77,8 +83,9 @@ def test_a_path_of_steady_rate_is_smoother_than_one_that_wanders() -> None:
     rng = np.random.default_rng(0)
     draws = {steady: FreePath(40, steady).root() @ rng.normal(size=(40, 400)) for steady in (0, 1)}
     assert all(0.5 < float(np.sqrt(np.mean(d[-1] ** 2))) < 5 for d in draws.values())
-    rough = {k: np.abs(np.diff(d, 2, axis=0)).mean() / np.ptp(d, axis=0).mean()
-             for k, d in draws.items()}  # fmt: skip
+    rough = {
+        k: np.abs(np.diff(d, 2, axis=0)).mean() / np.ptp(d, axis=0).mean() for k, d in draws.items()
+    }
     assert rough[1] < 0.3 * rough[0]
     steps = np.abs(np.diff(draws[1], axis=0)).mean(axis=1)
     assert steps[0] > 0.2 * steps.mean()  # it may come with any rate

@@ -58,9 +58,13 @@ def test_a_few_readings_are_diagnosed_as_nothing(name: str, rows: int) -> None:
     assert diagnose_gap(data).verdict in ("none", "unknown")
 
 
-@pytest.mark.parametrize(("column", "field", "what"), [
-    ("q3_rad", "q", "joint readings"), ("force_y_N", "tangential", "force components"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("column", "field", "what"),
+    [
+        ("q3_rad", "q", "joint readings"),
+        ("force_y_N", "tangential", "force components"),
+    ],
+)
 def test_a_hole_in_a_column_costs_its_samples_and_not_the_channel(
     column: str, field: str, what: str
 ) -> None:
@@ -90,8 +94,9 @@ def test_a_rig_has_as_many_thermometers_as_it_has(sensors: tuple[int, ...], read
     data = gap_data(imported(table, meta(design)))
     assert (0 if data.temperature is None else data.temperature.shape[1]) == read
     left = [n for n in data.notes if "not used" in n]
-    assert left == ["temperature3_C: not used; thermometers count from temperature1_C without "
-                    "gaps."] * (3 in sensors)  # fmt: skip
+    assert left == [
+        "temperature3_C: not used; thermometers count from temperature1_C without gaps."
+    ] * (3 in sensors)
 
 
 @pytest.mark.parametrize("column", ["q3_rad", "temperature2_C"])

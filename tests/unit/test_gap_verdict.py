@@ -53,8 +53,9 @@ def part(word: str, columns: list[int], **info: object) -> Part:
     return Part(variant(word, word, columns, (1.0,), **info), 1.0)
 
 
-def said(parts: tuple[Part, ...], sizes: tuple[float, ...], weight: float = 0.0,
-         eta: float = 0.0) -> Explanation:  # fmt: skip
+def said(
+    parts: tuple[Part, ...], sizes: tuple[float, ...], weight: float = 0.0, eta: float = 0.0
+) -> Explanation:
     return Explanation(parts, weight, eta, sizes, weight)
 
 
@@ -76,10 +77,13 @@ def replace_bench(engine: Engine, bench: Bench) -> Engine:
 def test_the_main_cause_of_two_is_the_larger_one_as_far_as_their_sizes_are_known() -> None:
     mechanisms = (part("joint_yield", [0]), part("thermal_drift", [1]))
     linear = (part("joint_yield", [0]), part("force_scale", [1]))
-    for parts, ratio, share in ((mechanisms, 1.0, 0.5), (mechanisms, 1.2, 0.946 * 0.95 + 0.025),
-                                (linear, 1.2, 0.641 * 0.95 + 0.025),
-                                (linear, 3.0, 0.985 * 0.95 + 0.025),
-                                (mechanisms, 1e12, 0.975)):  # fmt: skip
+    for parts, ratio, share in (
+        (mechanisms, 1.0, 0.5),
+        (mechanisms, 1.2, 0.946 * 0.95 + 0.025),
+        (linear, 1.2, 0.641 * 0.95 + 0.025),
+        (linear, 3.0, 0.985 * 0.95 + 0.025),
+        (mechanisms, 1e12, 0.975),
+    ):
         found = _main(said(parts, (ratio * 1e-5, 1e-5)), True)
         assert found[parts[0].word] == pytest.approx(share, abs=2e-3)
         assert sum(found.values()) == pytest.approx(1.0)
@@ -92,8 +96,11 @@ def test_the_main_cause_of_two_is_the_larger_one_as_far_as_their_sizes_are_known
 def test_what_explains_far_less_inherits_nothing_unless_it_fits_closely() -> None:
     both = (part("thermal_drift", [0]), part("joint_yield", [1]))
     failed = said(both, (2e-5, 1e-5), 0.0)
-    for weight, eta, heir in ((-10.0, 9e-6, "thermal_drift"), (-90.0, 9e-6, "unknown"),
-                              (-90.0, 3e-6, "thermal_drift")):  # fmt: skip
+    for weight, eta, heir in (
+        (-10.0, 9e-6, "thermal_drift"),
+        (-90.0, 9e-6, "unknown"),
+        (-90.0, 3e-6, "thermal_drift"),
+    ):
         alone = said(both[:1], (2e-5,), weight, eta)
         assert _heir(failed, [failed, alone], {failed.words: 0.0}, 2e-6) == heir
 
@@ -121,8 +128,12 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
     # where three laws fit to the noise there is less room for another
     noise = found.engine.bench.noise.stated
     for eta, unknown in ((1.9 * noise, 1 - THREE_CLOSELY), (2.1 * noise, 1 - THREE)):
-        one = replace(found, explanations=(said(three, (1e-5, 5e-6, 3e-6), 0.0, eta),),
-                      unknown=-800.0, alone={})  # fmt: skip
+        one = replace(
+            found,
+            explanations=(said(three, (1e-5, 5e-6, 3e-6), 0.0, eta),),
+            unknown=-800.0,
+            alone={},
+        )
         assert with_posterior(one, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
     # two of them explain nearly as much: then they are meant, whatever the third does
     third = said(three, (1e-5, 1e-5, 5e-6), 0.0, OFF)
@@ -200,8 +211,9 @@ def test_of_springs_beside_a_mechanism_the_better_ones_are_taken(
     monkeypatch: pytest.MonkeyPatch, wall: float, taken: int
 ) -> None:
     """Those that share its joint bring more, but mostly are no second trouble."""
-    springs = [Scored(part(SPRINGS, [0], joints=j).variant, 9.0 - len(j), 1.0, 0)
-               for j in ([0], [1, 2])]  # fmt: skip
+    springs = [
+        Scored(part(SPRINGS, [0], joints=j).variant, 9.0 - len(j), 1.0, 0) for j in ([0], [1, 2])
+    ]
 
     def explained(_: Engine, parts: tuple[Part, ...], evidence: float, taken: float) -> Explanation:
         assert taken == 0.0
@@ -241,8 +253,12 @@ def test_of_a_short_table_what_a_law_explains_is_not_unknown() -> None:
     found = search(small_engine_of(bench), variants)
     law, noise = (part("joint_creep", [0]),), bench.noise.stated
     sure = 1 - 0.5 * BENCH_DOUBT  # on a bench; of two that are doubted, half comes back
-    shares = ((noise, False, None), (1.6 * noise, False, None), (3 * noise, False, sure),
-              (noise, True, 1 - UNKNOWN_DOUBT))  # fmt: skip
+    shares = (
+        (noise, False, None),
+        (1.6 * noise, False, None),
+        (3 * noise, False, sure),
+        (noise, True, 1 - UNKNOWN_DOUBT),
+    )
     for eta, arm, unknown in shares:
         data = replace(bench.data, arm=arm)
         engine = replace_bench(found.engine, replace(bench, data=data))
@@ -266,10 +282,12 @@ def test_what_no_word_names_is_unknown_unless_a_word_explains_it_as_well() -> No
     variants = library(bench, ["joint_creep"])
     found = search(small_engine_of(bench), variants)
     creep, jerks, noise = part("joint_creep", [0]), part(JERKS, [1]), bench.noise.stated
-    for parts, eta, main in (((jerks,), 3 * noise, "unknown"),
-                             ((jerks, creep), 3 * noise, "unknown"),
-                             ((creep, jerks), 3 * noise, "joint_creep"),
-                             ((jerks,), noise, "joint_creep")):  # fmt: skip
+    for parts, eta, main in (
+        ((jerks,), 3 * noise, "unknown"),
+        ((jerks, creep), 3 * noise, "unknown"),
+        ((creep, jerks), 3 * noise, "joint_creep"),
+        ((jerks,), noise, "joint_creep"),
+    ):
         word = said((creep,), (1e-5,), -20.0, eta)
         odd = said(parts, (1e-5, 0.5e-5)[: len(parts)], 20.0, 0.0)
         whole = replace(found, explanations=(word,), nameless=(odd,), unknown=-90.0, alone={})
@@ -334,8 +352,14 @@ def test_pairs_are_looked_for_around_the_best_words(
     """Of a bench around more of them: two words that belong together may look poor alone there."""
     bench = small_bench()
     bench = replace(bench, data=replace(bench.data, arm=arm))
-    words = ["joint_creep", "joint_stiffness_error", "force_scale", "time_lag",
-             "displacement_scale", "zero_shift"]  # fmt: skip
+    words = [
+        "joint_creep",
+        "joint_stiffness_error",
+        "force_scale",
+        "time_lag",
+        "displacement_scale",
+        "zero_shift",
+    ]
     engine = small_engine(bench)
     asked: list[int] = []
 
@@ -347,8 +371,10 @@ def test_pairs_are_looked_for_around_the_best_words(
     variants = library(bench, words)
     search(engine, variants)
     assert asked == [around]
-    ranked = [replace(said((part(w, [0]),), (3e-5,)), log_weight=-float(i), eta=1e-6)
-              for i, w in enumerate(words)]  # fmt: skip
+    ranked = [
+        replace(said((part(w, [0]),), (3e-5,)), log_weight=-float(i), eta=1e-6)
+        for i, w in enumerate(words)
+    ]
     monkeypatch.undo()
     assert _seeds({e.words: e for e in ranked}, 4) == ranked[:4]
 

@@ -83,8 +83,10 @@ def test_flow_under_weight_comes_to_the_same_state_in_the_end() -> None:
 def test_curves_of_the_net_torque_start_where_the_weight_left_them() -> None:
     torque, weight = np.linspace(-20, 60, 81), np.full(81, -30.0)
     net = torque + weight
-    for shape, law in ((beyond, lambda x: np.sign(x) * np.maximum(np.abs(x) - 10, 0)),
-                       (above, lambda x: np.maximum(x - 10, 0))):  # fmt: skip
+    for shape, law in (
+        (beyond, lambda x: np.sign(x) * np.maximum(np.abs(x) - 10, 0)),
+        (above, lambda x: np.maximum(x - 10, 0)),
+    ):
         assert shape(torque, weight, 10.0) == pytest.approx(law(net) - law(weight))
         assert shape(np.zeros(1), weight[:1], 10.0) == 0.0
 
@@ -101,8 +103,16 @@ def hanging(levels: Array, gravity: float = -30.0, poses: tuple[float, ...] = (1
     number = np.repeat(np.arange(len(poses)), n)
     force = np.tile(np.repeat(levels, 4), len(poses))
     step = np.tile(np.repeat(np.arange(len(levels)), 4), len(poses))
-    data = bench_data(force, 1e-5 * force, setups=setups, arm=True, setup=number, run=number,
-                      step=step, time=np.tile(np.arange(float(n)), len(poses)))  # fmt: skip
+    data = bench_data(
+        force,
+        1e-5 * force,
+        setups=setups,
+        arm=True,
+        setup=number,
+        run=number,
+        step=step,
+        time=np.tile(np.arange(float(n)), len(poses)),
+    )
     return make_bench(data)
 
 
@@ -351,8 +361,14 @@ def test_the_search_refines_the_tool_of_a_curve_and_looks_alone_and_beside() -> 
     assert any("odd curve" in v.label and v.info["tool_kg"] == 1.6 for v in finer)
 
     def scored(joint: int, knee: str) -> Scored:
-        return Scored(variant("joint_yield", f"{joint} {knee}", [0], (1.0,), joint=joint,
-                              axis=None, knee=knee), 0.0, 1.0, 0)  # fmt: skip
+        return Scored(
+            variant(
+                "joint_yield", f"{joint} {knee}", [0], (1.0,), joint=joint, axis=None, knee=knee
+            ),
+            0.0,
+            1.0,
+            0,
+        )
 
     alone = [scored(1, "round"), scored(1, "sharp"), scored(2, "sharp")]
     beside = [scored(3, "sharp"), scored(3, "sharp"), scored(4, "sharp"), scored(5, "sharp")]

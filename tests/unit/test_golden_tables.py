@@ -102,14 +102,23 @@ def test_notes_stand_under_what_they_are_what_is_wrong_first() -> None:
     assert tuple(diagnose_text.NOTED) == KINDS
     notes = ordered([Note(kind, f"Of {kind}.") for kind in reversed(KINDS)])
     text = diagnose_text.render(replace(shown.without_gap().result, said=notes))
-    assert text.endswith("See to this first:\n  Of fault.\n\nSet aside:\n  Of set aside.\n\n"
-                         "Not decidable from these data:\n  Of undecided.\n\n"
-                         "To be known:\n  Of remark.")  # fmt: skip
+    assert text.endswith(
+        "See to this first:\n  Of fault.\n\nSet aside:\n  Of set aside.\n\n"
+        "Not decidable from these data:\n  Of undecided.\n\n"
+        "To be known:\n  Of remark."
+    )
 
 
-@pytest.mark.parametrize(("p", "said"), [
-    (1.0, "> 99 %"), (0.9951, "> 99 %"), (0.994, "99 %"), (0.5, "50 %"), (0.004, "< 1 %"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("p", "said"),
+    [
+        (1.0, "> 99 %"),
+        (0.9951, "> 99 %"),
+        (0.994, "99 %"),
+        (0.5, "50 %"),
+        (0.004, "< 1 %"),
+    ],
+)
 def test_a_probability_is_never_said_to_be_one_or_none(p: float, said: str) -> None:
     assert diagnose_text.likely(p) == said
 

@@ -45,10 +45,22 @@ def test_labels_are_json_and_meta_is_valid(cases: list[HiddenCase]) -> None:
 
 
 def test_columns_are_the_contracted_ones_and_of_one_length(cases: list[HiddenCase]) -> None:
-    known = {"time_s", "session_s", "pose", "direction", "repetition", "branch", "step", "force_N",
-             "force_x_N", "force_y_N", "force_z_N", "displacement_mm",
-             *(f"q{j}_rad" for j in range(1, 7)),
-             *(f"temperature{j}_C" for j in range(1, 7))}  # fmt: skip
+    known = {
+        "time_s",
+        "session_s",
+        "pose",
+        "direction",
+        "repetition",
+        "branch",
+        "step",
+        "force_N",
+        "force_x_N",
+        "force_y_N",
+        "force_z_N",
+        "displacement_mm",
+        *(f"q{j}_rad" for j in range(1, 7)),
+        *(f"temperature{j}_C" for j in range(1, 7)),
+    }
     for case in cases:
         assert set(case.columns) <= known
         assert {len(c) for c in case.columns.values()} == {case.label["samples"]}
@@ -73,8 +85,10 @@ def test_only_answers_hold_answers(cases: list[HiddenCase]) -> None:
         assert not any(word in told for word in WORDS if word not in ("none", "unknown"))
 
 
-@pytest.mark.parametrize(("word", "snr"), [("joint_yield", (8.0, 8.2)), ("time_lag", (2.0, 2.05)),
-                                           ("zero_shift", (30.0, 31.0))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("word", "snr"),
+    [("joint_yield", (8.0, 8.2)), ("time_lag", (2.0, 2.05)), ("zero_shift", (30.0, 31.0))],
+)
 def test_the_gap_is_as_large_as_asked_for(word: str, snr: tuple[float, float]) -> None:
     case = draw_case(5, 3, word=word, design="medium", snr=snr)
     assert case.label["truth"] == [word]

@@ -16,10 +16,23 @@ from rig.worlds.hidden.words import EFFECTS
 from tests.unit.hidden_scenes import FORM_NAMES, contribution, effect_of, middle, scene_of
 
 ELASTIC = ("joint_nonlinear_stiffness", "contact_seating", "link_flexibility", "base_compliance")
-UNSEEN = ("link_flexibility", "base_compliance", "base_slip", "contact_seating", "zero_shift",
-          "thermal_drift", "displacement_scale")  # fmt: skip
-IN_GEAR = ("joint_yield", "joint_hysteresis", "joint_creep", "joint_nonlinear_stiffness",
-           "joint_backlash", "joint_stiffness_error")  # fmt: skip
+UNSEEN = (
+    "link_flexibility",
+    "base_compliance",
+    "base_slip",
+    "contact_seating",
+    "zero_shift",
+    "thermal_drift",
+    "displacement_scale",
+)
+IN_GEAR = (
+    "joint_yield",
+    "joint_hysteresis",
+    "joint_creep",
+    "joint_nonlinear_stiffness",
+    "joint_backlash",
+    "joint_stiffness_error",
+)
 
 
 @pytest.fixture(scope="module")
@@ -266,8 +279,9 @@ def test_beams_bend_by_the_cube_of_their_length() -> None:
 
     plan = plan_straight()
     scene = scene_of("medium")
-    scene = replace(scene, plan=plan, tool=np.array([[-1.18425, 0.0, 0.1807]]),
-                    unit=np.array([[0.0, 0.0, 1.0]]))  # fmt: skip
+    scene = replace(
+        scene, plan=plan, tool=np.array([[-1.18425, 0.0, 0.1807]]), unit=np.array([[0.0, 0.0, 1.0]])
+    )
     whole = beam_compliance(scene, 0, 0) + beam_compliance(scene, 0, 1)
     assert whole == pytest.approx(1.18425**3 / 3, rel=1e-9)
 

@@ -59,9 +59,14 @@ def test_the_own_textbook_form_explains_its_word(
     assert set(left) == {*EFFECTS, "none"}
 
 
-@pytest.mark.parametrize(("word", "form", "size"), [("joint_yield", "sharp", 2.0),
-                                                    ("joint_backlash", "smooth", 1.5e-3),
-                                                    ("base_slip", "yaw_sharp", 20.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("word", "form", "size"),
+    [
+        ("joint_yield", "sharp", 2.0),
+        ("joint_backlash", "smooth", 1.5e-3),
+        ("base_slip", "yaw_sharp", 20.0),
+    ],
+)
 def test_the_right_shape_is_found_among_many_without_readings(
     word: str, form: str, size: float
 ) -> None:

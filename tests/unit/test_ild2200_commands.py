@@ -20,9 +20,17 @@ VALUES = frames.encode(np.arange(1000, 1100, dtype=np.int32))
 
 def settings_words(**changes: int) -> bytes:
     words = {
-        "rate": 2, "number": 1, "hold": 0, "method": 1, "offset": 0, "zero": 0, "range": 10,
-        "lock": 0, "output": 1, "laser": 1,
-    }  # fmt: skip
+        "rate": 2,
+        "number": 1,
+        "hold": 0,
+        "method": 1,
+        "offset": 0,
+        "zero": 0,
+        "range": 10,
+        "lock": 0,
+        "output": 1,
+        "laser": 1,
+    }
     return struct.pack(">10I", *{**words, **changes}.values())
 
 

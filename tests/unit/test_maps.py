@@ -253,11 +253,15 @@ def test_emulated_models_are_marked(tmp_path: Path) -> None:
 
 
 def test_an_arm_without_closed_form_has_no_map(tmp_path: Path) -> None:
-    text = (MODELS / "F1.yaml").read_text().replace(
-        "robot: ur10e",
-        "dh: {d_m: [0.18, 0.01, 0, 0.17, 0.12, 0.12], a_m: [0, -0.61, -0.57, 0, 0, 0], "
-        "alpha_rad: [1.5708, 0, 0, 1.5708, -1.5708, 0]}",
-    )  # fmt: skip
+    text = (
+        (MODELS / "F1.yaml")
+        .read_text()
+        .replace(
+            "robot: ur10e",
+            "dh: {d_m: [0.18, 0.01, 0, 0.17, 0.12, 0.12], a_m: [0, -0.61, -0.57, 0, 0, 0], "
+            "alpha_rad: [1.5708, 0, 0, 1.5708, -1.5708, 0]}",
+        )
+    )
     (tmp_path / "m.yaml").write_text(text)
     written = draw(couple(tmp_path / "m.yaml", samples=1000), tmp_path)
     assert {p.stem for p in written} == {"stiffness"}

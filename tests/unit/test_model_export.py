@@ -79,9 +79,14 @@ def test_mujoco_deflects_as_predicted(f1: ArmModel) -> None:
     for _ in range(3000):
         data.qfrc_applied[:] = 0
         mujoco.mj_applyFT(
-            engine, data, np.array([0, 30.0, 0]), np.zeros(3), data.site_xpos[site], body,
+            engine,
+            data,
+            np.array([0, 30.0, 0]),
+            np.zeros(3),
+            data.site_xpos[site],
+            body,
             data.qfrc_applied,
-        )  # fmt: skip
+        )
         mujoco.mj_step(engine, data)
     moved = (data.site("tool").xpos - start)[1]
     assert np.abs(data.qvel).max() < 1e-6

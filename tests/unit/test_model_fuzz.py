@@ -19,13 +19,34 @@ PAPER_XY = Path(__file__).parents[2] / "protocols" / "paper_xy.yaml"
 F1 = (MODELS / "F1.yaml").read_text() + (
     "link_segments: robot\nmounting: {tilt_Nm_per_rad: 5e5, turn_Nm_per_rad: 5e5}\n"
 )
-F2 = (MODELS / "F2.yaml").read_text().replace(
-    "kind: rigid", "kind: {beam: {material: steel, diameter_mm: 30, half_length_mm: 50}}"
-)  # fmt: skip
+F2 = (
+    (MODELS / "F2.yaml")
+    .read_text()
+    .replace("kind: rigid", "kind: {beam: {material: steel, diameter_mm: 30, half_length_mm: 50}}")
+)
 VALUES = (
-    "0", "-1", "1e-300", "1e300", "nan", ".inf", "-.inf", "abc", "[]", "{}", "null", "true",
-    "1e9", "-1e9", "1e-9", '""', "[1,2,3]", "[0,0,0]", "90", "180", "360",
-)  # fmt: skip
+    "0",
+    "-1",
+    "1e-300",
+    "1e300",
+    "nan",
+    ".inf",
+    "-.inf",
+    "abc",
+    "[]",
+    "{}",
+    "null",
+    "true",
+    "1e9",
+    "-1e9",
+    "1e-9",
+    '""',
+    "[1,2,3]",
+    "[0,0,0]",
+    "90",
+    "180",
+    "360",
+)
 _PLACE = re.compile(r"(?<=[\[ ,])-?\d[\d.e+-]*|(?<=: )\w+")
 
 

@@ -40,10 +40,21 @@ def test_a_limit_is_not_raised_without_need(allowed_N: float | None, written: in
 
 def planned(*levels: tuple[float, ...]) -> Design:
     return Design(
-        setups=(), levels=levels, repetitions=1, unload=True, both_senses=False, cycles=(1.0,),
-        hold_s=5.0, sample_s=1.0, approach_s=14.0, zero_s=6.0, rest_s=10.0, readings=False,
-        components=False, instruments=Instruments(0.1, 2e-6, 0.005, 0.003),
-    )  # fmt: skip
+        setups=(),
+        levels=levels,
+        repetitions=1,
+        unload=True,
+        both_senses=False,
+        cycles=(1.0,),
+        hold_s=5.0,
+        sample_s=1.0,
+        approach_s=14.0,
+        zero_s=6.0,
+        rest_s=10.0,
+        readings=False,
+        components=False,
+        instruments=Instruments(0.1, 2e-6, 0.005, 0.003),
+    )
 
 
 @pytest.mark.parametrize(

@@ -171,8 +171,11 @@ def test_what_the_measurement_calls_stale_stays_so(hub: Hub, now: Time) -> None:
     assert sent(hub, viewer())[-1]["force"]["stale"]
     hub.set_state(state(None), now.t)
     assert sent(hub, viewer())[-1]["force"] == {
-        "N": 1.0, "mm": 1.0, "age_s": None, "stale": True,
-    }  # fmt: skip
+        "N": 1.0,
+        "mm": 1.0,
+        "age_s": None,
+        "stale": True,
+    }
 
 
 def test_the_end_comes_after_everything_else(hub: Hub) -> None:

@@ -243,10 +243,17 @@ def test_closing_ends_an_open_question(page: Page) -> None:
 def sample(row: int, **changes: Any) -> dict[str, Any]:
     values = {"force_N": 10.0, "displacement_mm": 0.1, "settled": 1.0, "slots_missed": 1.0}
     usual = {
-        "pose": "P1", "direction": "x", "repetition": 1, "step": 1, "branch": "loading",
-        "time_s": 3.0 + row, "session_s": 30.0 + row, "lateness_s": 0.002, "values": values,
+        "pose": "P1",
+        "direction": "x",
+        "repetition": 1,
+        "step": 1,
+        "branch": "loading",
+        "time_s": 3.0 + row,
+        "session_s": 30.0 + row,
+        "lateness_s": 0.002,
+        "values": values,
         "invalid": {"robot": 0, "dynamometer": 0, "laser": 0},
-    }  # fmt: skip
+    }
     return usual | changes
 
 

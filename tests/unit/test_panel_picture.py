@@ -21,11 +21,26 @@ HOME = Path(__file__).resolve().parents[2]
 PROTOCOL = load_protocol(HOME / "protocols" / "paper_xy.yaml")
 SETTING = Setting(PROTOCOL, emulated=True, speed=50.0, pitch_mm=0.5)
 VIEW = LiveView(
-    phase="approach", pose="P1", direction="y", repetition=2, repetitions=3, step=4, steps=12,
-    force_N=40.0, target_N=60.0, band_N=0.6, displacement_mm=0.7, stiffness_N_per_mm=57.0,
-    settle_remaining_s=2.5, samples=2, samples_wanted=5, branch="loading", force_age_s=0.1,
-    displacement_age_s=0.2, limits=(LimitLevel("force", 60.0, 240.0, "N", "stop"),),
-)  # fmt: skip
+    phase="approach",
+    pose="P1",
+    direction="y",
+    repetition=2,
+    repetitions=3,
+    step=4,
+    steps=12,
+    force_N=40.0,
+    target_N=60.0,
+    band_N=0.6,
+    displacement_mm=0.7,
+    stiffness_N_per_mm=57.0,
+    settle_remaining_s=2.5,
+    samples=2,
+    samples_wanted=5,
+    branch="loading",
+    force_age_s=0.1,
+    displacement_age_s=0.2,
+    limits=(LimitLevel("force", 60.0, 240.0, "N", "stop"),),
+)
 
 
 def moment(view: LiveView | None = VIEW, **changes: object) -> Moment:
@@ -117,8 +132,12 @@ def test_before_the_first_value_nothing_looks_live() -> None:
     state = json.loads(to_json(state_of(SETTING, moment(None))))
     assert state["phase"] == "starting"
     assert state["force"] == {
-        "N": None, "age_s": None, "target_N": None, "band_N": 0.0, "stale": True,
-    }  # fmt: skip
+        "N": None,
+        "age_s": None,
+        "target_N": None,
+        "band_N": 0.0,
+        "stale": True,
+    }
     assert state["displacement"] == {"mm": None, "age_s": None, "stale": True}
     assert shown(force_N=nan).force.stale
 
@@ -127,8 +146,11 @@ def test_the_end_stands_over_everything() -> None:
     prompt = Prompt("unload", "back")
     state = state_of(SETTING, moment(prompt=prompt, ending="aborted", message="stopped"))
     assert (state.phase, state.prompt, state.turn, state.message) == (
-        "aborted", None, None, "stopped",
-    )  # fmt: skip
+        "aborted",
+        None,
+        None,
+        "stopped",
+    )
 
 
 def test_the_prediction_is_that_of_rig_simulate(tmp_path: Path) -> None:

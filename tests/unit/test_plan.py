@@ -143,9 +143,11 @@ def test_a_limit_that_a_softer_arm_meets(paper: MeasurementProtocol, lab: Statio
 
 @pytest.mark.parametrize(
     ("q_deg", "warned"),
-    [("[0.2344, -1.7425, -1.8867, -1.0832, 1.5708, -1.3364]", True),
-     ("[0.2344, -17.425, -1.8867, -1.0832, 1.5708, -1.3364]", False)],
-)  # fmt: skip
+    [
+        ("[0.2344, -1.7425, -1.8867, -1.0832, 1.5708, -1.3364]", True),
+        ("[0.2344, -17.425, -1.8867, -1.0832, 1.5708, -1.3364]", False),
+    ],
+)
 def test_radians_in_the_place_of_degrees_are_asked_about(q_deg: str, warned: bool) -> None:
     path = PROTOCOLS / "paper_xy.yaml"
     text = path.read_text("utf-8").replace("[13.43, -99.84, -108.10, -62.06, 90.0, -76.57]", q_deg)
@@ -218,10 +220,14 @@ def test_only_what_even_a_much_stiffer_arm_exceeds_is_refused(
     possible = dataclasses.replace(lab, laser=dataclasses.replace(lab.laser, range_mm=1.0))
     assert "0 % to spare" in " ".join(plan(paper, possible).warnings)
     station = dataclasses.replace(lab, laser=dataclasses.replace(lab.laser, range_mm=0.5))
-    assert refusal(paper, station).splitlines()[0].endswith(
-        "runs[0]: about 1.6 mm expected at 220 N, the laser's range is 0.5 mm. Lower the top "
-        "force, or give stop_at_displacement_mm."
-    )  # fmt: skip
+    assert (
+        refusal(paper, station)
+        .splitlines()[0]
+        .endswith(
+            "runs[0]: about 1.6 mm expected at 220 N, the laser's range is 0.5 mm. Lower the top "
+            "force, or give stop_at_displacement_mm."
+        )
+    )
 
 
 def test_a_pose_beyond_the_joints_is_refused(paper: MeasurementProtocol) -> None:

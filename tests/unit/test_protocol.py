@@ -84,8 +84,13 @@ def test_sequence_follows_the_order(paper: MeasurementProtocol) -> None:
     assert by_run == [(0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3)]
     other = dataclasses.replace(paper, order="by_repetition")
     assert [(index, n) for index, _, n in other.sequence()] == [
-        (0, 1), (1, 1), (0, 2), (1, 2), (0, 3), (1, 3),
-    ]  # fmt: skip
+        (0, 1),
+        (1, 1),
+        (0, 2),
+        (1, 2),
+        (0, 3),
+        (1, 3),
+    ]
 
 
 @settings(deadline=None)
@@ -99,9 +104,12 @@ def test_every_level_is_measured_as_often_as_asked(
 ) -> None:
     run = Run("P1", "x", tuple(float(f) for f in sorted(levels)))
     protocol = dataclasses.replace(
-        load_paper(), runs=(run, run), repetitions=repetitions, order=order,
+        load_paper(),
+        runs=(run, run),
+        repetitions=repetitions,
+        order=order,
         branches="loading-unloading",
-    )  # fmt: skip
+    )
     pairs = [(index, n) for index, _, n in protocol.sequence()]
     assert sorted(pairs) == [(i, n) for i in (0, 1) for n in range(1, repetitions + 1)]
     steps = protocol.steps(run)

@@ -53,11 +53,17 @@ def test_without_plateaus_nothing_is_taken_off_and_the_origin_is_unknown() -> No
     assert curve.notes == (said,)
 
 
-@pytest.mark.parametrize(("without", "said"), [
-    ({2}, "Repetition 2 has no zero-load plateau: force and displacement are taken as measured."),
-    ({1, 3}, "Repetitions 1 and 3 have no zero-load plateau: "),
-    ({1, 2, 4}, "Repetitions 1, 2 and 4 have no zero-load plateau: "),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("without", "said"),
+    [
+        (
+            {2},
+            "Repetition 2 has no zero-load plateau: force and displacement are taken as measured.",
+        ),
+        ({1, 3}, "Repetitions 1 and 3 have no zero-load plateau: "),
+        ({1, 2, 4}, "Repetitions 1, 2 and 4 have no zero-load plateau: "),
+    ],
+)
 def test_repetitions_without_a_plateau_are_listed_in_words(without: set[int], said: str) -> None:
     rows = []
     for n in (1, 2, 3, 4):

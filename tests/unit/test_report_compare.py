@@ -140,9 +140,7 @@ def test_unlike_things_are_remarked(tmp_path: Path) -> None:
     wide = bench(tmp_path / "wide.h5")
     narrow = bench(tmp_path / "narrow.h5", forces=(10.0, 20.0, 30.0))
     (found,) = make([wide, narrow], Wishes(gap=False)).to_json()["comparison"]
-    assert found["remarks"] == [
-        "they rest on other ranges of force (20 to 100 N; 10 to 30 N)"
-    ]  # fmt: skip
+    assert found["remarks"] == ["they rest on other ranges of force (20 to 100 N; 10 to 30 N)"]
 
 
 def test_nothing_to_compare(tmp_path: Path) -> None:

@@ -47,8 +47,15 @@ def run(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_quick_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     follow(tmp_path, monkeypatch, skip=SLOW)
-    for name in ("line.json", "arm.yaml", "next.yaml",
-                 "compared.html", "bench.h5", "bench.html", "arm.csv"):  # fmt: skip
+    for name in (
+        "line.json",
+        "arm.yaml",
+        "next.yaml",
+        "compared.html",
+        "bench.h5",
+        "bench.html",
+        "arm.csv",
+    ):
         assert (tmp_path / name).is_file(), name
 
 

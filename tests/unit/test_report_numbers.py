@@ -64,10 +64,14 @@ def look_up(document: Any, pointer: str) -> Any:
 def shown(page: Page) -> list[tuple[str, float, str, float]]:
     """(pointer, value in full, text, scale) of every number of the page."""
     return [
-        (e.attributes["data-pointer"], float(e.attributes["value"]), e.text,
-         float(e.attributes.get("data-scale", "1")))
+        (
+            e.attributes["data-pointer"],
+            float(e.attributes["value"]),
+            e.text,
+            float(e.attributes.get("data-scale", "1")),
+        )
         for e in page.all("data")
-    ]  # fmt: skip
+    ]
 
 
 def last_digit(text: str) -> float:

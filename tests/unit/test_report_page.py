@@ -49,11 +49,54 @@ QUIET = Wishes(gap=False, made="2026-03-01T12:00:00+01:00")
 EVIL = "<script>alert(1)<script><img src=x onerror=alert(2)> $x^$ \\frac{ #panic() *b*"
 NAME = "<script>alert(1)<script><img src=x> $x^$ \\frac{ *b*"  # as long as names may be
 ALLOWED = {
-    "html", "head", "meta", "title", "style", "body", "header", "h1", "h2", "h3", "h4", "p", "nav",
-    "ol", "li", "a", "main", "section", "dl", "dt", "dd", "div", "figure", "figcaption", "svg",
-    "defs", "g", "path", "use", "clippath", "rect", "image", "pattern", "table", "caption", "thead",
-    "tbody", "tr", "th", "td", "data", "strong", "span", "code", "pre", "ul", "footer",
-}  # fmt: skip
+    "html",
+    "head",
+    "meta",
+    "title",
+    "style",
+    "body",
+    "header",
+    "h1",
+    "h2",
+    "h3",
+    "h4",
+    "p",
+    "nav",
+    "ol",
+    "li",
+    "a",
+    "main",
+    "section",
+    "dl",
+    "dt",
+    "dd",
+    "div",
+    "figure",
+    "figcaption",
+    "svg",
+    "defs",
+    "g",
+    "path",
+    "use",
+    "clippath",
+    "rect",
+    "image",
+    "pattern",
+    "table",
+    "caption",
+    "thead",
+    "tbody",
+    "tr",
+    "th",
+    "td",
+    "data",
+    "strong",
+    "span",
+    "code",
+    "pre",
+    "ul",
+    "footer",
+}
 
 
 @pytest.fixture(scope="module")
@@ -70,10 +113,11 @@ def evil(tmp_path_factory: pytest.TempPathFactory) -> Report:
         stop_reason=EVIL,
         devices={EVIL: {EVIL: EVIL, "serial_number": EVIL}},
         calibration={EVIL: {EVIL: [EVIL]}},
-        events=[{"kind": "note", "text": EVIL, "sample": 0},
-                {"kind": "discard", "text": EVIL, "reason": EVIL, "first": 0, "last": 0,
-                 "sample": 3}],
-    )  # fmt: skip
+        events=[
+            {"kind": "note", "text": EVIL, "sample": 0},
+            {"kind": "discard", "text": EVIL, "reason": EVIL, "first": 0, "last": 0, "sample": 3},
+        ],
+    )
     again = folder / "b" / path.name
     again.parent.mkdir()
     write(replace(load(path), uuid="another"), again)
@@ -110,8 +154,12 @@ def test_ids_are_unique_and_references_meet_one(evil: Report) -> None:
     page = Page(html)
     ids = [e.attributes["id"] for e in page.elements if "id" in e.attributes]
     assert len(ids) == len(set(ids))
-    wanted = {v[1:] for e in page.elements for n, v in e.attributes.items()
-              if n in ("href", "xlink:href") and v.startswith("#")}  # fmt: skip
+    wanted = {
+        v[1:]
+        for e in page.elements
+        for n, v in e.attributes.items()
+        if n in ("href", "xlink:href") and v.startswith("#")
+    }
     wanted |= set(re.findall(r"url\(#([^)]+)\)", html))
     assert len(wanted) > 100
     assert wanted <= set(ids)
@@ -186,9 +234,12 @@ def test_an_unknown_gap_is_said_what_it_looks_like(tmp_path: Path) -> None:
 
 
 def test_in_short_the_gap_shrinks_with_its_interval() -> None:
-    found = {"verdict": "joint_yield", "probabilities": {"joint_yield": 0.97},
-             "meanings": {"joint_yield": "gives way"},
-             "gap": {"held_out": {"shrink_factor": 56.3, "ci95": [12.0, 101.5]}}}  # fmt: skip
+    found = {
+        "verdict": "joint_yield",
+        "probabilities": {"joint_yield": 0.97},
+        "meanings": {"joint_yield": "gives way"},
+        "gap": {"held_out": {"shrink_factor": 56.3, "ci95": [12.0, 101.5]}},
+    }
     rows = Facts((("Gap", _gap(Node({"diagnose": found}))),))
     text = Page(render(Document("", "", (), (Section("s", "", (rows,)),), ""))).text
     assert "the gap shrinks 56.3 [12.0, 102] times on withheld data" in text
@@ -198,8 +249,14 @@ def test_in_short_the_gap_shrinks_with_its_interval() -> None:
 def test_where_an_effect_may_sit_is_said_with_the_numbers_of_the_json(
     places: dict[str, float],
 ) -> None:
-    one = {"name": "joint_yield", "probability": 1.0, "share_of_gap": 1.0, "parameters": {},
-           "indistinguishable_from": [], "places": places}  # fmt: skip
+    one = {
+        "name": "joint_yield",
+        "probability": 1.0,
+        "share_of_gap": 1.0,
+        "parameters": {},
+        "indistinguishable_from": [],
+        "places": places,
+    }
     blocks = tuple(_effects(Node({"effects": [one], "parameter_meanings": {}}, "/gap")))
     text = Page(render(Document("", "", (), (Section("s", "", blocks),), ""))).text
     assert ("leave open: joint 1 (62 %), joint 5 (38 %)." in text) == (len(places) > 1)
@@ -207,8 +264,14 @@ def test_where_an_effect_may_sit_is_said_with_the_numbers_of_the_json(
 
 def test_a_parameter_whose_name_misleads_is_explained() -> None:
     share = {"share_through_friction": {"unit": "1", "value": 4.6, "ci95": [0.2, 9.0]}}
-    one = {"name": "joint_hysteresis", "probability": 1.0, "share_of_gap": 1.0,
-           "parameters": share, "indistinguishable_from": [], "places": {}}  # fmt: skip
+    one = {
+        "name": "joint_hysteresis",
+        "probability": 1.0,
+        "share_of_gap": 1.0,
+        "parameters": share,
+        "indistinguishable_from": [],
+        "places": {},
+    }
     told = {"share_through_friction": "it may pass 1"}
     blocks = tuple(_effects(Node({"effects": [one], "parameter_meanings": told}, "/gap")))
     text = Page(render(Document("", "", (), (Section("s", "", blocks),), ""))).text
@@ -220,8 +283,14 @@ def test_what_many_runs_have_to_themselves_is_its_range() -> None:
         f"drift_x_run{r}": {"unit": "N", "value": v, "ci95": [v - 0.1, v + 0.1]}
         for r, v in ((1, 0.5), (2, -3.25), (3, 2.75), (4, 1.0))
     }
-    one = {"name": "force_drift", "probability": 1.0, "share_of_gap": 1.0, "parameters": drift,
-           "indistinguishable_from": [], "places": {}}  # fmt: skip
+    one = {
+        "name": "force_drift",
+        "probability": 1.0,
+        "share_of_gap": 1.0,
+        "parameters": drift,
+        "indistinguishable_from": [],
+        "places": {},
+    }
     (table,) = _effects(Node({"effects": [one], "parameter_meanings": {}}, "/gap"))
     assert isinstance(table, Table)
     assert [cells[1] for cells in table.rows] == [

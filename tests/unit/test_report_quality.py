@@ -25,11 +25,21 @@ def test_devices_and_lateness_of_a_measured_set() -> None:
     assert facts["lateness_s"] == {"median": 1e-4, "p95": pytest.approx(1e-4), "max": 1e-4}
     assert facts["duration_s"] == 7.0
     assert facts["devices"] == [
-        {"name": "laser", "values": 510, "invalid": 10, "samples_without_value": 0,
-         "oldest_value_s": 0.01},
-        {"name": "robot", "values": 625, "invalid": 0, "samples_without_value": 0,
-         "oldest_value_s": 0.008},
-    ]  # fmt: skip
+        {
+            "name": "laser",
+            "values": 510,
+            "invalid": 10,
+            "samples_without_value": 0,
+            "oldest_value_s": 0.01,
+        },
+        {
+            "name": "robot",
+            "values": 625,
+            "invalid": 0,
+            "samples_without_value": 0,
+            "oldest_value_s": 0.008,
+        },
+    ]
 
 
 def test_what_was_not_recorded_is_null(plain: Dataset) -> None:

@@ -45,9 +45,12 @@ def unloading(c: Curve, law: Callable[[float], float], remaining: float) -> Curv
 def table(force: Sequence[float], displacement: Sequence[float]) -> LevelTable:
     n = len(force)
     return LevelTable(
-        np.array(force), np.array(displacement), np.full(n, 0.1), np.full(n, 1e-9),
+        np.array(force),
+        np.array(displacement),
+        np.full(n, 0.1),
+        np.full(n, 1e-9),
         np.full(n, np.nan),
-    )  # fmt: skip
+    )
 
 
 def k_of(result: Stiffness) -> float:
@@ -290,11 +293,16 @@ def test_scales_from_micronewtons_to_meganewtons(force: float, displacement: flo
     scaled = replace(
         base,
         points=tuple(
-            replace(p, force=p.force * force, displacement=p.displacement * displacement,
-                    u_force=p.u_force * force, u_displacement=p.u_displacement * displacement)
+            replace(
+                p,
+                force=p.force * force,
+                displacement=p.displacement * displacement,
+                u_force=p.u_force * force,
+                u_displacement=p.u_displacement * displacement,
+            )
             for p in base.points
         ),
-    )  # fmt: skip
+    )
     one, other = analyze_curve(base), analyze_curve(scaled)
     assert k_of(other) == pytest.approx(k_of(one) * force / displacement, rel=1e-9)
     assert other.status == one.status

@@ -26,8 +26,9 @@ def test_pearsons_data_with_yorks_weights() -> None:
 
 
 def test_gum_h3_calibration_of_a_thermometer() -> None:
-    t = np.array([21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503,
-                  26.010, 26.511])  # fmt: skip
+    t = np.array(
+        [21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511]
+    )
     b = -1e-3 * np.array([171, 169, 166, 159, 164, 165, 156, 157, 159, 161, 160])
     fit = weighted_line(t - 20.0, b, np.ones(11), intercept=True)
     s = np.sqrt(fit.chi2 / fit.dof)

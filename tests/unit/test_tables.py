@@ -99,7 +99,7 @@ def test_extreme_scales_and_a_force_of_zero(tmp_path: Path) -> None:
         lambda t: t.replace("unloading,1", 'unloading,"1.0"'),
         lambda t: t.replace("9.9", "+9.90e0"),
     ],
-)  # fmt: skip
+)
 def test_spellings_of_one_table(tmp_path: Path, change: Any) -> None:
     plain, other = bring(tmp_path, TABLE), bring(tmp_path, change(TABLE))
     assert plain.columns.keys() == other.columns.keys()
@@ -142,13 +142,16 @@ def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("steps", "kept", "note"),
     [
-        (["0", "1", "2", "1", "0", "-1", "-2", ""], [0, 1, 2, 1, 0, 3, 4, -1],
-         "steps below 0 are numbered on: -1 is 3 ... -2 is 4"),
+        (
+            ["0", "1", "2", "1", "0", "-1", "-2", ""],
+            [0, 1, 2, 1, 0, 3, 4, -1],
+            "steps below 0 are numbered on: -1 is 3 ... -2 is 4",
+        ),
         (["0", "-1", "1"], [0, 2, 1], "steps below 0 are numbered on: -1 is 2"),
         (["-2", "-1"], [2, 1], "steps below 0 are numbered on: -1 is 1 ... -2 is 2"),
         (["0", "-1", "-1", ""], [0, -1, -1, -1], ""),
     ],
-)  # fmt: skip
+)
 def test_steps_of_a_load_the_other_way(
     tmp_path: Path, steps: list[str], kept: list[int], note: str
 ) -> None:
@@ -174,105 +177,223 @@ def test_progress_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 HEAD = "time_s,direction,repetition,branch,step,force_N,displacement_mm\n"
 GOOD = "0,x,1,zero,0,0,0\n"
 REFUSED: list[tuple[str | bytes, str]] = [
-    ("", ": empty; wanted: a first row with the names of the columns, force_N and "
-     "displacement_mm at least."),
-    ("# only a comment\n", ": no header row; wanted: a first row with the names of the columns, "
-     "force_N and displacement_mm at least."),
-    ("0,1.5,2\n1,2,3\n", ":1: no header row: the first row holds numbers (0, 1.5, 2 ...); wanted: "
-     "the names of the columns, force_N and displacement_mm at least."),
+    (
+        "",
+        ": empty; wanted: a first row with the names of the columns, force_N and "
+        "displacement_mm at least.",
+    ),
+    (
+        "# only a comment\n",
+        ": no header row; wanted: a first row with the names of the columns, "
+        "force_N and displacement_mm at least.",
+    ),
+    (
+        "0,1.5,2\n1,2,3\n",
+        ":1: no header row: the first row holds numbers (0, 1.5, 2 ...); wanted: "
+        "the names of the columns, force_N and displacement_mm at least.",
+    ),
     (HEAD, ": no samples; there is nothing below the header."),
-    ("force_N;displacement_mm\n1,5;2,5\n", ":1: the columns are separated by semicolons; wanted: "
-     "commas between the columns and a point as decimal mark. Save the table so, or replace the "
-     "characters."),
-    ("force_N\tdisplacement_mm\n1\t2\n", ":1: the columns are separated by tabs; wanted: commas "
-     "between the columns and a point as decimal mark. Save the table so, or replace the "
-     "characters."),
-    ("force_N,displacement_mm\n1,5,2,5\n", ":2: 4 cells, but the header names 2 columns. If the "
-     "numbers have decimal commas, write points instead."),
-    (HEAD + GOOD + "1,x,1,loading,1,10,5,1,25\n", ":3: 9 cells, but the header names 7 columns. If "
-     "the numbers have decimal commas, write points instead."),
-    ("force_N,displacement_mm,time_s,step\n1,5,2,0,3\n", ":2: 5 cells, but the header names 4 "
-     "columns. If the numbers have decimal commas, write points instead."),
-    (HEAD + GOOD + "1,x,1,loading,1,10,1,a,b\n", ":3: 9 cells, but the header names 7 columns. "
-     "Remove what is too much, or name it in the header."),
-    ("force_N,displacement_mm\n1;5\n", ":2: 1 cell, but the header names 2 columns; wanted: "
-     "commas between the cells, not semicolons."),
-    ("force_n,displacement_mm\n1,5\n", ': the column force_N is missing; the header has force_n, '
-     'displacement_mm. Is it "force_n"? Rename it.'),
-    ("force_kN,displacement_mm\n1,5\n", ': the column force_N is missing; the header has force_kN, '
-     'displacement_mm. Is it "force_kN"? Convert its values to N, then rename it.'),
-    ("force_N,time_s\n1,5\n", ": the column displacement_mm is missing; the header has force_N, "
-     "time_s."),
-    ("force_N,displacement_mm,force_N\n1,5,1\n", ':1: the column "force_N" is there twice (columns '
-     "1 and 3); rename or remove one."),
+    (
+        "force_N;displacement_mm\n1,5;2,5\n",
+        ":1: the columns are separated by semicolons; wanted: "
+        "commas between the columns and a point as decimal mark. Save the table so, or replace the "
+        "characters.",
+    ),
+    (
+        "force_N\tdisplacement_mm\n1\t2\n",
+        ":1: the columns are separated by tabs; wanted: commas "
+        "between the columns and a point as decimal mark. Save the table so, or replace the "
+        "characters.",
+    ),
+    (
+        "force_N,displacement_mm\n1,5,2,5\n",
+        ":2: 4 cells, but the header names 2 columns. If the "
+        "numbers have decimal commas, write points instead.",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,10,5,1,25\n",
+        ":3: 9 cells, but the header names 7 columns. If "
+        "the numbers have decimal commas, write points instead.",
+    ),
+    (
+        "force_N,displacement_mm,time_s,step\n1,5,2,0,3\n",
+        ":2: 5 cells, but the header names 4 "
+        "columns. If the numbers have decimal commas, write points instead.",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,10,1,a,b\n",
+        ":3: 9 cells, but the header names 7 columns. "
+        "Remove what is too much, or name it in the header.",
+    ),
+    (
+        "force_N,displacement_mm\n1;5\n",
+        ":2: 1 cell, but the header names 2 columns; wanted: "
+        "commas between the cells, not semicolons.",
+    ),
+    (
+        "force_n,displacement_mm\n1,5\n",
+        ": the column force_N is missing; the header has force_n, "
+        'displacement_mm. Is it "force_n"? Rename it.',
+    ),
+    (
+        "force_kN,displacement_mm\n1,5\n",
+        ": the column force_N is missing; the header has force_kN, "
+        'displacement_mm. Is it "force_kN"? Convert its values to N, then rename it.',
+    ),
+    (
+        "force_N,time_s\n1,5\n",
+        ": the column displacement_mm is missing; the header has force_N, time_s.",
+    ),
+    (
+        "force_N,displacement_mm,force_N\n1,5,1\n",
+        ':1: the column "force_N" is there twice (columns 1 and 3); rename or remove one.',
+    ),
     ("force_N,displacement_mm,\n1,5,\n", ":1: column 3 has no name (a comma too many?); name it."),
-    (HEAD + GOOD + "1,x,1,loading,1,10\n", ":3: 6 cells, but the header names 7 columns; nothing "
-     "for displacement_mm. Was the file cut off? Complete or remove the row."),
-    (HEAD + GOOD + "1,x,1,loading,1,10,a note,1\n", ":3: 8 cells, but the header names 7 columns. "
-     "Remove what is too much, or name it in the header."),
-    (HEAD + GOOD + "\n# pause\n1,x,1,loading,1,ten,1\n", ':5: column force_N: "ten" is not a '
-     "number; wanted: a number in N, with a point as decimal mark."),
-    (HEAD + GOOD + '1,x,1,loading,1,"10,5",1\n', ':3: column force_N: "10,5" is not a number; '
-     'wanted: a number in N, with a point as decimal mark. Write "10.5".'),
-    (HEAD + GOOD + "1,x,1,loading,1,10.5 N,1\n", ':3: column force_N: "10.5 N" is not a number; '
-     'wanted: a number in N, with a point as decimal mark. Write "10.5"; the unit stands in the '
-     "column's name."),
-    (HEAD + GOOD + "1,x,1,loading,1,1_0,1\n", ':3: column force_N: "1_0" is not a number; wanted: '
-     "a number in N, with a point as decimal mark."),
-    (HEAD + GOOD + "1,x,1,loading,1,True,1\n", ':3: column force_N: "True" is not a number; '
-     "wanted: a number in N, with a point as decimal mark."),
-    (HEAD + "1,x,1,loading,1,true,1\n", ':2: column force_N: "true" is not a number; wanted: a '
-     "number in N, with a point as decimal mark."),
-    (HEAD + GOOD + '1,x,1,loading,"1,5",5\n', ":3: 6 cells, but the header names 7 columns; "
-     "nothing for displacement_mm. Was the file cut off? Complete or remove the row."),
-    (HEAD + GOOD + "1,x,1,loading,1,,1\n", ":3: column force_N: an empty cell is not allowed; "
-     "every row needs a finite value."),
-    (HEAD + GOOD + "1,x,1,loading,1,5,nan\n", ':3: column displacement_mm: "nan" (mm) is not '
-     "allowed; every row needs a finite value."),
-    (HEAD + GOOD + "1,x,1,loading,1,-inf,0\n", ':3: column force_N: "-inf" (N) is not allowed; '
-     "every row needs a finite value."),
-    (HEAD + GOOD + "1,x,1,loading,1,-2e7,0\n", ':3: column force_N: "-2e7" (N) is not allowed; '
-     "allowed: -10000000 N to 10000000 N. Is the unit right?"),
-    (HEAD + GOOD + "1,x,1,loading,1,1,100001\n", ':3: column displacement_mm: "100001" (mm) is '
-     "not allowed; allowed: -100000 mm to 100000 mm. Is the unit right?"),
-    ("force_N,displacement_mm,force_z_N\n1,5,\n1,5,2e7\n", ':3: column force_z_N: "2e7" (N) is '
-     "not allowed; allowed: -10000000 N to 10000000 N. Is the unit right?"),
-    (HEAD + GOOD + "1,x,1,loading,1,1e999,0\n", ':3: column force_N: "1e999" (N) is not allowed; '
-     "every row needs a finite value."),
-    (HEAD + GOOD + ",x,1,loading,1,5,0\n", ":3: column time_s: an empty cell is not allowed; "
-     "every row needs a finite value."),
-    (HEAD + GOOD + "1,x,1,laoding,1,5,0\n", ':3: column branch: "laoding" is not allowed; allowed: '
-     'zero, loading, unloading, cycle. Did you mean "loading"?'),
-    (HEAD + GOOD + "1,x,1,up,1,5,0\n", ':3: column branch: "up" is not allowed; allowed: '
-     "zero, loading, unloading, cycle."),
-    (HEAD + GOOD + "1,x,1,,1,5,0\n", ":3: column branch: an empty cell is not allowed; allowed: "
-     "zero, loading, unloading, cycle."),
-    (HEAD + GOOD + "1,z,1,loading,1,5,0\n", ':3: column direction: "z" is not allowed; META.yaml '
-     "does not define it. Known: x, y."),
-    (HEAD + GOOD + "1,x,0,loading,1,5,0\n", ':3: column repetition: "0" is not allowed; wanted: a '
-     "whole number, 1, 2, 3 ...."),
-    (HEAD + GOOD + "1,x,1.5,loading,1,5,0\n", ':3: column repetition: "1.5" is not allowed; '
-     "wanted: a whole number, 1, 2, 3 ...."),
-    (HEAD + GOOD + "1,x,1,loading,2.5,5,0\n", ':3: column step: "2.5" is not allowed; wanted: a '
-     "whole number, or nothing (continuous)."),
-    (HEAD + GOOD + "1,x,1,loading,1e40,5,0\n", ':3: column step: "1e40" is not allowed; wanted: a '
-     "whole number, or nothing (continuous)."),
-    (HEAD + GOOD + "1,x,1,loading,-1e40,5,0\n", ':3: column step: "-1e40" is not allowed; wanted: '
-     "a whole number, or nothing (continuous)."),
-    (HEAD + GOOD + '1,x,"1,loading,1,5,0\n', ":3: quotes that do not match (unexpected end of "
-     "data); a cell in quotes must end in its line."),
-    (HEAD.replace("step", "pose") + "1,x,1,zero,P1,5,0\n1,x,1,zero,P2,5,0\n", ':3: column pose: '
-     '"P2" is not allowed; META.yaml does not define it. Known: P1.'),
-    (HEAD.replace("direction", "name") + GOOD, ": the column direction is missing, and META.yaml "
-     "defines 2: x, y. Add the column, or leave one in META."),
-    (HEAD.encode() + b"0,x,1,zero,0,0,0\n\n0,x,1,\xe4,0,0,0\n", ":4: the byte 0xE4 is no UTF-8 "
-     "text; save the file as UTF-8."),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,10\n",
+        ":3: 6 cells, but the header names 7 columns; nothing "
+        "for displacement_mm. Was the file cut off? Complete or remove the row.",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,10,a note,1\n",
+        ":3: 8 cells, but the header names 7 columns. "
+        "Remove what is too much, or name it in the header.",
+    ),
+    (
+        HEAD + GOOD + "\n# pause\n1,x,1,loading,1,ten,1\n",
+        ':5: column force_N: "ten" is not a '
+        "number; wanted: a number in N, with a point as decimal mark.",
+    ),
+    (
+        HEAD + GOOD + '1,x,1,loading,1,"10,5",1\n',
+        ':3: column force_N: "10,5" is not a number; '
+        'wanted: a number in N, with a point as decimal mark. Write "10.5".',
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,10.5 N,1\n",
+        ':3: column force_N: "10.5 N" is not a number; '
+        'wanted: a number in N, with a point as decimal mark. Write "10.5"; the unit stands in the '
+        "column's name.",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,1_0,1\n",
+        ':3: column force_N: "1_0" is not a number; wanted: '
+        "a number in N, with a point as decimal mark.",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,True,1\n",
+        ':3: column force_N: "True" is not a number; '
+        "wanted: a number in N, with a point as decimal mark.",
+    ),
+    (
+        HEAD + "1,x,1,loading,1,true,1\n",
+        ':2: column force_N: "true" is not a number; wanted: a '
+        "number in N, with a point as decimal mark.",
+    ),
+    (
+        HEAD + GOOD + '1,x,1,loading,"1,5",5\n',
+        ":3: 6 cells, but the header names 7 columns; "
+        "nothing for displacement_mm. Was the file cut off? Complete or remove the row.",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,,1\n",
+        ":3: column force_N: an empty cell is not allowed; every row needs a finite value.",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,5,nan\n",
+        ':3: column displacement_mm: "nan" (mm) is not allowed; every row needs a finite value.',
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,-inf,0\n",
+        ':3: column force_N: "-inf" (N) is not allowed; every row needs a finite value.',
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,-2e7,0\n",
+        ':3: column force_N: "-2e7" (N) is not allowed; '
+        "allowed: -10000000 N to 10000000 N. Is the unit right?",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,1,100001\n",
+        ':3: column displacement_mm: "100001" (mm) is '
+        "not allowed; allowed: -100000 mm to 100000 mm. Is the unit right?",
+    ),
+    (
+        "force_N,displacement_mm,force_z_N\n1,5,\n1,5,2e7\n",
+        ':3: column force_z_N: "2e7" (N) is '
+        "not allowed; allowed: -10000000 N to 10000000 N. Is the unit right?",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1,1e999,0\n",
+        ':3: column force_N: "1e999" (N) is not allowed; every row needs a finite value.',
+    ),
+    (
+        HEAD + GOOD + ",x,1,loading,1,5,0\n",
+        ":3: column time_s: an empty cell is not allowed; every row needs a finite value.",
+    ),
+    (
+        HEAD + GOOD + "1,x,1,laoding,1,5,0\n",
+        ':3: column branch: "laoding" is not allowed; allowed: '
+        'zero, loading, unloading, cycle. Did you mean "loading"?',
+    ),
+    (
+        HEAD + GOOD + "1,x,1,up,1,5,0\n",
+        ':3: column branch: "up" is not allowed; allowed: zero, loading, unloading, cycle.',
+    ),
+    (
+        HEAD + GOOD + "1,x,1,,1,5,0\n",
+        ":3: column branch: an empty cell is not allowed; allowed: "
+        "zero, loading, unloading, cycle.",
+    ),
+    (
+        HEAD + GOOD + "1,z,1,loading,1,5,0\n",
+        ':3: column direction: "z" is not allowed; META.yaml does not define it. Known: x, y.',
+    ),
+    (
+        HEAD + GOOD + "1,x,0,loading,1,5,0\n",
+        ':3: column repetition: "0" is not allowed; wanted: a whole number, 1, 2, 3 ....',
+    ),
+    (
+        HEAD + GOOD + "1,x,1.5,loading,1,5,0\n",
+        ':3: column repetition: "1.5" is not allowed; wanted: a whole number, 1, 2, 3 ....',
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,2.5,5,0\n",
+        ':3: column step: "2.5" is not allowed; wanted: a whole number, or nothing (continuous).',
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,1e40,5,0\n",
+        ':3: column step: "1e40" is not allowed; wanted: a whole number, or nothing (continuous).',
+    ),
+    (
+        HEAD + GOOD + "1,x,1,loading,-1e40,5,0\n",
+        ':3: column step: "-1e40" is not allowed; wanted: a whole number, or nothing (continuous).',
+    ),
+    (
+        HEAD + GOOD + '1,x,"1,loading,1,5,0\n',
+        ":3: quotes that do not match (unexpected end of "
+        "data); a cell in quotes must end in its line.",
+    ),
+    (
+        HEAD.replace("step", "pose") + "1,x,1,zero,P1,5,0\n1,x,1,zero,P2,5,0\n",
+        ':3: column pose: "P2" is not allowed; META.yaml does not define it. Known: P1.',
+    ),
+    (
+        HEAD.replace("direction", "name") + GOOD,
+        ": the column direction is missing, and META.yaml "
+        "defines 2: x, y. Add the column, or leave one in META.",
+    ),
+    (
+        HEAD.encode() + b"0,x,1,zero,0,0,0\n\n0,x,1,\xe4,0,0,0\n",
+        ":4: the byte 0xE4 is no UTF-8 text; save the file as UTF-8.",
+    ),
     (HEAD.encode() + b"0,x,1,zero,0,0,0\n0,x,\x00,", ":3: binary data; a text file is wanted."),
     (HEAD.encode("utf-16"), ": UTF-16 text; save it as CSV UTF-8."),
     (b"PK\x03\x04\x14\x00", ": an Excel or zip file; save the sheet as CSV (UTF-8)."),
-    (HEAD.replace("step", "discarded") + "0,x,1,zero,2,0,0\n", ':2: column discarded: "2" is not '
-     "allowed; wanted: 0 or 1."),
-]  # fmt: skip
+    (
+        HEAD.replace("step", "discarded") + "0,x,1,zero,2,0,0\n",
+        ':2: column discarded: "2" is not allowed; wanted: 0 or 1.',
+    ),
+]
 
 
 @pytest.mark.parametrize(("table", "message"), REFUSED)
@@ -362,9 +483,30 @@ NUMBERS = st.one_of(
     st.floats().map(repr),
     st.integers(-(10**25), 10**25).map(str),
     st.from_regex(r"[-+]?[0-9]{0,3}[.,]?[0-9]{0,3}([eE][-+]?[0-9]{0,4})?", fullmatch=True),
-    st.sampled_from([*csvcells.MISSING, "inf", "-Infinity", "1_0", "0x1p3", "1e", "--1", "1 2", "x",
-                     "True", "1.5N", "٣", "1d5", "1f", "½", "- 1", "1e+", "+.5", "."]),
-)  # fmt: skip
+    st.sampled_from(
+        [
+            *csvcells.MISSING,
+            "inf",
+            "-Infinity",
+            "1_0",
+            "0x1p3",
+            "1e",
+            "--1",
+            "1 2",
+            "x",
+            "True",
+            "1.5N",
+            "٣",
+            "1d5",
+            "1f",
+            "½",
+            "- 1",
+            "1e+",
+            "+.5",
+            ".",
+        ]
+    ),
+)
 
 
 @one_example(cells=[("24364748235606261760", ""), ("1_0", "")])

@@ -60,12 +60,20 @@ newtons, millimetres = st.floats(-1e7, 1e7), st.floats(-1e5, 1e5)
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     rows=st.lists(
-        st.tuples(newtons, millimetres, st.floats(allow_infinity=False), st.integers(-1, 2**40),
-                  st.sampled_from(["x", "y"]), st.sampled_from(["zero", "loading", "cycle"]),
-                  st.booleans(), st.text("aä,;\"'# é|", max_size=5).map(str.strip)),
-        min_size=1, max_size=20,
+        st.tuples(
+            newtons,
+            millimetres,
+            st.floats(allow_infinity=False),
+            st.integers(-1, 2**40),
+            st.sampled_from(["x", "y"]),
+            st.sampled_from(["zero", "loading", "cycle"]),
+            st.booleans(),
+            st.text("aä,;\"'# é|", max_size=5).map(str.strip),
+        ),
+        min_size=1,
+        max_size=20,
     )
-)  # fmt: skip
+)
 def test_round_trip_is_exact(
     tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[Any, ...]]
 ) -> None:
@@ -73,11 +81,15 @@ def test_round_trip_is_exact(
     folder = tmp_path_factory.mktemp("trip")
     data = bring(folder, "direction,force_N,displacement_mm\n" + "x,0,0\n" * len(rows))
     columns = data.columns | {
-        "force_N": np.array(force), "displacement_mm": np.array(displacement),
-        "q1_rad": np.array(q), "step": np.array(step), "direction": np.array(direction),
-        "branch": np.array(branch), "discarded": np.array(discarded),
+        "force_N": np.array(force),
+        "displacement_mm": np.array(displacement),
+        "q1_rad": np.array(q),
+        "step": np.array(step),
+        "direction": np.array(direction),
+        "branch": np.array(branch),
+        "discarded": np.array(discarded),
         "note": np.array([f"n{text}" for text in note]),
-    }  # fmt: skip
+    }
     back = there_and_back(replace(data, columns=columns), folder)
     for name, values in columns.items():
         assert example.same_values(values, back.columns[name]), name

@@ -118,9 +118,11 @@ def test_no_contact_is_no_force() -> None:
 
 
 @given(
-    slope=st.floats(1e-7, 1e-3), reach=st.floats(1e-9, 1e-2), guess=st.floats(0, 1e4),
+    slope=st.floats(1e-7, 1e-3),
+    reach=st.floats(1e-9, 1e-2),
+    guess=st.floats(0, 1e4),
     bend=st.floats(0, 1e-5),
-)  # fmt: skip
+)
 def test_root_leaves_no_excess(slope: float, reach: float, guess: float, bend: float) -> None:
     def excess(force: float) -> float:
         return slope * force + bend * force * force - reach

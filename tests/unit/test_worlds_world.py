@@ -235,8 +235,14 @@ def _world_without_scatter() -> World:
     def elements() -> tuple[object, ...]:
         return tuple(joint_element(joint, Spring(2e4)) for joint in range(6))
 
-    design = Design("bare", "bare", (0.2, -1.7, -1.9, -1.1, 1.6, -1.3), elements,  # type: ignore[arg-type]
-                    scatter_relative=0.0, scatter_m=0.0)  # fmt: skip
+    design = Design(
+        "bare",
+        "bare",
+        (0.2, -1.7, -1.9, -1.1, 1.6, -1.3),
+        elements,  # type: ignore[arg-type]
+        scatter_relative=0.0,
+        scatter_m=0.0,
+    )
     return World(design, 0)
 
 

@@ -24,9 +24,25 @@ FILES = sorted(PROTOCOLS.glob("*.yaml")) + sorted(PROTOCOLS.glob("stations/*.yam
 SEEDS = range(200)
 JARGON = ("pydantic", "Traceback", "errors.", "validation error", "type=", "tag:yaml", "http")
 WRONG = (
-    None, True, -1, 0, 1e12, "three", "1,5", [], {}, [1, "x"], {"a": {"b": 1}}, "", "nan", "yes",
-    [[[]]], -0.001, "\u00b5", "x" * 10_000,
-)  # fmt: skip
+    None,
+    True,
+    -1,
+    0,
+    1e12,
+    "three",
+    "1,5",
+    [],
+    {},
+    [1, "x"],
+    {"a": {"b": 1}},
+    "",
+    "nan",
+    "yes",
+    [[[]]],
+    -0.001,
+    "\u00b5",
+    "x" * 10_000,
+)
 
 
 def containers(data: Any) -> list[Any]:
@@ -58,8 +74,9 @@ def replace(data: Any, rng: random.Random) -> None:
 
 def swap(data: Any, rng: random.Random) -> None:
     at, other = rng.choice(containers(data)), rng.choice(containers(data))
-    keys = [rng.choice(list(c)) if isinstance(c, dict) else rng.randrange(len(c))
-            for c in (at, other)]  # fmt: skip
+    keys = [
+        rng.choice(list(c)) if isinstance(c, dict) else rng.randrange(len(c)) for c in (at, other)
+    ]
     at[keys[0]] = str(other[keys[1]])
 
 

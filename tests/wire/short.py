@@ -71,9 +71,14 @@ def run_rig(
     limited = [] if largest_file is None else ["prlimit", f"--fsize={largest_file}"]
     result = subprocess.run(
         [*limited, sys.executable, "-m", "rig", *words],
-        cwd=cwd, capture_output=True, text=True, timeout=timeout, check=False,
-        stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(HOME)},
-    )  # fmt: skip
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+        stdin=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(HOME)},
+    )
     return Outcome(result.returncode, result.stdout, result.stderr)
 
 

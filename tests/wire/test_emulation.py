@@ -317,8 +317,11 @@ def test_the_child_by_hand_prints_its_addresses_and_ends_with_its_input() -> Non
     files = ["protocols/stations/emulated.yaml", "protocols/load_unload_hold.yaml"]
     child = subprocess.Popen(
         [sys.executable, "-m", "rig.emulation.emulated", *files],
-        cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
     assert child.stdin
     assert child.stdout
     endpoints = json.loads(child.stdout.readline())["endpoints"]
@@ -331,9 +334,13 @@ def test_the_child_by_hand_prints_its_addresses_and_ends_with_its_input() -> Non
 def test_the_child_by_hand_with_a_wrong_file() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "rig.emulation.emulated", "nowhere.yaml"],
-        cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
         timeout=60,
-    )  # fmt: skip
+    )
     assert done.returncode == 2
     assert "nowhere.yaml" in done.stderr
     assert "Traceback" not in done.stderr
@@ -350,9 +357,12 @@ def test_rig_emulate_shows_all_and_ends_by_ctrl_c() -> None:
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code],
-        cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-    )  # fmt: skip
+    )
     assert process.stdout
     table = []
     while not table or "Ctrl-C" not in table[-1]:

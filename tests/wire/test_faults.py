@@ -49,14 +49,16 @@ NAMED = {
 
 CASES = [
     pytest.param(
-        device, fault, when,
+        device,
+        fault,
+        when,
         marks=[] if (device, fault, when) in QUICK else [pytest.mark.slow],
         id=f"{device}-{fault}-{when}",
     )
     for device, emulator in DEVICES.items()
     for fault in emulator.faults
     for when in ("start", "mid-run")
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("device", "fault", "when"), CASES)

@@ -45,9 +45,12 @@ class Bench:
 
     def client(self, port: str, **changes: object) -> Ild2200:
         settings = {
-            "driver": "ild2200", "port": port, "output_rate_Hz": RATE_HZ,
-            "connect_deadline_s": CONNECT_S, "stale_after_s": STALE_S,
-        }  # fmt: skip
+            "driver": "ild2200",
+            "port": port,
+            "output_rate_Hz": RATE_HZ,
+            "connect_deadline_s": CONNECT_S,
+            "stale_after_s": STALE_S,
+        }
         client = Ild2200(
             Ild2200Settings(**{**settings, **changes}),  # type: ignore[arg-type]
             Clock(self.scene.speed),

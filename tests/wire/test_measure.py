@@ -98,9 +98,13 @@ def test_measurements_are_never_overwritten(tmp_path: Path) -> None:
 def started(folder: Path, words: list[str]) -> subprocess.Popen[str]:
     """A measurement in the background, returned once it has recorded some rows."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "rig", *words], cwd=folder, stderr=subprocess.PIPE, text=True,
-        stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(HOME)},
-    )  # fmt: skip
+        [sys.executable, "-m", "rig", *words],
+        cwd=folder,
+        stderr=subprocess.PIPE,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(HOME)},
+    )
     journal = folder / "run.h5.journal"
     for _ in range(400):
         if journal.exists() and journal.read_text(errors="replace").count('"sample"') >= 8:

@@ -275,9 +275,12 @@ def test_when_the_measuring_process_dies_viewers_hear_of_it(tmp_path: Path) -> N
         "link.show(state()); sys.stdin.readline(); os._exit(9)"
     )
     process = subprocess.Popen(
-        [sys.executable, "-c", program], cwd=HOME, text=True,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    )  # fmt: skip
+        [sys.executable, "-c", program],
+        cwd=HOME,
+        text=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
     assert process.stdin is not None
     assert process.stdout is not None
     client = PanelClient(process.stdout.readline().strip()).connect()
@@ -320,9 +323,13 @@ class Measurement:
     def __init__(self, folder: Path, repetitions: int = 1, **changes: Any) -> None:
         words = [*short_files(folder, repetitions, **changes), "--panel"]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "rig", *words], cwd=folder, stderr=subprocess.PIPE, text=True,
-            stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(HOME)},
-        )  # fmt: skip
+            [sys.executable, "-m", "rig", *words],
+            cwd=folder,
+            stderr=subprocess.PIPE,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": str(HOME)},
+        )
         assert self.process.stderr is not None
         self.lines: list[str] = [self.process.stderr.readline()]
         found = re.search(r"Operator's page: (http\S+)", self.lines[0])
@@ -460,10 +467,13 @@ def test_a_resumed_run_shows_what_was_measured_before(tmp_path: Path) -> None:
     assert running.ended()[0] == 4
     shown = running.operator.samples()
     process = subprocess.Popen(
-        [sys.executable, "-m", "rig", "measure", "--resume", "run.h5", "--panel"], cwd=tmp_path,
-        stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL,
+        [sys.executable, "-m", "rig", "measure", "--resume", "run.h5", "--panel"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        stdin=subprocess.DEVNULL,
         env={**os.environ, "PYTHONPATH": str(HOME)},
-    )  # fmt: skip
+    )
     assert process.stderr is not None
     found = re.search(r"(http\S+)", process.stderr.readline())
     assert found

@@ -87,11 +87,18 @@ def present_design(bench: Bench) -> Design:
         setups=data.setups,
         levels=tuple(_levels(bench, s) for s in range(len(data.setups))),
         repetitions=int(np.clip(len(np.unique(rows.repetition)), 1, 3)),
-        unload=_unloads(bench), both_senses=bool({-1.0, 1.0} <= set(sizes.tolist())), cycles=(1.0,),
-        hold_s=hold, sample_s=sample, approach_s=approach, zero_s=zero, rest_s=_rest_s(bench),
-        readings=bench.has_q, components=rows.tangential is not None,
+        unload=_unloads(bench),
+        both_senses=bool({-1.0, 1.0} <= set(sizes.tolist())),
+        cycles=(1.0,),
+        hold_s=hold,
+        sample_s=sample,
+        approach_s=approach,
+        zero_s=zero,
+        rest_s=_rest_s(bench),
+        readings=bench.has_q,
+        components=rows.tangential is not None,
         instruments=data.instruments,
-    )  # fmt: skip
+    )
 
 
 def _unloads(bench: Bench) -> bool:
@@ -165,16 +172,26 @@ def planned(design: Design, bench: Bench) -> GapData:
     outside = np.array([s.outside for s in design.setups])[setup]
     new = np.append(True, (np.diff(setup) != 0) | (np.diff(repetition) != 0))
     return replace(
-        data, setups=design.setups, time=time, session=session,
-        run=np.cumsum(new).astype(whole) - 1, setup=setup, repetition=repetition,
-        branch=branch.astype(whole), step=step.astype(whole), force=load,
+        data,
+        setups=design.setups,
+        time=time,
+        session=session,
+        run=np.cumsum(new).astype(whole) - 1,
+        setup=setup,
+        repetition=repetition,
+        branch=branch.astype(whole),
+        step=step.astype(whole),
+        force=load,
         displacement=(lever**2 @ data.compliance + outside) * load,
         instruments=design.instruments,
         tangential=np.zeros((n, 2)) if design.components else None,
         q=np.zeros((n, data.joints)) if design.readings else None,
-        output_encoder=design.readings or data.output_encoder, temperature=None, simulated=None,
-        on_the_way=None, imposed="displacement" if bench.imposed else "force",
-    )  # fmt: skip
+        output_encoder=design.readings or data.output_encoder,
+        temperature=None,
+        simulated=None,
+        on_the_way=None,
+        imposed="displacement" if bench.imposed else "force",
+    )
 
 
 def _walk(design: Design) -> Iterator[tuple[float, ...]]:

@@ -145,14 +145,22 @@ def _proposal(
     rest = tuple(o for o, _ in rated[1:])
     odds = f"expected: {_nats(best.expected_nats)} in about {best.minutes:.0f} min"
     if best.expected_nats >= ENOUGH:
-        return NextMeasurement(f"{best.text} ({odds}.)", pair, best.kind, best.expected_nats,
-                               best.minutes, rest, candidate.design)  # fmt: skip
+        return NextMeasurement(
+            f"{best.text} ({odds}.)",
+            pair,
+            best.kind,
+            best.expected_nats,
+            best.minutes,
+            rest,
+            candidate.design,
+        )
     text = (
         f"No procedure derived from this one is expected to tell them apart (odds of 20 to 1, "
         f"{ENOUGH:g} nats). The best of {len(rated)}: {best.text} ({odds}.)"
     )
-    return NextMeasurement(text, pair, "none", best.expected_nats, best.minutes,
-                           tuple(o for o, _ in rated))  # fmt: skip
+    return NextMeasurement(
+        text, pair, "none", best.expected_nats, best.minutes, tuple(o for o, _ in rated)
+    )
 
 
 def _nats(value: float) -> str:
@@ -307,10 +315,14 @@ def _with_noise(bench: Bench, there: Bench) -> Bench:
     sample = float(np.median(now.response * np.sqrt(count)))
     root = np.sqrt(there.rows.weight) if not there.rows.continuous else 1.0
     noise = replace(
-        there.noise, response=np.maximum(there.noise.response, sample / root), q=now.q,
-        force=now.force, run=now.run, stated=now.stated,
+        there.noise,
+        response=np.maximum(there.noise.response, sample / root),
+        q=now.q,
+        force=now.force,
+        run=now.run,
+        stated=now.stated,
         hold=np.maximum(there.noise.hold, float(now.hold.min())),
-    )  # fmt: skip
+    )
     return replace(there, noise=noise)
 
 

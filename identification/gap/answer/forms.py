@@ -63,8 +63,10 @@ def lasting(form: Form) -> Form:
     """The form with what the arm and the instruments still do in another session; of a drift, of
     jumps of the datum and of what single runs have to themselves nothing is left."""
     laws = EFFECTS[form.word].laws
-    keep = [laws.lasts and t.coefficient not in laws.of_session and "run" not in t.shape
-            for t in form.law.terms]  # fmt: skip
+    keep = [
+        laws.lasts and t.coefficient not in laws.of_session and "run" not in t.shape
+        for t in form.law.terms
+    ]
     return _of_terms(form, keep)
 
 

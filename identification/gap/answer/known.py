@@ -29,8 +29,9 @@ def knowing(bench: Bench, forms: Sequence[Form]) -> Bench:
     if not forms:
         return bench
     if bench.imposed:
-        raise NotKnown("effects of a model are known as displacements, and here the displacement "
-                       "is imposed")  # fmt: skip
+        raise NotKnown(
+            "effects of a model are known as displacements, and here the displacement is imposed"
+        )
     less, does, more = (
         np.column_stack([_stacked(_pushed(bench, by), lawful(f)) for f in forms])
         for by in (1 - LOAD_SD, 1.0, 1 + LOAD_SD)

@@ -58,7 +58,7 @@ def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Wher
         joints=_joints(engine, fit, sizes),
         seen_by_encoders=_seen(engine, word),
         share=inside / total if total > 0 else 0.0,
-    )  # fmt: skip
+    )
 
 
 def _seen(engine: Engine, word: str) -> bool | None:
@@ -103,8 +103,9 @@ def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
         if force.size:
             old = out.get(setup.direction, (np.inf, -np.inf))
             out[setup.direction] = (
-                min(old[0], float(force.min())), max(old[1], float(force.max()))
-            )  # fmt: skip
+                min(old[0], float(force.min())),
+                max(old[1], float(force.max())),
+            )
     return out
 
 

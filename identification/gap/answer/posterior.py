@@ -355,8 +355,9 @@ def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:
     start = base + before
     mine = slice(start, start + len(fitted.parts[index].variant.columns))
     covariance = fitted.joint_covariance
-    at = {int(engine.base.names[i].removeprefix("spring")) - 1: i
-          for i in engine.base.index("spring")}  # fmt: skip
+    at = {
+        int(engine.base.names[i].removeprefix("spring")) - 1: i for i in engine.base.index("spring")
+    }
     return Softer(
         {j: float(fitted.base[i]) for j, i in at.items()},
         {j: float(covariance[i, i]) for j, i in at.items()},

@@ -97,11 +97,21 @@ def remainder(engine: Engine, fit: Fit) -> Remainder:
     weight = samples / samples.sum()
     low, high = np.quantile(np.sqrt(draws**2 @ weight), [0.025, 0.975])
     out = Remainder(
-        setup=setup, branch=branch, load=load, displacement=mean_of(bench.rows.displacement),
-        samples=samples, residual=residual, noise=np.sqrt(variance), mean=mean, sd=sd,
-        rms=float(np.sqrt(mean**2 @ weight)), ci95=(float(low), float(high)), largest=None,
-        visits=visits, unrepeated_rms=unrepeated,
-    )  # fmt: skip
+        setup=setup,
+        branch=branch,
+        load=load,
+        displacement=mean_of(bench.rows.displacement),
+        samples=samples,
+        residual=residual,
+        noise=np.sqrt(variance),
+        mean=mean,
+        sd=sd,
+        rms=float(np.sqrt(mean**2 @ weight)),
+        ci95=(float(low), float(high)),
+        largest=None,
+        visits=visits,
+        unrepeated_rms=unrepeated,
+    )
     return replace(out, largest=_largest(bench, out, mean_of(bench.rows.measured_force)))
 
 
@@ -218,6 +228,11 @@ def _largest(bench: Bench, m: Remainder, force: Array) -> Place | None:
     k = int(np.argmax(np.where(clear, np.abs(m.mean), 0.0)))
     where = bench.data.setups[m.setup[k]]
     return Place(
-        where.pose, where.direction, int(m.branch[k]), float(force[k]), float(m.displacement[k]),
-        float(m.mean[k]), float(m.sd[k]),
-    )  # fmt: skip
+        where.pose,
+        where.direction,
+        int(m.branch[k]),
+        float(force[k]),
+        float(m.displacement[k]),
+        float(m.mean[k]),
+        float(m.sd[k]),
+    )

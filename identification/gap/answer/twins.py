@@ -45,8 +45,9 @@ class Twin:
     def form(self, form: Form) -> Form:
         """The same motion of the target from the other place: less compliance on a longer lever."""
         share = self.factor**-2
-        return Form(self.word, self.moved(form.law), share * form.values,
-                    share**2 * form.covariance)  # fmt: skip
+        return Form(
+            self.word, self.moved(form.law), share * form.values, share**2 * form.covariance
+        )
 
 
 PLACE = ("joint", "axis", "depth")

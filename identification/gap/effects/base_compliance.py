@@ -65,9 +65,16 @@ def variants(bench: Bench) -> list[Variant]:
         info: dict[str, Any] = {"depth_m": depth, "turned": False}
         seen = [a for a in range(3) if np.abs(m[:, a]).max() > 1e-3]
         out.append(
-            variant(WORD, f"axes {depth:g} m below", [columns[a] for a in seen], SCALES, each=True,
-                    axes=seen, **info)
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"axes {depth:g} m below",
+                [columns[a] for a in seen],
+                SCALES,
+                each=True,
+                axes=seen,
+                **info,
+            )
+        )
         if {0, 1} <= set(seen) and np.abs(both).max() > 1e-3:
             coupling = bench.add(bench.outside_column(both * bench.load))
             stand = _turned(depth, [*(columns[a] for a in seen), coupling], seen)
@@ -77,9 +84,16 @@ def variants(bench: Bench) -> list[Variant]:
         for a in seen:
             if a < 2 or depth == 0:
                 out.append(
-                    variant(WORD, f"axis {'xyz'[a]} {depth:g} m below", [columns[a]], SCALES,
-                            prior=0.3, axes=[a], **info)
-                )  # fmt: skip
+                    variant(
+                        WORD,
+                        f"axis {'xyz'[a]} {depth:g} m below",
+                        [columns[a]],
+                        SCALES,
+                        prior=0.3,
+                        axes=[a],
+                        **info,
+                    )
+                )
     return out
 
 
@@ -91,17 +105,31 @@ def _turned(depth: float, columns: list[int], axes: list[int]) -> Variant:
     total = np.append(np.ones(len(axes)), 0.0)
     between = np.zeros((2, len(columns)))
     between[:, :2], between[:, -1] = 1.0, (2.0, -2.0)
-    return variant(WORD, f"turned axes {depth:g} m below", columns, SCALES, root, total,
-                   prior=0.5, each=(True,) * len(axes), within=between, axes=axes, depth_m=depth,
-                   turned=True)  # fmt: skip
+    return variant(
+        WORD,
+        f"turned axes {depth:g} m below",
+        columns,
+        SCALES,
+        root,
+        total,
+        prior=0.5,
+        each=(True,) * len(axes),
+        within=between,
+        axes=axes,
+        depth_m=depth,
+        turned=True,
+    )
 
 
 def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
     """The same with compliances that change with the moment about a lying axis, by which feet are
     pressed, or bolts let go of a plate; m (n, 3) m."""
     axes, k = [a for a in stand.info["axes"] if a < 2], len(stand.columns)
-    bends = [(a, share * (float(np.abs(m[:, a] * bench.load).max()) or 1.0))
-             for a in axes for share in BENDS_AT]  # fmt: skip
+    bends = [
+        (a, share * (float(np.abs(m[:, a] * bench.load).max()) or 1.0))
+        for a in axes
+        for share in BENDS_AT
+    ]
     bent = [bench.add(bent_column(bench, m[:, a], at)) for a, at in bends]
     root = np.zeros((k + len(bent), k + len(bent)))
     root[:k, :k] = stand.root
@@ -115,10 +143,17 @@ def _on_feet(bench: Bench, stand: Variant, m: Array) -> Variant:
         row[k:] = [float(a == axis and b <= at) for a, b in bends]
     positive = None if stand.positive is None else np.append(stand.positive, np.zeros(len(bent)))
     return variant(
-        WORD, f"{stand.label}, on feet", [*stand.columns, *bent], SCALES, root,
-        False if positive is None else positive, prior=0.3,
-        each=stand.each, within=within, **{**stand.info, "bends_Nm": bends},
-    )  # fmt: skip
+        WORD,
+        f"{stand.label}, on feet",
+        [*stand.columns, *bent],
+        SCALES,
+        root,
+        False if positive is None else positive,
+        prior=0.3,
+        each=stand.each,
+        within=within,
+        **{**stand.info, "bends_Nm": bends},
+    )
 
 
 def bent_column(bench: Bench, m: Array, beyond: float) -> Array:

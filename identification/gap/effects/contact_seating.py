@@ -97,8 +97,12 @@ def variants(bench: Bench) -> list[Variant]:
         out.append(_one_after_the_other(bench, [s * top for s in STEPS], scales))
     if _comes_back(bench):
         kept = [STAYS, IN_A_RUN] if np.any(bench.rest & ~bench.rebuilt) else [STAYS]
-        out += [_some_stays(bench, law, share * top, scales, kind)
-                for kind in kept for share in forces for law in SEATED]  # fmt: skip
+        out += [
+            _some_stays(bench, law, share * top, scales, kind)
+            for kind in kept
+            for share in forces
+            for law in SEATED
+        ]
     return [*out, *_slacks(bench)]
 
 
@@ -125,8 +129,16 @@ def _one_after_the_other(bench: Bench, forces: list[float], scales: tuple[float,
     wide = np.diff(edges)
     root = np.diag(edges[1:] / wide) - np.diag(edges[1:-1] / wide[1:], 1)
     grows = np.asarray(np.linalg.inv(root))
-    return variant(WORD, "one after the other", columns, scales, root, within=grows,
-                   force_N=forces[0], laws=tuple(("slack", f) for f in forces))  # fmt: skip
+    return variant(
+        WORD,
+        "one after the other",
+        columns,
+        scales,
+        root,
+        within=grows,
+        force_N=forces[0],
+        laws=tuple(("slack", f) for f in forces),
+    )
 
 
 def _seated(
@@ -134,8 +146,16 @@ def _seated(
 ) -> Variant:
     """One law with a force scale N."""
     share = f0 / float(np.abs(bench.load).max())
-    return variant(WORD, f"{law} {share:.3g}", [_late(bench, law, f0)], scales, force_N=f0,
-                   laws=((law, f0),), goes_on=law in GOES_ON, prior=prior)  # fmt: skip
+    return variant(
+        WORD,
+        f"{law} {share:.3g}",
+        [_late(bench, law, f0)],
+        scales,
+        force_N=f0,
+        laws=((law, f0),),
+        goes_on=law in GOES_ON,
+        prior=prior,
+    )
 
 
 def pressed(bench: Bench) -> tuple[Array, Array]:
@@ -162,8 +182,17 @@ def _slacks(bench: Bench) -> list[Variant]:
     toes = [v.columns[0] for v in single["toe"]]
     root = np.diag([LOST["toe"] * _given(bench, s * stroke) for s in TOES])
     laws = tuple(("toe", s * stroke) for s in TOES)
-    several = variant(WORD, "toes", toes, (0.1, 0.3, 1.0), root, each=True, prior=2.0,
-                      force_N=TOES[-1] * stroke, laws=laws)  # fmt: skip
+    several = variant(
+        WORD,
+        "toes",
+        toes,
+        (0.1, 0.3, 1.0),
+        root,
+        each=True,
+        prior=2.0,
+        force_N=TOES[-1] * stroke,
+        laws=laws,
+    )
     out = [v for vs in single.values() for v in vs]
     if bench.course.approaches:
         out += [_then_seats(bench, s * stroke, 1 / len(SLACKS)) for s in SLACKS]
@@ -174,8 +203,15 @@ def _slack(bench: Bench, law: str, force: float, prior: float = 1.0) -> Variant:
     """One slack, as wide as the simulated spring gives under a force N."""
     d = LOST[law] * _given(bench, force)
     share = force / _stroke(bench)
-    return variant(WORD, f"{law} {share:.3g}", [_late(bench, law, force)], (0.5 * d, d),
-                   force_N=force, laws=((law, force),), prior=prior)  # fmt: skip
+    return variant(
+        WORD,
+        f"{law} {share:.3g}",
+        [_late(bench, law, force)],
+        (0.5 * d, d),
+        force_N=force,
+        laws=((law, force),),
+        prior=prior,
+    )
 
 
 def _then_seats(bench: Bench, force: float, prior: float) -> Variant:
@@ -184,9 +220,17 @@ def _then_seats(bench: Bench, force: float, prior: float) -> Variant:
     stroke = _stroke(bench)
     wide = [force, *(force + s * (stroke - force) for s in SEATS)]
     root = np.diag([_given(bench, w) for w in wide])
-    return variant(WORD, f"slack {force / stroke:.3g}, then seats",
-                   [_late(bench, "slack", w) for w in wide], (0.1, 0.3, 1.0), root, each=True,
-                   prior=prior, force_N=force, laws=tuple(("slack", w) for w in wide))  # fmt: skip
+    return variant(
+        WORD,
+        f"slack {force / stroke:.3g}, then seats",
+        [_late(bench, "slack", w) for w in wide],
+        (0.1, 0.3, 1.0),
+        root,
+        each=True,
+        prior=prior,
+        force_N=force,
+        laws=tuple(("slack", w) for w in wide),
+    )
 
 
 def _late(bench: Bench, law: str, force: float) -> int:

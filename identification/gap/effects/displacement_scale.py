@@ -33,8 +33,18 @@ def variants(bench: Bench) -> list[Variant]:
     out = [variant(WORD, "gain", [straight], scales(bench), positive=False)]
     if bench.data.arm and top > 0:  # one spring's curve would be the same
         bend = bench.add(bench.outside_column(line * np.abs(line) / top))
-        out.append(variant(WORD, "gain that bends", [straight, bend], SCALES, BENDS,
-                           positive=False, prior=0.5, full=top))  # fmt: skip
+        out.append(
+            variant(
+                WORD,
+                "gain that bends",
+                [straight, bend],
+                SCALES,
+                BENDS,
+                positive=False,
+                prior=0.5,
+                full=top,
+            )
+        )
         out += [_of_two_ranges(bench, straight, share, top) for share in CHANGES_AT]
     return out
 
@@ -43,8 +53,16 @@ def _of_two_ranges(bench: Bench, straight: int, share: float, top: float) -> Var
     """Beyond a share of the largest reading (m) the gain is another one."""
     beyond = bench.add(bench.outside_column(hinge(bench.line, share * top)))
     prior = 0.5 / len(CHANGES_AT)
-    return variant(WORD, f"gain that changes at {share:g}", [straight, beyond], SCALES,
-                   positive=False, prior=prior, above=share * top, share=share)  # fmt: skip
+    return variant(
+        WORD,
+        f"gain that changes at {share:g}",
+        [straight, beyond],
+        SCALES,
+        positive=False,
+        prior=prior,
+        above=share * top,
+        share=share,
+    )
 
 
 def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:

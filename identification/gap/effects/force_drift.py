@@ -59,11 +59,20 @@ def variants(bench: Bench) -> list[Variant]:
     for label, given in named.items():
         same: dict[str, Any] = {"positive": False, "path": label}
         often = 2.0 if label == "rates" else 1.0
-        out.append(variant(WORD, label, amplifiers.alike(given), scales, prior=often, names=("",),
-                           **same))  # fmt: skip
+        out.append(
+            variant(WORD, label, amplifiers.alike(given), scales, prior=often, names=("",), **same)
+        )
         if len(amplifiers.axes) > 1:
-            out.append(variant(WORD, f"{label}, each component", amplifiers.own(given), scales,
-                               names=tuple(amplifiers.axes), **same))  # fmt: skip
+            out.append(
+                variant(
+                    WORD,
+                    f"{label}, each component",
+                    amplifiers.own(given),
+                    scales,
+                    names=tuple(amplifiers.axes),
+                    **same,
+                )
+            )
     out += _each_run(bench, scales)
     return out + [v for k, way in free.items() for v in _free(amplifiers, k, way, scales)]
 
@@ -105,8 +114,9 @@ def _free(
         return out
     fewer = way._replace(pieces=min(way.pieces, EACH_PIECES))
     own = amplifiers.own(free_path(bench, fewer.pieces).T)
-    out.append(free_variant(WORD, f"{label}, each component", fewer, own, scales, tuple(axes),
-                            prior=1.0))  # fmt: skip
+    out.append(
+        free_variant(WORD, f"{label}, each component", fewer, own, scales, tuple(axes), prior=1.0)
+    )
     along = _alike(bench)
     together = amplifiers.together(hats, along)
     if together != plain:
@@ -148,8 +158,18 @@ def _each_run(bench: Bench, scales: tuple[float, ...]) -> list[Variant]:
     places = [(int(r), name) for r in runs for name in _axes(bench)]
     columns = [bench.add(component(bench, AXES[name], since(bench, r))) for r, name in places]
     names = tuple(f"{name}_run{r + 1}" for r, name in places)
-    return [variant(WORD, "each run", columns, scales, positive=False, path="each run",
-                    names=names, places=places)]  # fmt: skip
+    return [
+        variant(
+            WORD,
+            "each run",
+            columns,
+            scales,
+            positive=False,
+            path="each run",
+            names=names,
+            places=places,
+        )
+    ]
 
 
 def since(bench: Bench, run: int) -> Array:

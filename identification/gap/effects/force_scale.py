@@ -32,8 +32,18 @@ def variants(bench: Bench) -> list[Variant]:
     out = [variant(WORD, "gain", [straight], scales(bench), positive=False)]
     if bench.data.arm and top > 0:  # one spring's curve would be the same
         bend = bench.add(shown(bench, bench.load * np.abs(bench.load) / top))
-        out.append(variant(WORD, "gain that bends", [straight, bend], SCALES, BENDS,
-                           positive=False, prior=0.5, full=top))  # fmt: skip
+        out.append(
+            variant(
+                WORD,
+                "gain that bends",
+                [straight, bend],
+                SCALES,
+                BENDS,
+                positive=False,
+                prior=0.5,
+                full=top,
+            )
+        )
     return out + [_of_one(bench, axis) for axis in _loaded(bench)]
 
 
@@ -47,8 +57,15 @@ def _loaded(bench: Bench) -> list[int]:
 def _of_one(bench: Bench, axis: int) -> Variant:
     """Every component has an amplifier of its own."""
     column = bench.add(component(bench, axis))
-    return variant(WORD, f"gain of {'xyz'[axis]}", [column], SCALES, positive=False, prior=0.2,
-                   component="xyz"[axis])  # fmt: skip
+    return variant(
+        WORD,
+        f"gain of {'xyz'[axis]}",
+        [column],
+        SCALES,
+        positive=False,
+        prior=0.2,
+        component="xyz"[axis],
+    )
 
 
 def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:

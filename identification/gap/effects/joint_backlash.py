@@ -43,8 +43,11 @@ from identification.gap.laws.lost_motion import (
     SOFTER,
     UNEVEN,
     Play,
+    crosses,
+    less_rub,
     net,
     resting_columns,
+    within_play,
 )
 from identification.gap.model.bench import TOOL_KG, Bench
 from identification.gap.model.flanks import Flanks, placed, shapes
@@ -68,7 +71,6 @@ _PRELOADED = (("free", "friction"), (0.03,))  # kinds and zones at first
 SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 _VISITED = 0.45  # of the play from an end: nearer than the middle
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
-MOST_RUB = 0.25  # of it at most
 _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an arm
 _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
@@ -91,8 +93,13 @@ def variants(bench: Bench) -> list[Variant]:
         places: dict[bytes, list[int]] = {}
         for name, kg, x, share in () if inside else _crossings(bench, j, span):
             for zone in ZONES:
-                info: dict[str, Any] = {"joint": j, "zone_Nm": zone * span, "crossing": name,
-                                        "tool_kg": kg, "preload_Nm": 0.0}  # fmt: skip
+                info: dict[str, Any] = {
+                    "joint": j,
+                    "zone_Nm": zone * span,
+                    "crossing": name,
+                    "tool_kg": kg,
+                    "preload_Nm": 0.0,
+                }
                 label = f"joint {j + 1} {name}" + (f" tool {kg:g} kg" if share < 1 else "")
                 out += _zone(bench, x, kinds, label, f"{zone:g}", share, info, places)
         out += _preloaded(bench, j, span, places)
@@ -121,7 +128,7 @@ def _crossings(bench: Bench, j: int, span: float) -> list[tuple[str, float, Arra
     out = [
         ("weight", kg, x, 1.0 / len(masses))
         for kg, x in net
-        if _crosses(x, torque)  # one that its weight preloads beyond the load never does
+        if crosses(x, torque)  # one that its weight preloads beyond the load never does
     ]
     if np.abs(plain).max() < 0.5 * span:
         out.append(("load", TOOL_KG, torque, 1.0))
@@ -143,8 +150,14 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
         if abs(preload) < by_tool:
             continue
         for zone in zones:
-            info = {"joint": j, "zone_Nm": zone * span, "crossing": "weight", "tool_kg": TOOL_KG,
-                    "preload_Nm": float(preload), "step_Nm": step}  # fmt: skip
+            info = {
+                "joint": j,
+                "zone_Nm": zone * span,
+                "crossing": "weight",
+                "tool_kg": TOOL_KG,
+                "preload_Nm": float(preload),
+                "step_Nm": step,
+            }
             label = f"joint {j + 1} preload {way * preload / (high - low):.2g}"
             share = _by_preload(bench) / _PRELOADS
             out += _zone(bench, plain + preload, kinds, label, f"{zone:g}", share, info, places)
@@ -157,8 +170,13 @@ def unreached(bench: Bench, variant: Variant) -> float:
     info = variant.info
     if info["kind"] in PLACED:
         return 0.0
-    x = net(bench, int(info["joint"]), str(info["crossing"]), float(info["tool_kg"]),
-            float(info["preload_Nm"]))  # fmt: skip
+    x = net(
+        bench,
+        int(info["joint"]),
+        str(info["crossing"]),
+        float(info["tool_kg"]),
+        float(info["preload_Nm"]),
+    )
     place = Play(bench, x, float(info["zone_Nm"])).place(info["kind"])
     left = [0.5 - float(place.max()), 0.5 + float(place.min())]
     return sum(v for v in left if v < _VISITED or info["kind"] in HELD)
@@ -227,22 +245,43 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
     columns = [bench.add_joint(j, part) for part in (*parts, torque / float(np.ptp(torque)))]
     scales = tuple(s * bench.reach for s in _SHARES)
     info: dict[str, Any] = {
-        "joint": j, "zone_Nm": flanks.zone, "crossing": "load", "tool_kg": TOOL_KG,
-        "preload_Nm": 0.0, "kind": flanks.kind, "flanks": flanks, "span": float(np.ptp(torque)),
-    }  # fmt: skip
+        "joint": j,
+        "zone_Nm": flanks.zone,
+        "crossing": "load",
+        "tool_kg": TOOL_KG,
+        "preload_Nm": 0.0,
+        "kind": flanks.kind,
+        "flanks": flanks,
+        "span": float(np.ptp(torque)),
+    }
     root = np.diag([1.0, FRICTION, 1.0])
     return [
-        variant(WORD, f"joint {j + 1} {flanks.kind}{name}", columns[:k], scales, root[:k, :k],
-                np.eye(k)[0] if flanks.kind == "gap" else _less_rub(k), _PLACED_PRIOR,
-                _least(bench, j, flanks.zone), each=(True, True), **info)
+        variant(
+            WORD,
+            f"joint {j + 1} {flanks.kind}{name}",
+            columns[:k],
+            scales,
+            root[:k, :k],
+            np.eye(k)[0] if flanks.kind == "gap" else less_rub(k),
+            _PLACED_PRIOR,
+            _least(bench, j, flanks.zone),
+            each=(True, True),
+            **info,
+        )
         for k, name in ((2, ""), (3, ", other springs"))
-    ]  # fmt: skip
+    ]
 
 
 def _zone(
-    bench: Bench, x: Array, kinds: tuple[str, ...], label: str, zone: str, prior: float,
-    info: dict[str, Any], places: dict[bytes, list[int]],
-) -> list[Variant]:  # fmt: skip
+    bench: Bench,
+    x: Array,
+    kinds: tuple[str, ...],
+    label: str,
+    zone: str,
+    prior: float,
+    info: dict[str, Any],
+    places: dict[bytes, list[int]],
+) -> list[Variant]:
     """Variants of one zone, per kind, on the net torque x (n,)."""
     scales = SCALES if bench.data.arm else tuple(s * bench.reach for s in _SHARES)
     j, width, out = int(info["joint"]), float(info["zone_Nm"]), []
@@ -261,10 +300,20 @@ def _zone(
         columns += resting if rests else []
         root = np.diag([1.0, FRICTION, *[0.3] * (len(columns) - 2)])
         out.append(
-            variant(WORD, f"{label} {kind} zone {zone}", columns, scales, root,
-                    _less_rub(len(columns)), prior, _least(bench, j, width), each=(True,),
-                    within=_inside(len(columns)), **(info | {"kind": kind, "rests": rests}))
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"{label} {kind} zone {zone}",
+                columns,
+                scales,
+                root,
+                less_rub(len(columns)),
+                prior,
+                _least(bench, j, width),
+                each=(True,),
+                within=within_play(len(columns)),
+                **(info | {"kind": kind, "rests": rests}),
+            )
+        )
     return out
 
 
@@ -279,28 +328,6 @@ def _least(bench: Bench, joint: int, zone: float) -> float:
 
 
 _SOFTER = 2.5  # times
-
-
-def _less_rub(k: int) -> Array:
-    """(k,) of the coefficients, positive where the play is so much larger than the friction beside
-    it: more of it is hysteresis."""
-    out = np.zeros(k)
-    out[:2] = 1.0, -1.0 / MOST_RUB
-    return out
-
-
-def _inside(k: int) -> Array:
-    """(m, k) of the coefficients: a play of that zone rubs as much too much at most as too little;
-    free places, from the third on, are no further off than half of the play, to either side."""
-    rows = [np.eye(k)[0] + np.eye(k)[1] / MOST_RUB]
-    rows += [np.eye(k)[0] + side * np.eye(k)[i] for i in range(2, k) for side in (2.0, -2.0)]
-    return np.array(rows)
-
-
-def _crosses(net: Array, torque: Array) -> bool:
-    """Whether the net torque comes to zero, or near it (weights are known to a few percent)."""
-    margin = 0.05 * float(np.abs(net - torque).max()) + 0.02 * float(np.abs(torque).max())
-    return bool(net.min() < margin and net.max() > -margin)
 
 
 def _floating(bench: Bench, joint: int, loose: Flags, places: dict[bytes, list[int]]) -> list[int]:

@@ -115,17 +115,41 @@ def _elements(
 
 
 def _family(
-    name: str, columns: list[int], times_s: Array, sizes: tuple[float, ...], spectrum: float,
-    pairs: float, info: dict[str, Any],
-) -> list[Variant]:  # fmt: skip
+    name: str,
+    columns: list[int],
+    times_s: Array,
+    sizes: tuple[float, ...],
+    spectrum: float,
+    pairs: float,
+    info: dict[str, Any],
+) -> list[Variant]:
     """The whole spectrum, and each time with its neighbour, of these priors."""
-    out = [variant(WORD, f"{name} spectrum", columns, sizes, smooth_root(len(columns), 0.5),
-                   prior=spectrum, each=True, times_s=times_s, **info)]  # fmt: skip
+    out = [
+        variant(
+            WORD,
+            f"{name} spectrum",
+            columns,
+            sizes,
+            smooth_root(len(columns), 0.5),
+            prior=spectrum,
+            each=True,
+            times_s=times_s,
+            **info,
+        )
+    ]
     for k in range(len(columns) - 1):
         out.append(
-            variant(WORD, f"{name} T {times_s[k]:.3g} s", columns[k : k + 2], sizes,
-                    prior=pairs / (len(columns) - 1), each=True, times_s=times_s[k : k + 2], **info)
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"{name} T {times_s[k]:.3g} s",
+                columns[k : k + 2],
+                sizes,
+                prior=pairs / (len(columns) - 1),
+                each=True,
+                times_s=times_s[k : k + 2],
+                **info,
+            )
+        )
     return out
 
 

@@ -33,13 +33,10 @@ from identification.gap.laws.closer import Word, places
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.friction_law import (
     BY_LOAD,
-    EXPONENTIAL,
     LAWS,
-    ON_TOP,
     SLIPPING,
     by_ratio,
 )
-from identification.gap.laws.interval import Coefficients, Parameter, from_zero
 from identification.gap.laws.law import Laws
 from identification.gap.laws.specimens import with_other_springs
 from identification.gap.model.bench import Bench
@@ -197,7 +194,7 @@ def growing(bench: Bench, found: Variant) -> list[Variant]:
     carries = np.abs(torque + bench.weight(joint))
     top, out = float(carries.max()), []
     reach = bench.reach_of(torque) * np.geomspace(REACHES[0], REACHES[-1], _GROWING)
-    for law in _exponential_laws(bench):
+    for law in friction_law.exponential_laws(bench):
         load, anew = (torque, fresh) if path is None else (path.load, path.fresh)
         z = bristles(load, reach, anew, law.startswith("Bouc-Wen"), weight)
         held = reach * (z if path is None else z[path.kept])
@@ -206,10 +203,20 @@ def growing(bench: Bench, found: Variant) -> list[Variant]:
         for r, states in zip(reach, both, strict=True):
             columns = [bench.add_joint(joint, unit * h) for h in states]
             out.append(
-                variant(WORD, f"{name} {law} {r:.3g} Nm grows", columns, SCALES, each=True,
-                        prior=0.25 / (4 * _GROWING), joint=joint, radius=np.array([r, r]), law=law,
-                        memory=memory, grows_to=top)
-            )  # fmt: skip
+                variant(
+                    WORD,
+                    f"{name} {law} {r:.3g} Nm grows",
+                    columns,
+                    SCALES,
+                    each=True,
+                    prior=0.25 / (4 * _GROWING),
+                    joint=joint,
+                    radius=np.array([r, r]),
+                    law=law,
+                    memory=memory,
+                    grows_to=top,
+                )
+            )
     return out
 
 
@@ -217,9 +224,14 @@ _GROWING = 6  # reaches
 
 
 def _laws(
-    bench: Bench, joint: int, span: float, memory: str, fresh: Flags, path: Path | None,
+    bench: Bench,
+    joint: int,
+    span: float,
+    memory: str,
+    fresh: Flags,
+    path: Path | None,
     weight: Array | None,
-) -> list[Variant]:  # fmt: skip
+) -> list[Variant]:
     """All laws of one joint and memory."""
     name = f"joint {joint + 1}{memory}"
     found = _spectra(bench, joint, name, span, fresh, path, weight)
@@ -231,9 +243,15 @@ def _laws(
 
 
 def _spectra(
-    bench: Bench, joint: int, name: str, span: float, fresh: Flags, path: Path | None,
-    weight: Array | None, strengths: tuple[float, ...] = RADII,
-) -> list[Variant]:  # fmt: skip
+    bench: Bench,
+    joint: int,
+    name: str,
+    span: float,
+    fresh: Flags,
+    path: Path | None,
+    weight: Array | None,
+    strengths: tuple[float, ...] = RADII,
+) -> list[Variant]:
     """The whole spectrum of strengths, which holds back what the spring would deflect; on an arm
     also where the stated spring is that of small loads, which make nothing slip: then every element
     adds its play (Prandtl 1928)."""
@@ -256,27 +274,21 @@ def _spectra(
         columns = [bench.add_joint(joint, unit * state) for state in states.T]
         label = f"{name} spectrum{' that slips' if law == 'Prandtl' else ''}"
         out.append(
-            variant(WORD, label, columns, SCALES, smooth_root(len(columns), 0.6, 0.3), prior=0.25,
-                    each=True, within=_no_knee(bench, torque, reach * radii), joint=joint,
-                    radius=radii, law=law)
-        )  # fmt: skip
+            variant(
+                WORD,
+                label,
+                columns,
+                SCALES,
+                smooth_root(len(columns), 0.6, 0.3),
+                prior=0.25,
+                each=True,
+                within=friction_law.no_knee(bench, torque, reach * radii),
+                joint=joint,
+                radius=radii,
+                law=law,
+            )
+        )
     return out
-
-
-def _no_knee(bench: Bench, torque: Array, slips: Array) -> Array | None:
-    """(1, k): that what slips at torques (k,) has slipped by a good part where the force is first
-    half of its largest, of what it has at the largest torque (n,). Friction acts from the first
-    load on; what holds half the load and then gives way has yielded. Of a specimen that is loaded
-    from one side: to and fro, strokes far beyond the first slip show friction of one strength."""
-    if bench.data.arm or not bench.course.one_sided:
-        return None
-    size, force = np.abs(torque), np.abs(bench.rows.measured_force)
-    half = float(size[int(np.argmax(force >= 0.5 * force.max()))])
-    early, late = (np.maximum(top - slips, 0.0) for top in (half, float(size.max())))
-    return np.asarray(early - _AT_HALF * late)[None, :] / max(float(late.max()), _TINY)
-
-
-_AT_HALF = 0.18  # a spectrum as strong everywhere slips a quarter
 
 
 def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) -> list[Variant]:
@@ -287,36 +299,37 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
     alone = most if bench.imposed else min(_SMALL + bench.course.unloads, most)
     for k in range(alone):
         out.append(
-            variant(WORD, f"{name} r {radius[k] / span:.3g}", columns[k : k + 2], SCALES,
-                    smooth_root(2, 0.7), each=True, within=spectrum.within[:, k : k + 2],
-                    prior=0.25 / alone, joint=joint,
-                    radius=radius[k : k + 2], law="Iwan")
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"{name} r {radius[k] / span:.3g}",
+                columns[k : k + 2],
+                SCALES,
+                smooth_root(2, 0.7),
+                each=True,
+                within=spectrum.within[:, k : k + 2],
+                prior=0.25 / alone,
+                joint=joint,
+                radius=radius[k : k + 2],
+                law="Iwan",
+            )
+        )
     return out
 
 
-def _exponential_laws(bench: Bench) -> tuple[str, ...]:
-    """Of an arm in both conventions, as spectra are; a specimen's friction brings a spring of its
-    own. Friction in proportion to the load can't turn a specimen's answer against its load."""
-    if bench.data.arm:
-        return (*EXPONENTIAL, *SLIPPING)
-    with_load = bench.load * bench.response
-    keeps = with_load.min() >= -_TURNED * with_load.max(initial=0.0)
-    return (*EXPONENTIAL, *BY_LOAD) if keeps else EXPONENTIAL
-
-
-_TURNED = 0.01  # of the largest product of both
-
-
 def _exponential(
-    bench: Bench, joint: int, name: str, reaches: Array, fresh: Flags, path: Path | None,
+    bench: Bench,
+    joint: int,
+    name: str,
+    reaches: Array,
+    fresh: Flags,
+    path: Path | None,
     weight: Array | None,
-) -> list[Variant]:  # fmt: skip
+) -> list[Variant]:
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches (k,) of the range of torque."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
     span, out = bench.reach_of(torque), []
     prior = 0.25 / (len(reaches) - 1) / (2 if bench.data.arm else 1)  # two conventions
-    for law in _exponential_laws(bench):
+    for law in friction_law.exponential_laws(bench):
         by_load, elastic = law in BY_LOAD, law.startswith("Bouc-Wen")
         reach = span * reaches * (NEARER if by_load else 1.0)
         load = torque if path is None else path.load
@@ -330,36 +343,20 @@ def _exponential(
         columns = [bench.add_joint(joint, -bench.sense * c * h) for h in held.T]
         for k in range(len(reach) - 1):
             out.append(
-                variant(WORD, f"{name} {law} {reaches[k]:.3g}", columns[k : k + 2], SCALES,
-                        smooth_root(2, 0.5), prior=prior, each=True, joint=joint,
-                        radius=reach[k : k + 2], law=law)
-            )  # fmt: skip
+                variant(
+                    WORD,
+                    f"{name} {law} {reaches[k]:.3g}",
+                    columns[k : k + 2],
+                    SCALES,
+                    smooth_root(2, 0.5),
+                    prior=prior,
+                    each=True,
+                    joint=joint,
+                    radius=reach[k : k + 2],
+                    law=law,
+                )
+            )
     return out
-
-
-def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
-    """Of the strengths that slip, which takes a load beyond them, and of those near the largest one
-    the less the less they do; of friction in proportion to the load, at the largest one."""
-    radius, joint = np.asarray(v.info["radius"]), int(v.info["joint"])
-    if v.other_springs:
-        found = found.without_line(joint)
-    largest = float(np.abs(bench.torque[:, joint]).max())
-    slips = np.clip((1 - radius / max(largest, _TINY)) / _HARDLY, 0.0, 1.0)
-    law = str(v.info["law"])
-    if law in BY_LOAD:
-        radius = np.full(len(radius), largest)
-    if law == "Iwan":  # what never slips is a spring like the joint's own
-        found = found.on_spring(slips - 1, joint)
-    if law in ON_TOP:  # of all that gives way at large loads, as of the other convention
-        found = found.on_spring(slips, joint)
-    return {
-        "friction": from_zero(found.linear(slips * radius, bench.torque_unit)),
-        "share_through_friction": found.per_spring(slips, joint),
-    }
-
-
-_HARDLY = 0.2  # of the largest load: what slips beyond the rest of it shows less
-_TINY = 1e-300
 
 
 def _look_closer(word: Word) -> list[Variant]:
@@ -376,7 +373,7 @@ def _look_closer(word: Word) -> list[Variant]:
 EFFECT = Effect(
     WORD,
     variants=variants,
-    parameters=_parameters,
+    parameters=friction_law.parameters,
     laws=Laws(friction_law.describe, friction_law.columns),
     lengths=("share_through_friction",),
     finer=_look_closer,

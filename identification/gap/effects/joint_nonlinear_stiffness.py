@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.evidence.engine import NEIGHBOUR
+from identification.gap.laws import elastic_law
 from identification.gap.laws.closer import Word, closing_in
-from identification.gap.laws.curves import above, beyond, hinge
+from identification.gap.laws.curves import above, beyond, from_level_to_level, hinge
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter
-from identification.gap.laws.law import Law, Laws, Term
+from identification.gap.laws.law import Laws
 from identification.gap.model.bench import TOOL_KG, Bench
 from identification.gap.model.variants import Variant, smooth_root, variant
 
@@ -33,8 +33,11 @@ PLACES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of corners; of all of 
 SCALES = (0.05, 0.15, 0.4, 1.0)
 # Of a rig without an arm, where rubber locks and foam buckles and is squeezed flat: close together
 # at both ends of the range, and up to a hundred times stiffer.
-FINE = (0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.86, 0.91,
-        0.95, 0.98)  # fmt: skip
+FINE = (
+    *(0.01, 0.02, 0.035, 0.05, 0.075),
+    *(0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8),
+    *(0.86, 0.91, 0.95, 0.98),
+)
 FINE_SCALES = (0.15, 1.0, 6.0, 40.0)
 ALONG = tuple(k / 24 for k in range(1, 24))  # of all of the range, where it goes both ways
 
@@ -56,24 +59,47 @@ def variants(bench: Bench) -> list[Variant]:
         info: dict[str, Any] = {"joint": j, "torque": top, "hinges": hinges}
         line = bench.add_joint(j, c * x)
         out.append(
-            variant(WORD, f"joint {j + 1} curve", [line, *columns], SCALES, _root(len(hinges)),
-                    positive=False, prior=0.5, kinds=("line", *hinges), **info)
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"joint {j + 1} curve",
+                [line, *columns],
+                SCALES,
+                _root(len(hinges)),
+                positive=False,
+                prior=0.5,
+                kinds=("line", *hinges),
+                **info,
+            )
+        )
         for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
             column = bench.add_joint(j, c * shape)
             out.append(
-                variant(WORD, f"joint {j + 1} {name}", [column], SCALES, positive=False,
-                        prior=0.1, kinds=(name,), **info)
-            )  # fmt: skip
+                variant(
+                    WORD,
+                    f"joint {j + 1} {name}",
+                    [column],
+                    SCALES,
+                    positive=False,
+                    prior=0.1,
+                    kinds=(name,),
+                    **info,
+                )
+            )
         for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
             if np.mean(hinges[k : k + 2]) < _seen_from(bench, j, x):
                 continue
             out.append(
-                variant(WORD, f"joint {j + 1} bend {hinges[k]}", [line, *columns[k : k + 2]],
-                        SCALES,
-                        positive=False, prior=0.2 / (len(PLACES) - 1),
-                        kinds=("line", *hinges[k : k + 2]), **info)
-            )  # fmt: skip
+                variant(
+                    WORD,
+                    f"joint {j + 1} bend {hinges[k]}",
+                    [line, *columns[k : k + 2]],
+                    SCALES,
+                    positive=False,
+                    prior=0.2 / (len(PLACES) - 1),
+                    kinds=("line", *hinges[k : k + 2]),
+                    **info,
+                )
+            )
         if not bench.data.arm and bench.course.once and not bench.course.rests:
             out += _locks(bench, j, line, top) + _level_by_level(bench, j, line, top)
         elif not bench.data.arm and bench.rows.continuous and _came_back(bench):
@@ -98,10 +124,19 @@ def _net(bench: Bench, j: int, line: int) -> list[Variant]:
         columns = [bench.add_joint(j, c * above(torque, weight, b)) for b in places]
         kinds = ("line", *(("above", float(b)) for b in places))
         out.append(
-            variant(WORD, f"joint {j + 1} curve of the net torque", [line, *columns], SCALES,
-                    _root(len(places)), positive=False, prior=0.4, kinds=kinds, tool_kg=TOOL_KG,
-                    **info)
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"joint {j + 1} curve of the net torque",
+                [line, *columns],
+                SCALES,
+                _root(len(places)),
+                positive=False,
+                prior=0.4,
+                kinds=kinds,
+                tool_kg=TOOL_KG,
+                **info,
+            )
+        )
     return out
 
 
@@ -110,9 +145,20 @@ def _odd(bench: Bench, j: int, line: int, kg: float, prior: float) -> Variant:
     most = float(np.abs(torque + hung).max())
     columns = [bench.add_joint(j, c * beyond(torque, hung, b * most)) for b in HINGES]
     kinds = ("line", *(("beyond", b * most) for b in HINGES))
-    return variant(WORD, f"joint {j + 1} odd curve, tool {kg:.3g} kg", [line, *columns], SCALES,
-                   _root(), positive=False, prior=prior, kinds=kinds, tool_kg=kg, joint=j,
-                   torque=float(np.abs(torque).max()), line=line)  # fmt: skip
+    return variant(
+        WORD,
+        f"joint {j + 1} odd curve, tool {kg:.3g} kg",
+        [line, *columns],
+        SCALES,
+        _root(),
+        positive=False,
+        prior=prior,
+        kinds=kinds,
+        tool_kg=kg,
+        joint=j,
+        torque=float(np.abs(torque).max()),
+        line=line,
+    )
 
 
 def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
@@ -139,10 +185,20 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
             continue
         columns = [found.columns[0], bench.add_joint(j, c * hinge(x, b))]
         out.append(
-            variant(WORD, f"joint {j + 1} corner {b:.3g}", columns, SCALES, np.eye(2),
-                    positive=False, prior=share, kinds=("line", b), joint=j, torque=top,
-                    hinges=(b,))
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"joint {j + 1} corner {b:.3g}",
+                columns,
+                SCALES,
+                np.eye(2),
+                positive=False,
+                prior=share,
+                kinds=("line", b),
+                joint=j,
+                torque=top,
+                hinges=(b,),
+            )
+        )
     return out
 
 
@@ -204,20 +260,20 @@ def _level_by_level(bench: Bench, j: int, line: int, top: float) -> list[Variant
     x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
     places = np.unique(np.append(np.abs(x), 0.0))
     columns = [bench.add_joint(j, c * hinge(x, b)) for b in places[1:-1]]
-    return [variant(WORD, f"joint {j + 1} curve from level to level", [line, *columns], SCALES,
-                    _from_level_to_level(places), positive=False, prior=0.5,
-                    kinds=("line", *places[1:-1].tolist()), joint=j, torque=top)]  # fmt: skip
-
-
-def _from_level_to_level(places: Array) -> Array:
-    """Root of the prior of a line and hinges between places (k + 1,), so that the curve at these
-    is as rough as the imperfection of laws is (`engine.alike`), none at the first of them."""
-    near = np.exp(-np.abs(places[:, None] - places) / NEIGHBOUR)
-    from_first = near - near[:1] - near[:, :1] + 1.0
-    covariance = from_first[1:, 1:] + 1e-9 * np.eye(len(places) - 1)
-    slopes = np.diff(np.eye(len(places)), axis=0)[:, 1:] / np.diff(places)[:, None]
-    bends = np.diff(slopes, axis=0, prepend=0.0)
-    return np.asarray(bends @ np.linalg.cholesky(covariance))
+    return [
+        variant(
+            WORD,
+            f"joint {j + 1} curve from level to level",
+            [line, *columns],
+            SCALES,
+            from_level_to_level(places),
+            positive=False,
+            prior=0.5,
+            kinds=("line", *places[1:-1].tolist()),
+            joint=j,
+            torque=top,
+        )
+    ]
 
 
 def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
@@ -227,17 +283,37 @@ def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
     columns = [bench.add_joint(j, c * above(x, bench.weight(j), b)) for b in places]
     kinds = ("line", *(("above", float(b)) for b in places))
     scales = SCALES if arm else FINE_SCALES
-    return variant(WORD, f"joint {j + 1} uneven curve", [line, *columns], scales,
-                   _root(len(places)), positive=False, prior=0.4, kinds=kinds, tool_kg=TOOL_KG,
-                   joint=j, torque=top)  # fmt: skip
+    return variant(
+        WORD,
+        f"joint {j + 1} uneven curve",
+        [line, *columns],
+        scales,
+        _root(len(places)),
+        positive=False,
+        prior=0.4,
+        kinds=kinds,
+        tool_kg=TOOL_KG,
+        joint=j,
+        torque=top,
+    )
 
 
 def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
     """A curve of FINE hinges."""
     places, columns = _finely(bench, j, top)
-    return variant(WORD, f"joint {j + 1} fine curve", [line, *columns], FINE_SCALES,
-                   _root(len(places)), positive=False, prior=0.5, kinds=("line", *places),
-                   joint=j, torque=top, hinges=places)  # fmt: skip
+    return variant(
+        WORD,
+        f"joint {j + 1} fine curve",
+        [line, *columns],
+        FINE_SCALES,
+        _root(len(places)),
+        positive=False,
+        prior=0.5,
+        kinds=("line", *places),
+        joint=j,
+        torque=top,
+        hinges=places,
+    )
 
 
 def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
@@ -258,11 +334,21 @@ def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
         root[0, 0], root[1:, 1:3] = 1.0, both
         powers = -bench.sense * np.column_stack([np.zeros(2), np.linalg.pinv(both)])
         out.append(
-            variant(WORD, f"joint {j + 1} {name}", [line, *columns], FINE_SCALES, root,
-                    positive=powers.sum(axis=0), within=powers,
-                    prior=(0.25 if "stops" in name else 0.5) / (len(STEEPER) - 1),
-                    kinds=("line", *places), joint=j, torque=top, hinges=places)
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"joint {j + 1} {name}",
+                [line, *columns],
+                FINE_SCALES,
+                root,
+                positive=powers.sum(axis=0),
+                within=powers,
+                prior=(0.25 if "stops" in name else 0.5) / (len(STEEPER) - 1),
+                kinds=("line", *places),
+                joint=j,
+                torque=top,
+                hinges=places,
+            )
+        )
     return out
 
 
@@ -286,50 +372,6 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     return {"change_of_compliance_over_range": found.linear(change, "1", bench.sense)}
 
 
-def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
-    """Terms: a line, hinges `beyond` a torque or above a net one, powers; `measured_to`: where they
-    were seen."""
-    joint, top = int(v.info["joint"]), float(v.info["torque"])
-    c = float(bench.compliance[joint])
-    terms, unit = [], []
-    for kind in v.info["kinds"]:
-        if kind == "line":
-            terms.append(Term("compliance"))
-        elif isinstance(kind, tuple):
-            terms.append(Term("compliance", {f"net_{kind[0]}": kind[1]}))
-        elif isinstance(kind, float):
-            terms.append(Term("compliance", {"beyond": kind * top}))
-        else:
-            terms.append(Term(f"compliance_{kind}"))
-        unit.append(c / top ** (_POWERS.get(kind, 1) - 1))
-    constants = {"joint": joint, "measured_to": top}
-    if "tool_kg" in v.info:
-        constants["tool"] = float(v.info["tool_kg"])
-    return Law(constants, tuple(terms)), np.array(unit, dtype=float)
-
-
-def _columns(bench: Bench, law: Law) -> list[Array]:
-    """Deflection of the joint over its torque."""
-    joint = law.constants["joint"]
-    x, weight = bench.true_torque[:, joint], bench.weight(joint, law.constants.get("tool", TOOL_KG))
-    shapes = {
-        "compliance_quadratic": x * np.abs(x),
-        "compliance_cubic": x**3,
-        "compliance_even": x**2,
-    }
-    out = []
-    for t in law.terms:
-        bent = hinge(x, t.shape.get("beyond", 0.0))
-        for key, bend in (("net_above", above), ("net_beyond", beyond)):
-            if key in t.shape:
-                bent = bend(x, weight, t.shape[key])
-        out.append(bench.joint_column(joint, shapes.get(t.coefficient, bent)))
-    return out
-
-
-_POWERS = {"quadratic": 2, "cubic": 3, "even": 2}
-
-
 def _look_closer(word: Word) -> list[Variant]:
     odd = [s for s in word.alone if "line" in s.variant.info]
     bends = [s for s in word.alone if " bend " in s.variant.label]
@@ -340,7 +382,7 @@ EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
-    laws=Laws(_describe, _columns),
+    laws=Laws(elastic_law.describe, elastic_law.columns),
     lengths=("change_of_compliance_over_range",),
     finer=_look_closer,
 )

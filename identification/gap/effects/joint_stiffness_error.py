@@ -43,27 +43,50 @@ def variants(bench: Bench) -> list[Variant]:
         # a spring's compliance stays positive: a tenth of what is simulated at least
         least, sign = (0.0, False) if bench.data.arm else (STIFFEST, True)
         out.append(
-            variant(WORD, f"joint {j + 1}", [column], scales, positive=sign, least=least, joint=j,
-                    joints=[j])
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"joint {j + 1}",
+                [column],
+                scales,
+                positive=sign,
+                least=least,
+                joint=j,
+                joints=[j],
+            )
+        )
     if len(columns) > 1:
         scales = tuple(max(2 * float(relative.max()), 0.2) * f for f in SCALES)
         out.append(
-            variant(WORD, "all joints", columns, scales, positive=False,
-                    joints=bench.moving_joints())
-        )  # fmt: skip
+            variant(
+                WORD, "all joints", columns, scales, positive=False, joints=bench.moving_joints()
+            )
+        )
     for a, b in combinations(range(len(columns)), 2) if len(columns) > 2 else ():
         pair = [bench.moving_joints()[i] for i in (a, b)]
         out.append(
-            variant(WORD, f"joints {pair[0] + 1} and {pair[1] + 1}", [columns[a], columns[b]],
-                    scales, positive=False, prior=PAIRS / comb(len(columns), 2), joints=pair)
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"joints {pair[0] + 1} and {pair[1] + 1}",
+                [columns[a], columns[b]],
+                scales,
+                positive=False,
+                prior=PAIRS / comb(len(columns), 2),
+                joints=pair,
+            )
+        )
     for k, j in enumerate(bench.moving_joints() if len(columns) > 2 else ()):
         rest = [i for i in bench.moving_joints() if i != j]
         out.append(
-            variant(WORD, f"all joints but {j + 1}", columns[:k] + columns[k + 1 :], scales,
-                    positive=False, prior=0.5 / len(columns), joints=rest)
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"all joints but {j + 1}",
+                columns[:k] + columns[k + 1 :],
+                scales,
+                positive=False,
+                prior=0.5 / len(columns),
+                joints=rest,
+            )
+        )
     return out
 
 

@@ -95,8 +95,16 @@ def _under_weight(
         fresh = fresh_of(bench, memory)
         # what a controller takes back it had clamped: no metal that flows back
         kept = flowing_back(bench, load, column, top, fresh) if memory == UNDER_WEIGHT else {}
-        info = {"joint": joint, "memory": memory, "flow_s": 0.0, "load": load, "column": column,
-                "top": top, "back": kept, "weight": weight}  # fmt: skip
+        info = {
+            "joint": joint,
+            "memory": memory,
+            "flow_s": 0.0,
+            "load": load,
+            "column": column,
+            "top": top,
+            "back": kept,
+            "weight": weight,
+        }
         states = bench.plays(load, radius, fresh, weight)
         label = f"joint {joint + 1}{memory}"
         out += knees(bench, WORD, label, [column(s) for s in states.T], radius, info)

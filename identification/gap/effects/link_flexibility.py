@@ -55,14 +55,32 @@ def _placed(bench: Bench, links: Array, placed: str) -> list[Variant]:
     ]
     where = "" if placed == PLACED[0] else f" {placed}"
     out = [
-        variant(WORD, f"segment {k + 1}{where}", columns[each * k : each * (k + 1)], SCALES, root,
-                each=True, segments=[k], placed=placed)
+        variant(
+            WORD,
+            f"segment {k + 1}{where}",
+            columns[each * k : each * (k + 1)],
+            SCALES,
+            root,
+            each=True,
+            segments=[k],
+            placed=placed,
+        )
         for k in range(count)
-    ]  # fmt: skip
+    ]
     if count > 1:
         both = np.kron(np.eye(count), root).astype(float)
-        out.append(variant(WORD, f"both arms{where}", columns, SCALES, both, each=True,
-                           segments=list(range(count)), placed=placed))  # fmt: skip
+        out.append(
+            variant(
+                WORD,
+                f"both arms{where}",
+                columns,
+                SCALES,
+                both,
+                each=True,
+                segments=list(range(count)),
+                placed=placed,
+            )
+        )
     return out
 
 

@@ -66,14 +66,21 @@ def variants(bench: Bench) -> list[Variant]:
     if len(groups) > 1:
         groups.append((list(known), "all directions", _ALL))
     out = [
-        variant(WORD, label + each[0].label,
-                [c for k in each for c in k.columns] + _given(bench, names, each), SCALES,
-                positive=False, prior=prior * each[0].share, directions=names,
-                shapes=[k.shapes for k in each], read=[k.read for k in each],
-                shown=max(slants[name] for name in names) / MOST_CROSSTALK)
+        variant(
+            WORD,
+            label + each[0].label,
+            [c for k in each for c in k.columns] + _given(bench, names, each),
+            SCALES,
+            positive=False,
+            prior=prior * each[0].share,
+            directions=names,
+            shapes=[k.shapes for k in each],
+            read=[k.read for k in each],
+            shown=max(slants[name] for name in names) / MOST_CROSSTALK,
+        )
         for names, label, prior in groups
         for each in zip(*(known[name] for name in names), strict=True)
-    ]  # fmt: skip
+    ]
     out += _each_pose(bench)
     return out + _each_run(bench, {name: kinds[0] for name, kinds in known.items()})
 
@@ -86,18 +93,28 @@ def _each_pose(bench: Bench) -> list[Variant]:
     shown = rows.tangential is not None or bench.has_q
     if not shown or len({s.direction for s in setups}) == len(setups):  # no direction comes again
         return []
-    tops = [float(np.abs(bench.load[rows.setup == k]).max(initial=0.0)) or 1.0
-            for k in range(len(setups))]  # fmt: skip
+    tops = [
+        float(np.abs(bench.load[rows.setup == k]).max(initial=0.0)) or 1.0
+        for k in range(len(setups))
+    ]
     out = []
     for label, powers, share in (("", (1,), 1.0), (", turning", (1, 2, 3), 0.7)):
         shapes = [tuple(Shape(p, top) for p in powers) for top in tops]
         columns = [_in_pool(bench, each, rows.setup == k) for k, each in enumerate(shapes)]
         out.append(
-            variant(WORD, f"each pose{label}", [c for mine in columns for c in mine], SCALES,
-                    positive=False, prior=_ALL * _EACH_POSE_SHARE * share,
-                    directions=[s.direction for s in setups], poses=[s.pose for s in setups],
-                    shapes=shapes, read=[()] * len(setups))
-        )  # fmt: skip
+            variant(
+                WORD,
+                f"each pose{label}",
+                [c for mine in columns for c in mine],
+                SCALES,
+                positive=False,
+                prior=_ALL * _EACH_POSE_SHARE * share,
+                directions=[s.direction for s in setups],
+                poses=[s.pose for s in setups],
+                shapes=shapes,
+                read=[()] * len(setups),
+            )
+        )
     return out
 
 
@@ -114,9 +131,21 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
         [] if bench.data.arm else [bench.add(c) for name in straight for c in _as_read(bench, name)]
     )
     sd = [1.0] * len(common) + [_BETWEEN_RUNS] * len(own) + [1.0] * len(given)
-    return [variant(WORD, "each run", [*common, *own, *given], SCALES, np.diag(sd), positive=False,
-                    prior=_ALL * _EACH_RUN_SHARE, directions=list(straight), shapes=shapes,
-                    read=[()] * len(shapes), tips=runs.tolist())]  # fmt: skip
+    return [
+        variant(
+            WORD,
+            "each run",
+            [*common, *own, *given],
+            SCALES,
+            np.diag(sd),
+            positive=False,
+            prior=_ALL * _EACH_RUN_SHARE,
+            directions=list(straight),
+            shapes=shapes,
+            read=[()] * len(shapes),
+            tips=runs.tolist(),
+        )
+    ]
 
 
 def _as_read(bench: Bench, direction: str) -> list[Array]:

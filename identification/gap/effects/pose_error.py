@@ -110,18 +110,31 @@ def refined(bench: Bench, found: Variant, estimate: Callable[[Variant], Estimate
             columns = secants(bench, offset, angles, compliance, reads, pose, read)
             used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
         out = replace(
-            found, label=f"{found.label}, as they are", prior=3.0,
+            found,
+            label=f"{found.label}, as they are",
+            prior=3.0,
             columns=tuple(bench.add(c) for c in used),
-            info={**found.info, "offset_m": offset, "angles_rad": angles, "turn_rad": turn,
-                  "compliance": compliance, "reads": reads},
-        )  # fmt: skip
+            info={
+                **found.info,
+                "offset_m": offset,
+                "angles_rad": angles,
+                "turn_rad": turn,
+                "compliance": compliance,
+                "reads": reads,
+            },
+        )
     return [out]
 
 
 def secants(
-    bench: Bench, offset: Array, angles: Array, compliance: Array, reads: float = 1.0,
-    pose: str = "", read: bool = True,
-) -> list[Array]:  # fmt: skip
+    bench: Bench,
+    offset: Array,
+    angles: Array,
+    compliance: Array,
+    reads: float = 1.0,
+    pose: str = "",
+    read: bool = True,
+) -> list[Array]:
     """Stacked columns per metre of tool offset (3) and radian of each joint that stands elsewhere.
 
     With levers l + dl the target moves by `c ((l + dl)^2 - l^2) F = 2 c (l + dl/2) dl F`: linear in
@@ -177,16 +190,32 @@ def _through(bench: Bench, change: Array, middle: Array, compliance: Array) -> l
 
 
 def _variant(
-    label: str, columns: list[int], sizes: list[float], prior: float, kind: str, pose: str = "",
+    label: str,
+    columns: list[int],
+    sizes: list[float],
+    prior: float,
+    kind: str,
+    pose: str = "",
     read: bool = True,
-) -> Variant:  # fmt: skip
+) -> Variant:
     """pose: the only one in which it is so; "" all. read: whether readings show where joints
     stand."""
     return variant(
-        WORD, label, columns, (1.0,), np.diag(sizes), positive=False, prior=prior, kind=kind,
-        offset_m=np.zeros(3), angles_rad=np.zeros(6), turn_rad=np.zeros(3), reads=1.0,
-        pose=pose, read=read,
-    )  # fmt: skip
+        WORD,
+        label,
+        columns,
+        (1.0,),
+        np.diag(sizes),
+        positive=False,
+        prior=prior,
+        kind=kind,
+        offset_m=np.zeros(3),
+        angles_rad=np.zeros(6),
+        turn_rad=np.zeros(3),
+        reads=1.0,
+        pose=pose,
+        read=read,
+    )
 
 
 def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:

@@ -48,19 +48,31 @@ def variants(bench: Bench) -> list[Variant]:
     out = []
     for label, path in paths(bench).items():
         columns = [bench.add(bench.outside_column(m * path)) for m in masks]
-        out.append(variant(WORD, label, columns, _scales(bench), positive=False, path=label,
-                           names=named))  # fmt: skip
+        out.append(
+            variant(WORD, label, columns, _scales(bench), positive=False, path=label, names=named)
+        )
     for sensor, path in _temperatures(bench).items():
         columns = [bench.add(bench.outside_column(m * path)) for m in masks]
-        out.append(variant(WORD, _called(sensor), columns, _scales(bench, path), positive=False,
-                           path=TEMPERATURE, names=named, sensor=sensor))  # fmt: skip
+        out.append(
+            variant(
+                WORD,
+                _called(sensor),
+                columns,
+                _scales(bench, path),
+                positive=False,
+                path=TEMPERATURE,
+                names=named,
+                sensor=sensor,
+            )
+        )
     out += _late(bench)
     scales, free = _scales(bench), free_paths(bench)
     if not free:
         return out
     every = [bench.add(bench.outside_column(m * path)) for m in masks for path in rates(bench)]
-    out.append(variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates",
-                       names=named))  # fmt: skip
+    out.append(
+        variant(WORD, "rates", every, scales, positive=False, prior=2.0, path="rates", names=named)
+    )
     for label, way in free.items():
         hats = free_path(bench, way.pieces)
         columns = [bench.add(bench.outside_column(m * hat)) for m in masks for hat in hats.T]
@@ -95,12 +107,25 @@ def _late(bench: Bench) -> list[Variant]:
     for sensor, path in _temperatures(bench).items():
         ways = followed(path, bench.rows.session, lags)
         for k in range(len(lags) - 1):
-            columns = [bench.add(bench.outside_column(m * way))
-                       for m in masks for way in ways[:, k : k + 2].T]  # fmt: skip
-            out.append(variant(WORD, f"{_called(sensor)} late {lags[k]:.3g} s", columns,
-                               _scales(bench, path), positive=False, prior=1 / (len(lags) - 1),
-                               path=TEMPERATURE, names=named, sensor=sensor,
-                               lags_s=lags[k : k + 2]))  # fmt: skip
+            columns = [
+                bench.add(bench.outside_column(m * way))
+                for m in masks
+                for way in ways[:, k : k + 2].T
+            ]
+            out.append(
+                variant(
+                    WORD,
+                    f"{_called(sensor)} late {lags[k]:.3g} s",
+                    columns,
+                    _scales(bench, path),
+                    positive=False,
+                    prior=1 / (len(lags) - 1),
+                    path=TEMPERATURE,
+                    names=named,
+                    sensor=sensor,
+                    lags_s=lags[k : k + 2],
+                )
+            )
     return out
 
 

@@ -95,12 +95,30 @@ def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
         column = bench.add(change)
         pair += [column] if kind in KINDS[:2] else []
         info: dict[str, Any] = {"lag_s": lag, "kind": kind, "channel": channel}
-        out.append(variant(WORD, f"{channel} {kind} {lag:.3g} s", [column], (0.5, 1.0),
-                           prior=likely, least=LEAST, **info))  # fmt: skip
+        out.append(
+            variant(
+                WORD,
+                f"{channel} {kind} {lag:.3g} s",
+                [column],
+                (0.5, 1.0),
+                prior=likely,
+                least=LEAST,
+                **info,
+            )
+        )
     if len(pair) > 1:
         info = {"lag_s": lag, "kind": "window", "channel": channel}
-        out.append(variant(WORD, f"{channel} window {lag:.3g} s", pair, (0.5,),
-                           prior=0.5 * likely, least=LEAST, **info))  # fmt: skip
+        out.append(
+            variant(
+                WORD,
+                f"{channel} window {lag:.3g} s",
+                pair,
+                (0.5,),
+                prior=0.5 * likely,
+                least=LEAST,
+                **info,
+            )
+        )
     return out
 
 
@@ -248,8 +266,9 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     a sample is not seen at all), and no coefficient tells what kind it is: the effect as fitted
     is read as the lag of every kind that does the same, each the more the closer it comes."""
     n, info, w = bench.rows.n, v.info, found.w
-    does = sum((much * bench.columns[c][:n] for much, c in zip(w, v.columns, strict=True)),
-               np.zeros(n))  # fmt: skip
+    does = sum(
+        (much * bench.columns[c][:n] for much, c in zip(w, v.columns, strict=True)), np.zeros(n)
+    )
     total = found.linear(np.ones(len(w)), "1")
     relative = total.sd / max(abs(total.value), 1e-6)
     lags, misses, spread = np.zeros((3, len(KINDS)))

@@ -34,13 +34,22 @@ def variants(bench: Bench) -> list[Variant]:
             shifted.append(r)
             jump = bench.add(bench.outside_column((mine & (rows.run >= r)).astype(float)))
             shifts.append(bench.add(bench.outside_column((rows.run == r).astype(float))))
-            out.append(variant(WORD, f"jump before run {r + 1}", [jump], scales, positive=False,
-                               runs=[r]))  # fmt: skip
+            out.append(
+                variant(WORD, f"jump before run {r + 1}", [jump], scales, positive=False, runs=[r])
+            )
     if len(shifts) > 1:
         out.append(
-            variant(WORD, "every run", shifts, scales, positive=False, prior=float(len(out)),
-                    runs=[], shifts=shifted)
-        )  # fmt: skip
+            variant(
+                WORD,
+                "every run",
+                shifts,
+                scales,
+                positive=False,
+                prior=float(len(out)),
+                runs=[],
+                shifts=shifted,
+            )
+        )
     return out
 
 

@@ -1,4 +1,4 @@
-"""Cholesky factors of what an evidence is made of."""
+"""Factors of what an evidence is made of, and what columns span."""
 
 from __future__ import annotations
 
@@ -20,3 +20,14 @@ def factor_of(inner: Array) -> Array:
 
 
 _ROUNDING = 1e-13  # of the largest eigenvalue: what is below that a factor can't tell from nothing
+
+
+def span_of(columns: Array) -> Array:
+    """(n, r) orthonormal basis of what columns (n, k) span: some say the same, and what rounding
+    leaves of those is no direction."""
+    size = np.linalg.norm(columns, axis=0)
+    basis, values, _ = np.linalg.svd(columns / np.where(size > 0, size, 1.0), full_matrices=False)
+    return basis[:, values > _SAME * values[0]]
+
+
+_SAME = 1e-9  # of the largest singular value: what adds less to a span is there already

@@ -222,9 +222,12 @@ def _add(out: list[Array], mine: Some, other: Some, products: list[Array]) -> No
 
 
 def _add_squares(
-    out: Array, some: Some, columns: NDArray[np.intp], rows: slice = slice(None),
+    out: Array,
+    some: Some,
+    columns: NDArray[np.intp],
+    rows: slice = slice(None),
     weight: Array | float = 1.0,
-) -> None:  # fmt: skip
+) -> None:
     """Adds weighted products over some rows, where columns (v, k) are there."""
     at = some.at[columns]
     mine = np.flatnonzero(at.any(axis=1))

@@ -150,11 +150,13 @@ class EvidenceTable:
     def _gram(self, level: NoiseLevel, which: Ints, root: Array) -> Array:
         """Products (w, k, k) of unit coefficients of some variants."""
         ends = pairwise(np.searchsorted(which, self._edges))
-        part = np.concatenate([
-            stack.at(level)[which[a:b] - start]
-            for stack, start, (a, b) in zip(self._stacks, self._edges[:-1], ends, strict=True)
-            if a < b
-        ])  # fmt: skip
+        part = np.concatenate(
+            [
+                stack.at(level)[which[a:b] - start]
+                for stack, start, (a, b) in zip(self._stacks, self._edges[:-1], ends, strict=True)
+                if a < b
+            ]
+        )
         if len(level.taken):
             gone = level.taken[:, self._columns[which]].transpose(1, 0, 2)  # (w, r, k)
             part -= np.swapaxes(gone, 1, 2) @ gone

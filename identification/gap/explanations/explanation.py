@@ -58,8 +58,11 @@ class Explanation:
         """With other sizes (rms m) of its effects, the largest first."""
         each = list(sizes)
         order = _order(self.parts, each)
-        return replace(self, parts=tuple(self.parts[i] for i in order),
-                       sizes=tuple(float(each[i]) for i in order))  # fmt: skip
+        return replace(
+            self,
+            parts=tuple(self.parts[i] for i in order),
+            sizes=tuple(float(each[i]) for i in order),
+        )
 
     @property
     def good(self) -> bool:

@@ -156,9 +156,11 @@ TAKES_MORE = 90.0
 
 
 def _simpler(
-    explanation: Explanation, ranked: Sequence[Explanation], kept: Mapping[frozenset[str], float],
+    explanation: Explanation,
+    ranked: Sequence[Explanation],
+    kept: Mapping[frozenset[str], float],
     arm: bool,
-) -> Explanation | None:  # fmt: skip
+) -> Explanation | None:
     """With an effect less, where that explains nearly as much: of three effects two; of an arm's
     two the one."""
     e, many = explanation, len(explanation.words)
@@ -248,9 +250,11 @@ _SHARES = np.exp(-0.5 * _DEVIATES**2) / np.exp(-0.5 * _DEVIATES**2).sum()
 
 
 def _heir(
-    explanation: Explanation, ranked: Sequence[Explanation],
-    kept: Mapping[frozenset[str], float], noise: float,
-) -> str:  # fmt: skip
+    explanation: Explanation,
+    ranked: Sequence[Explanation],
+    kept: Mapping[frozenset[str], float],
+    noise: float,
+) -> str:
     """Who gets the weight of an explanation that leaves too much for its number of effects: the
     best one with fewer of the same effects that explains enough for itself, else unknown."""
     for e in ranked:

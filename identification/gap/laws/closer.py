@@ -68,9 +68,11 @@ def _lead(word: Word) -> float:
 
 
 def closing_in(
-    word: Word, refined: Callable[..., list[Variant]], starts: list[Scored],
+    word: Word,
+    refined: Callable[..., list[Variant]],
+    starts: list[Scored],
     closer: tuple[float, ...] = (_CLOSE,),
-) -> list[Variant]:  # fmt: skip
+) -> list[Variant]:
     """Finer shapes about those that were found, and finer ones still about the best of these. What
     is best moves along narrow valleys (a zone is as wide as the crossing is far): every look but
     the closest is moved after it until it stays, and the last one is kept. What was seen to be far

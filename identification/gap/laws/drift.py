@@ -187,8 +187,10 @@ def free_paths(bench: Bench) -> dict[str, FreePath]:
         return {}
     if not bench.rows.continuous:
         most = _resting_pieces(bench) if np.any(waited(bench)) else 0
-        return {label: FreePath(max(pieces, most * (label == WINDING)))
-                for label, pieces in PIECES.items()}  # fmt: skip
+        return {
+            label: FreePath(max(pieces, most * (label == WINDING)))
+            for label, pieces in PIECES.items()
+        }
     most = _resting_pieces(bench) if bench.course.rests else LONG_PIECES
     pieces = min(3 * (bench.course.passes - 3), most)
     if pieces < LEAST_PIECES:
@@ -209,12 +211,28 @@ def free_path(bench: Bench, pieces: int) -> Array:
 
 
 def free_variant(
-    word: str, label: str, path: FreePath, columns: list[int], scales: tuple[float, ...],
-    names: tuple[str, ...], prior: float = 2.0,
-) -> Variant:  # fmt: skip
+    word: str,
+    label: str,
+    path: FreePath,
+    columns: list[int],
+    scales: tuple[float, ...],
+    names: tuple[str, ...],
+    prior: float = 2.0,
+) -> Variant:
     """Drifts along such a path each, called names; columns: path by path."""
-    return variant(word, label, columns, scales, path.root(len(names)), positive=False, prior=prior,
-                   path="free", names=names, pieces=path.pieces, steady=path.steady)  # fmt: skip
+    return variant(
+        word,
+        label,
+        columns,
+        scales,
+        path.root(len(names)),
+        positive=False,
+        prior=prior,
+        path="free",
+        names=names,
+        pieces=path.pieces,
+        steady=path.steady,
+    )
 
 
 def path_root(pieces: int) -> Array:

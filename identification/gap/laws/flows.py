@@ -72,8 +72,10 @@ def make(bench: Bench, flows: Sequence[Flow]) -> None:
             np.repeat(np.column_stack([f.load for f in many.values()]), size, axis=1),
             np.concatenate([f.radius for f in many.values()]),
             np.repeat([f.time for f in many.values()], size),
-            bench.rows, first.fresh, first.weight,
+            bench.rows,
+            first.fresh,
+            first.weight,
             np.repeat([f.square for f in many.values()], size),
-        )  # fmt: skip
+        )
         parts = np.split(every, np.cumsum(size)[:-1], axis=1)
         bench.flows.update(zip(many, parts, strict=True))

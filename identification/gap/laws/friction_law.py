@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.arrays import Array
+from identification.gap.laws.interval import Coefficients, Parameter, from_zero
 from identification.gap.laws.law import (
     ACROSS,
     ANEW,
@@ -29,8 +30,18 @@ SLIPPING = tuple(f"{law} that slips" for law in EXPONENTIAL)
 LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
 ON_TOP = ("Prandtl", *SLIPPING)
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)
-_MEMORY = {"": KEPT, "worked in": WORKED, "rested": LOST, UNDER_WEIGHT.strip(): HUNG,
-           SET_UP_ANEW.strip(): ANEW, LASTING.strip(): ACROSS}  # fmt: skip
+_AT_HALF = 0.18  # a spectrum as strong everywhere slips a quarter
+_TURNED = 0.01  # of the largest product of both
+_HARDLY = 0.2  # of the largest load: what slips beyond the rest of it shows less
+_TINY = 1e-300
+_MEMORY = {
+    "": KEPT,
+    "worked in": WORKED,
+    "rested": LOST,
+    UNDER_WEIGHT.strip(): HUNG,
+    SET_UP_ANEW.strip(): ANEW,
+    LASTING.strip(): ACROSS,
+}
 
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
@@ -102,3 +113,47 @@ def by_ratio(load: Array, span: float) -> Array:
 
 
 _NONE = 0.05  # of the range: loads below that are as good as none
+
+
+def no_knee(bench: Bench, torque: Array, slips: Array) -> Array | None:
+    """(1, k): that what slips at torques (k,) has slipped by a good part where the force is first
+    half of its largest, of what it has at the largest torque (n,). Friction acts from the first
+    load on; what holds half the load and then gives way has yielded. Of a specimen that is loaded
+    from one side: to and fro, strokes far beyond the first slip show friction of one strength."""
+    if bench.data.arm or not bench.course.one_sided:
+        return None
+    size, force = np.abs(torque), np.abs(bench.rows.measured_force)
+    half = float(size[int(np.argmax(force >= 0.5 * force.max()))])
+    early, late = (np.maximum(top - slips, 0.0) for top in (half, float(size.max())))
+    return np.asarray(early - _AT_HALF * late)[None, :] / max(float(late.max()), _TINY)
+
+
+def exponential_laws(bench: Bench) -> tuple[str, ...]:
+    """Of an arm in both conventions, as spectra are; a specimen's friction brings a spring of its
+    own. Friction in proportion to the load can't turn a specimen's answer against its load."""
+    if bench.data.arm:
+        return (*EXPONENTIAL, *SLIPPING)
+    with_load = bench.load * bench.response
+    keeps = with_load.min() >= -_TURNED * with_load.max(initial=0.0)
+    return (*EXPONENTIAL, *BY_LOAD) if keeps else EXPONENTIAL
+
+
+def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
+    """Of the strengths that slip, which takes a load beyond them, and of those near the largest one
+    the less the less they do; of friction in proportion to the load, at the largest one."""
+    radius, joint = np.asarray(v.info["radius"]), int(v.info["joint"])
+    if v.other_springs:
+        found = found.without_line(joint)
+    largest = float(np.abs(bench.torque[:, joint]).max())
+    slips = np.clip((1 - radius / max(largest, _TINY)) / _HARDLY, 0.0, 1.0)
+    law = str(v.info["law"])
+    if law in BY_LOAD:
+        radius = np.full(len(radius), largest)
+    if law == "Iwan":  # what never slips is a spring like the joint's own
+        found = found.on_spring(slips - 1, joint)
+    if law in ON_TOP:  # of all that gives way at large loads, as of the other convention
+        found = found.on_spring(slips, joint)
+    return {
+        "friction": from_zero(found.linear(slips * radius, bench.torque_unit)),
+        "share_through_friction": found.per_spring(slips, joint),
+    }

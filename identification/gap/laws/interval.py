@@ -111,9 +111,10 @@ class Coefficients:
         value = s.value.get(joint, 0.0) + float(functional @ self.w)
         variance = s.variance.get(joint, 0.0) + float(functional @ (moves + 2 * cross))
         softer = Softer(
-            {**s.value, joint: value}, {**s.variance, joint: variance},
+            {**s.value, joint: value},
+            {**s.variance, joint: variance},
             {**s.cross, joint: cross + moves},
-        )  # fmt: skip
+        )
         return replace(self, softer=softer)
 
     def of_spring(self, joint: int) -> tuple[float, float]:

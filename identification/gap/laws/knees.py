@@ -30,8 +30,14 @@ from identification.gap.recording.turns import way_back
 
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 # A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
-_LIKELY = {"": 1.0, LASTING: 0.5, SET_UP_ANEW: 0.5, TAKEN_BACK: 0.3, UNDER_WEIGHT: 1.0,
-           BACK_UNDER_WEIGHT: 0.3}  # fmt: skip
+_LIKELY = {
+    "": 1.0,
+    LASTING: 0.5,
+    SET_UP_ANEW: 0.5,
+    TAKEN_BACK: 0.3,
+    UNDER_WEIGHT: 1.0,
+    BACK_UNDER_WEIGHT: 0.3,
+}
 _HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 _FIRST = 2  # lower ones only round off the knees above them
 # Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
@@ -98,14 +104,25 @@ def knees(
             inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
             place = [*inside, *extra]
             kept = [*inside.values(), *[_HARDENS] * len(extra)]
-            exact = {**info, "radius": radius[place], "centre": radius[k],
-                     "back": {} if knee == "round" and arm else info["back"], "knee": knee,
-                     "softens": softens}  # fmt: skip
+            exact = {
+                **info,
+                "radius": radius[place],
+                "centre": radius[k],
+                "back": {} if knee == "round" and arm else info["back"],
+                "knee": knee,
+                "softens": softens,
+            }
             at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
             out += with_back(word, at, chosen, np.diag(kept), share / 4, exact)
     if arm and bench.course.unloads:
-        exact = {**info, "radius": radius, "centre": radius[0], "back": {},
-                 "knee": "slow", "softens": False}  # fmt: skip
+        exact = {
+            **info,
+            "radius": radius,
+            "centre": radius[0],
+            "back": {},
+            "knee": "slow",
+            "softens": False,
+        }
         at, likely = f"{label} at {THRESHOLDS[0]:g} and on", _SLOW * _LIKELY[info["memory"]]
         root = smooth_root(len(radius), 0.6, 0.3)
         out += with_back(word, at, columns, root, likely, exact)
@@ -118,9 +135,14 @@ _LEFT = 0.2  # of the largest response: as much as friction seldom holds
 
 
 def _hardened(
-    bench: Bench, load: Array, radius: Array, column: Callable[[Array], int], word: str, name: str,
+    bench: Bench,
+    load: Array,
+    radius: Array,
+    column: Callable[[Array], int],
+    word: str,
+    name: str,
     info: dict[str, Any],
-) -> list[Variant]:  # fmt: skip
+) -> list[Variant]:
     """What hardens alike in both senses (Voce 1948) and is loaded again and again: it yields on
     only beyond the largest load it has borne. Specimens from one side, under a tip from the first
     load on (said of loads that come back before they grow, and of what is not taken back by a long
@@ -140,14 +162,31 @@ def _hardened(
     out = []
     for k in range(len(radius)):
         root = np.diag([1.0, *[_HARDENS] * (len(radius) - k - 1)])
-        exact = {**info, "memory": HARDENED, "flow_s": 0.0, "radius": radius[k:],
-                 "centre": radius[k], "load": load, "column": column, "back": {},
-                 "knee": "hardened"}  # fmt: skip
+        exact = {
+            **info,
+            "memory": HARDENED,
+            "flow_s": 0.0,
+            "radius": radius[k:],
+            "centre": radius[k],
+            "load": load,
+            "column": column,
+            "back": {},
+            "knee": "hardened",
+        }
         label = f"{name}{HARDENED} beyond {radius[k] / top:.3g}"
         out.append(
-            variant(word, label, columns[k:], SCALES, root, np.ones(len(root)),
-                    0.7 / len(radius), LEAST, **exact)
-        )  # fmt: skip
+            variant(
+                word,
+                label,
+                columns[k:],
+                SCALES,
+                root,
+                np.ones(len(root)),
+                0.7 / len(radius),
+                LEAST,
+                **exact,
+            )
+        )
     return out
 
 
@@ -175,10 +214,20 @@ def with_back(
         k, n = len(columns), len(columns) + len(more)
         each, within = softening(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
         out.append(
-            variant(word, label + name, [*columns, *more], SCALES,
-                    block([root, _RETURNS * np.eye(len(more))]), np.repeat([1.0, 0.0], [k, n - k]),
-                    prior, LEAST, each, within, **info)
-        )  # fmt: skip
+            variant(
+                word,
+                label + name,
+                [*columns, *more],
+                SCALES,
+                block([root, _RETURNS * np.eye(len(more))]),
+                np.repeat([1.0, 0.0], [k, n - k]),
+                prior,
+                LEAST,
+                each,
+                within,
+                **info,
+            )
+        )
     return out
 
 

@@ -140,9 +140,15 @@ def _moved(bench: Bench, found: Variant, place: Place, factor: float) -> Variant
         columns += other["back"].get(info["back_from"], [])
     if len(columns) != len(found.columns):
         return None
-    exact = {**other, "back_from": info["back_from"], "radius": flow.radius, "flow_s": flow.time,
-             "centre": factor * float(info["centre"]), "square": flow.square,
-             "knee": info["knee"]}  # fmt: skip
+    exact = {
+        **other,
+        "back_from": info["back_from"],
+        "radius": flow.radius,
+        "flow_s": flow.time,
+        "centre": factor * float(info["centre"]),
+        "square": flow.square,
+        "knee": info["knee"],
+    }
     start, end = found.label.rsplit(" at ", 1)
     how = start.removeprefix(place_in(found.label)) + f" at {exact['centre']:.4g}"
     label = " ".join([name + how, *end.split(" ")[1:]])

@@ -31,8 +31,15 @@ from identification.gap.model.variants import (
     Variant,
 )
 
-_MEMORY = {"": KEPT, LASTING: ACROSS, TAKEN_BACK: LOST, HARDENED: KEPT,
-           UNDER_WEIGHT: HUNG, BACK_UNDER_WEIGHT: HUNG_LOST, SET_UP_ANEW: ANEW}  # fmt: skip
+_MEMORY = {
+    "": KEPT,
+    LASTING: ACROSS,
+    TAKEN_BACK: LOST,
+    HARDENED: KEPT,
+    UNDER_WEIGHT: HUNG,
+    BACK_UNDER_WEIGHT: HUNG_LOST,
+    SET_UP_ANEW: ANEW,
+}
 _SQUARE = 2.0  # of the overstress; without a word it flows in proportion
 
 
@@ -74,9 +81,14 @@ def flow_of(bench: Bench, law: Law, load: Array) -> Flow:
     constants, weight = law.constants, None
     if constants["memory"] in (HUNG, HUNG_LOST) and "joint" in constants:  # a twin is elsewhere
         weight = bench.weight(constants["joint"])
-    return Flow(load, _with(law, "threshold")[1], constants["flow_time"],
-                fresh_after(bench, constants["memory"]), weight,
-                constants.get("flow_exponent") == _SQUARE)  # fmt: skip
+    return Flow(
+        load,
+        _with(law, "threshold")[1],
+        constants["flow_time"],
+        fresh_after(bench, constants["memory"]),
+        weight,
+        constants.get("flow_exponent") == _SQUARE,
+    )
 
 
 def _with(law: Law, shape: str) -> tuple[list[int], Array]:

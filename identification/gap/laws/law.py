@@ -93,18 +93,21 @@ class Laws:
         law = replace(law, constants={**law.constants, "about": tuple(compliance.tolist())})
         columns = (self.rows(bench, law) * scale).T
         return replace(
-            variant, label=f"{variant.label}, {AS_THEY_ARE}",
+            variant,
+            label=f"{variant.label}, {AS_THEY_ARE}",
             columns=tuple(map(bench.add, columns)),
             info={**variant.info, "compliance": compliance},
-        )  # fmt: skip
+        )
 
 
 def _counted_from(bench: Bench, compliance: Array) -> Bench:
     """The bench with these springs (m,)."""
     return replace(
-        bench, compliance=compliance, elastic=bench.torque * compliance,
+        bench,
+        compliance=compliance,
+        elastic=bench.torque * compliance,
         slope=bench.slope_of(compliance),
-    )  # fmt: skip
+    )
 
 
 KEPT, ACROSS, LOST, WORKED = "kept", "kept across poses", "lost between runs", "worked in"

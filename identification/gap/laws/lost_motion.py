@@ -16,6 +16,7 @@ _LOOSE = ("free", "friction", "friction 1/2", "friction 3", "soft", "slow", "arc
 PLACED = ("gap", "held", "dragged")  # by the data: flanks.py
 HELD = ("rubbing", *KEPT)  # stays where it was left: no free place
 KINDS = (*_LOOSE, "rubbing", *KEPT)
+MOST_RUB = 0.25  # of it at most
 _RADII = {"friction": 1.0, "friction 3": 3.0, "rubbing": 0.7, "friction 1/2": 0.5}  # zones
 
 
@@ -104,3 +105,25 @@ def resting_columns(bench: Bench, joint: int) -> dict[str, Array]:
         q[np.array([p == pose for p in poses])[bench.rows.setup], joint] = 1.0
         out[pose] = bench.stacked(q=q)
     return out
+
+
+def less_rub(k: int) -> Array:
+    """(k,) of the coefficients, positive where the play is so much larger than the friction beside
+    it: more of it is hysteresis."""
+    out = np.zeros(k)
+    out[:2] = 1.0, -1.0 / MOST_RUB
+    return out
+
+
+def within_play(k: int) -> Array:
+    """(m, k) of the coefficients: a play of that zone rubs as much too much at most as too little;
+    free places, from the third on, are no further off than half of the play, to either side."""
+    rows = [np.eye(k)[0] + np.eye(k)[1] / MOST_RUB]
+    rows += [np.eye(k)[0] + side * np.eye(k)[i] for i in range(2, k) for side in (2.0, -2.0)]
+    return np.array(rows)
+
+
+def crosses(net: Array, torque: Array) -> bool:
+    """Whether the net torque comes to zero, or near it (weights are known to a few percent)."""
+    margin = 0.05 * float(np.abs(net - torque).max()) + 0.02 * float(np.abs(torque).max())
+    return bool(net.min() < margin and net.max() > -margin)

@@ -63,11 +63,19 @@ def with_other_springs(
         assert v.positive is not None
         info = {**v.info, "other_springs": True}
         out.append(
-            replace(v, label=f"{v.label}, other springs", columns=(*v.columns, line), scales=scales,
-                    root=block([v.root, more * np.eye(1)]), positive=np.append(v.positive, 0.0),
-                    each=(*v.each, False), within=np.pad(v.within, ((0, 0), (0, 1))),
-                    prior=0.5 * v.prior, info=info)
-        )  # fmt: skip
+            replace(
+                v,
+                label=f"{v.label}, other springs",
+                columns=(*v.columns, line),
+                scales=scales,
+                root=block([v.root, more * np.eye(1)]),
+                positive=np.append(v.positive, 0.0),
+                each=(*v.each, False),
+                within=np.pad(v.within, ((0, 0), (0, 1))),
+                prior=0.5 * v.prior,
+                info=info,
+            )
+        )
     return out
 
 
@@ -86,10 +94,20 @@ def plateaus(bench: Bench, found: Variant) -> list[Variant]:
         each, within = softening(radius, len(radius))
         exact = {**info, "radius": radius, "back": {}, "knee": "plateau"}
         out.append(
-            variant(found.word, f"joint {info['joint'] + 1} at {knee:.4g}{PLATEAU} {end:.4g}",
-                    columns, _SCALES, None, True, 0.25 / _ENDS, found.least, each, within,
-                    **exact)
-        )  # fmt: skip
+            variant(
+                found.word,
+                f"joint {info['joint'] + 1} at {knee:.4g}{PLATEAU} {end:.4g}",
+                columns,
+                _SCALES,
+                None,
+                True,
+                0.25 / _ENDS,
+                found.least,
+                each,
+                within,
+                **exact,
+            )
+        )
     if info.get("other_springs"):
         return with_other_springs(bench, int(info["joint"]), out, _SCALES, OWN)
     return out

@@ -21,9 +21,11 @@ _GRID_STEP = 0.03  # between finely spaced thresholds, as their share
 
 
 def of_knee(
-    bench: Bench, v: Variant, found: Coefficients,
+    bench: Bench,
+    v: Variant,
+    found: Coefficients,
     named: Callable[[Bench, Variant, Parameter], dict[str, Parameter]],
-) -> dict[str, Parameter]:  # fmt: skip
+) -> dict[str, Parameter]:
     """Threshold, of an arm the push where it is met, slope beyond and flow time. named: what the
     threshold is called at its place, with what is not known of that."""
     info = v.info

@@ -114,8 +114,9 @@ def _gains(bench: Bench) -> list[_Part]:
         return [("gain force", bench.stacked(line), both)]
     force = [("gain force", shown(bench, bench.load), meter.force_gain)]
     if _askew(bench):  # every component has a sensor and an amplifier of its own
-        force = [(f"gain force {'xyz'[a]}", component(bench, a), meter.force_gain)
-                 for a in range(3)]  # fmt: skip
+        force = [
+            (f"gain force {'xyz'[a]}", component(bench, a), meter.force_gain) for a in range(3)
+        ]
     # the laser's acts on what it read, however far off the simulated springs are
     read = bench.line if bench.data.arm else line
     return [

@@ -18,23 +18,12 @@ from identification.arrays import Array, Flags
 from identification.gap.data import GapData
 from identification.gap.model.driven import driven
 from identification.gap.model.history import moves, play, rests
+from identification.gap.model.layout import Layout, layout_of
 from identification.gap.model.noise import Noise, estimate_noise
 from identification.gap.model.pool import Pool
 from identification.gap.recording.course import Course
 from identification.gap.recording.imposed import displacement_imposed
 from identification.gap.recording.rows import Rows, reduce_rows
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Where the channels lie in a stacked vector of `size`; empty slices for what is missing."""
-
-    n: int
-    joints: int
-    q: slice
-    tangential: slice
-    zero_force: slice
-    size: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +105,15 @@ class Bench:
     @cached_property
     def course(self) -> Course:
         """How the load went."""
-        return Course(self.data, self.rows, self.imposed, self.load, self.response, self.slope,
-                      self.stated_slope)  # fmt: skip
+        return Course(
+            self.data,
+            self.rows,
+            self.imposed,
+            self.load,
+            self.response,
+            self.slope,
+            self.stated_slope,
+        )
 
     @cached_property
     def line_slope(self) -> Array:
@@ -152,15 +148,20 @@ class Bench:
             pushed = mine[~rows.zero[mine]]
             if not pushed.size:
                 continue
-            ends = [mine[rows.zero[mine] & (mine < pushed[0])],
-                    mine[rows.zero[mine] & (mine > pushed[-1])]]  # fmt: skip
+            ends = [
+                mine[rows.zero[mine] & (mine < pushed[0])],
+                mine[rows.zero[mine] & (mine > pushed[-1])],
+            ]
             if not all(e.size for e in ends):
                 continue
             weight = [rows.weight[e] for e in ends]
-            force = [np.average(rows.measured_force[e], weights=w)
-                     for e, w in zip(ends, weight, strict=True)]  # fmt: skip
-            time = [np.average(rows.session[e], weights=w)
-                    for e, w in zip(ends, weight, strict=True)]  # fmt: skip
+            force = [
+                np.average(rows.measured_force[e], weights=w)
+                for e, w in zip(ends, weight, strict=True)
+            ]
+            time = [
+                np.average(rows.session[e], weights=w) for e, w in zip(ends, weight, strict=True)
+            ]
             sd = self.noise.force * float(np.sqrt(sum(1 / w.sum() for w in weight)))
             if abs(force[1] - force[0]) > _DRIFTS * sd:
                 out[mine] = np.interp(rows.session[mine], time, force)
@@ -265,7 +266,7 @@ class Bench:
 
     def slope_of(self, compliance: Array) -> Array:
         """(n,) m/N: compliance along the direction with springs of that compliance (m,)."""
-        return np.asarray(self.lever**2 @ compliance + _outside(self.data, self.rows))
+        return np.asarray(self.lever**2 @ compliance + self.data.outside_of(self.rows.setup))
 
     def _follow(self, response: Array) -> Array:
         """Deflections (n, m) of the joints under the force behind a response (n,) m."""
@@ -353,7 +354,7 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
     rows = rows or reduce_rows(data)
     c = data.compliance if compliance is None else compliance
     lever = np.stack([s.lever for s in data.setups])[rows.setup]
-    outside = _outside(data, rows)
+    outside = data.outside_of(rows.setup)
     slope, stated = (lever**2 @ springs + outside for springs in (c, data.compliance))
     imposed = displacement_imposed(data)
     load = driven(data, rows, imposed)
@@ -364,7 +365,7 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         response = rows.displacement
         scatter, trend = rows.displacement_scatter, rows.displacement_trend
     torque = lever * load[:, None]
-    layout = _layout(data, rows, imposed)
+    layout = layout_of(data, rows, imposed)
     observed = np.zeros(layout.size)
     observed[: rows.n] = response
     if layout.q.stop > layout.q.start and rows.q is not None:
@@ -375,23 +376,21 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         observed[layout.zero_force] = rows.measured_force[rows.zero]
     reach = max(float(np.ptp(slope * load)), float(np.ptp(response)), 1e-15)
     return Bench(
-        data=data, rows=rows, layout=layout, noise=estimate_noise(data, rows, stated, imposed),
-        imposed=imposed, sense=-1.0 if imposed else 1.0, compliance=c, load=load, response=response,
-        torque=torque, lever=lever, elastic=torque * c, slope=slope, reach=reach, scatter=scatter,
-        trend=trend, observed=observed,
-    )  # fmt: skip
-
-
-def _outside(data: GapData, rows: Rows) -> Array:
-    """(n,) m/N: of the setup of every row."""
-    return np.array([s.outside for s in data.setups])[rows.setup]
-
-
-def _layout(data: GapData, rows: Rows, imposed: bool) -> Layout:
-    n, m, h = rows.n, data.joints, len(rows.edges)
-    q = h * m if data.q is not None and data.output_encoder else 0
-    t = 0 if rows.tangential is None else 2 * h
-    # what is held at no displacement may still be pressed, or pulled
-    z = 0 if imposed or data.imposed == "displacement" else int(rows.zero.sum())
-    return Layout(n, m, slice(n, n + q), slice(n + q, n + q + t),
-                  slice(n + q + t, n + q + t + z), n + q + t + z)  # fmt: skip
+        data=data,
+        rows=rows,
+        layout=layout,
+        noise=estimate_noise(data, rows, stated, imposed),
+        imposed=imposed,
+        sense=-1.0 if imposed else 1.0,
+        compliance=c,
+        load=load,
+        response=response,
+        torque=torque,
+        lever=lever,
+        elastic=torque * c,
+        slope=slope,
+        reach=reach,
+        scatter=scatter,
+        trend=trend,
+        observed=observed,
+    )

@@ -139,16 +139,25 @@ def _gap(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, f
 
     def flanks(p: Array, k: int = 2) -> Flanks:
         half = span * float(np.exp(p[1]))
-        return Flanks("gap", span * float(p[0]), half, half * float(np.exp(min(p[2], 0.0))),
-                      span * _FRICTIONS[k])  # fmt: skip
+        return Flanks(
+            "gap",
+            span * float(p[0]),
+            half,
+            half * float(np.exp(min(p[2], 0.0))),
+            span * _FRICTIONS[k],
+        )
 
     def left(p: Array, k: int = 2) -> float:
         f = flanks(p)
         return _left([_dead_zone(load - f.centre, f.zone, f.corner), rubs[:, k]], y, weight)
 
     middle = float(load.min() + load.max()) / (2 * span)
-    starts = [np.array([middle + c, np.log(h), np.log(r)])
-              for c in _CENTRES for h in _HALVES for r in _CORNERS]  # fmt: skip
+    starts = [
+        np.array([middle + c, np.log(h), np.log(r)])
+        for c in _CENTRES
+        for h in _HALVES
+        for r in _CORNERS
+    ]
     best, _ = _descend(left, starts, np.array([0.03, 0.3, 0.7]), most)
     each = [left(best, k) for k in range(len(_FRICTIONS))]
     k = int(np.argmin(each))
@@ -167,16 +176,23 @@ def _held(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, 
 def _dragged(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, float]:
     def flanks(p: Array) -> Flanks:
         half, radius = span * np.exp(p[1:3])
-        return Flanks("dragged", span * float(p[0]), float(half), _CORNERS[0] * float(half),
-                      float(radius))  # fmt: skip
+        return Flanks(
+            "dragged", span * float(p[0]), float(half), _CORNERS[0] * float(half), float(radius)
+        )
 
     return _with_friction(bench, load, span, most, flanks, _HALVES, _DRAGS, 0.3)
 
 
 def _with_friction(
-    bench: Bench, load: Array, span: float, most: float, flanks: Callable[[Array], Flanks],
-    widths: tuple[float, ...], others: tuple[float, ...], step: float,
-) -> tuple[Flanks, float]:  # fmt: skip
+    bench: Bench,
+    load: Array,
+    span: float,
+    most: float,
+    flanks: Callable[[Array], Flanks],
+    widths: tuple[float, ...],
+    others: tuple[float, ...],
+    step: float,
+) -> tuple[Flanks, float]:
     """The best of flanks that friction is part of, by centre and the logarithms of a width, in
     steps of `step`, and of a second one; what they leave."""
 
@@ -184,8 +200,12 @@ def _with_friction(
         return _left([load, shapes(bench, load, flanks(p))[0]], bench.response, bench.rows.weight)
 
     middle = float(load.min() + load.max()) / (2 * span)
-    starts = [np.array([middle + c, np.log(w), np.log(o)])
-              for c in _CENTRES for w in widths for o in others]  # fmt: skip
+    starts = [
+        np.array([middle + c, np.log(w), np.log(o)])
+        for c in _CENTRES
+        for w in widths
+        for o in others
+    ]
     best, rest = _descend(left, starts, np.array([0.03, step, 0.5]), most)
     return flanks(best), rest
 

@@ -211,9 +211,14 @@ def _prefix(keep: Array, gain: Array) -> Array:
 
 
 def flowing_play(
-    load: Array, radius: Array, times: Array, rows: Rows, fresh: Flags, weight: Array | None = None,
+    load: Array,
+    radius: Array,
+    times: Array,
+    rows: Rows,
+    fresh: Flags,
+    weight: Array | None = None,
     square: Flags | bool = False,
-) -> Array:  # fmt: skip
+) -> Array:
     """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
 
     `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
@@ -263,9 +268,14 @@ def _flowing(over: Array, square: Flags | bool) -> Array:
 
 
 def _flown(
-    state: Array, share: Array, least: Array, most: Array,
-    radius: Array, square: Flags | bool, some: bool,
-) -> Array:  # fmt: skip
+    state: Array,
+    share: Array,
+    least: Array,
+    most: Array,
+    radius: Array,
+    square: Flags | bool,
+    some: bool,
+) -> Array:
     """States (k,) after a while in which [least, most] held still. some: any flows with the
     square."""
     over = _clipped(state, least, most) - state

@@ -78,8 +78,9 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         per_sample, common = _running(data, rows, slope, imposed, whites), np.zeros(rows.n)
     elif imposed:  # the force answers
         answer = _scatter(data, data.force, hold) or meter.force
-        per_sample = np.hypot(slope * max(answer, 0.33 * meter.force),
-                              np.where(rows.rests, 0.0, meter.displacement))  # fmt: skip
+        per_sample = np.hypot(
+            slope * max(answer, 0.33 * meter.force), np.where(rows.rests, 0.0, meter.displacement)
+        )
         common = np.where(rows.rests, meter.displacement / np.sqrt(rows.hold_weight), 0.0)
     else:
         alone = np.where(rows.steady, meter.displacement, fallback)
@@ -102,15 +103,18 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
     rounded = 0.0 if rows.continuous or imposed else _rounded(data, hold)
     per_sample = np.maximum(per_sample, rounded)  # next to an edge, one is a whole step off
     return Noise(
-        response=per_sample / np.sqrt(weight), q=_encoders(data, rows, hold), force=meter.force,
-        hold=np.hypot(max(HOLD_SHARE * stated, rounded), common), run=RUN_SHARE * stated,
+        response=per_sample / np.sqrt(weight),
+        q=_encoders(data, rows, hold),
+        force=meter.force,
+        hold=np.hypot(max(HOLD_SHARE * stated, rounded), common),
+        run=RUN_SHARE * stated,
         stated=stated,
         raised=raised,
         swings=_swings(data, rows, hold),
         slow=_slow(data, rows, float(np.median(slope)), hold),
         sure=data.arm or (rows.continuous and _shown(data, imposed, whites)),
         seen=0.0 if data.arm and not rows.continuous else min(white, stated),
-    )  # fmt: skip
+    )
 
 
 def _shown(data: GapData, imposed: bool, whites: tuple[float, float]) -> bool:

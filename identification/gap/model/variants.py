@@ -95,8 +95,17 @@ class Variant:
         """What its evidence follows from, but for the prior: of a word, variants of the same shape
         are one under several names."""
         positive = None if self.positive is None else self.positive.tobytes()
-        return (self.word, self.columns, self.scales, self.root.tobytes(), positive, self.least,
-                self.each, self.within.tobytes(), self.other_springs)  # fmt: skip
+        return (
+            self.word,
+            self.columns,
+            self.scales,
+            self.root.tobytes(),
+            positive,
+            self.least,
+            self.each,
+            self.within.tobytes(),
+            self.other_springs,
+        )
 
 
 def variant(

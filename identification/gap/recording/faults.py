@@ -32,8 +32,15 @@ class Fault:
 
 
 SIGNS, BURSTS, FROZEN, GOES_BACK, JUMPS, FULL, BROKEN, SILENT = (
-    "signs", "bursts", "frozen", "goes back", "jumps", "full", "broken", "silent",
-)  # fmt: skip
+    "signs",
+    "bursts",
+    "frozen",
+    "goes back",
+    "jumps",
+    "full",
+    "broken",
+    "silent",
+)
 
 
 def found_in(data: GapData) -> tuple[Fault, ...]:
@@ -141,9 +148,15 @@ def _silent(data: GapData) -> str:
 
 
 _DETECTORS: dict[str, Callable[[GapData], str]] = {
-    SIGNS: _signs, BURSTS: _bursts, FROZEN: _lost, GOES_BACK: _goes_back, JUMPS: _jumps,
-    FULL: _full, BROKEN: _broken, SILENT: _silent,
-}  # fmt: skip
+    SIGNS: _signs,
+    BURSTS: _bursts,
+    FROZEN: _lost,
+    GOES_BACK: _goes_back,
+    JUMPS: _jumps,
+    FULL: _full,
+    BROKEN: _broken,
+    SILENT: _silent,
+}
 
 
 # --- how each is found ---------------------------------------------------------------------------

@@ -130,8 +130,9 @@ def on_plateau(data: GapData, hold: Ints) -> bool:
     nobody finds these by setting a force. hold (n,): consecutive ids."""
     starts = first_rows(hold)
     on = np.diff(data.run[starts]) == 0
-    went = [np.abs(np.diff(v[starts])) / (np.ptp(v) or 1.0)
-            for v in (data.force, data.displacement)]  # fmt: skip
+    went = [
+        np.abs(np.diff(v[starts])) / (np.ptp(v) or 1.0) for v in (data.force, data.displacement)
+    ]
     flat = on & (went[0] < _SAME) & (went[1] > _OTHER)
     return bool(np.any(flat[:-2] & flat[1:-1] & flat[2:]))
 
@@ -351,8 +352,10 @@ def _broken_off(edges: Ints, times: Array) -> dict[tuple[int, int], list[tuple[f
     if len(edges) < 3:
         return {}
     e, t = edges.tolist(), times.tolist()
-    return {(e[0], e[1]): [(t[1] - (t[2] - t[1]), t[1])],
-            (e[-2], e[-1]): [(t[-2], t[-2] + (t[-2] - t[-3]))]}  # fmt: skip
+    return {
+        (e[0], e[1]): [(t[1] - (t[2] - t[1]), t[1])],
+        (e[-2], e[-1]): [(t[-2], t[-2] + (t[-2] - t[-3]))],
+    }
 
 
 def _misfit(t: Array, y: Array, spans: list[tuple[float, float]]) -> Array:

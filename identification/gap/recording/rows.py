@@ -155,21 +155,39 @@ def reduce_rows(data: GapData) -> Rows:
     steadied = steadied * (1 + relaxed(force, displacement, time, holds, weight, stands))
     rested, rests = still(data.displacement, meter.displacement)
     return Rows(
-        time=time, session=mean(_session(data)), clock=data.session is not None, run=run,
-        setup=setup, repetition=first(data.repetition), branch=branch, step=step, hold=holds,
-        level=level, weight=weight, force=steadied, measured_force=force, steady=steady,
-        displacement=displacement, rested=rested, rests=rests,
+        time=time,
+        session=mean(_session(data)),
+        clock=data.session is not None,
+        run=run,
+        setup=setup,
+        repetition=first(data.repetition),
+        branch=branch,
+        step=step,
+        hold=holds,
+        level=level,
+        weight=weight,
+        force=steadied,
+        measured_force=force,
+        steady=steady,
+        displacement=displacement,
+        rested=rested,
+        rests=rests,
         hold_weight=np.bincount(holds, weights=weight)[holds].astype(float),
         force_scatter=bins.scatter(data.force, data.displacement),
         displacement_scatter=bins.scatter(data.displacement, data.force),
-        spread=bins.trend(data.time, data.time), force_trend=bins.trend(data.time, data.force),
+        spread=bins.trend(data.time, data.time),
+        force_trend=bins.trend(data.time, data.force),
         displacement_trend=bins.trend(data.time, data.displacement),
-        tangential=bins.mean_of(data.tangential), q=bins.mean_of(data.q),
-        temperature=bins.mean_of(data.temperature), simulated=bins.mean_of(data.simulated),
+        tangential=bins.mean_of(data.tangential),
+        q=bins.mean_of(data.q),
+        temperature=bins.mean_of(data.temperature),
+        simulated=bins.mean_of(data.simulated),
         zero=at_zero & ~coming,
         on_the_way=ramp,
-        continuous=bins.running, starts=_changes(run), hold_starts=_changes(holds),
-    )  # fmt: skip
+        continuous=bins.running,
+        starts=_changes(run),
+        hold_starts=_changes(holds),
+    )
 
 
 def _still(

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from identification.arrays import Array, Flags
+from identification.gap.evidence.factor import span_of
 from identification.gap.explanations.explanation import PLAIN, Likeness, SearchResult
 from identification.gap.laws.drift import free_path, path_root
 from identification.gap.model.base import Base
@@ -108,10 +109,17 @@ def _jerks(bench: Bench, base: Base, target: Array) -> list[Variant]:
     at = np.arange(n)
     columns = [bench.add(bench.outside_column((at >= k).astype(float))) for k in places]
     return [
-        variant(JERKS, f"{k} of them", columns[:k], scales, positive=False,
-                prior=exp(lgamma(k + 1) - k * log(n)) / len(COUNTS))
-        for k in COUNTS if k <= len(columns)
-    ]  # fmt: skip
+        variant(
+            JERKS,
+            f"{k} of them",
+            columns[:k],
+            scales,
+            positive=False,
+            prior=exp(lgamma(k + 1) - k * log(n)) / len(COUNTS),
+        )
+        for k in COUNTS
+        if k <= len(columns)
+    ]
 
 
 def jump_rows(bench: Bench, base: Base, target: Array, most: int) -> list[int]:
@@ -121,9 +129,12 @@ def jump_rows(bench: Bench, base: Base, target: Array, most: int) -> list[int]:
     white = 1 / bench.sigma[:n]
     load = _spread(bench.load)
     sense = np.where(rises(bench.load), 1.0, -1.0)
-    smooth = [chebvander(load, _CURVE), chebvander(load, _LOOP) * sense[:, None],
-              chebvander(_spread(bench.rows.session), _SLOW)]  # fmt: skip
-    known = np.linalg.qr(np.column_stack([base.columns[:n], *smooth]) * white[:, None])[0]
+    smooth = [
+        chebvander(load, _CURVE),
+        chebvander(load, _LOOP) * sense[:, None],
+        chebvander(_spread(bench.rows.session), _SLOW),
+    ]
+    known = span_of(np.column_stack([base.columns[:n], *smooth]) * white[:, None])
     left = white * target[:n]
     left = left - known @ (known.T @ left)
 

@@ -58,8 +58,14 @@ def as_moved(
 ) -> list[dict[str, Parameter]]:
     """Parameters of the parts of an explanation, where a gain of the laser is one of them: what
     only the laser saw of the others was read by that factor too large."""
-    gain = next((r["factor"] for p, r in zip(parts, read, strict=True)
-                 if p.word == displacement_scale.WORD), None)  # fmt: skip
+    gain = next(
+        (
+            r["factor"]
+            for p, r in zip(parts, read, strict=True)
+            if p.word == displacement_scale.WORD
+        ),
+        None,
+    )
     if gain is None or not bench.data.arm or bench.has_q:
         return read
     return [

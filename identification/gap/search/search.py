@@ -88,8 +88,9 @@ def _as_stated(engine: Engine) -> float:
     above = np.floor(PARTS * np.log(max(hidden / least, 1.0)) / LOG_STEP)
     etas = least * np.exp(np.arange(-PARTS, above + 1) / PARTS * LOG_STEP)
     more = [log_joint_between(engine, (), float(eta)) for eta in etas]
-    less = float(np.interp(hidden / engine.bench.noise.stated, [_STEP, 1.0],
-                           [_SURE_SHARE, _UNSURE_SHARE]))  # fmt: skip
+    less = float(
+        np.interp(hidden / engine.bench.noise.stated, [_STEP, 1.0], [_SURE_SHARE, _UNSURE_SHARE])
+    )
     return log_mean(
         [engine.levels[0].log_base, *more], [1 - less, *(less / len(more) for _ in more)]
     )

@@ -21,6 +21,7 @@ import numpy as np
 from identification.arrays import Array, Ints
 from identification.gap.evidence.compare import by_word, log_mean, marginal, score
 from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.factor import span_of
 from identification.gap.evidence.parts import Part, part_sizes
 from identification.gap.explanations.explanation import PLAIN, Likeness, SearchResult
 from identification.gap.explanations.priors import log_unknown
@@ -67,10 +68,12 @@ def _creeps(found: SearchResult, settles: float) -> bool:
     settles (log evidence): in two directions what goes on by amounts and times of its own in each
     is what two joints do."""
     return any(
-        e.words == {"joint_creep"} and e.eta <= found.engine.bench.noise.stated and e.good
+        e.words == {"joint_creep"}
+        and e.eta <= found.engine.bench.noise.stated
+        and e.good
         and e.log_weight > settles - TAKES_TWO
         for e in found.explanations
-    )  # fmt: skip
+    )
 
 
 SETTLES = "settles"
@@ -85,8 +88,14 @@ def strangers(bench: Bench, base: Base, target: Array) -> list[Variant]:
     if bench.course.rests:
         return swings
     waves = _waves(bench, base, target)
-    return [*_slopes(bench), *swings, *waves, *_rough(bench, target), *_jumps(bench),
-            *_settles(bench)]  # fmt: skip
+    return [
+        *_slopes(bench),
+        *swings,
+        *waves,
+        *_rough(bench, target),
+        *_jumps(bench),
+        *_settles(bench),
+    ]
 
 
 def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[Likeness, ...]:
@@ -127,9 +136,17 @@ def _slopes(bench: Bench) -> list[Variant]:
     scales = _scales(bench)
     return [
         variant("slopes", "each run", each, scales, positive=False, prior=0.5),
-        variant("slopes", "wander", path, scales, path_root(_PIECES), positive=False, prior=0.5,
-                wanders=True),
-    ]  # fmt: skip
+        variant(
+            "slopes",
+            "wander",
+            path,
+            scales,
+            path_root(_PIECES),
+            positive=False,
+            prior=0.5,
+            wanders=True,
+        ),
+    ]
 
 
 def _swings(bench: Bench, base: Base, target: Array) -> list[Variant]:
@@ -172,8 +189,10 @@ def _rough(bench: Bench, target: Array) -> list[Variant]:
         return []
     if not bench.data.arm and _smooth(bench, place, target[: rows.n]):
         return []
-    columns = [bench.add(bench.outside_column((place == k).astype(float)))
-               for k in range(int(place.max()) + 1)]  # fmt: skip
+    columns = [
+        bench.add(bench.outside_column((place == k).astype(float)))
+        for k in range(int(place.max()) + 1)
+    ]
     return [variant("rough", "levels", columns, _scales(bench), positive=False)]
 
 
@@ -227,8 +246,9 @@ def _settles(bench: Bench) -> list[Variant]:
     masks = [(rows.setup == s).astype(float) for s in np.unique(rows.setup)]
     columns = [bench.add(bench.outside_column(m * c)) for m in masks for c in z.T]
     root = np.asarray(np.kron(np.eye(len(masks)), smooth_root(len(times), 0.5)), dtype=float)
-    return [variant(SETTLES, "each setup", columns, _scales(bench), root, positive=False,
-                    prior=SELDOM)]  # fmt: skip
+    return [
+        variant(SETTLES, "each setup", columns, _scales(bench), root, positive=False, prior=SELDOM)
+    ]
 
 
 SELDOM = 0.1  # what settles is mostly a joint
@@ -236,15 +256,21 @@ SETTLING = (3.0, 9.0, 27.0, 81.0, 243.0)  # times s of a reading each second
 
 
 def _periodic(
-    bench: Bench, base: Base, target: Array, kind: str, phase: Array, count: Array,
-    masks: list[Array], span: float,
-) -> list[Variant]:  # fmt: skip
+    bench: Bench,
+    base: Base,
+    target: Array,
+    kind: str,
+    phase: Array,
+    count: Array,
+    masks: list[Array],
+    span: float,
+) -> list[Variant]:
     """Sine and cosine of a phase (n,) from 0 to 1 for the numbers of periods in it that take most
     of the gap."""
     if not len(count):
         return []
     white = 1 / bench.sigma[: bench.rows.n]
-    known = np.linalg.qr(base.columns[: bench.rows.n] * white[:, None])[0]
+    known = span_of(base.columns[: bench.rows.n] * white[:, None])
     left = white * target[: bench.rows.n]
     taken = partial(square_of, known, left - known @ (known.T @ left), white, phase, masks)
     parts = [count[i : i + _AT_ONCE] for i in range(0, len(count), _AT_ONCE)]
@@ -256,9 +282,16 @@ def _periodic(
         best = float(about[int(taken(about).argmax())])
         columns = [bench.add(bench.outside_column(c)) for c in _both(phase, best, masks).T]
         out.append(
-            variant(kind, f"{best:.3g} periods", columns, _scales(bench), positive=False,
-                    prior=1.0 / len(count), period=span / best)
-        )  # fmt: skip
+            variant(
+                kind,
+                f"{best:.3g} periods",
+                columns,
+                _scales(bench),
+                positive=False,
+                prior=1.0 / len(count),
+                period=span / best,
+            )
+        )
     return out
 
 

@@ -37,8 +37,15 @@ def nothing_loaded_moves(random: Generator) -> Trial:
     drift, kind = _wander(random, time)
     if random.random() < 0.4:
         drift = drift + random.uniform(0.05, 0.3) * _wander(random, time)[0]
-    return Trial(time, np.zeros_like(time), float(random.choice([-1, 1])) * drift, "force",
-                 parameters={"law": kind}, timeless=False, clean=True)  # fmt: skip
+    return Trial(
+        time,
+        np.zeros_like(time),
+        float(random.choice([-1, 1])) * drift,
+        "force",
+        parameters={"law": kind},
+        timeless=False,
+        clean=True,
+    )
 
 
 def cell_at_rest(random: Generator) -> Trial:
@@ -46,8 +53,9 @@ def cell_at_rest(random: Generator) -> Trial:
     time = np.linspace(0, 1, samples(random, 4))
     drift, kind = _wander(random, time)
     force = float(random.choice([-1, 1])) * drift
-    return Trial(time, force, np.zeros_like(time), parameters={"law": kind}, timeless=False,
-                 clean=True)  # fmt: skip
+    return Trial(
+        time, force, np.zeros_like(time), parameters={"law": kind}, timeless=False, clean=True
+    )
 
 
 def _springs(random: Generator, least: int = 2) -> Path:
@@ -62,8 +70,15 @@ def drift_under_cycles(random: Generator) -> Trial:
     path = _springs(random, 4)
     drift, kind = _wander(random, path.time)
     size = random.uniform(0.05, 0.5)
-    return Trial(path.time, path.value + size * drift, path.value, timeless=False, clean=True,
-                 accept=frozenset({"thermal_drift"}), parameters={"law": kind})  # fmt: skip
+    return Trial(
+        path.time,
+        path.value + size * drift,
+        path.value,
+        timeless=False,
+        clean=True,
+        accept=frozenset({"thermal_drift"}),
+        parameters={"law": kind},
+    )
 
 
 def drift_between_pauses(random: Generator) -> Trial:
@@ -78,8 +93,16 @@ def drift_between_pauses(random: Generator) -> Trial:
     zero = np.isin(path.leg % 3, [0])
     drift, kind = _wander(random, path.time)
     force = path.value + random.uniform(0.05, 0.5) * drift
-    return Trial(path.time, force, path.value, "force", zero=zero, timeless=False, clean=True,
-                 parameters={"law": kind})  # fmt: skip
+    return Trial(
+        path.time,
+        force,
+        path.value,
+        "force",
+        zero=zero,
+        timeless=False,
+        clean=True,
+        parameters={"law": kind},
+    )
 
 
 def warming_under_cycles(random: Generator) -> Trial:
@@ -87,8 +110,16 @@ def warming_under_cycles(random: Generator) -> Trial:
     path = _springs(random, 4)
     drift, kind = _wander(random, path.time)
     moved = path.value + random.uniform(0.05, 0.5) * drift
-    return Trial(path.time, path.value, moved, "force", timeless=False, clean=True,
-                 accept=frozenset({"force_drift"}), parameters={"law": kind})  # fmt: skip
+    return Trial(
+        path.time,
+        path.value,
+        moved,
+        "force",
+        timeless=False,
+        clean=True,
+        accept=frozenset({"force_drift"}),
+        parameters={"law": kind},
+    )
 
 
 def late_channel(random: Generator) -> Trial:
@@ -101,14 +132,25 @@ def late_channel(random: Generator) -> Trial:
     path = through(points, samples(random, 3 * len(points)), seconds=seconds, eased=True)
     lag = random.uniform(0.03, 0.25) * seconds[-1] / sum(seconds)
     filtered = bool(random.random() < 0.6)
-    late = (lowpass(path.time, path.value, lag) if filtered
-            else np.interp(path.time - lag, path.time, path.value))  # fmt: skip
+    late = (
+        lowpass(path.time, path.value, lag)
+        if filtered
+        else np.interp(path.time - lag, path.time, path.value)
+    )
     in_force = bool(random.random() < 0.5)
     extra = {"lag_share": lag, "filter": filtered}
     if in_force:
         return Trial(path.time, late, path.value, timeless=False, clean=True, parameters=extra)
-    return Trial(path.time, path.value, late, "force", accept=frozenset({"joint_creep"}),
-                 timeless=False, clean=True, parameters=extra)  # fmt: skip
+    return Trial(
+        path.time,
+        path.value,
+        late,
+        "force",
+        accept=frozenset({"joint_creep"}),
+        timeless=False,
+        clean=True,
+        parameters=extra,
+    )
 
 
 def datum_that_jumps(random: Generator) -> Trial:

@@ -32,8 +32,9 @@ def _with_loop(random: Generator, u: Array, force: Array) -> Array:
     return np.asarray(force + most * slider(u / length, np.ones(len(u))))
 
 
-def _curve(random: Generator, path: Path, force: Array, first: float,
-           accept: frozenset[str] = frozenset()) -> Trial:  # fmt: skip
+def _curve(
+    random: Generator, path: Path, force: Array, first: float, accept: frozenset[str] = frozenset()
+) -> Trial:
     repeated = path.repetition if random.random() < 0.5 else None
     force = _with_loop(random, path.value, force)
     return Trial(path.time, force, path.value, stiffness=first, accept=accept, repetition=repeated)
@@ -140,8 +141,14 @@ def bolted_joint(random: Generator) -> Trial:
     force = force + rub * slider(path.value / random.uniform(0.005, 0.03), np.ones(len(force)))
     accept = _CURVE if round_ > 0.1 * half else frozenset()
     repeated = path.repetition if random.random() < 0.5 else None
-    return Trial(path.time, force, path.value, accept=accept, repetition=repeated,
-                 parameters={"width_share": 2 * half})  # fmt: skip
+    return Trial(
+        path.time,
+        force,
+        path.value,
+        accept=accept,
+        repetition=repeated,
+        parameters={"width_share": 2 * half},
+    )
 
 
 def geared_joint(random: Generator) -> Trial:
@@ -154,8 +161,9 @@ def geared_joint(random: Generator) -> Trial:
     held = path.value - zero - slider(path.value - zero, np.full(len(path.time), rub))
     moved = path.value + half * np.tanh(held / edge)
     accept = frozenset({"joint_hysteresis"}) if rub > 0.05 else frozenset()
-    return Trial(path.time, path.value, moved, "force", accept=accept,
-                 parameters={"width_share": 2 * half})  # fmt: skip
+    return Trial(
+        path.time, path.value, moved, "force", accept=accept, parameters={"width_share": 2 * half}
+    )
 
 
 # --------------------------------------------------------------------------------------- seats

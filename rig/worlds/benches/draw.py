@@ -30,11 +30,22 @@ _STRAIGHT_SHARE = (1e-4, 0.01)
 _TRIES = 40
 # How often each word is drawn: as benches meet them.
 _WEIGHTS = {
-    "joint_yield": 14, "joint_hysteresis": 17, "joint_creep": 12, "joint_nonlinear_stiffness": 12,
-    "joint_backlash": 6, "contact_seating": 5, "force_drift": 4, "thermal_drift": 4,
-    "time_lag": 3, "zero_shift": 2, "force_scale": 1, "displacement_scale": 1,
-    "joint_stiffness_error": 2, "none": 6, "unknown": 11,
-}  # fmt: skip
+    "joint_yield": 14,
+    "joint_hysteresis": 17,
+    "joint_creep": 12,
+    "joint_nonlinear_stiffness": 12,
+    "joint_backlash": 6,
+    "contact_seating": 5,
+    "force_drift": 4,
+    "thermal_drift": 4,
+    "time_lag": 3,
+    "zero_shift": 2,
+    "force_scale": 1,
+    "displacement_scale": 1,
+    "joint_stiffness_error": 2,
+    "none": 6,
+    "unknown": 11,
+}
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,11 @@ def _spring_part(rig: Rig) -> float:
     """rms of what the spring's error beyond its stated range does, over that of all that departs
     from the specimen's first slope."""
     k, stated = rig.stiffness, rig.stated
-    near = np.clip(k, stated.stiffness * max(1 - WITHIN_SD * stated.relative_sd, 0.02),
-                   stated.stiffness * (1 + WITHIN_SD * stated.relative_sd))  # fmt: skip
+    near = np.clip(
+        k,
+        stated.stiffness * max(1 - WITHIN_SD * stated.relative_sd, 0.02),
+        stated.stiffness * (1 + WITHIN_SD * stated.relative_sd),
+    )
     if rig.by_force:
         wrong = (1 / k - 1 / near) * rig.force
         rest = rig.displacement - rig.force / k

@@ -158,8 +158,11 @@ def fluid_in_a_field(random: Generator) -> Trial:
     """A magnetorheological damper shaken: a saturating force of speed, with a lag over the stroke,
     beside a spring (Kwok 2006). One or a few amplitudes at one rate."""
     cycles = whole(random, 3, 15)
-    path = through(to_and_fro(-1, 1, cycles, float(random.choice([0.0, 0.6]))),
-                   samples(random, 2 * cycles), eased=True)  # fmt: skip
+    path = through(
+        to_and_fro(-1, 1, cycles, float(random.choice([0.0, 0.6]))),
+        samples(random, 2 * cycles),
+        eased=True,
+    )
     speed = path.speed / np.abs(path.speed).max()
     steep, shift = random.uniform(4, 15), random.uniform(0.02, 0.25)
     goal = np.tanh(steep * speed)

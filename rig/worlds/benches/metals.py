@@ -159,9 +159,14 @@ def indent(random: Generator) -> Trial:
         deep = drive.value
         force = np.where(into, deep**m, (np.maximum(deep - pit, 0) / (1 - pit)) ** n)
     return Trial(
-        drive.time, force, deep, "force" if by_force else "displacement",
-        stiffness=n / (1 - pit), accept=_CYCLED, parameters={"pit_share": pit},
-    )  # fmt: skip
+        drive.time,
+        force,
+        deep,
+        "force" if by_force else "displacement",
+        stiffness=n / (1 - pit),
+        accept=_CYCLED,
+        parameters={"pit_share": pit},
+    )
 
 
 FORMS: dict[str, tuple[Form, ...]] = {

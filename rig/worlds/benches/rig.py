@@ -26,8 +26,9 @@ class Stated:
     @property
     def slope_sd(self) -> float:
         """Relative, of the line that spring and gains give together."""
-        return float(np.hypot(np.hypot(self.relative_sd, self.force_gain_sd),
-                              self.displacement_gain_sd))  # fmt: skip
+        return float(
+            np.hypot(np.hypot(self.relative_sd, self.force_gain_sd), self.displacement_gain_sd)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +93,10 @@ def make_rig(form: Form, word: str, trial: Trial, random: Generator) -> Rig:
 
 
 def _gains(random: Generator) -> tuple[float, float]:
-    return (float(random.choice([0.002, 0.005, 0.01, 0.02])),
-            float(random.choice([0.001, 0.003, 0.01])))  # fmt: skip
+    return (
+        float(random.choice([0.002, 0.005, 0.01, 0.02])),
+        float(random.choice([0.001, 0.003, 0.01])),
+    )
 
 
 def _straight(word: str, true: float, random: Generator) -> tuple[Stated, dict[str, float]]:
@@ -101,8 +104,11 @@ def _straight(word: str, true: float, random: Generator) -> tuple[Stated, dict[s
     stated of them together."""
     force_sd, moved_sd = _gains(random)
     spring_sd = log_uniform(random, 0.01, 0.3 if word == "none" else 0.06)
-    sds = {"force_scale": force_sd, "displacement_scale": moved_sd,
-           "joint_stiffness_error": spring_sd}  # fmt: skip
+    sds = {
+        "force_scale": force_sd,
+        "displacement_scale": moved_sd,
+        "joint_stiffness_error": spring_sd,
+    }
     off = {w: sd * float(np.clip(random.standard_normal(), -0.7, 0.7)) for w, sd in sds.items()}
     if word != "none":
         total = float(np.linalg.norm(list(sds.values())))
@@ -110,8 +116,12 @@ def _straight(word: str, true: float, random: Generator) -> tuple[Stated, dict[s
         off[word] = -min(size, 0.6) if random.random() < 0.5 else size
     else:
         off["joint_stiffness_error"] = spring_sd * random.uniform(-NO_ERROR_SD, NO_ERROR_SD)
-    stated = Stated(_digits(true / (1 + off["joint_stiffness_error"]), 4), _digits(spring_sd, 2),
-                    force_sd, moved_sd)  # fmt: skip
+    stated = Stated(
+        _digits(true / (1 + off["joint_stiffness_error"]), 4),
+        _digits(spring_sd, 2),
+        force_sd,
+        moved_sd,
+    )
     return stated, off
 
 
@@ -121,8 +131,10 @@ def _bent(
     """What one believes of a spring that is none: its first slope, a data sheet's, a secant, or
     something far off; a clean one is known within its uncertainty."""
     force_sd, moved_sd = _gains(random)
-    off = {w: sd * float(np.clip(random.standard_normal(), -1, 1))
-           for w, sd in (("force_scale", force_sd), ("displacement_scale", moved_sd))}  # fmt: skip
+    off = {
+        w: sd * float(np.clip(random.standard_normal(), -1, 1))
+        for w, sd in (("force_scale", force_sd), ("displacement_scale", moved_sd))
+    }
     way = 0.0 if trial.clean else random.random()
     if way < 0.55:
         sd = log_uniform(random, 0.03, 0.3)

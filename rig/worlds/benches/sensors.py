@@ -161,16 +161,20 @@ def meta_of(rig: Rig, readings: Readings, random: Generator) -> dict[str, Any]:
         "robot": "none",
         "directions": {"x": [1.0, 0.0, 0.0]},
         "instruments": {
-            "force": {"standard_uncertainty_N": readings.force_u,
-                      "gain_relative_sd": stated.force_gain_sd},
-            "displacement": {"standard_uncertainty_mm": readings.displacement_u,
-                             "gain_relative_sd": stated.displacement_gain_sd},
+            "force": {
+                "standard_uncertainty_N": readings.force_u,
+                "gain_relative_sd": stated.force_gain_sd,
+            },
+            "displacement": {
+                "standard_uncertainty_mm": readings.displacement_u,
+                "gain_relative_sd": stated.displacement_gain_sd,
+            },
         },
         "simulation": {
             "stiffness_N_per_mm": {"x": stated.stiffness},
             "stiffness_relative_sd": stated.relative_sd,
         },
-    }  # fmt: skip
+    }
     if random.random() < 0.5:
         meta["imposed"] = rig.trial.imposed
     return meta

@@ -60,8 +60,11 @@ def drifting_force(law: str) -> Callable[[Scene, Generator], Drawn]:
         def parameters(size: float) -> dict[str, Any]:
             end = size * float(path[-1])  # a path that turns back ends elsewhere than at its most
             drift = end * channels if each else end * along
-            return {"drift_over_session_N": drift, "session_s": float(scene.history.time[-1]),
-                    **extra}  # fmt: skip
+            return {
+                "drift_over_session_N": drift,
+                "session_s": float(scene.history.time[-1]),
+                **extra,
+            }
 
         return Drawn(change, parameters, (0.03, 15.0))
 

@@ -65,8 +65,9 @@ def _forget(turns: list[tuple[float, float]], x: float, sense: int) -> list[tupl
     return turns
 
 
-def flow(time: Array, load: Array, limit: float, viscosity_s: float, power: float, fresh: Index
-         ) -> Array:  # fmt: skip
+def flow(
+    time: Array, load: Array, limit: float, viscosity_s: float, power: float, fresh: Index
+) -> Array:
     """Overstress flow (Perzyna 1966): `y' = (<|x - y| - limit> / limit)^power limit / T`."""
     out = np.empty_like(load)
     y, before = 0.0, float(time[0])
@@ -93,8 +94,9 @@ def _flowed(y: float, x: float, dt: float, limit: float, viscosity_s: float, pow
     return y + math.copysign(over - left, x - y)
 
 
-def backstress(load: Array, limit: float, first: float, recall: float, second: float, fresh: Index
-               ) -> Array:  # fmt: skip
+def backstress(
+    load: Array, limit: float, first: float, recall: float, second: float, fresh: Index
+) -> Array:
     """Plastic path with two back stresses (Armstrong, Frederick 1966; Chaboche 1986), of which
     one saturates at `first / recall`: at yield `dy = dx / (first - recall a sign + second)`."""
     out = np.empty_like(load)

@@ -33,8 +33,9 @@ def _bends(scene: Scene, setup: int, link: int, twist: float, taper: float) -> f
     length = float(np.linalg.norm(end - start))
     axis = (end - start) / length
     share = (_GAUSS + 1) / 2
-    moment = np.cross(scene.tool[setup] - (start + share[:, None] * (end - start)),
-                      scene.unit[setup])  # fmt: skip
+    moment = np.cross(
+        scene.tool[setup] - (start + share[:, None] * (end - start)), scene.unit[setup]
+    )
     along = moment @ axis
     bending = np.sum(moment**2, axis=1) - along**2
     stiff = 1.0 + taper * (0.5 - share)
@@ -141,8 +142,12 @@ def slipping_base(axis: str, law: str) -> Callable[[Scene, Generator], Drawn]:
         }
 
         def parameters(size: float) -> dict[str, Any]:
-            return {"stiffness_after_Nm_per_rad": 1e6 / size, "axis": turn, "axis_depth_m": depth,
-                    **extra}  # fmt: skip
+            return {
+                "stiffness_after_Nm_per_rad": 1e6 / size,
+                "axis": turn,
+                "axis_depth_m": depth,
+                **extra,
+            }
 
         def change(size: float) -> Change:
             return Change(outside=size * moved)

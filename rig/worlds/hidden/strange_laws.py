@@ -128,8 +128,10 @@ def teeth(scene: Scene, random: Generator) -> Drawn:
     advance = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(scene.history.load)))])
     pitch = scene.history.load.max() * random.uniform(0.17, 0.45)
     wave = np.sin(2 * np.pi * advance / pitch + random.uniform(0, 2 * np.pi))
-    return _outside(wave * np.minimum(1.0, scene.history.load / (0.1 * scene.history.load.max())),
-                    {"pitch_N": pitch})  # fmt: skip
+    return _outside(
+        wave * np.minimum(1.0, scene.history.load / (0.1 * scene.history.load.max())),
+        {"pitch_N": pitch},
+    )
 
 
 def force_dropouts(scene: Scene, random: Generator) -> Drawn:

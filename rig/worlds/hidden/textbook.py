@@ -96,9 +96,11 @@ def _yield(seen: Observed) -> list[Explanation]:
     if not joints:
         return []
     return _knees(
-        net[:, joints], seen, lambda c, state: _one(seen, joints[c], state),
+        net[:, joints],
+        seen,
+        lambda c, state: _one(seen, joints[c], state),
         np.abs(weights[:, joints]).max(axis=0),
-    )  # fmt: skip
+    )
 
 
 def _slip(seen: Observed) -> list[Explanation]:

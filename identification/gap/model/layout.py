@@ -1,0 +1,37 @@
+"""Where the channels of an observation lie, one below the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from identification.gap.data import GapData
+from identification.gap.recording.rows import Rows
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where the channels lie in a stacked vector of `size`; empty slices for what is missing."""
+
+    n: int
+    joints: int
+    q: slice
+    tangential: slice
+    zero_force: slice
+    size: int
+
+
+def layout_of(data: GapData, rows: Rows, imposed: bool) -> Layout:
+    """Of the channels that the data have; (n, m) from the rows and the joints."""
+    n, m, h = rows.n, data.joints, len(rows.edges)
+    q = h * m if data.q is not None and data.output_encoder else 0
+    t = 0 if rows.tangential is None else 2 * h
+    # what is held at no displacement may still be pressed, or pulled
+    z = 0 if imposed or data.imposed == "displacement" else int(rows.zero.sum())
+    return Layout(
+        n,
+        m,
+        slice(n, n + q),
+        slice(n + q, n + q + t),
+        slice(n + q + t, n + q + t + z),
+        n + q + t + z,
+    )
