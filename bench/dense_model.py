@@ -13,7 +13,7 @@ from identification.gap.data import UNLOADING
 from identification.gap.evidence import engine
 from identification.gap.model.base import HALF, compliance_found, prediction
 from identification.gap.model.bench import Bench
-from identification.gap.model.noise import ENCODER_OFFSET_RAD
+from identification.gap.model.encoders import ENCODER_OFFSET_RAD
 
 Array = NDArray[np.float64]
 
@@ -122,6 +122,13 @@ def nuisances(bench: Bench) -> list[tuple[str, Array, float]]:
     for j in range(m if bench.has_q else 0):
         off = stacked(bench, None, np.tile(np.eye(m)[j], (rows.n, 1)))
         out.append((f"offset {j}", off, ENCODER_OFFSET_RAD))
+        for name, group, sd in (
+            ("run", rows.run, bench.noise.q_run),
+            ("setup", rows.setup, bench.noise.q_setup),
+        ):
+            for g in np.unique(group) if sd > 0 else ():
+                mine = np.where((group == g)[:, None], np.eye(m)[j], 0.0)
+                out.append((f"offset of {name} {g} {j}", stacked(bench, None, mine), sd))
     return out
 
 

@@ -318,6 +318,8 @@ def _with_noise(bench: Bench, there: Bench) -> Bench:
         there.noise,
         response=np.maximum(there.noise.response, sample / root),
         q=now.q,
+        q_run=now.q_run,
+        q_setup=now.q_setup,
         force=now.force,
         run=now.run,
         stated=now.stated,

@@ -48,11 +48,13 @@ def variants(bench: Bench) -> list[Variant]:
     same, and nobody turns a screw while a load stands: none where its reading hardly moves. None
     of weights, which nobody reads."""
     top = float(np.abs(bench.rows.measured_force).max())
-    scales = tuple(s * top for s in shares(bench, SHARES))
+    usual = SHARES if np.any(bench.zero_line) else shares(bench, SHARES)
+    scales = tuple(s * top for s in usual)
     if not top > 0 or (not bench.imposed and _cannot_drift(bench)):
         return []
     amplifiers = _Amplifiers(bench, _axes(bench))
-    named, free = {k: [path] for k, path in paths(bench).items()}, free_paths(bench)
+    shown = bool(np.any(bench.zero_line))
+    named, free = {k: [p] for k, p in paths(bench, shown=shown).items()}, free_paths(bench)
     if free:
         named["rates"] = rates(bench)
     out = []

@@ -282,9 +282,12 @@ def _zone(
     info: dict[str, Any],
     places: dict[bytes, list[int]],
 ) -> list[Variant]:
-    """Variants of one zone, per kind, on the net torque x (n,)."""
+    """Variants of one zone, per kind, on the net torque x (n,). Of a rig that is loaded from one
+    side, none of which a flank was not seen: that is a seat."""
     scales = SCALES if bench.data.arm else tuple(s * bench.reach for s in _SHARES)
-    j, width, out = int(info["joint"]), float(info["zone_Nm"]), []
+    j, width, out = int(info["joint"]), float(info["zone_Nm"]), list[Variant]()
+    if _pressed(bench) and min(-float(x.min()), float(x.max())) < _FLANK * width:
+        return out
     floating = _floating(bench, j, np.abs(x) < width, places)
     resting = _resting(bench, j, places)
     play = Play(bench, x, width)
@@ -327,6 +330,7 @@ def _least(bench: Bench, joint: int, zone: float) -> float:
     return share * 2 * zone * float(bench.line_slope[mine].mean())
 
 
+_FLANK = 2.0  # zones from the middle: there the play is over
 _SOFTER = 2.5  # times
 
 

@@ -32,6 +32,7 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.growing import Growing
 from identification.gap.recording.rows import Rows
 from identification.gap.recording.turns import rises
+from identification.running import first_rows
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 _CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
@@ -212,11 +213,25 @@ class Engine:
         top = np.abs(response).max(axis=1, initial=0.0)
         contrast[size <= 1e-9 * (1 + top)] = 0.0
         holds = len(self._edges)
-        readings = tuple(
-            Some.of(white[:, start : start + holds]) for start in range(q.start, q.stop, holds)
-        )
+        starts = range(q.start, q.stop, holds)
+        readings = tuple(Some.of(self._apart(white, slice(k, k + holds))) for k in starts)
         even = np.hstack([means, white[:, q.stop :]])
         return White(even, readings, Some.of(contrast), holds, self._groups)
+
+    def _apart(self, white: Array, joint: slice) -> Array:
+        """(c, holds) readings of a joint, in units of noise that those of a run have no share of in
+        common any more: `(1 + v v')^-1/2`, v what is common over what each has to itself."""
+        readings = white[:, joint]
+        if not self.bench.noise.q_run > 0:
+            return readings
+        common = self.bench.noise.q_run / self.sigma[joint]
+        run = self.bench.rows.run[self._edges]
+        first = first_rows(run)
+        square = np.add.reduceat(common**2, first)
+        share = (1 - 1 / np.sqrt(1 + square)) / square
+        along = np.add.reduceat(readings * common, first, axis=1) * share
+        counts = np.diff(np.append(first, len(run)))
+        return np.asarray(readings - common * np.repeat(along, counts, axis=1))
 
     def _left(self, eta: float) -> Weights:
         """What an imperfection leaves of the precision."""

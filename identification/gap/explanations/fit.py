@@ -141,6 +141,7 @@ def _weighed(engine: Engine, X: Array, eta: float, keep: Flags) -> Array:
     sigma2 = engine.sigma**2
     n = engine.bench.rows.n
     sigma2[:n] += (ROW_PART * eta) ** 2  # more samples of the same row are as far off
+    sigma2[engine.bench.layout.q] += (eta / LEVER_M) ** 2
     p = np.where(keep, 1 / sigma2, 0.0)
     out = X * p[:, None]
     held = np.flatnonzero((common > 0) & keep)
@@ -157,11 +158,16 @@ def _weighed(engine: Engine, X: Array, eta: float, keep: Flags) -> Array:
 
 
 def _holds(engine: Engine, eta: float) -> tuple[Array, Array]:
-    """Per stacked row: number of its hold (per channel), standard deviation common to the hold."""
+    """Per stacked row: number of its hold (of readings of a joint: of its run), and standard
+    deviation common to it."""
     bench, n = engine.bench, engine.bench.rows.n
     size = bench.layout.size
     key, common = np.arange(size) + float(n), np.zeros(size)
     key[:n] = bench.rows.hold
-    common[bench.layout.q] = eta / LEVER_M
+    q, joints = bench.layout.q, bench.data.joints
+    if q.stop > q.start:
+        run = bench.rows.run[bench.rows.edges]
+        key[q] = n + size + (np.arange(joints)[:, None] * (run.max() + 1) + run).ravel()
+        common[q] = bench.noise.q_run
     common[:n] = np.hypot(bench.noise.hold, hold_part(bench.rows) * eta)
     return np.asarray(key, dtype=float), common

@@ -125,14 +125,15 @@ _BACK, _CLEARLY = 0.33, 5.0  # of all that was seen; standard deviations
 _SWINGS, _AGAIN = 0.25, 4  # of all that was seen; turning points
 
 
-def paths(bench: Bench) -> dict[str, Array]:
+def paths(bench: Bench, *, shown: bool = False) -> dict[str, Array]:
     """Named paths that a drift may take here: where it can't be told from a curve of the load,
-    only the straight line, and seldom (SMALL); none in one running pull or cycle. What is over
+    only the straight line, and seldom (SMALL); none in one running pull or cycle. shown: whether
+    the channel itself shows it without load. What is over
     before it was read a few times is no path, but a reading that is off."""
     t = _clock(bench)
     over = {f"T {share:g}" for share in RATES if np.sum(t < share) < _SEEN}
     every = {label: path for label, path in warm_ups(bench).items() if label not in over}
-    if own_clock(bench):
+    if own_clock(bench) or shown:
         return every
     return {} if bench.rows.continuous else {"linear": every["linear"]}
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.model.bench import Bench
-from identification.gap.model.noise import ENCODER_OFFSET_RAD
+from identification.gap.model.encoders import ENCODER_OFFSET_RAD
 
 HALF = 0.5  # of the geometry is expected, and as much may be missing or there
 # Of a piezoelectric dynamometer, relative; and what data sheets allow at most.
@@ -192,17 +192,24 @@ def _tares(bench: Bench) -> list[_Part]:
 
 
 def _offsets(bench: Bench) -> list[_Part]:
-    """Joint readings against the commanded pose, per pose and joint."""
+    """Joint readings against the commanded pose, per pose and joint; where setups of one pose are
+    read differently, per setup as well."""
     if not bench.has_q:
         return []
-    rows, out = bench.rows, []
+    rows, out = bench.rows, list[_Part]()
     poses = [s.pose for s in bench.data.setups]
-    for pose in dict.fromkeys(poses):
-        mine = np.array([p == pose for p in poses])[rows.setup]
+    groups = [
+        (pose, [p == pose for p in poses], ENCODER_OFFSET_RAD) for pose in dict.fromkeys(poses)
+    ]
+    if bench.noise.q_setup > 0:
+        each = np.eye(len(poses), dtype=bool).tolist()
+        groups += [(f"setup {s}", mine, bench.noise.q_setup) for s, mine in enumerate(each)]
+    for name, setups, sd in groups:
+        mine = np.array(setups)[rows.setup]
         for j in range(bench.data.joints):
             q = np.zeros((rows.n, bench.data.joints))
             q[mine, j] = 1.0
-            out.append((f"offset {pose} {j + 1}", bench.stacked(q=q), ENCODER_OFFSET_RAD))
+            out.append((f"offset {name} {j + 1}", bench.stacked(q=q), sd))
     return out
 
 

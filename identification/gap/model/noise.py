@@ -9,6 +9,7 @@ import numpy as np
 from identification.arrays import Array, Ints
 from identification.gap.data import GapData
 from identification.gap.model.driven import steepness
+from identification.gap.model.encoders import readings_of
 from identification.gap.model.history import half_sample
 from identification.gap.recording.holds import (
     ENOUGH,
@@ -19,10 +20,8 @@ from identification.gap.recording.holds import (
     swing_within,
 )
 from identification.gap.recording.rows import Rows
-from identification.gap.recording.white import LEAST_SAMPLES, QUARTILE, white_noise
+from identification.gap.recording.white import LEAST_SAMPLES, white_noise
 
-ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
-ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
 # The stated uncertainty of one sample includes what is common to a hold (vibration, linearity) and
 # to a run (datum); a third of it each leaves nine tenths for the single sample.
 HOLD_SHARE = 0.2
@@ -45,7 +44,8 @@ class Noise:
     else is stated is known to a factor UNSURE.
     swings: how many times what is stated an arm goes to and fro while nothing changes. slow: by
     which share of what is stated it may differ from hold to hold. seen: of one
-    sample, m, as far as a rig without an arm showed it: 0 where it read every level but once."""
+    sample, m, as far as a rig without an arm showed it: 0 where it read every level but once.
+    q_run, q_setup: common to the readings of a joint in a run, in a setup, rad."""
 
     response: Array
     q: Array
@@ -58,6 +58,8 @@ class Noise:
     swings: float = 0.0
     slow: float = 0.0
     seen: float = 0.0
+    q_run: float = 0.0
+    q_setup: float = 0.0
 
     @property
     def misjudged(self) -> bool:
@@ -101,10 +103,13 @@ def estimate_noise(data: GapData, rows: Rows, slope: Array, imposed: bool) -> No
         follows = _scatter(data, less, hold)
         raised = max(1.0, min(white, follows or 0.0) / meter.displacement)
     rounded = 0.0 if rows.continuous or imposed else _rounded(data, hold)
+    readings = readings_of(data, rows, hold)
     per_sample = np.maximum(per_sample, rounded)  # next to an edge, one is a whole step off
     return Noise(
         response=per_sample / np.sqrt(weight),
-        q=_encoders(data, rows, hold),
+        q=readings.one,
+        q_run=readings.run,
+        q_setup=readings.setup,
         force=meter.force,
         hold=np.hypot(max(HOLD_SHARE * stated, rounded), common),
         run=RUN_SHARE * stated,
@@ -176,38 +181,6 @@ def _slow(data: GapData, rows: Rows, slope: float, hold: Ints) -> float:
             return 0.0
         slow.append(max(stated**2 - white**2, 0.0) ** 0.5)
     return min(float(np.hypot(slow[0], slope * slow[1])) / meter.displacement, 1.0)
-
-
-def _encoders(data: GapData, rows: Rows, hold: Ints) -> Array:
-    """Noise of one joint reading (m,), rad: within holds, or between repetitions where holds are
-    too short; what is usual where neither tells."""
-    q = np.full(data.joints, ENCODER_RAD)
-    if data.q is None or rows.continuous:
-        return q
-    each = [scatter_within(data.q[:, j], hold) for j in range(data.joints)]
-    if any(found is None for found in each):
-        q[:] = _between_repetitions(data, rows) or ENCODER_RAD
-    for j, found in enumerate(each):
-        q[j] = max(found or q[j], 1e-7)
-    return q
-
-
-def _between_repetitions(data: GapData, rows: Rows) -> float | None:
-    """Noise of one joint reading from how levels repeat, rad: that of the middle joint, as one may
-    have a trouble of its own. Forces that differ a little are allowed for as simulated."""
-    assert rows.q is not None
-    lever = np.stack([s.lever for s in data.setups])[rows.setup]
-    left = rows.q - lever * data.compliance * rows.force[:, None]
-    free = rows.n
-    for group in (rows.level, rows.run):
-        size = np.bincount(group)
-        left = left - np.stack([np.bincount(group, w) / size for w in left.T], axis=1)[group]
-        free -= len(size)
-    free += len(np.unique(rows.setup))
-    if free < ENOUGH:
-        return None
-    spread = np.median(np.abs(left) * np.sqrt(rows.weight)[:, None], axis=0) / QUARTILE
-    return float(np.median(spread) * (rows.n / free) ** 0.5)
 
 
 def _raised(data: GapData, whites: tuple[float, float]) -> float:

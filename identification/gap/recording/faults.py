@@ -20,6 +20,7 @@ from identification.gap.recording.ends import after_break
 from identification.gap.recording.glitches import when
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.white import QUARTILE
+from identification.gap.recording.wraps import wraps
 from identification.running import first_rows
 
 
@@ -31,12 +32,13 @@ class Fault:
     text: str
 
 
-SIGNS, BURSTS, FROZEN, GOES_BACK, JUMPS, FULL, BROKEN, SILENT = (
+SIGNS, BURSTS, FROZEN, GOES_BACK, JUMPS, WRAPS, FULL, BROKEN, SILENT = (
     "signs",
     "bursts",
     "frozen",
     "goes back",
     "jumps",
+    "wraps",
     "full",
     "broken",
     "silent",
@@ -110,6 +112,17 @@ def _jumps(data: GapData) -> str:
     )
 
 
+def _wraps(data: GapData) -> str:
+    size = wraps(data)
+    if size is None:
+        return ""
+    return (
+        f"The displacement jumps by {1e3 * size:.4g} mm against its way, from one end of its range "
+        "to the other, again and again: a counter that starts again. Unwrap it in the table, and "
+        "diagnose again."
+    )
+
+
 def _full(data: GapData) -> str:
     full = saturates(data)
     if full is None:
@@ -153,6 +166,7 @@ _DETECTORS: dict[str, Callable[[GapData], str]] = {
     FROZEN: _lost,
     GOES_BACK: _goes_back,
     JUMPS: _jumps,
+    WRAPS: _wraps,
     FULL: _full,
     BROKEN: _broken,
     SILENT: _silent,

@@ -1,0 +1,123 @@
+"""How well joints are read: from reading to reading, from run to run, from setup to setup."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array, Ints
+from identification.gap.data import GapData
+from identification.gap.recording.holds import ENOUGH, scatter_within
+from identification.gap.recording.rows import Rows
+from identification.gap.recording.white import QUARTILE
+
+ENCODER_RAD = 1e-5  # resolution and jitter of a joint reading, where holds can't tell
+ENCODER_OFFSET_RAD = 4e-5  # repeatability of the arm, 0.05 mm at 1.3 m: q against command
+
+
+class Readings(NamedTuple):
+    """Standard deviations, rad: of one reading (m,); of what all readings of a run are off by, and
+    all of a setup, each joint by its own."""
+
+    one: Array
+    run: float
+    setup: float
+
+
+def readings_of(data: GapData, rows: Rows, hold: Ints) -> Readings:
+    """From what the joints read while the arm rests in holds (n,), and while it bears nothing."""
+    one = _one(data, rows, hold)
+    if data.q is None or rows.continuous:
+        return Readings(one, 0.0, 0.0)
+    return Readings(one, *_between_runs(data, rows, one))
+
+
+def _one(data: GapData, rows: Rows, hold: Ints) -> Array:
+    """Noise of one joint reading (m,), rad: within holds, or between repetitions where holds are
+    too short; what is usual where neither tells."""
+    q = np.full(data.joints, ENCODER_RAD)
+    if data.q is None or rows.continuous:
+        return q
+    each = [scatter_within(data.q[:, j], hold) for j in range(data.joints)]
+    if any(found is None for found in each):
+        q[:] = _between_repetitions(data, rows) or ENCODER_RAD
+    for j, found in enumerate(each):
+        q[j] = max(found or q[j], 1e-7)
+    return q
+
+
+def _between_repetitions(data: GapData, rows: Rows) -> float | None:
+    """Noise of one joint reading from how levels repeat, rad: that of the middle joint, as one may
+    have a trouble of its own. Forces that differ a little are allowed for as simulated."""
+    assert rows.q is not None
+    lever = np.stack([s.lever for s in data.setups])[rows.setup]
+    left = rows.q - lever * data.compliance * rows.force[:, None]
+    free = rows.n
+    for group in (rows.level, rows.run):
+        size = np.bincount(group)
+        left = left - np.stack([np.bincount(group, w) / size for w in left.T], axis=1)[group]
+        free -= len(size)
+    free += len(np.unique(rows.setup))
+    if free < ENOUGH:
+        return None
+    spread = np.median(np.abs(left) * np.sqrt(rows.weight)[:, None], axis=0) / QUARTILE
+    return float(np.median(spread) * (rows.n / free) ** 0.5)
+
+
+def _between_runs(data: GapData, rows: Rows, one: Array) -> tuple[float, float]:
+    """Standard deviations between runs of a setup, and between setups of a pose, rad, of what
+    joints read without load: the arm was sent to the same pose. 0 where readings alone explain it.
+    """
+    assert rows.q is not None
+    zero = rows.zero
+    runs, of_run = np.unique(rows.run[zero], return_inverse=True)
+    if len(runs) < _TWO:
+        return 0.0, 0.0
+    weight = np.bincount(of_run, rows.weight[zero])
+    means = _means(rows.q[zero] / one, of_run, rows.weight[zero])
+    setup = rows.setup[zero][np.unique(of_run, return_index=True)[1]]
+    run = _beyond(means, setup, 1 / weight)
+    setups, of_setup = np.unique(setup, return_inverse=True)
+    known = 1 / (1 / weight + run)
+    poses = [data.setups[s].pose for s in setups]
+    pose = np.array([poses.index(p) for p in poses])
+    between = _beyond(_means(means, of_setup, known), pose, 1 / np.bincount(of_setup, known))
+    sd = float(np.median(one))
+    return sd * run**0.5, sd * between**0.5
+
+
+_TWO = 2
+
+
+def _means(values: Array, group: Ints, weight: Array) -> Array:
+    """(g, m) of values (n, m), weighted."""
+    sums = np.stack([np.bincount(group, weight * v) for v in values.T], axis=1)
+    return np.asarray(sums / np.bincount(group, weight)[:, None])
+
+
+def _beyond(means: Array, group: Ints, variance: Array) -> float:
+    """Variance that means (r, m) scatter by within groups (r,) beyond their own (r,); 0 where that
+    may be chance. The two thirds of the joints that scatter least tell, as far as chance lets
+    them: a trouble sits in one or two, and what the readings do all joints do."""
+    from scipy.special import chdtri
+
+    _, group = np.unique(group, return_inverse=True)
+    count = np.bincount(group)
+    free = int(np.sum(count - 1))
+    if not free:
+        return 0.0
+    left = means - _means(means, group, 1 / variance)[group]
+    each = np.sort(np.sum(left**2 / variance[:, None], axis=0) / free)
+    least = max(1, len(each) * 2 // 3)
+    # medians of the ranks of as many chi squares (Benard)
+    above = 1 - (np.arange(1, least + 1) - 0.3) / (len(each) + 0.4)
+    ratio = float(each[:least].mean() / (chdtri(free, above) / free).mean())
+    if ratio < chdtri(_AS_MANY * free, _CHANCE) / (_AS_MANY * free):
+        return 0.0
+    return (ratio - 1.0) * float(np.mean(variance[count[group] > 1]))
+
+
+# That mean of four of six scatters as a chi square of so many times the degrees of freedom would;
+# how seldom chance alone is taken for more.
+_AS_MANY, _CHANCE = 3, 0.01

@@ -1,0 +1,124 @@
+"""Joint readings that are off from run to run, and from setup to setup: seen, and no effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bench.dense_model import dense
+from identification.arrays import Array
+from identification.gap.data import GapData
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.evidence.engine import Engine
+from identification.gap.explanations.fit import _weighed
+from identification.gap.model.base import base_columns, prediction
+from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.encoders import Readings, readings_of
+from identification.gap.recording.holds import hold_ids, rest_ids
+from identification.gap.recording.rows import reduce_rows
+from rig.diagnosis.gap_data import gap_data
+from tests.conformance.gap_designs import Design, imported, meta, noisy
+
+RUN, SETUP = 4e-6, 9e-6  # rad; a reading scatters by 1e-5
+DESIGN = Design(("P1", "P2"), repetitions=4, steps=4, hold=8)
+
+
+@cache
+def plain(seed: int = 0) -> GapData:
+    return gap_data(imported(noisy(DESIGN, seed=seed), meta(DESIGN)))
+
+
+def off(data: GapData, run: float = 0.0, setup: float = 0.0, seed: int = 0) -> GapData:
+    """With readings that are off by so much, every joint by its own."""
+    assert data.q is not None
+    rng = np.random.default_rng(seed)
+    of_run = rng.normal(0, 1, (int(data.run.max()) + 1, data.joints))
+    of_setup = rng.normal(0, 1, (len(data.setups), data.joints))
+    return replace(data, q=data.q + run * of_run[data.run] + setup * of_setup[data.setup])
+
+
+def found_in(data: GapData) -> Readings:
+    return readings_of(data, reduce_rows(data), rest_ids(data, hold_ids(data)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_readings_of_a_run_and_of_a_setup_have_in_common_is_found(seed: int) -> None:
+    found = found_in(off(plain(seed), RUN, SETUP, seed))
+    np.testing.assert_allclose(found.one, 1e-5, rtol=0.15)
+    assert found.run == pytest.approx(RUN, rel=0.4)
+    assert found.setup == pytest.approx(SETUP, rel=0.7)
+
+
+def test_it_is_none_where_readings_alone_explain_it() -> None:
+    """By chance once in a hundred times; then less than readings that are off by themselves."""
+    each = [found_in(plain(seed)) for seed in range(8)]
+    assert sorted(r.run for r in each)[6] == 0
+    assert sorted(r.setup for r in each)[6] == 0
+    assert max(max(r.run, r.setup) for r in each) < RUN
+
+
+def test_runs_that_differ_are_no_setups_that_do() -> None:
+    each = [found_in(off(plain(seed), 3 * RUN, seed=seed)) for seed in range(8)]
+    assert min(r.run for r in each) > RUN
+    assert sorted(r.setup for r in each)[6] == 0
+
+
+def test_a_trouble_of_two_joints_is_none_of_the_readings() -> None:
+    """What gave way in one run stays there in all later ones, and is of the joint."""
+    data = plain()
+    assert data.q is not None
+    later = (data.run >= 3).astype(float)[:, None]
+    q = data.q + 2e-4 * later * np.array([1.0, 0, 0.5, 0, 0, 0])
+    assert found_in(replace(data, q=q)).run < 0.5 * RUN
+
+
+def test_a_force_that_drifts_is_none_of_the_readings() -> None:
+    data = plain()
+    assert data.session is not None
+    found = found_in(replace(data, force=data.force + 8.0 * data.session / data.session.max()))
+    assert found.run < 0.5 * RUN
+
+
+def test_readings_that_are_off_together_are_no_effect() -> None:
+    """Thousands of readings tell that to many standard deviations, in every joint."""
+    found = diagnose_gap(off(plain(1), RUN, SETUP, 1))
+    assert found.verdict == "none"
+    assert found.probabilities["none"] > 0.8
+
+
+@cache
+def read_badly() -> Bench:
+    small = Design(("P1",), repetitions=3, steps=3, hold=6)
+    data = gap_data(imported(noisy(small), meta(small)))
+    bench = make_bench(off(data, RUN, SETUP, 2))
+    return replace(bench, noise=replace(bench.noise, q_run=RUN, q_setup=SETUP))
+
+
+def test_the_evidence_is_that_of_one_dense_covariance() -> None:
+    bench = read_badly()
+    engine = Engine(bench, base_columns(bench), bench.observed - prediction(bench), np.zeros(1))
+    model = dense(bench)
+    common, run = (RUN / bench.sigma[bench.layout.q]) ** 2, bench.rows.run[bench.rows.edges]
+    square = [common.reshape(6, -1)[:, run == r].sum(axis=1) for r in np.unique(run)]
+    constant = float(np.sum(np.log(bench.sigma)) + 0.5 * np.sum(np.log1p(square)))
+    constant += 0.5 * bench.layout.size * np.log(2 * np.pi)
+    exact = model.log_density(np.zeros(len(model.target)), 0.0)
+    assert engine.levels[0].log_base - constant == pytest.approx(exact, rel=1e-8)
+
+
+@pytest.mark.parametrize("eta", [0.0, 2e-6])
+def test_fits_weigh_them_with_the_same_covariance(eta: float) -> None:
+    bench = read_badly()
+    engine = Engine(bench, base_columns(bench), bench.observed - prediction(bench), np.zeros(1))
+    q, size = bench.layout.q, bench.layout.size
+    X: Array = np.zeros((size, 3))
+    X[q] = np.random.default_rng(3).normal(0, 1e-5, (q.stop - q.start, 3))
+    run = np.tile(bench.rows.run[bench.rows.edges], 6)
+    joint = np.repeat(np.arange(6), len(bench.rows.edges))
+    alike = (run[:, None] == run) & (joint[:, None] == joint)
+    V = RUN**2 * alike + np.diag(bench.sigma[q] ** 2 + (eta / 0.3) ** 2)
+    found = _weighed(engine, X, eta, np.ones(size, dtype=bool))
+    np.testing.assert_allclose(found[q], np.linalg.solve(V, X[q]), rtol=1e-9)
