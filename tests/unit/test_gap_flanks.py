@@ -188,7 +188,7 @@ def test_no_play_is_placed_where_there_is_none(bench: Bench) -> None:
 def test_placed_plays_are_their_laws_and_explain_the_data(bench: Bench) -> None:
     fresh = replace(bench, columns=Pool())
     made = [v for v in joint_backlash.variants(fresh) if v.info["kind"] in PLACED]
-    assert len(made) == 2
+    assert len(made) == 3
     pool = np.column_stack(fresh.columns)
     n = fresh.rows.n
     line = np.column_stack([np.ones(n), fresh.load])
@@ -272,3 +272,15 @@ def test_what_only_rubs_is_no_play_that_a_curve_takes_back(column: int, plays: b
     on_arm = copy(engine)
     on_arm.bench = replace(bench, data=replace(bench.data, arm=True))
     assert minor_parts(on_arm, parts, alike) < 5e3
+
+
+def test_from_one_side_both_flanks_of_a_play_have_to_be_seen() -> None:
+    """What is soft where the load begins is a seat."""
+    x = to_and_fro(low=0.0)
+    bench = a_bench(x, x + 0.4 * np.tanh(x / 0.03), "force")
+    assert bench.course.one_sided
+    made = joint_backlash.variants(bench)
+    assert made
+    for v in [*made, *(f for m in made[:4] for f in joint_backlash.refined(bench, m))]:
+        away = bench.true_torque[:, 0] + v.info["preload_Nm"]
+        assert min(-away.min(), away.max()) >= 2 * v.info["zone_Nm"]

@@ -48,12 +48,11 @@ def variants(bench: Bench) -> list[Variant]:
     same, and nobody turns a screw while a load stands: none where its reading hardly moves. None
     of weights, which nobody reads."""
     top = float(np.abs(bench.rows.measured_force).max())
-    usual = SHARES if np.any(bench.zero_line) else shares(bench, SHARES)
-    scales = tuple(s * top for s in usual)
+    shown = bool(np.any(bench.zero_line))  # without load, before and after
+    scales = tuple(s * top for s in (SHARES if shown else shares(bench, SHARES)))
     if not top > 0 or (not bench.imposed and _cannot_drift(bench)):
         return []
     amplifiers = _Amplifiers(bench, _axes(bench))
-    shown = bool(np.any(bench.zero_line))
     named, free = {k: [p] for k, p in paths(bench, shown=shown).items()}, free_paths(bench)
     if free:
         named["rates"] = rates(bench)

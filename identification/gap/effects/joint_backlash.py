@@ -32,6 +32,7 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.laws import lost_motion_law
 from identification.gap.laws.closer import Word, closing_in, nearly_leads, places, seen
+from identification.gap.laws.curves import hinge
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Laws
@@ -72,6 +73,7 @@ SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 _VISITED = 0.45  # of the play from an end: nearer than the middle
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
 _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an arm
+_BENDS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.8)  # of flanks, from where they begin
 _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
 
@@ -239,10 +241,15 @@ def _finer(
 
 
 def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
-    """With the springs as they are, and with others beside the play."""
+    """With the springs as they are, with others beside the play, and with curved flanks: teeth that
+    press each other are soft at first (Hertz 1882)."""
     torque = bench.true_torque[:, j]
+    span, away = float(np.ptp(torque)), torque - flanks.centre
+    reach = float(np.abs(away).max()) - flanks.zone
+    bends = [flanks.zone + share * reach for share in _BENDS]
     parts = [bench.sense * part for part in shapes(bench, torque, flanks)]
-    columns = [bench.add_joint(j, part) for part in (*parts, torque / float(np.ptp(torque)))]
+    springs = [torque / span, *(hinge(away, bend) / span for bend in bends)]
+    columns = [bench.add_joint(j, part) for part in (*parts, *springs)]
     scales = tuple(s * bench.reach for s in _SHARES)
     info: dict[str, Any] = {
         "joint": j,
@@ -252,9 +259,11 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
         "preload_Nm": 0.0,
         "kind": flanks.kind,
         "flanks": flanks,
-        "span": float(np.ptp(torque)),
+        "span": span,
+        "bends": bends,
     }
-    root = np.diag([1.0, FRICTION, 1.0])
+    root = np.diag([1.0, FRICTION, *[1.0] * len(springs)])
+    many = ((2, ""), (3, ", other springs"), (len(columns), ", curved flanks"))
     return [
         variant(
             WORD,
@@ -268,7 +277,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
             each=(True, True),
             **info,
         )
-        for k, name in ((2, ""), (3, ", other springs"))
+        for k, name in (many if flanks.sharp else many[:2])
     ]
 
 
@@ -283,10 +292,11 @@ def _zone(
     places: dict[bytes, list[int]],
 ) -> list[Variant]:
     """Variants of one zone, per kind, on the net torque x (n,). Of a rig that is loaded from one
-    side, none of which a flank was not seen: that is a seat."""
+    side, none within the load of which a flank was not seen: that is a seat."""
     scales = SCALES if bench.data.arm else tuple(s * bench.reach for s in _SHARES)
     j, width, out = int(info["joint"]), float(info["zone_Nm"]), list[Variant]()
-    if _pressed(bench) and min(-float(x.min()), float(x.max())) < _FLANK * width:
+    inside = bool(info["preload_Nm"]) and _pressed(bench)
+    if inside and min(-float(x.min()), float(x.max())) < _FLANK * width:
         return out
     floating = _floating(bench, j, np.abs(x) < width, places)
     resting = _resting(bench, j, places)

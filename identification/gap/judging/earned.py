@@ -34,7 +34,7 @@ def earned(found: SearchResult) -> SearchResult:
     """The posterior after a look at withheld data; as it was where there are none."""
     ways = folds(found.engine)
     if ways and _comes_again(found.engine.bench):
-        simpler = _foretold(found, *next(iter(ways.items())))
+        simpler = _foretold(found, *next(iter(ways.items()))) | dict(found.foretold)
         found = with_posterior(replace(found, foretold=simpler), found.kept) if simpler else found
     fold = ways.get("repetition")
     if fold is None:

@@ -25,10 +25,9 @@ from identification.gap.explanations.explanation import (
 )
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import with_posterior
-from identification.gap.judging.earned import left_of
+from identification.gap.judging.dead_zone import spoken_for
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.strain import LIMIT, strain
-from identification.gap.laws.lost_motion import PLACED
 from identification.gap.model.noise import UNSURE
 from identification.gap.words import CURVES, DRIFTS, FRICTION
 
@@ -65,31 +64,13 @@ def looked_up(found: SearchResult) -> SearchResult:
         heirs = [e for e in found.explanations if e.parts and any(e.words < w for w in lost)]
         done |= {e.words: judge(engine, e) for e in heirs if e.words not in done}
     done |= {e.words: judge(engine, e) for e in _near(found.nameless)}
-    done |= _as_a_play(engine, [done.get(e.words, e) for e in found.explanations])
     out, nameless = (
         tuple(sorted((done.get(e.words, e) for e in each), key=lambda e: -e.log_weight))
         for each in (found.explanations, found.nameless)
     )
-    return with_posterior(replace(found, explanations=out, nameless=nameless), found.kept)
-
-
-def _as_a_play(engine: Engine, ranked: list[Explanation]) -> dict[frozenset[str], Explanation]:
-    """A free curve, no likelier than a play that the data placed and that leaves hardly more: a
-    curve that is soft where the load goes through a play passes for it."""
-    alone = {min(e.words): e for e in ranked if len(e.words) == 1}
-    play, curve = alone.get(PLAY), alone.get(CURVE)
-    if play is None or curve is None or play.parts[0].variant.info["kind"] not in PLACED:
-        return {}
-    left, least = (left_of(engine, fit(engine, e)) for e in (play, curve))
-    if left > _HARDLY_MORE * least:
-        return {}
-    loss = max(curve.log_weight - play.log_weight + _PLAINLY, 0.0)
-    less = replace(curve, log_weight=curve.log_weight - loss, log_good=curve.log_good - loss)
-    return {curve.words: less}
-
-
-PLAY, CURVE = "joint_backlash", "joint_nonlinear_stiffness"
-_HARDLY_MORE, _PLAINLY = 1.05, 30.0  # times; nats, of tempered evidence
+    said = {} if engine.bench.data.arm else spoken_for(engine, out)
+    found = replace(found, explanations=out, nameless=nameless, foretold=said)
+    return with_posterior(found, found.kept)
 
 
 def _near(ranked: tuple[Explanation, ...]) -> list[Explanation]:

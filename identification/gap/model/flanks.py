@@ -54,6 +54,11 @@ class Flanks:
     corner: float
     friction: float
 
+    @property
+    def sharp(self) -> bool:
+        """Whether its corners are none of a smooth curve."""
+        return self.kind == "held" or self.corner < SHARP * self.zone
+
 
 def shapes(bench: Bench, load: Array, flanks: Flanks) -> tuple[Array, Array]:
     """Of a load (n,): place within the play (-1/2 .. 1/2), and the friction beside it."""
@@ -110,8 +115,7 @@ def _needed(bench: Bench, load: Array, found: Flanks, left: float) -> bool:
     rub = shapes(bench, load, found)[1]
     if left > ENOUGH_BESIDE * _left([load, rub], y, weight):
         return False
-    sharp = found.kind == "held" or found.corner < SHARP * found.zone
-    return left < (1.0 if sharp else CORNERS) * _left([*_smooth(load), rub], y, weight)
+    return left < (1.0 if found.sharp else CORNERS) * _left([*_smooth(load), rub], y, weight)
 
 
 def _smooth(load: Array) -> list[Array]:

@@ -1,0 +1,114 @@
+"""What a curve that is passed both ways says of lost motion: a play is a dead zone with sharp ends.
+
+A free curve passes for any play, and a play with soft ends beside a curve for any curve. The two
+are told apart by the stiffness along what they fit: within a play it falls to next to nothing, and
+is back where it was within a small part of the play; springs that harden, contacts and rubber
+change theirs over all of the way, and stages of a gear's stiffness lie within a factor of two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array, Flags
+from identification.gap.evidence.engine import Engine
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import fit
+
+PLAY, CURVE = "joint_backlash", "joint_nonlinear_stiffness"
+ELASTIC = frozenset({PLAY, CURVE})
+
+
+class Limits(NamedTuple):
+    """Of a play: stiffness within it, of that of the flanks; way from loose to stiff, of it."""
+
+    loose: float
+    sharp: float
+
+
+# To say play although a curve is likelier; to say it where that is the likelier one.
+PLAINLY, SOMEHOW = Limits(0.2, 0.2), Limits(0.3, 0.35)
+_POINTS = 400  # over the way of the displacement
+_STIFF = 0.75  # quantile of the stiffness that counts as that of the flanks
+_SOFT, _BACK = 0.4, 0.6  # of it: at the ends of the play; beyond them
+_WIDTHS = (0.01, 0.7)  # of the way
+
+
+def spoken_for(
+    engine: Engine, ranked: tuple[Explanation, ...]
+) -> dict[frozenset[str], Explanation]:
+    """Words of the best explanation, where a play or a curve is its largest effect -> that with the
+    other one in its place, where that is what it shows. Of a rig without an arm that is loaded both
+    ways."""
+    best = ranked[0]
+    if engine.bench.course.one_sided or not best.parts or best.parts[0].word not in ELASTIC:
+        return {}
+    rest, word = best.words - ELASTIC, best.parts[0].word
+    others = {min(e.words & ELASTIC): e for e in ranked if _is_one_beside(e, rest)}
+    other = others.get(PLAY if word == CURVE else CURVE)
+    if other is None:
+        return {}
+    play = has_dead_zone(*_curve(engine, best), PLAINLY if word == CURVE else SOMEHOW)
+    return {} if play == (word == PLAY) else {best.words: other}
+
+
+def _is_one_beside(explanation: Explanation, rest: frozenset[str]) -> bool:
+    """Whether it has a play, or a curve, as its largest effect, and the rest beside it."""
+    e = explanation
+    return len(e.words & ELASTIC) == 1 and e.words - ELASTIC == rest and e.parts[0].word in ELASTIC
+
+
+def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:
+    """Displacement (n,) and force (n,) of a fit, in the units of the load."""
+    bench, fitted = engine.bench, fit(engine, explanation)
+    response = bench.response - engine.target[: bench.rows.n] + fitted.response
+    response = response / bench.slope
+    return (bench.load, response) if bench.imposed else (response, bench.load)
+
+
+def has_dead_zone(u: Array, force: Array, limits: Limits) -> bool:
+    """Whether force (n,) over displacement u (n,) has a dead zone with sharp ends, inside."""
+    at = np.linspace(float(u.min()), float(u.max()), _POINTS)
+    order = np.argsort(u, kind="stable")
+    stiffness = np.gradient(np.interp(at, *_distinct(u[order], force[order])), at)
+    flank = float(np.quantile(stiffness, _STIFF))
+    return any(
+        _is_play(stiffness / flank, a, b, limits)
+        for a, b in _stretches(np.asarray(stiffness < _SOFT * flank))
+    )
+
+
+def _distinct(u: Array, force: Array) -> tuple[Array, Array]:
+    """The same with the mean force of neighbours that lie closer than two points do: of there and
+    back, between which friction is."""
+    cell = np.floor((u - u[0]) / (float(np.ptp(u)) or 1.0) * _POINTS).astype(np.int64)
+    _, which = np.unique(cell, return_inverse=True)
+    count = np.bincount(which)
+    return np.bincount(which, u) / count, np.bincount(which, force) / count
+
+
+def _stretches(soft: Flags) -> Iterator[tuple[int, int]]:
+    """First point of every stretch that is soft, and first behind it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], soft, [False]]).astype(int)))
+    yield from list(pairwise(edges.tolist()))[::2]
+
+
+def _is_play(share: Array, a: int, b: int, limits: Limits) -> bool:
+    """Whether the stretch from a to b of stiffness, as a share of that of the flanks, is loose
+    within and stiff again soon on both sides."""
+    width = b - a
+    if not _WIDTHS[0] < width / len(share) < _WIDTHS[1]:
+        return False
+    loose = a + np.flatnonzero(share[a:b] < limits.loose)
+    before, behind = np.flatnonzero(share[:a] > _BACK), b + np.flatnonzero(share[b:] > _BACK)
+    if not (loose.size and before.size and behind.size):
+        return False
+    ends = loose[0] - before[-1], behind[0] - loose[-1]
+    return bool(max(ends) <= max(limits.sharp * width, _LEAST))
+
+
+_LEAST = 4  # points, of a corner that lies between two readings

@@ -1,0 +1,114 @@
+"""Lost motion against curved springs: by how sharply the stiffness comes back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.gap.diagnose import diagnose_gap
+from identification.gap.judging.dead_zone import (
+    CURVE,
+    PLAINLY,
+    PLAY,
+    SOMEHOW,
+    has_dead_zone,
+    spoken_for,
+)
+from identification.gap.model.bench import Bench
+from tests.unit.test_gap_flanks import a_bench, held, to_and_fro
+
+U = np.linspace(-1.0, 1.0, 600)
+FRICTION = "joint_hysteresis"
+Spring = Callable[[Array], Array]
+
+
+def gap(half: float, power: float = 1.0, centre: float = 0.0) -> Spring:
+    def force(u: Array) -> Array:
+        x = u - centre
+        return np.asarray(np.sign(x) * np.maximum(np.abs(x) - half, 0.0) ** power)
+
+    return force
+
+
+def power(exponent: float) -> Spring:
+    return lambda u: np.asarray(np.sign(u) * np.abs(u) ** exponent)
+
+
+def stages(ratio: float, at: float) -> Spring:
+    return lambda u: np.asarray(u + (ratio - 1) * np.sign(u) * np.maximum(np.abs(u) - at, 0.0))
+
+
+PLAYS = {
+    "narrow": gap(0.03),
+    "wide": gap(0.3),
+    "teeth pressed as by Hertz": gap(0.15, 1.1),
+    "off the middle": gap(0.1, centre=0.4),
+}
+CURVES = {
+    "straight": power(1.0),
+    "contact": power(1.5),
+    "cubic": power(3.0),
+    "soft at first": power(2 / 3),
+    "stages of a gear": stages(1.85, 0.3),
+    "helper spring": stages(3.0, 0.3),
+    "rubber": lambda u: np.sinh(3 * u),
+    "saturates": lambda u: np.tanh(2 * u),
+    "a seat at the end": gap(0.4, centre=-0.8),
+}
+
+
+@pytest.mark.parametrize("name", PLAYS)
+def test_a_play_is_a_dead_zone_with_sharp_ends(name: str) -> None:
+    assert has_dead_zone(U, PLAYS[name](U), PLAINLY)
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_a_curve_has_none(name: str) -> None:
+    assert not has_dead_zone(U, CURVES[name](U), PLAINLY)
+
+
+def test_where_a_play_is_likelier_softer_ends_are_enough() -> None:
+    x = np.linspace(-1.0, 1.0, 600)
+    u = x + 0.3 * np.tanh(x / 0.06)
+    assert not has_dead_zone(u, x, PLAINLY)
+    assert has_dead_zone(u, x, SOMEHOW)
+    assert not has_dead_zone(U, stages(3.0, 0.3)(U), SOMEHOW)
+
+
+@pytest.mark.parametrize("cycles", [4, 8])
+@pytest.mark.parametrize("name", ["wide", "teeth pressed as by Hertz"])
+def test_a_play_that_a_free_curve_meets_as_well_is_a_play(name: str, cycles: int) -> None:
+    u = to_and_fro(cycles=cycles)
+    found = diagnose_gap(a_bench(PLAYS[name](u), u, "displacement").data)
+    assert found.verdict == PLAY
+    assert found.probabilities[PLAY] > 0.6
+
+
+@pytest.mark.parametrize("name", ["contact", "cubic"])
+def test_a_curve_that_a_soft_play_beside_a_curve_meets_better_is_a_curve(name: str) -> None:
+    u = to_and_fro(cycles=8)
+    found = diagnose_gap(a_bench(CURVES[name](u), u, "displacement").data)
+    assert found.verdict == CURVE
+
+
+def bolted() -> Bench:
+    """A bolt in its hole, which the plates rub along."""
+    u = to_and_fro(cycles=5)
+    force = gap(0.6)(u) + 0.02 * (u - held(u, 0.01)) / 0.01 * (1 + 0.4 * np.abs(u))
+    return a_bench(force, u, "displacement")
+
+
+def test_friction_beside_it_does_not_hide_a_play() -> None:
+    """What goes two ways has a middle; from one side nothing is said."""
+    result = diagnose_gap(bolted().data)
+    assert result.verdict == PLAY
+    ranked = result.found.explanations
+    both = next(e for e in ranked if e.words == {CURVE, FRICTION} and e.parts[0].word == CURVE)
+    said = spoken_for(result.engine, (both, *ranked))
+    assert said[both.words].words == {PLAY, FRICTION}
+    result.engine.bench.__dict__["course"] = SimpleNamespace(one_sided=True)
+    assert spoken_for(result.engine, (both, *ranked)) == {}
