@@ -14,6 +14,8 @@ from rig.worlds.hidden.scene import Scene
 _SCATTER = 0.4  # of the stated uncertainty: whole runs sit a little higher or lower
 _VIBRATION = 0.3
 Q_NOISE_RAD = 1.0e-5
+_READ_OFF = 0.5  # of the measurements: joints stand a little elsewhere in every run and setup
+_OFF_RUN_RAD, _OFF_SETUP_RAD = (1.0e-6, 5.0e-6), (2.0e-6, 1.2e-5)  # standard deviations
 _Q_DIGIT_RAD = 1.0e-6
 GAIN_BOUND = 2.0  # stated standard deviations
 CROSSTALK = 0.005  # at most, of a channel into another
@@ -33,7 +35,8 @@ class Noise:
 
 
 def draw_noise(scene: Scene, random: Generator) -> Noise:
-    """Noise of instruments as stated, scatter of whole runs and vibration within it."""
+    """Noise of instruments as stated, scatter of whole runs and vibration within it; where joints
+    stand, in some."""
     plan, history = scene.plan, scene.history
     count, runs = len(history.sample), int(history.run[-1]) + 1
     u = plan.instruments.displacement_mm
@@ -45,11 +48,22 @@ def draw_noise(scene: Scene, random: Generator) -> Noise:
     return Noise(
         displacement_mm=moved,
         force_N=plan.instruments.force_N * random.standard_normal((count, 3)),
-        q=Q_NOISE_RAD * random.standard_normal((count, 6)),
+        q=Q_NOISE_RAD * random.standard_normal((count, 6)) + _standing(scene, random),
         displacement_gain=1 + plan.instruments.displacement_gain * _gain(random),
         force_gain=1 + plan.instruments.force_gain * _gain(random),
         crosstalk=crosstalk,
     )
+
+
+def _standing(scene: Scene, random: Generator) -> Array:
+    """(count, 6) rad: the controller's deadband, and friction, leave joints elsewhere."""
+    history = scene.history
+    sample = history.sample
+    run, setup = (random.uniform(*limits) for limits in (_OFF_RUN_RAD, _OFF_SETUP_RAD))
+    of_run = run * random.standard_normal((int(history.run[-1]) + 1, 6))
+    of_setup = setup * random.standard_normal((len(scene.plan.setups), 6))
+    off = of_run[history.run[sample]] + of_setup[history.setup[sample]]
+    return np.asarray(off if random.random() < _READ_OFF else np.zeros_like(off))
 
 
 def _gain(random: Generator) -> float:
