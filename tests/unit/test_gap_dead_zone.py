@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from identification.arrays import Array
 from identification.gap.diagnose import diagnose_gap
+from identification.gap.evidence.engine import Engine
 from identification.gap.judging.dead_zone import (
     CURVE,
     PLAINLY,
@@ -69,6 +72,20 @@ def test_a_play_is_a_dead_zone_with_sharp_ends(name: str) -> None:
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_has_none(name: str) -> None:
     assert not has_dead_zone(U, CURVES[name](U), PLAINLY)
+    hardens = name in ("cubic", "rubber")  # as fast as some plays end softly
+    assert has_dead_zone(U, CURVES[name](U), SOMEHOW) == hardens
+
+
+def one_sharp_end(u: Array) -> Array:
+    return np.where(u < -0.2, u + 0.2, np.maximum(u + 0.2, 0.0) ** 3)
+
+
+@pytest.mark.parametrize(
+    "force", [one_sharp_end, gap(0.8), lambda u: 0 * u, lambda u: -u], ids=["one", "all", "0", "-"]
+)
+def test_what_lacks_a_flank_is_no_play(force: Spring) -> None:
+    assert not has_dead_zone(U, force(U), PLAINLY)
+    assert not has_dead_zone(0 * U, force(U), PLAINLY)
 
 
 def test_where_a_play_is_likelier_softer_ends_are_enough() -> None:
@@ -110,5 +127,9 @@ def test_friction_beside_it_does_not_hide_a_play() -> None:
     both = next(e for e in ranked if e.words == {CURVE, FRICTION} and e.parts[0].word == CURVE)
     said = spoken_for(result.engine, (both, *ranked))
     assert said[both.words].words == {PLAY, FRICTION}
-    result.engine.bench.__dict__["course"] = SimpleNamespace(one_sided=True)
+    bench = result.engine.bench
+    few = replace(bench, load=np.round(bench.load / np.ptp(bench.load), 1))
+    few.__dict__["course"] = SimpleNamespace(one_sided=False)
+    assert spoken_for(cast(Engine, SimpleNamespace(bench=few)), (both, *ranked)) == {}
+    bench.__dict__["course"] = SimpleNamespace(one_sided=True)
     assert spoken_for(result.engine, (both, *ranked)) == {}

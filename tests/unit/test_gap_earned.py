@@ -248,12 +248,12 @@ def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: b
     more = explained([4], second, -60.0)
     both = Explanation(more.parts + bump.parts, 0.0, 0.0, (2 * BUMP / 3, BUMP / 3), 0.0)
     after = earned(found(e, both, bump, more))
-    spoken = after.foretold.get(both.words)
+    spoken = after.speakers.get(both.words)
     assert spoken is (None if needed or second == "thermal_drift" else bump)
     assert chosen_of(after, "joint_nonlinear_stiffness" if spoken else second) is (spoken or both)
-    spoken_for = with_posterior(replace(after, foretold={both.words: bump}), {})
+    spoken_for = with_posterior(replace(after, speakers={both.words: bump}), {})
     for result, word in (
-        (with_posterior(replace(after, foretold={}), {}), second),
+        (with_posterior(replace(after, speakers={}), {}), second),
         (spoken_for, "joint_nonlinear_stiffness"),
     ):
         assert result.probabilities[word] > 0.7
@@ -265,7 +265,7 @@ def test_a_drift_alone_speaks_for_nobody() -> None:
     drift = explained([1, 2], "thermal_drift", -40.0)
     bump = explained([0], "joint_nonlinear_stiffness", -60.0)
     both = Explanation(bump.parts + drift.parts, 0.0, 0.0, (BUMP / 3, BUMP / 9), 0.0)
-    assert earned(found(e, both, drift, bump)).foretold[both.words] is bump
+    assert earned(found(e, both, drift, bump)).speakers[both.words] is bump
 
 
 @pytest.mark.parametrize(("bump_after", "speaks"), [(1.05, "bump"), (1.3, "creep"), (2.5, "creep")])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bench.dense_model import dense
+from bench.nested_cases import case_data
 from identification.arrays import Array
 from identification.gap.data import GapData
 from identification.gap.diagnose import diagnose_gap
@@ -16,7 +17,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import _weighed
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
-from identification.gap.model.encoders import Readings, readings_of
+from identification.gap.model.encoders import Readings, _beyond, readings_of
 from identification.gap.recording.holds import hold_ids, rest_ids
 from identification.gap.recording.rows import reduce_rows
 from rig.diagnosis.gap_data import gap_data
@@ -76,10 +77,50 @@ def test_a_trouble_of_two_joints_is_none_of_the_readings() -> None:
 
 
 def test_a_force_that_drifts_is_none_of_the_readings() -> None:
+    """It reads what the joints don't feel."""
     data = plain()
     assert data.session is not None
     found = found_in(replace(data, force=data.force + 8.0 * data.session / data.session.max()))
     assert found.run < 0.5 * RUN
+
+
+def test_a_load_that_is_left_in_some_runs_is_none_of_the_readings() -> None:
+    """The force shows what the joints feel."""
+    data = plain()
+    assert data.q is not None
+    left = 3.0 * np.random.default_rng(5).normal(size=int(data.run.max()) + 1)[data.run]
+    lever = np.stack([s.lever for s in data.setups])[data.setup]
+    q = data.q + left[:, None] * lever * data.compliance
+    assert found_in(replace(data, q=q, force=data.force + left)).run < 0.5 * RUN
+
+
+@pytest.mark.parametrize("precise", [0.1, 0.3])
+def test_joints_that_are_read_better_than_others_are_off_by_as_much(precise: float) -> None:
+    data = plain()
+    assert data.q is not None
+    few = np.array([1.0, precise, 1.0, precise, 1.0, precise])
+    rows = reduce_rows(data)
+    means = np.stack([np.bincount(data.run, v) for v in data.q.T], axis=1)
+    means = (means / np.bincount(data.run)[:, None])[data.run]
+    assert rows.q is not None
+    found = found_in(off(replace(data, q=means + (data.q - means) * few), RUN, 0.0, 3))
+    assert found.run == pytest.approx(RUN, rel=0.4)
+
+
+def test_what_scatters_beyond_unequal_variances_is_found() -> None:
+    """Means of few readings beside those of many (DerSimonian and Laird 1986)."""
+    rng, variance = np.random.default_rng(0), np.array([0.02] * 4 + [1.0] * 4)
+    sd = np.sqrt(variance + 0.5)[:, None]
+    found = [
+        _beyond(sd * rng.normal(size=(8, 6)), np.zeros(8, int), variance, np.ones(6))
+        for _ in range(60)
+    ]
+    assert np.mean(found) == pytest.approx(0.5, rel=0.3)
+
+
+def test_of_few_elements_nothing_is_said() -> None:
+    rng = np.random.default_rng(0)
+    assert _beyond(9 * rng.normal(size=(8, 3)), np.zeros(8, int), np.ones(8), np.ones(3)) == 0
 
 
 def test_readings_that_are_off_together_are_no_effect() -> None:
@@ -97,16 +138,17 @@ def read_badly() -> Bench:
     return replace(bench, noise=replace(bench.noise, q_run=RUN, q_setup=SETUP))
 
 
-def test_the_evidence_is_that_of_one_dense_covariance() -> None:
-    bench = read_badly()
-    engine = Engine(bench, base_columns(bench), bench.observed - prediction(bench), np.zeros(1))
+def test_the_evidence_at_every_imperfection_is_that_of_one_dense_covariance() -> None:
+    plainly = make_bench(case_data("yield"))
+    bench = replace(plainly, noise=replace(plainly.noise, q_run=RUN, q_setup=SETUP))
+    etas = np.array([0.0, 1e-6, 2e-5, 1e-4])
+    engine = Engine(bench, base_columns(bench), bench.observed - prediction(bench), etas)
     model = dense(bench)
-    common, run = (RUN / bench.sigma[bench.layout.q]) ** 2, bench.rows.run[bench.rows.edges]
-    square = [common.reshape(6, -1)[:, run == r].sum(axis=1) for r in np.unique(run)]
-    constant = float(np.sum(np.log(bench.sigma)) + 0.5 * np.sum(np.log1p(square)))
-    constant += 0.5 * bench.layout.size * np.log(2 * np.pi)
-    exact = model.log_density(np.zeros(len(model.target)), 0.0)
-    assert engine.levels[0].log_base - constant == pytest.approx(exact, rel=1e-8)
+    constant = float(np.sum(np.log(bench.sigma))) + 0.5 * bench.layout.size * np.log(2 * np.pi)
+    nothing = np.zeros(len(model.target))
+    for level in engine.levels:
+        exact = model.log_density(nothing, level.eta)
+        assert level.log_base - constant == pytest.approx(exact, rel=1e-8)
 
 
 @pytest.mark.parametrize("eta", [0.0, 2e-6])

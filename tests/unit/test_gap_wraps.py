@@ -30,20 +30,36 @@ def test_a_counter_that_wraps_is_told_and_nothing_explains_it() -> None:
     assert any("jumps by 0." in note and "Unwrap it" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("what", ["straight", "twice", "snaps", "fast", "runs", "sizes"])
-def test_what_jumps_for_a_reason_is_no_counter(what: str) -> None:
-    force, u, run = FORCE, FORCE / SPRING, np.zeros(N, dtype=np.int64)
-    if what == "twice":
-        u = counted(u)[:60]
-        force, run = force[:60], run[:60]
-    elif what == "snaps":  # to the other side, the way that it is pushed
-        u = u + 2e-2 * np.sign(np.roll(force, 20))
-    elif what == "fast":  # few readings a stroke
-        u = np.tile([1e-3, -1e-3], N // 2)
-    elif what == "runs":  # each starts where it was zeroed
-        u, run = (np.arange(N) % 100) * 1e-5, np.arange(N) // 100
-    elif what == "sizes":  # something lets go, and is pushed up again
-        starts = (0.0, 0.05, 0.15, 0.0)
-        u = 1e-3 * np.concatenate([np.linspace(start, 1.0, N // 4) for start in starts])
-    data = bench_data(force, u, step=np.full(len(u), -1), run=run)
+PLAIN = FORCE / SPRING
+RUNS = np.arange(N) // 100
+STARTS = (0.0, 0.05, 0.15, 0.0)
+SAWTOOTH = TOP * (np.arange(N) % 100) / 100
+
+
+def pieces(*ends: tuple[float, float]) -> Array:
+    """(n,) m, from one end to the other of each."""
+    return 1e-3 * np.concatenate([np.linspace(a, b, N // len(ends)) for a, b in ends])
+
+
+@pytest.mark.parametrize(
+    ("force", "u"),
+    [
+        (FORCE, PLAIN),
+        (FORCE[:60], counted(PLAIN)[:60]),
+        (FORCE, PLAIN + 2e-2 * np.sign(np.roll(FORCE, 20))),
+        (FORCE, np.tile([1e-3, -1e-3], N // 2)),
+        (FORCE, pieces(*((a, 1.0) for a in STARTS))),
+        (FORCE, pieces(*((a, a + 1) for a in (0.0, 0.5, 1.0, 1.5)))),
+        (SAWTOOTH, SAWTOOTH / SPRING),
+        (FORCE[:0], PLAIN[:0]),
+    ],
+    ids=["straight", "twice", "snaps", "fast", "lets go", "slips by half", "let go", "empty"],
+)
+def test_what_jumps_for_a_reason_is_no_counter(force: Array, u: Array) -> None:
+    data = bench_data(force, u, step=np.full(len(u), -1))
+    assert wraps(data) is None
+
+
+def test_runs_that_start_where_they_were_zeroed_are_no_counter() -> None:
+    data = bench_data(FORCE, (np.arange(N) % 100) * 1e-5, step=np.full(N, -1), run=RUNS)
     assert wraps(data) is None

@@ -95,7 +95,7 @@ def _misfit(engine: Engine, own: Array, columns: Array, eta: float) -> float:
     bench, n = engine.bench, engine.bench.rows.n
     variance = engine.sigma**2
     variance[:n] += bench.noise.hold**2 + eta**2
-    variance[bench.layout.q] += (eta / LEVER_M) ** 2
+    variance[bench.layout.q] += (eta / LEVER_M) ** 2 + bench.noise.q_run**2
     root = 1 / np.sqrt(variance)
     size = np.linalg.norm(columns * root[:, None], axis=0)
     free = (columns * root[:, None])[:, size > 0] / size[size > 0]

@@ -32,7 +32,6 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.laws import lost_motion_law
 from identification.gap.laws.closer import Word, closing_in, nearly_leads, places, seen
-from identification.gap.laws.curves import hinge
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Laws
@@ -73,7 +72,6 @@ SCALES = (1e-5, 5e-5, 2e-4, 1e-3)  # rad
 _VISITED = 0.45  # of the play from an end: nearer than the middle
 FRICTION = 0.3  # deflection of the friction beside the play, against the play
 _SHARES = (0.003, 0.02, 0.1, 0.3)  # of the deflection, on a bench without an arm
-_BENDS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.55, 0.8)  # of flanks, from where they begin
 _PLACED_PRIOR = 2.0  # as much together as four kinds of one zone
 
 
@@ -241,15 +239,10 @@ def _finer(
 
 
 def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
-    """With the springs as they are, with others beside the play, and with curved flanks: teeth that
-    press each other are soft at first (Hertz 1882)."""
+    """With the springs as they are, and with others beside the play."""
     torque = bench.true_torque[:, j]
-    span, away = float(np.ptp(torque)), torque - flanks.centre
-    reach = float(np.abs(away).max()) - flanks.zone
-    bends = [flanks.zone + share * reach for share in _BENDS]
     parts = [bench.sense * part for part in shapes(bench, torque, flanks)]
-    springs = [torque / span, *(hinge(away, bend) / span for bend in bends)]
-    columns = [bench.add_joint(j, part) for part in (*parts, *springs)]
+    columns = [bench.add_joint(j, part) for part in (*parts, torque / float(np.ptp(torque)))]
     scales = tuple(s * bench.reach for s in _SHARES)
     info: dict[str, Any] = {
         "joint": j,
@@ -259,11 +252,9 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
         "preload_Nm": 0.0,
         "kind": flanks.kind,
         "flanks": flanks,
-        "span": span,
-        "bends": bends,
+        "span": float(np.ptp(torque)),
     }
-    root = np.diag([1.0, FRICTION, *[1.0] * len(springs)])
-    many = ((2, ""), (3, ", other springs"), (len(columns), ", curved flanks"))
+    root = np.diag([1.0, FRICTION, 1.0])
     return [
         variant(
             WORD,
@@ -277,7 +268,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
             each=(True, True),
             **info,
         )
-        for k, name in (many if flanks.sharp else many[:2])
+        for k, name in ((2, ""), (3, ", other springs"))
     ]
 
 

@@ -85,6 +85,10 @@ class Engine:
         self._inverse = 1 / self.sigma[:n]
         self._length_u = np.sqrt(np.add.reduceat(self._inverse**2, self._edges))
         self._length_q = 1 / self.sigma[bench.layout.q]
+        run = bench.rows.run[self._edges]
+        self._runs = first_rows(run)
+        self._run = np.repeat(np.arange(len(self._runs)), np.diff(np.append(self._runs, len(run))))
+        self._along = self._of_mean()
         counts = np.diff(np.append(self._edges, n))
         self._hold = np.repeat(np.arange(len(self._edges)), counts)
         self._alone = counts[self._hold] == 1
@@ -201,6 +205,12 @@ class Engine:
         square = white.between(white, [w])[0] - shared.T @ shared
         return square, beside[0] - shared.T @ base.left, base.log_base
 
+    def _of_mean(self) -> Array:
+        """(m holds,) direction of the mean of a joint's readings in a run, of length 1."""
+        length = self._length_q.reshape(-1, len(self._edges))
+        square = np.add.reduceat(length**2, self._runs, axis=1)
+        return np.asarray(length / np.sqrt(square[:, self._run])).ravel()
+
     def _whiten(self, columns: Array) -> White:
         n, q = self.bench.rows.n, self.bench.layout.q
         white = np.ascontiguousarray(columns.T) / self.sigma
@@ -213,25 +223,19 @@ class Engine:
         top = np.abs(response).max(axis=1, initial=0.0)
         contrast[size <= 1e-9 * (1 + top)] = 0.0
         holds = len(self._edges)
-        starts = range(q.start, q.stop, holds)
-        readings = tuple(Some.of(self._apart(white, slice(k, k + holds))) for k in starts)
+        joints = [slice(k, k + holds) for k in range(0, q.stop - q.start, holds)]
+        readings = tuple(Some.of(self._apart(white[:, q], joint)) for joint in joints)
         even = np.hstack([means, white[:, q.stop :]])
         return White(even, readings, Some.of(contrast), holds, self._groups)
 
     def _apart(self, white: Array, joint: slice) -> Array:
-        """(c, holds) readings of a joint, in units of noise that those of a run have no share of in
-        common any more: `(1 + v v')^-1/2`, v what is common over what each has to itself."""
+        """(c, holds) readings of a joint in units of noise; where those of a run have something in
+        common, (c, holds + runs): what differs within runs, and the mean of each."""
         readings = white[:, joint]
         if not self.bench.noise.q_run > 0:
             return readings
-        common = self.bench.noise.q_run / self.sigma[joint]
-        run = self.bench.rows.run[self._edges]
-        first = first_rows(run)
-        square = np.add.reduceat(common**2, first)
-        share = (1 - 1 / np.sqrt(1 + square)) / square
-        along = np.add.reduceat(readings * common, first, axis=1) * share
-        counts = np.diff(np.append(first, len(run)))
-        return np.asarray(readings - common * np.repeat(along, counts, axis=1))
+        along = np.add.reduceat(readings * self._along[joint], self._runs, axis=1)
+        return np.hstack([readings - self._along[joint] * along[:, self._run], along])
 
     def _left(self, eta: float) -> Weights:
         """What an imperfection leaves of the precision."""
@@ -239,9 +243,23 @@ class Engine:
         lever = (eta / LEVER_M) ** 2 if self.bench.data.arm else 0.0
         return Weights(
             1 / (1 + hold * self._length_u**2),
-            1 / (1 + lever * self._length_q**2),
+            *self._left_of_readings(lever),
             1 / (1 + (ROW_PART * eta / self.sigma[self._inside]) ** 2),
         )
+
+    def _left_of_readings(self, off: float) -> tuple[Array, float]:
+        """Of joint readings, each off by a variance (rad^2) more, and log of the determinant of
+        that. Exact where the readings of a run are equally precise."""
+        each = 1 / (1 + off * self._length_q**2)
+        if not each.size or not self.bench.noise.q_run > 0:
+            return each, float(np.log(each).sum())
+        each = each.reshape(self.bench.data.joints, -1)
+        along, length = (v.reshape(each.shape) for v in (self._along, self._length_q))
+        more = off * np.add.reduceat((along * length) ** 2, self._runs, axis=1)
+        common = self.bench.noise.q_run**2 * np.add.reduceat(length**2, self._runs, axis=1)
+        means = 1 / (1 + common + more)
+        log = np.log(each).sum() + np.log1p(more).sum() + np.log(means).sum()
+        return np.hstack([each, means]).ravel(), float(log)
 
     def _common(self, white: White, weights: list[Weights]) -> list[Array]:
         """Per set of weights (c, p): products with target, base and repeatable imperfection."""
@@ -274,7 +292,7 @@ class Engine:
         turn = np.asarray(solve_triangular(factor, root.T, lower=True, check_finite=False))
         left = turn @ gram[b, 0]
         share = self._freedom / max(len(w.contrast), 1)
-        log_noise = -0.5 * (np.log(w.hold).sum() + np.log(w.q).sum())
+        log_noise = -0.5 * (np.log(w.hold).sum() + w.log_q)
         log_noise -= 0.5 * share * np.log(w.contrast).sum()
         misfit = float(gram[0, 0] - left @ left)
         log_base = float(-0.5 * misfit - np.log(np.diag(factor)).sum() - log_noise)

@@ -27,7 +27,7 @@ def span_of(columns: Array) -> Array:
     leaves of those is no direction."""
     size = np.linalg.norm(columns, axis=0)
     basis, values, _ = np.linalg.svd(columns / np.where(size > 0, size, 1.0), full_matrices=False)
-    return basis[:, values > _SAME * values[0]]
+    return basis[:, values > _SAME * values.max(initial=0.0)]
 
 
 _SAME = 1e-9  # of the largest singular value: what adds less to a span is there already

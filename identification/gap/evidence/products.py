@@ -33,10 +33,12 @@ _SPARSE = 0.2  # share of numbers that are not zero, below which zeros are left 
 @dataclass(frozen=True, eq=False)
 class Weights:
     """What an imperfection leaves of the precision: of hold means (holds,), of joint readings
-    (m holds,), and of contrasts (rows,)."""
+    (m holds,) or of what they are taken apart into, and of contrasts (rows,). log_q: log of its
+    determinant in the readings."""
 
     hold: Array
     q: Array
+    log_q: float
     contrast: Array
 
 

@@ -114,8 +114,8 @@ class SearchResult:
     none), probabilities of all words, the engine it ran on, log weight and imperfection (m) of a
     gap that no law explains, what share of its weight withheld data leave an explanation, and what
     a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
-    that no word names, best first. foretold: words of an explanation -> one with fewer of its
-    effects that foretells withheld data better, and speaks for it."""
+    that no word names, best first. speakers: words of an explanation -> the one that speaks for it:
+    fewer of its effects that foretell withheld data better, or a play in a curve's place."""
 
     engine: Engine
     explanations: tuple[Explanation, ...]
@@ -127,7 +127,7 @@ class SearchResult:
     kept: Mapping[frozenset[str], float] = field(default_factory=dict)
     looks_like: Likeness | None = None
     nameless: tuple[Explanation, ...] = ()
-    foretold: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
+    speakers: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
 
 
 def explain(

@@ -66,7 +66,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
         fewer = _simpler(e, ranked, kept, arm)
-        said = found.foretold.get(e.words) or fewer or e
+        said = found.speakers.get(e.words) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
         many = (THREE_CLOSELY if closely else THREE) if arm and _tells_of_three(said) else 1.0
         for word, share in _main(_of(e, fewer.words) if fewer is said else said, arm).items():

@@ -41,8 +41,8 @@ def chosen_of(found: SearchResult, verdict: str) -> Explanation:
 
 
 def _needless(found: SearchResult, explanation: Explanation) -> bool:
-    """Whether fewer of its effects foretell withheld data better; what drifts nothing foretells."""
-    simpler = found.foretold.get(explanation.words)
+    """Whether another explanation speaks for it; for what drifts, which nothing foretells, none."""
+    simpler = found.speakers.get(explanation.words)
     return simpler is not None and not (explanation.words - simpler.words) & BETWEEN_RUNS
 
 

@@ -30,12 +30,14 @@ class Limits(NamedTuple):
     sharp: float
 
 
-# To say play although a curve is likelier; to say it where that is the likelier one.
+# To say play although a curve is likelier; to say it where that is the likelier one, as it is of
+# few curves: what hardens as fast as a cubic spring passes.
 PLAINLY, SOMEHOW = Limits(0.2, 0.2), Limits(0.3, 0.35)
 _POINTS = 400  # over the way of the displacement
 _STIFF = 0.75  # quantile of the stiffness that counts as that of the flanks
 _SOFT, _BACK = 0.4, 0.6  # of it: at the ends of the play; beyond them
 _WIDTHS = (0.01, 0.7)  # of the way
+_FEWEST = 100  # places that were read, of the points
 
 
 def spoken_for(
@@ -43,9 +45,11 @@ def spoken_for(
 ) -> dict[frozenset[str], Explanation]:
     """Words of the best explanation, where a play or a curve is its largest effect -> that with the
     other one in its place, where that is what it shows. Of a rig without an arm that is loaded both
-    ways."""
-    best = ranked[0]
-    if engine.bench.course.one_sided or not best.parts or best.parts[0].word not in ELASTIC:
+    ways, and was read at so many places that corners lie between neighbouring ones."""
+    best, bench = ranked[0], engine.bench
+    if not best.parts or best.parts[0].word not in ELASTIC:
+        return {}
+    if bench.course.one_sided or len(_distinct(np.sort(bench.load), bench.load)[0]) < _FEWEST:
         return {}
     rest, word = best.words - ELASTIC, best.parts[0].word
     others = {min(e.words & ELASTIC): e for e in ranked if _is_one_beside(e, rest)}
@@ -71,11 +75,15 @@ def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:
 
 
 def has_dead_zone(u: Array, force: Array, limits: Limits) -> bool:
-    """Whether force (n,) over displacement u (n,) has a dead zone with sharp ends, inside."""
-    at = np.linspace(float(u.min()), float(u.max()), _POINTS)
+    """Whether force (n,) over displacement u (n,) has a dead zone with sharp ends, inside. None of
+    what has no stiff flanks."""
     order = np.argsort(u, kind="stable")
-    stiffness = np.gradient(np.interp(at, *_distinct(u[order], force[order])), at)
+    read, answer = _distinct(u[order], force[order])
+    at = np.linspace(float(read[0]), float(read[-1]), _POINTS)
+    stiffness = np.gradient(np.interp(at, read, answer)) if len(read) > 1 else np.zeros(_POINTS)
     flank = float(np.quantile(stiffness, _STIFF))
+    if not flank > 0:
+        return False
     return any(
         _is_play(stiffness / flank, a, b, limits)
         for a, b in _stretches(np.asarray(stiffness < _SOFT * flank))

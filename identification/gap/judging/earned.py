@@ -31,11 +31,12 @@ _LOOKED_AT, _WITHIN = 6, 9.0  # explanations, and nats below the best, that are 
 
 
 def earned(found: SearchResult) -> SearchResult:
-    """The posterior after a look at withheld data; as it was where there are none."""
+    """The posterior after a look at withheld data; as it was where there are none. Who speaks for
+    an explanation already goes on to."""
     ways = folds(found.engine)
     if ways and _comes_again(found.engine.bench):
-        simpler = _foretold(found, *next(iter(ways.items()))) | dict(found.foretold)
-        found = with_posterior(replace(found, foretold=simpler), found.kept) if simpler else found
+        simpler = _foretold(found, *next(iter(ways.items()))) | dict(found.speakers)
+        found = with_posterior(replace(found, speakers=simpler), found.kept) if simpler else found
     fold = ways.get("repetition")
     if fold is None:
         return found

@@ -69,7 +69,7 @@ def looked_up(found: SearchResult) -> SearchResult:
         for each in (found.explanations, found.nameless)
     )
     said = {} if engine.bench.data.arm else spoken_for(engine, out)
-    found = replace(found, explanations=out, nameless=nameless, foretold=said)
+    found = replace(found, explanations=out, nameless=nameless, speakers=said)
     return with_posterior(found, found.kept)
 
 

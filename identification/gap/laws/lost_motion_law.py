@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.laws.curves import hinge
 from identification.gap.laws.law import Law, Term
 from identification.gap.laws.lost_motion import HELD, PLACED, Play, net, resting_columns
 from identification.gap.model.bench import TOOL_KG, Bench
@@ -28,11 +27,9 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     if info["kind"] in PLACED:
         flanks = info["flanks"]
         constants |= {"centre": flanks.centre, "corner": flanks.corner, "friction": flanks.friction}
-        terms = [Term("width"), Term("rub"), Term("compliance")]
-        terms += [Term("compliance", {"beyond": bend}) for bend in info["bends"]]
-        count, unit = len(v.columns), 1 / float(info["span"])
-        scale = np.array([1.0, 1.0, *[unit] * (count - 2)])
-        return Law(constants, tuple(terms[:count])), scale
+        terms, unit = [Term("width"), Term("rub"), Term("compliance")], 1 / float(info["span"])
+        count = len(v.columns)
+        return Law(constants, tuple(terms[:count])), np.array([1.0, 1.0, unit])[:count]
     terms = [Term("width"), Term("rub")]
     law = Law(constants, ())
     for s, first in _places(bench, law) if info["kind"] not in HELD else []:
@@ -62,9 +59,6 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     loose = np.abs(x) < c["zone"]
     out = []
     for t in law.terms:
-        if "beyond" in t.shape:
-            out.append(bench.joint_column(joint, hinge(x - c["centre"], t.shape["beyond"])))
-            continue
         if t.coefficient in parts:
             out.append(bench.joint_column(joint, parts[t.coefficient]))
             continue

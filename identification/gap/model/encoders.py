@@ -26,7 +26,7 @@ class Readings(NamedTuple):
 
 
 def readings_of(data: GapData, rows: Rows, hold: Ints) -> Readings:
-    """From what the joints read while the arm rests in holds (n,), and while it bears nothing."""
+    """From what the joints read while the arm rests in holds (n,), and at zero load."""
     one = _one(data, rows, hold)
     if data.q is None or rows.continuous:
         return Readings(one, 0.0, 0.0)
@@ -67,24 +67,31 @@ def _between_repetitions(data: GapData, rows: Rows) -> float | None:
 
 def _between_runs(data: GapData, rows: Rows, one: Array) -> tuple[float, float]:
     """Standard deviations between runs of a setup, and between setups of a pose, rad, of what
-    joints read without load: the arm was sent to the same pose. 0 where readings alone explain it.
-    """
+    joints read at zero load: the arm was sent to the same pose. As read, or less what the force
+    that is read there does, whichever scatters less: one that drifts is none, and a load that was
+    left is. 0 where readings alone explain it."""
     assert rows.q is not None
+    lever = np.stack([s.lever for s in data.setups])[rows.setup]
+    loaded = rows.q - lever * data.compliance * rows.measured_force[:, None]
+    return min(_of_zeros(data, rows, q, one) for q in (rows.q, loaded))
+
+
+def _of_zeros(data: GapData, rows: Rows, q: Array, one: Array) -> tuple[float, float]:
+    """The same of readings q (n, m) rad, of which each scatters by one (m,)."""
     zero = rows.zero
     runs, of_run = np.unique(rows.run[zero], return_inverse=True)
     if len(runs) < _TWO:
         return 0.0, 0.0
     weight = np.bincount(of_run, rows.weight[zero])
-    means = _means(rows.q[zero] / one, of_run, rows.weight[zero])
+    means = _means(q[zero], of_run, rows.weight[zero])
     setup = rows.setup[zero][np.unique(of_run, return_index=True)[1]]
-    run = _beyond(means, setup, 1 / weight)
+    run = _beyond(means, setup, 1 / weight, one)
     setups, of_setup = np.unique(setup, return_inverse=True)
-    known = 1 / (1 / weight + run)
+    known = 1 / (1 / weight + run / float(np.median(one)) ** 2)
     poses = [data.setups[s].pose for s in setups]
     pose = np.array([poses.index(p) for p in poses])
-    between = _beyond(_means(means, of_setup, known), pose, 1 / np.bincount(of_setup, known))
-    sd = float(np.median(one))
-    return sd * run**0.5, sd * between**0.5
+    between = _beyond(_means(means, of_setup, known), pose, 1 / np.bincount(of_setup, known), one)
+    return run**0.5, between**0.5
 
 
 _TWO = 2
@@ -96,28 +103,33 @@ def _means(values: Array, group: Ints, weight: Array) -> Array:
     return np.asarray(sums / np.bincount(group, weight)[:, None])
 
 
-def _beyond(means: Array, group: Ints, variance: Array) -> float:
-    """Variance that means (r, m) scatter by within groups (r,) beyond their own (r,); 0 where that
-    may be chance. The two thirds of the joints that scatter least tell, as far as chance lets
-    them: a trouble sits in one or two, and what the readings do all joints do."""
+def _beyond(means: Array, group: Ints, variance: Array, one: Array) -> float:
+    """Variance (rad^2) that means (r, m) scatter by within groups (r,) beyond their own, which is
+    variance (r,) times the square of one (m,); 0 where that may be chance. By the moments of the
+    weighted squares (DerSimonian, Laird 1986), of the two thirds of the joints that scatter least,
+    as far as chance lets them: a trouble sits in one or two, and what the readings do all joints
+    do. Of fewer than four joints nothing is said."""
     from scipy.special import chdtri
 
     _, group = np.unique(group, return_inverse=True)
     count = np.bincount(group)
     free = int(np.sum(count - 1))
-    if not free:
+    if not free or means.shape[1] < _FEWEST:
         return 0.0
-    left = means - _means(means, group, 1 / variance)[group]
-    each = np.sort(np.sum(left**2 / variance[:, None], axis=0) / free)
-    least = max(1, len(each) * 2 // 3)
+    left = (means - _means(means, group, 1 / variance)[group]) / one
+    each = np.sum(left**2 / variance[:, None], axis=0) / free
+    order = np.argsort(each)[: means.shape[1] * 2 // 3]
     # medians of the ranks of as many chi squares (Benard)
-    above = 1 - (np.arange(1, least + 1) - 0.3) / (len(each) + 0.4)
-    ratio = float(each[:least].mean() / (chdtri(free, above) / free).mean())
+    above = 1 - (np.arange(1, len(order) + 1) - 0.3) / (means.shape[1] + 0.4)
+    ratio = float(each[order].mean() / (chdtri(free, above) / free).mean())
     if ratio < chdtri(_AS_MANY * free, _CHANCE) / (_AS_MANY * free):
         return 0.0
-    return (ratio - 1.0) * float(np.mean(variance[count[group] > 1]))
+    total = np.bincount(group, 1 / variance)
+    grows = float(np.sum(total - np.bincount(group, variance**-2) / total))  # times the excess
+    return (ratio - 1.0) * free / (grows * float(np.mean(one[order] ** -2.0)))
 
 
+_FEWEST = 4
 # That mean of four of six scatters as a chi square of so many times the degrees of freedom would;
 # how seldom chance alone is taken for more.
 _AS_MANY, _CHANCE = 3, 0.01

@@ -54,11 +54,6 @@ class Flanks:
     corner: float
     friction: float
 
-    @property
-    def sharp(self) -> bool:
-        """Whether its corners are none of a smooth curve."""
-        return self.kind == "held" or self.corner < SHARP * self.zone
-
 
 def shapes(bench: Bench, load: Array, flanks: Flanks) -> tuple[Array, Array]:
     """Of a load (n,): place within the play (-1/2 .. 1/2), and the friction beside it."""
@@ -115,7 +110,8 @@ def _needed(bench: Bench, load: Array, found: Flanks, left: float) -> bool:
     rub = shapes(bench, load, found)[1]
     if left > ENOUGH_BESIDE * _left([load, rub], y, weight):
         return False
-    return left < (1.0 if found.sharp else CORNERS) * _left([*_smooth(load), rub], y, weight)
+    sharp = found.kind == "held" or found.corner < SHARP * found.zone
+    return left < (1.0 if sharp else CORNERS) * _left([*_smooth(load), rub], y, weight)
 
 
 def _smooth(load: Array) -> list[Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -45,14 +45,15 @@ def draw_noise(scene: Scene, random: Generator) -> Noise:
     moved = white * random.standard_normal(count) + scatter[history.run[history.sample]]
     moved += _VIBRATION * u * _ringing(random, count)
     crosstalk = np.eye(3) + CROSSTALK * random.uniform(-1, 1, (3, 3)) * (1 - np.eye(3))
-    return Noise(
+    noise = Noise(
         displacement_mm=moved,
         force_N=plan.instruments.force_N * random.standard_normal((count, 3)),
-        q=Q_NOISE_RAD * random.standard_normal((count, 6)) + _standing(scene, random),
+        q=Q_NOISE_RAD * random.standard_normal((count, 6)),
         displacement_gain=1 + plan.instruments.displacement_gain * _gain(random),
         force_gain=1 + plan.instruments.force_gain * _gain(random),
         crosstalk=crosstalk,
     )
+    return replace(noise, q=noise.q + _standing(scene, random))
 
 
 def _standing(scene: Scene, random: Generator) -> Array:
