@@ -18,9 +18,9 @@ from identification.arrays import Array, Flags
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
+from identification.gap.explanations.verdict import FLANKS
 
 PLAY, CURVE = "joint_backlash", "joint_nonlinear_stiffness"
-ELASTIC = frozenset({PLAY, CURVE})
 
 
 class Limits(NamedTuple):
@@ -47,12 +47,12 @@ def spoken_for(
     other one in its place, where that is what it shows. Of a rig without an arm that is loaded both
     ways, and was read at so many places that corners lie between neighbouring ones."""
     best, bench = ranked[0], engine.bench
-    if not best.parts or best.parts[0].word not in ELASTIC:
+    if not best.parts or best.parts[0].word not in FLANKS:
         return {}
     if bench.course.one_sided or len(_distinct(np.sort(bench.load), bench.load)[0]) < _FEWEST:
         return {}
-    rest, word = best.words - ELASTIC, best.parts[0].word
-    others = {min(e.words & ELASTIC): e for e in ranked if _is_one_beside(e, rest)}
+    rest, word = best.words - FLANKS, best.parts[0].word
+    others = {min(e.words & FLANKS): e for e in ranked if _is_one_beside(e, rest)}
     other = others.get(PLAY if word == CURVE else CURVE)
     if other is None:
         return {}
@@ -63,7 +63,7 @@ def spoken_for(
 def _is_one_beside(explanation: Explanation, rest: frozenset[str]) -> bool:
     """Whether it has a play, or a curve, as its largest effect, and the rest beside it."""
     e = explanation
-    return len(e.words & ELASTIC) == 1 and e.words - ELASTIC == rest and e.parts[0].word in ELASTIC
+    return len(e.words & FLANKS) == 1 and e.words - FLANKS == rest and e.parts[0].word in FLANKS
 
 
 def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:

@@ -50,14 +50,10 @@ def _one(data: GapData, rows: Rows, hold: Ints) -> Array:
 def _between_repetitions(data: GapData, rows: Rows) -> float | None:
     """Noise of one joint reading from how levels repeat, rad: that of the middle joint, as one may
     have a trouble of its own. Forces that differ a little are allowed for as simulated."""
-    assert rows.q is not None
-    lever = np.stack([s.lever for s in data.setups])[rows.setup]
-    left = rows.q - lever * data.compliance * rows.force[:, None]
-    free = rows.n
+    left, free = _unloaded(data, rows, rows.force), rows.n
     for group in (rows.level, rows.run):
-        size = np.bincount(group)
-        left = left - np.stack([np.bincount(group, w) / size for w in left.T], axis=1)[group]
-        free -= len(size)
+        left = left - _means(left, group, np.ones(rows.n))[group]
+        free -= int(group.max()) + 1
     free += len(np.unique(rows.setup))
     if free < ENOUGH:
         return None
@@ -71,9 +67,15 @@ def _between_runs(data: GapData, rows: Rows, one: Array) -> tuple[float, float]:
     that is read there does, whichever scatters less: one that drifts is none, and a load that was
     left is. 0 where readings alone explain it."""
     assert rows.q is not None
+    readings = rows.q, _unloaded(data, rows, rows.measured_force)
+    return min(_of_zeros(data, rows, q, one) for q in readings)
+
+
+def _unloaded(data: GapData, rows: Rows, force: Array) -> Array:
+    """(n, m) rad: readings less what a force (n,) does as simulated."""
+    assert rows.q is not None
     lever = np.stack([s.lever for s in data.setups])[rows.setup]
-    loaded = rows.q - lever * data.compliance * rows.measured_force[:, None]
-    return min(_of_zeros(data, rows, q, one) for q in (rows.q, loaded))
+    return np.asarray(rows.q - lever * data.compliance * force[:, None])
 
 
 def _of_zeros(data: GapData, rows: Rows, q: Array, one: Array) -> tuple[float, float]:
