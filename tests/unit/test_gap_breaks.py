@@ -172,6 +172,21 @@ def test_a_stiffness_that_goes_its_own_way_in_time_is_nobody_s_word(
         assert "its own way in time" in looks_like(found.looks_like, arm=False)
 
 
+def test_another_stiffness_in_every_run_is_nobody_s_word() -> None:
+    """A clamp that is set anew: every run is a straight line, and no path of a drift is needed."""
+    run = np.arange(N) // (N // 9)
+    stroke = 1e-3 * triangle(N, 9)
+    softer = np.array([0.0, 0.2, -0.1, 0.3, -0.2, 0.1, -0.25, 0.15, 0.05])
+    force = SPRING * stroke * (1 + softer[run])
+    noise = np.random.default_rng(8).normal(0, NOISE_N, N)
+    data = running(force + noise, stroke, imposed="displacement", run=run, repetition=run + 1)
+    found = diagnose_gap(data)
+    assert found.verdict == "unknown"
+    assert found.probabilities["unknown"] > 0.7
+    assert found.looks_like is not None
+    assert "its own way in time" in looks_like(found.looks_like, arm=False)
+
+
 @pytest.mark.parametrize("stays", [0.0, 0.6])
 def test_what_stays_when_the_load_is_gone_does_not_only_soften(stays: float) -> None:
     """Rubber comes back; under a tip most of the way is left."""

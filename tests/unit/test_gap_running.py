@@ -450,6 +450,17 @@ def test_turning_points_of_a_crank_are_no_holds() -> None:
         )
 
 
+@pytest.mark.parametrize("runs", [1, 2])
+def test_a_hold_of_which_only_the_ends_were_kept_is_one_and_a_pause_is_none(runs: int) -> None:
+    t = np.concatenate([np.arange(0, 6, 0.05), np.arange(150, 152, 0.05)])
+    force = 100 * np.minimum(t, 1.0)
+    run = (t > 100) * (runs - 1)
+    data = running(force, force / SPRING, imposed="force", run=run, repetition=run + 1)
+    bench = make_bench(replace(data, time=t, session=t))
+    assert bench.course.always_moves is (runs == 2)
+    assert words_with(bench, "joint_creep")
+
+
 @pytest.mark.parametrize(("imposed", "holds"), [(None, False), ("force", True)])
 def test_a_stroke_that_runs_on_while_the_force_stands_is_no_hold(
     imposed: str | None, holds: bool

@@ -29,6 +29,7 @@ from identification.gap.recording.rows import reduce_rows
 from identification.gap.search.refine import refine
 from rig.diagnosis.gap_data import _joint_to_joint, arm_setup
 from rig.models.robot import load_robot
+from tests.conformance.gap_designs import linear
 from tests.unit.test_gap_closer import assert_lawful
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data, fresh
@@ -414,6 +415,15 @@ def test_what_bends_before_the_first_load_that_was_read_is_lost_motion() -> None
     assert min(places) >= 1.3 * 0.25
     close = hanging(np.linspace(0.0, 80.0, 17))
     assert any(v.label.endswith("bend 0.1") for v in library(close, ["joint_nonlinear_stiffness"]))
+
+
+def test_a_direction_that_hardly_turns_a_joint_does_not_show_where_it_bends() -> None:
+    """Pushed along x joint 1 bears a twentieth of what it bears along y, in steps of an eighth."""
+    found = library(make_bench(linear("medium")), ["joint_nonlinear_stiffness"])
+    bends = {v.label for v in found}
+    assert "joint 1 bend 0.2" in bends
+    assert "joint 1 bend 0.1" not in bends
+    assert "joint 5 bend 0.1" in bends  # which both directions turn, x by smaller steps
 
 
 def test_between_no_load_and_the_second_a_bench_shows_a_step() -> None:

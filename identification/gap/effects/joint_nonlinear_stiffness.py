@@ -181,7 +181,7 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
     share, out = 0.2 / (len(PLACES) - 1) / len(_ABOUT), []
     for b in (np.mean(places) + close * _ABOUT).tolist():
-        if b < _first_seen(x):
+        if b < _first_seen(bench, x):
             continue
         columns = [found.columns[0], bench.add_joint(j, c * hinge(x, b))]
         out.append(
@@ -206,20 +206,24 @@ def _seen_from(bench: Bench, j: int, x: Array) -> float:
     """Share of the range from which on a bend is no step at no load. Of levels to either side of a
     bench's the second tells: any line goes through zero and the first."""
     if bench.data.arm:
-        return _first_seen(x)
+        return _first_seen(bench, x)
     if bench.rows.continuous or not _both_ways(bench, j):
         return 0.0
-    first = _first_seen(x)
+    first = _first_seen(bench, x)
     return float(np.abs(x)[np.abs(x) > first].min(initial=1.0)) if first < 1 else 1.0
 
 
-def _first_seen(x: Array) -> float:
+def _first_seen(bench: Bench, x: Array) -> float:
     """Share of the range from which on a bend shows in x (n,). What bends before the first load
-    that was read is a step where the load begins: lost motion."""
-    return float(_HARDLY * np.abs(x)[np.abs(x) > _NO_LOAD].min(initial=1.0))
+    that was read is a step where the load begins: lost motion. A direction that hardly turns the
+    joint sees its bends as little."""
+    load, setup = np.abs(x), bench.rows.setup
+    most = np.zeros(len(bench.data.setups))
+    np.maximum.at(most, setup, load)
+    return float(_HARDLY * load[(load > _NO_LOAD) & (most[setup] > _BEARS)].min(initial=1.0))
 
 
-_NO_LOAD = 0.02  # of the range
+_NO_LOAD, _BEARS = 0.02, 0.2  # of the range
 _HARDLY = 1.3  # times the first load: hands set it as exactly as that
 _ABOUT = np.linspace(-0.08, 0.08, 9)  # of the range
 _TOOL_STEPS_KG = np.array([-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4])

@@ -182,16 +182,18 @@ _NOISE = 4.0  # standard deviations, by second differences
 
 
 def _smooth(bench: Bench, values: Array) -> Array:
-    """Means (n,) of a running recording over the rows about each: noise of what is driven is in the
-    response as well, and must not stand in the column that is to explain it. Where means are far
-    from what was read, as about a step, it was no noise, and stays."""
+    """Parabolas (n,) through the rows about each of a running recording (Savitzky and Golay 1964):
+    noise of what is driven is in the response as well, and must not stand in the column that is to
+    explain it; a fast swing is to keep its height. Where they are far from what was read, as about
+    a step, it was no noise, and stays."""
+    from scipy.signal import savgol_filter
+
     if not bench.rows.continuous:
         return values
     out = values.copy()
-    kernel = np.ones(2 * _SIDE + 1)
     for a, b in pairwise(bench.rows.run_edges):
         if b - a > 4 * _SIDE:
-            inner = np.convolve(values[a:b], kernel / kernel.sum(), mode="valid")
+            inner = savgol_filter(values[a:b], 2 * _SIDE + 1, 2)[_SIDE:-_SIDE]
             read = values[a + _SIDE : b - _SIDE]
             noise = white_sd(np.diff(values[a:b], 2))
             near = np.abs(inner - read) <= _NOISE * noise

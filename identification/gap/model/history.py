@@ -323,8 +323,7 @@ def row_time(rows: Rows) -> float:
 
 
 def delayed(values: Array, delay: float, rows: Rows) -> Array:
-    """`values(t - delay)` of values (n,) or (n, k), within every run, the path between rows being
-    straight ramps."""
+    """`values(t - delay)` of values (n,) or (n, k), within every run, along a path through rows."""
     out = np.empty_like(values)
     for a, b, t, v in _ramps(values, rows):
         place = np.interp(rows.time[a:b] - delay, t, np.arange(len(t), dtype=float))
@@ -335,7 +334,7 @@ def delayed(values: Array, delay: float, rows: Rows) -> Array:
 
 
 def averaged(values: Array, window: float, rows: Rows) -> Array:
-    """Means of values (n,) or (n, k) over the last `window` s, along the same ramps; before a run
+    """Means of values (n,) or (n, k) over the last `window` s, along the same path; before a run
     they are what they are at its first row."""
     out = np.empty_like(values)
     for a, b, t, v in _ramps(values, rows):
@@ -357,7 +356,7 @@ def averaged(values: Array, window: float, rows: Rows) -> Array:
 
 def _ramps(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]:
     """Of every run its first row and the one after its last, and corners of its path: times (m,)
-    and values (m,) or (m, k)."""
+    and values (m,) or (m, k). From hold to hold it is straight."""
     half = half_sample(rows)
     for a, b in pairwise(rows.run_edges.tolist()):
         t, v = rows.time[a:b], values[a:b]
@@ -368,4 +367,19 @@ def _ramps(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]
             v = np.concatenate([v, v[new], v[:-1][new[1:]]])
             order = np.argsort(t, kind="stable")
             t, v = t[order], v[order]
+        elif len(t) >= _FEWEST and np.all(np.diff(t) > 0):
+            t, v = _rounded(t, v)
         yield a, b, t, v
+
+
+def _rounded(time: Array, values: Array) -> tuple[Array, Array]:
+    """More corners, along a smooth path through values (n, ...) read at times (n,) (Akima 1970):
+    straight ramps would cut the tops of fast swings off."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    n = len(time)
+    fine = np.interp(np.arange(_BETWEEN * (n - 1) + 1) / _BETWEEN, np.arange(n), time)
+    return fine, np.asarray(Akima1DInterpolator(time, values)(fine))
+
+
+_BETWEEN, _FEWEST = 4, 4  # corners for each row; rows that have a curve

@@ -258,7 +258,7 @@ class Course:
         count = int(np.clip(self.rows.n // 4, 8, max(40, 10 * self.passes)))
         at = np.minimum((t * count).astype(np.int64), count - 1)
         rows = np.bincount(at, minlength=count)
-        held = np.flatnonzero(rows)
+        held, first = np.unique(at, return_index=True)
 
         def speed(values: Array) -> Array:
             mean = np.bincount(at, weights=values, minlength=count)[held] / rows[held]
@@ -269,8 +269,10 @@ class Course:
             slow &= speed(np.abs(self.rows.measured_force)) < _STANDS
         elif self.data.imposed != "force":  # a stroke that runs on while the force stands
             slow &= np.abs(speed(self.response)) < _RUNS_ON
-        slow = np.pad(slow, 1)
-        stands = slow[1:-1] & (slow[:-2] | slow[2:])  # a turning point alone is no hold
+        beside = np.pad(slow, 1)
+        # a turning point alone is no hold; what was left out of one run for pieces together is
+        left_out = (np.diff(held) > 1) & (np.diff(self.rows.run[first]) == 0)
+        stands = slow & (beside[:-2] | beside[2:] | left_out)
         return float(np.diff(held)[~stands].sum()) / max(count - 1, 1)
 
     @cached_property

@@ -37,6 +37,7 @@ KNOTS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)  # of the largest load
 BELOW = (0.05, 0.15, 0.5)  # of the largest load: so far below what it bore it is as soft as it gets
 _FEWEST_ROWS = 30
 _PASSES, _LEAST_PIECES, _PIECES = 3, 3, 12  # of the load; of a path in time
+_RUNS = 2  # of fewer a drift is as likely
 _STAYS = 0.3  # of the way, when the load is gone: what only softens comes back
 _CURVE, _LOOP, _SLOW = 7, 4, 5  # degrees of a smooth response that jumps are looked for beside
 _NOTHING_NEW = 1e-6  # of its square is left of a jump beside what is known
@@ -93,13 +94,27 @@ def _softening(bench: Bench) -> list[Variant]:
 
 
 def _wanders(bench: Bench) -> list[Variant]:
-    """Of a load that comes and goes often enough to tell time from load."""
+    """Of a load that comes and goes often enough to tell time from load: along a path, or another
+    one in every run."""
     pieces = min(bench.course.passes - _PASSES, _PIECES)
     if not bench.course.returns or pieces < _LEAST_PIECES:
         return []
-    spring, hats = bench.slope * bench.load, free_path(bench, pieces)
-    columns = [bench.add(bench.outside_column(spring * hat)) for hat in hats.T]
-    return [variant(WANDERS, "in time", columns, LOSSES, path_root(pieces), positive=False)]
+    spring, runs = bench.slope * bench.load, np.unique(bench.rows.run)
+    path = [spring * hat for hat in free_path(bench, pieces).T]
+    each = [spring * (bench.rows.run == r) for r in runs] if len(runs) > _RUNS else []
+    kinds = [("in time", path, path_root(pieces)), ("each run", each, None)]
+    return [
+        variant(
+            WANDERS,
+            label,
+            [bench.add(bench.outside_column(c)) for c in columns],
+            LOSSES,
+            root,
+            positive=False,
+        )
+        for label, columns, root in kinds
+        if columns
+    ]
 
 
 def _jerks(bench: Bench, base: Base, target: Array) -> list[Variant]:
