@@ -21,6 +21,7 @@ PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 SUPPORTED = ((3, 11), (3, 12))  # ur-rtde has wheels for no newer ones
 STAMP = VENV / "installed-for.txt"
 DEMO = HOME / "out" / "demo"
+WORKERS = min((os.cpu_count() or 2) + 1, 8)  # processes that test
 
 
 def main() -> int:
@@ -95,8 +96,9 @@ def _test(words: list[str]) -> int:
         ["ruff", "format", "--check", "."],
         ["mypy"],
         ["lint-imports"],
-        # whoever is done takes work from the other: some tests wait long for devices
-        ["pytest", "-n", "2", "--dist", "worksteal", *words],
+        # whoever is done takes work from the others; one more than there are processors, because
+        # some tests wait long for devices
+        ["pytest", "-n", str(WORKERS), "--dist", "worksteal", *words],
     ]
     for check in checks:
         print("+", " ".join(check), flush=True)

@@ -6,8 +6,10 @@ families (sharp, exponential, power laws) than those the library is built from.
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -266,42 +268,40 @@ CASES: dict[str, tuple[Law, str]] = {
 }
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, GapResult]:
-    out = {}
-    for name, (law, _) in CASES.items():
-        out[name] = diagnose(measure(tmp_path_factory.mktemp(name), law)).result
-    return out
+@cache  # and no fixture of all of them: tests of this file run in several processes
+def result_of(name: str) -> GapResult:
+    with tempfile.TemporaryDirectory() as folder:
+        return diagnose(measure(Path(folder), CASES[name][0])).result
 
 
 @pytest.mark.parametrize("name", list(CASES))
-def test_verdict(results: dict[str, GapResult], name: str) -> None:
-    assert results[name].verdict == CASES[name][1]
+def test_verdict(name: str) -> None:
+    assert result_of(name).verdict == CASES[name][1]
 
 
-def test_where_yield_sits(results: dict[str, GapResult]) -> None:
-    found = results["yield"]
+def test_where_yield_sits() -> None:
+    found = result_of("yield")
     assert found.where.directions == ("y",)
     assert found.where.joints == (1,)
     assert found.where.seen_by_encoders is True
-    assert results["slip"].where.seen_by_encoders is False
+    assert result_of("slip").where.seen_by_encoders is False
 
 
-def test_threshold_of_the_yield(results: dict[str, GapResult]) -> None:
-    threshold = results["yield"].effects[0].parameters["threshold"]
+def test_threshold_of_the_yield() -> None:
+    threshold = result_of("yield").effects[0].parameters["threshold"]
     assert threshold.unit == "Nm"
     assert threshold.value == pytest.approx(45.0, rel=0.05)
 
 
-def test_onset_where_a_direction_reaches_the_threshold(results: dict[str, GapResult]) -> None:
+def test_onset_where_a_direction_reaches_the_threshold() -> None:
     tip = load_robot("ur10e").jacobian(np.array(Q["P1"]), tool_offset(np.array([0, 0, 0.1])))
-    found = results["yield"].effects[0].parameters
+    found = result_of("yield").effects[0].parameters
     assert found["onset_y"].value == pytest.approx(45.0 / abs(tip[1, 0]), rel=0.05)
     assert "onset_x" not in found  # never so much on joint 1
 
 
-def test_creep_fraction_and_time(results: dict[str, GapResult]) -> None:
-    parameters = results["creep"].effects[0].parameters
+def test_creep_fraction_and_time() -> None:
+    parameters = result_of("creep").effects[0].parameters
     assert parameters["creep_fraction"].value == pytest.approx(0.2, rel=0.25)
     assert parameters["retardation_time"].low < 20.0 < parameters["retardation_time"].high
 
@@ -355,16 +355,14 @@ def test_two_joints_that_creep_are_told_without_their_readings(
     assert found.after < 1.2 * found.noise
 
 
-def test_a_gain_that_bends_is_read_as_its_straight_line(results: dict[str, GapResult]) -> None:
-    factor = results["bend"].effects[0].parameters["factor"]
+def test_a_gain_that_bends_is_read_as_its_straight_line() -> None:
+    factor = result_of("bend").effects[0].parameters["factor"]
     assert factor.value == pytest.approx(1 - 0.1 * (1 + 0.75 * 0.08), abs=0.004)
 
 
-def test_named_effect_leaves_the_noise_and_beats_others_on_withheld_data(
-    results: dict[str, GapResult],
-) -> None:
+def test_named_effect_leaves_the_noise_and_beats_others_on_withheld_data() -> None:
     for name in ("yield", "creep", "drift", "seat"):
-        r = results[name]
+        r = result_of(name)
         assert r.after < 1.3 * r.noise, name
         assert all(r.held_out[0].after < other for other in r.runners_up.values()), name
 
@@ -384,12 +382,10 @@ def test_deleted_word_leaves_unknown(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("word", ["joint_hysteresis", "load_misalignment"])
-def test_an_effect_that_is_added_takes_no_other_s_place(
-    tmp_path: Path, results: dict[str, GapResult], word: str
-) -> None:
+def test_an_effect_that_is_added_takes_no_other_s_place(tmp_path: Path, word: str) -> None:
     """Nor is more left with it: the search may like the word alone better than both, for fewer."""
     with_it = diagnose(measure(tmp_path, yields), add=[word]).result
-    plain = results["yield"]
+    plain = result_of("yield")
     assert set(with_it.names) >= {*plain.names, word}
     assert with_it.after < 1.01 * plain.after
     assert with_it.without_added == pytest.approx(plain.after, rel=1e-3)
@@ -403,9 +399,9 @@ def test_two_words_may_be_added_to_nothing() -> None:
     assert found.without_added is not None
 
 
-def test_same_data_same_answer(tmp_path: Path, results: dict[str, GapResult]) -> None:
+def test_same_data_same_answer(tmp_path: Path) -> None:
     again = diagnose(measure(tmp_path, seats)).result
-    assert again.probabilities == results["seat"].probabilities
+    assert again.probabilities == result_of("seat").probabilities
 
 
 def test_unknown_word_is_refused(tmp_path: Path) -> None:
@@ -451,7 +447,7 @@ def test_an_arm_tells_a_gain_that_bends_and_springs_off_beside_one_joint(tmp_pat
     assert labels == {"gain"}
 
 
-def test_json_is_plain_and_complete(results: dict[str, GapResult], tmp_path: Path) -> None:
+def test_json_is_plain_and_complete(tmp_path: Path) -> None:
     import json
 
     out = diagnose(measure(tmp_path, seats)).to_json()
@@ -495,9 +491,7 @@ def test_a_million_samples_of_friction_on_a_bench() -> None:
     assert share.high - share.low < 0.1
 
 
-def test_renamed_poses_and_permuted_directions_change_nothing(
-    tmp_path: Path, results: dict[str, GapResult]
-) -> None:
+def test_renamed_poses_and_permuted_directions_change_nothing(tmp_path: Path) -> None:
     dataset = measure(tmp_path, seats)
     text = (tmp_path / "samples.csv").read_text().replace(",P1,", ",Q7,")
     meta = (tmp_path / "meta.yaml").read_text().replace("P1:", "Q7:")
@@ -505,7 +499,7 @@ def test_renamed_poses_and_permuted_directions_change_nothing(
     (tmp_path / "meta.yaml").write_text(meta)
     renamed = diagnose(import_table(tmp_path / "samples.csv", tmp_path / "meta.yaml"))
     assert dataset.rows == renamed.result.bench.rows.weight.sum()
-    assert renamed.result.probabilities == results["seat"].probabilities
+    assert renamed.result.probabilities == result_of("seat").probabilities
 
 
 THIN = "direction,repetition,branch,step,force_N,displacement_mm\n"

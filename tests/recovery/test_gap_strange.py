@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -113,22 +114,22 @@ KINDS: dict[str, Added] = {
 }
 
 
-@pytest.fixture(scope="module")
-def told() -> dict[str, GapResult]:
-    return {kind: diagnose_gap(measured(added)) for kind, added in KINDS.items()}
+@cache
+def told(kind: str) -> GapResult:
+    return diagnose_gap(measured(KINDS[kind]))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_no_word_names_is_unknown_and_told(told: dict[str, GapResult], kind: str) -> None:
-    result = told[kind]
+def test_what_no_word_names_is_unknown_and_told(kind: str) -> None:
+    result = told(kind)
     assert result.verdict == "unknown"
     assert result.looks_like is not None
     assert result.looks_like.kind == kind
     assert looks_like(result.looks_like) in render(result)
 
 
-def test_the_period_of_a_swing_is_found(told: dict[str, GapResult]) -> None:
-    like = told["swings"].looks_like
+def test_the_period_of_a_swing_is_found() -> None:
+    like = told("swings").looks_like
     assert like is not None
     assert like.period == pytest.approx(61.0, rel=0.01)
     assert "61" in looks_like(like)

@@ -13,6 +13,7 @@ Source: averaging and filter settings of amplifiers and laser sensors.
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -186,19 +187,25 @@ def _smooth(bench: Bench, values: Array) -> Array:
     noise of what is driven is in the response as well, and must not stand in the column that is to
     explain it; a fast swing is to keep its height. Where they are far from what was read, as about
     a step, it was no noise, and stays."""
-    from scipy.signal import savgol_filter
-
     if not bench.rows.continuous:
         return values
-    out = values.copy()
+    out, kernel = values.copy(), _parabola()
     for a, b in pairwise(bench.rows.run_edges):
         if b - a > 4 * _SIDE:
-            inner = savgol_filter(values[a:b], 2 * _SIDE + 1, 2)[_SIDE:-_SIDE]
+            inner = np.convolve(values[a:b], kernel, mode="valid")
             read = values[a + _SIDE : b - _SIDE]
             noise = white_sd(np.diff(values[a:b], 2))
             near = np.abs(inner - read) <= _NOISE * noise
             out[a + _SIDE : b - _SIDE] = np.where(near, inner, read)
     return out
+
+
+@cache
+def _parabola() -> Array:
+    """Weights of the rows about one at the middle of a parabola through them."""
+    from scipy.signal import savgol_coeffs
+
+    return np.asarray(savgol_coeffs(2 * _SIDE + 1, 2))
 
 
 def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:
