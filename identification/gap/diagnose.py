@@ -247,8 +247,9 @@ def _likeness(found: SearchResult, verdict: str) -> Likeness | None:
 def _effects(
     found: SearchResult, chosen: Explanation, known: list[Known]
 ) -> tuple[EffectFound, ...]:
+    all_of_them = (*found.explanations, *found.nameless)
     weights = np.array(
-        [e.log_good + log(found.kept.get(e.words, 1.0) + 1e-300) for e in found.explanations]
+        [e.log_good + log(found.kept.get(e.words, 1.0) + 1e-300) for e in all_of_them]
     )
     share = np.exp(weights - weights.max())
     total = float(share.sum())
@@ -257,7 +258,7 @@ def _effects(
     out = []
     for i, part in enumerate(chosen.parts):
         present = sum(
-            float(s) for e, s in zip(found.explanations, share, strict=True) if part.word in e.words
+            float(s) for e, s in zip(all_of_them, share, strict=True) if part.word in e.words
         )
         out.append(
             EffectFound(

@@ -98,9 +98,9 @@ def test_what_could_not_be_drawn_is_listed_and_not_scored() -> None:
 
 def test_the_worlds_of_the_project_end_to_end() -> None:
     made, words = generator("hidden")
-    out = report(run(Plan(cases=2, seed=1), made, words))
-    assert [c["status"] for c in out["cases"]] == ["answered"] * 2
-    assert out["summary"]["right_all_kinds"]["n"] <= 2
+    out = report(run(Plan(cases=1, seed=1), made, words))
+    assert [c["status"] for c in out["cases"]] == ["answered"]
+    assert out["summary"]["right_all_kinds"]["n"] <= 1
     assert {c["answers"]["design"] for c in out["cases"]} <= {"rich", "medium", "paper"}
 
 

@@ -450,6 +450,18 @@ def test_turning_points_of_a_crank_are_no_holds() -> None:
         )
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_straight_line_read_with_noise_bends_at_its_ends_and_is_no_curve(seed: int) -> None:
+    """About a turn of the load the noise of its readings counts as elsewhere."""
+    rng = np.random.default_rng(seed)
+    force = 50 - 50 * np.cos(2 * np.pi * np.arange(800) / 40)
+    read, shown = force + rng.normal(0, 1.0, 800), force / SPRING + rng.normal(0, 1e-6, 800)
+    data = running(read, shown, imposed="force", instruments=Instruments(1.0, 1e-6, 0.005, 0.003))
+    noise = make_bench(data).noise.response
+    assert np.quantile(noise, 0.01) > 5e-6  # of 10 um that the force makes
+    assert diagnose_gap(data).verdict == "none"
+
+
 @pytest.mark.parametrize("runs", [1, 2])
 def test_a_hold_of_which_only_the_ends_were_kept_is_one_and_a_pause_is_none(runs: int) -> None:
     t = np.concatenate([np.arange(0, 6, 0.05), np.arange(150, 152, 0.05)])
@@ -459,6 +471,8 @@ def test_a_hold_of_which_only_the_ends_were_kept_is_one_and_a_pause_is_none(runs
     bench = make_bench(replace(data, time=t, session=t))
     assert bench.course.always_moves is (runs == 2)
     assert words_with(bench, "joint_creep")
+    later = make_bench(replace(data, time=t, session=t, run=(t > 5).astype(np.int64)))
+    assert not later.course.always_moves  # the run that was held began within the first piece
 
 
 @pytest.mark.parametrize(("imposed", "holds"), [(None, False), ("force", True)])

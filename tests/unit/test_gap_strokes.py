@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -95,6 +97,21 @@ def test_a_fast_swing_keeps_its_height_in_a_lag() -> None:
     true = 100 * (np.sin(2 * np.pi * (t - 1) / 30) - np.sin(2 * np.pi * t / 30)) / SPRING
     inner = slice(10, -10)
     assert np.abs(lagging - true)[inner].max() < 0.03 * np.abs(true).max()
+
+
+@pytest.mark.parametrize("then", [1.0, -1.0])
+def test_nobody_knows_the_path_across_a_pause_nor_where_a_time_stands_twice(then: float) -> None:
+    """Up, a pause of which nothing was kept, and on, or back: no path swings beyond in between."""
+    t = np.concatenate([np.arange(0, 5, 0.05), np.arange(65, 70, 0.05)])
+    t[150] = t[149]
+    force = np.where(t < 5, 12 * t, 60 + then * 12 * (t - 65))
+    data = running(force, force / SPRING, imposed="force")
+    bench = make_bench(replace(data, time=t, session=t))
+    behind = late(bench, "displacement", "delay", 0.6)[: len(t)]
+    pause = slice(100, 112)  # 0.6 s from its end on
+    came = 12 * 0.6 / SPRING  # of the stroke before
+    assert np.abs(behind[pause]).max() <= came * 1.01
+    assert behind[112:] == pytest.approx(-then * came, rel=0.1)
 
 
 def test_steps_of_what_is_driven_are_no_noise_and_stay_sharp_in_a_lag() -> None:

@@ -215,15 +215,19 @@ def _seen_from(bench: Bench, j: int, x: Array) -> float:
 
 def _first_seen(bench: Bench, x: Array) -> float:
     """Share of the range from which on a bend shows in x (n,). What bends before the first load
-    that was read is a step where the load begins: lost motion. A direction that hardly turns the
-    joint sees its bends as little."""
-    load, setup = np.abs(x), bench.rows.setup
-    most = np.zeros(len(bench.data.setups))
-    np.maximum.at(most, setup, load)
-    return float(_HARDLY * load[(load > _NO_LOAD) & (most[setup] > _BEARS)].min(initial=1.0))
+    that was read is a step where the load begins: lost motion. A direction sees the bends between
+    its first load and its last."""
+    load, setup, out = np.abs(x), bench.rows.setup, 1.0
+    for s in range(len(bench.data.setups)):
+        mine = load[(setup == s) & (load > _NO_LOAD)]
+        first = _HARDLY * float(mine.min(initial=1.0))
+        if mine.size and mine.max() > _WELL_BEYOND * first:
+            out = min(out, first)
+    return out
 
 
-_NO_LOAD, _BEARS = 0.02, 0.2  # of the range
+_NO_LOAD = 0.02  # of the range
+_WELL_BEYOND = 2.0  # times the first load: it takes a few levels beyond a bend to see it
 _HARDLY = 1.3  # times the first load: hands set it as exactly as that
 _ABOUT = np.linspace(-0.08, 0.08, 9)  # of the range
 _TOOL_STEPS_KG = np.array([-0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4])

@@ -13,7 +13,6 @@ Source: averaging and filter settings of amplifiers and laser sensors.
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -179,6 +178,8 @@ def _driven(bench: Bench) -> str:
 
 
 _SIDE = 4  # rows to either side
+# Weights of nine rows for one at the middle of a parabola through them (Savitzky and Golay 1964).
+_PARABOLA = np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21]) / 231
 _NOISE = 4.0  # standard deviations, by second differences
 
 
@@ -189,23 +190,15 @@ def _smooth(bench: Bench, values: Array) -> Array:
     a step, it was no noise, and stays."""
     if not bench.rows.continuous:
         return values
-    out, kernel = values.copy(), _parabola()
+    out = values.copy()
     for a, b in pairwise(bench.rows.run_edges):
         if b - a > 4 * _SIDE:
-            inner = np.convolve(values[a:b], kernel, mode="valid")
+            inner = np.convolve(values[a:b], _PARABOLA, mode="valid")
             read = values[a + _SIDE : b - _SIDE]
             noise = white_sd(np.diff(values[a:b], 2))
             near = np.abs(inner - read) <= _NOISE * noise
             out[a + _SIDE : b - _SIDE] = np.where(near, inner, read)
     return out
-
-
-@cache
-def _parabola() -> Array:
-    """Weights of the rows about one at the middle of a parabola through them."""
-    from scipy.signal import savgol_coeffs
-
-    return np.asarray(savgol_coeffs(2 * _SIDE + 1, 2))
 
 
 def _behind(bench: Bench, values: Array, kind: str, lag: float) -> Array:

@@ -98,9 +98,10 @@ PLAIN = 3.0  # nats that a shape must explain the gap better than anything else,
 
 @dataclass(frozen=True)
 class Likeness:
-    """What an unknown gap looks like. kind: slopes, swings, waves, rough or jumps; of a recording
-    that runs on jerks, damage, softening or wanders; period: s of a swing, m of a wave, None of
-    others; log_evidence: of the kind, nats; wanders: slopes that change within runs too."""
+    """What an unknown gap looks like. kind: slopes, swings, waves, rough, jumps or settles; of a
+    recording that runs on jerks, damage, softening, wanders or slopes; period: s of a swing, m of
+    a wave, None of others; log_evidence: of the kind, nats; wanders: slopes that change within runs
+    too."""
 
     kind: str
     period: float | None

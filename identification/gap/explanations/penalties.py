@@ -8,6 +8,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, Sizes
+from identification.gap.model.bench import Bench
 from identification.gap.words import (
     CURVES,
     DRIFTS,
@@ -151,7 +152,8 @@ def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
 
     - Where the noise of samples is seen (running recordings, rigs without an arm): a slope below
       it, a wall below half of it. Thousands of samples would show such an effect, but noise of low
-      frequency wanders as far; of a path that may take any way the wall stands at all of it.
+      frequency wanders as far; of a path that may take any way the wall stands at all of it, and of
+      a curve over a load that is read less well than what answers.
     - Of levels at rest: a wall far below what is stated of a sample, where a gap is none.
     - What the springs hide, or other channels show, counts by how far it moves; if it moves
       nothing, by how far those channels are beyond what instruments do (`shown`).
@@ -161,7 +163,8 @@ def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     if seen > 0:
         sizes = np.maximum(_sizes_that_show(parts, found), shown * seen + 1e-300)
         below = _SLOPE * float(np.maximum(np.log(seen / sizes), 0.0).sum())
-        share = [1.0 if p.variant.free_pieces else _WANDERS for p in parts]
+        loose = {"joint_nonlinear_stiffness"} if _diluted(engine.bench) else set()
+        share = [1.0 if p.variant.free_pieces or p.word in loose else _WANDERS for p in parts]
         return below + sum(_wall(w * seen / float(s)) for w, s in zip(share, sizes, strict=True))
     hidden = [p.word in _SHOWN_ELSEWHERE and not p.variant.bends for p in parts]
     elsewhere = np.array(hidden, dtype=bool)  # a gain that bends no spring hides
@@ -169,6 +172,14 @@ def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     sizes = np.where(elsewhere, found.moved, found.gap)
     sizes = np.maximum(sizes, shown * least + 1e-300)
     return sum(_wall(least / float(size)) for size in sizes)
+
+
+def _diluted(bench: Bench) -> bool:
+    """Whether more noise comes from what is driven than from what answers: over readings with noise
+    even a straight line bends where they end (regression dilution: Fuller 1987)."""
+    meter, steep = bench.data.instruments, float(np.median(np.abs(bench.slope)))
+    answers, drives = meter.displacement, meter.force * steep
+    return drives < answers if bench.imposed else answers < drives
 
 
 _SLOPE = 20.0  # nats per factor e below the noise

@@ -8,7 +8,6 @@ change theirs over all of the way, and stages of a gear's stiffness lie within a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -56,7 +55,10 @@ def spoken_for(
     other = others.get(PLAY if word == CURVE else CURVE)
     if other is None:
         return {}
-    play = has_dead_zone(*_curve(engine, best), PLAINLY if word == CURVE else SOMEHOW)
+    u, force = _curve(engine, best)
+    if word == PLAY and _is_a_step(u, force):
+        return {}
+    play = has_dead_zone(u, force, PLAINLY if word == CURVE else SOMEHOW)
     return {} if play == (word == PLAY) else {best.words: other}
 
 
@@ -77,17 +79,38 @@ def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:
 def has_dead_zone(u: Array, force: Array, limits: Limits) -> bool:
     """Whether force (n,) over displacement u (n,) has a dead zone with sharp ends, inside. None of
     what has no stiff flanks."""
+    share = _stiffness(u, force)
+    return any(_is_play(share, a, b, limits) for a, b in _soft(share))
+
+
+def _is_a_step(u: Array, force: Array) -> bool:
+    """Whether all that is soft along a fit is passed between a few readings: the displacement jumps
+    there, as no curve does, and nobody sees what the ends are like."""
+    soft = _soft(_stiffness(u, force))
+    at = np.linspace(float(u.min()), float(u.max()), _POINTS)
+    return bool(soft) and all(
+        max(_lengths((u >= at[a]) & (u <= at[b - 1])), default=0) <= _UNSEEN for a, b in soft
+    )
+
+
+def _lengths(inside: Flags) -> list[int]:
+    """Of the stretches of rows (n,) that are inside."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
+    return [int(n) for n in np.diff(edges)[::2]]
+
+
+_UNSEEN = 3  # readings in a row
+
+
+def _stiffness(u: Array, force: Array) -> Array:
+    """(p,) of force (n,) over displacement u (n,), at even points of its way, as a share of that
+    of the flanks; ones where none is stiff."""
     order = np.argsort(u, kind="stable")
     read, answer = _distinct(u[order], force[order])
     at = np.linspace(float(read[0]), float(read[-1]), _POINTS)
     stiffness = np.gradient(np.interp(at, read, answer)) if len(read) > 1 else np.zeros(_POINTS)
     flank = float(np.quantile(stiffness, _STIFF))
-    if not flank > 0:
-        return False
-    return any(
-        _is_play(stiffness / flank, a, b, limits)
-        for a, b in _stretches(np.asarray(stiffness < _SOFT * flank))
-    )
+    return stiffness / flank if flank > 0 else np.ones(_POINTS)
 
 
 def _distinct(u: Array, force: Array) -> tuple[Array, Array]:
@@ -99,10 +122,10 @@ def _distinct(u: Array, force: Array) -> tuple[Array, Array]:
     return np.bincount(which, u) / count, np.bincount(which, force) / count
 
 
-def _stretches(soft: Flags) -> Iterator[tuple[int, int]]:
+def _soft(share: Array) -> list[tuple[int, int]]:
     """First point of every stretch that is soft, and first behind it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], soft, [False]]).astype(int)))
-    yield from list(pairwise(edges.tolist()))[::2]
+    soft = np.concatenate([[False], share < _SOFT, [False]])
+    return list(pairwise(np.flatnonzero(np.diff(soft.astype(int))).tolist()))[::2]
 
 
 def _is_play(share: Array, a: int, b: int, limits: Limits) -> bool:

@@ -21,12 +21,20 @@ _TOLD, _MOVING, _FARTHEST = 5.0, 0.9, 8
 def steepness(rows: Rows, driven: Array, answer: Array, sd: float, simulated: Array) -> Array:
     """(n,) how much the answer changes per unit of what is driven, about a row within its run, over
     as many rows as tell its motion from its noise; changes of what is driven below three standard
-    deviations count as that much. Where its motion drowns, at least what is simulated (n,); where
-    it stands, no more than that: what goes on meanwhile is no answer."""
-    reach = _reach(rows, driven, sd)
+    deviations count as that much. About a turn both are back where they were, and the steeper side
+    counts. Where its motion drowns, at least what is simulated (n,); where it stands, no more than
+    that: what goes on meanwhile is no answer."""
+    reach, least = _reach(rows, driven, sd), max(3 * sd, 1e-300)
     a, b = _about(rows, reach or _REACH)
-    way = np.maximum(np.abs(driven[b] - driven[a]), max(3 * sd, 1e-300))
-    steep = np.abs(answer[b] - answer[a]) / way
+    here = np.arange(rows.n)
+
+    def between(first: Ints, last: Ints) -> Array:
+        way = np.maximum(np.abs(driven[last] - driven[first]), least)
+        return np.asarray(np.abs(answer[last] - answer[first]) / way)
+
+    about, beside = between(a, b), np.maximum(between(a, here), between(here, b))
+    turned = np.abs(driven[b] - driven[a]) < least
+    steep = np.where(turned, np.maximum(about, beside), about)
     steep = steep if reach else np.maximum(steep, simulated)
     return np.where(_stands(rows, driven, sd), np.minimum(steep, simulated), steep)
 

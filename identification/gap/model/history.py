@@ -325,7 +325,7 @@ def row_time(rows: Rows) -> float:
 def delayed(values: Array, delay: float, rows: Rows) -> Array:
     """`values(t - delay)` of values (n,) or (n, k), within every run, along a path through rows."""
     out = np.empty_like(values)
-    for a, b, t, v in _ramps(values, rows):
+    for a, b, t, v in _paths(values, rows):
         place = np.interp(rows.time[a:b] - delay, t, np.arange(len(t), dtype=float))
         low = place.astype(np.intp)
         share = (place - low).reshape(-1, *[1] * (v.ndim - 1))
@@ -337,7 +337,7 @@ def averaged(values: Array, window: float, rows: Rows) -> Array:
     """Means of values (n,) or (n, k) over the last `window` s, along the same path; before a run
     they are what they are at its first row."""
     out = np.empty_like(values)
-    for a, b, t, v in _ramps(values, rows):
+    for a, b, t, v in _paths(values, rows):
         step = np.diff(t).reshape(-1, *[1] * (v.ndim - 1))
         area = np.concatenate([0.0 * v[:1], np.cumsum(step * (v[1:] + v[:-1]) / 2, axis=0)])
 
@@ -354,7 +354,7 @@ def averaged(values: Array, window: float, rows: Rows) -> Array:
     return out
 
 
-def _ramps(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]:
+def _paths(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]:
     """Of every run its first row and the one after its last, and corners of its path: times (m,)
     and values (m,) or (m, k). From hold to hold it is straight."""
     half = half_sample(rows)
@@ -367,19 +367,29 @@ def _ramps(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]
             v = np.concatenate([v, v[new], v[:-1][new[1:]]])
             order = np.argsort(t, kind="stable")
             t, v = t[order], v[order]
-        elif len(t) >= _FEWEST and np.all(np.diff(t) > 0):
+        elif len(t) > 1:
             t, v = _rounded(t, v)
         yield a, b, t, v
 
 
 def _rounded(time: Array, values: Array) -> tuple[Array, Array]:
     """More corners, along a smooth path through values (n, ...) read at times (n,) (Akima 1970):
-    straight ramps would cut the tops of fast swings off."""
+    straight ramps would cut the tops of fast swings off. Across a pause, or where a time stands
+    twice, nobody knows the path, and it is straight."""
     from scipy.interpolate import Akima1DInterpolator
 
-    n = len(time)
-    fine = np.interp(np.arange(_BETWEEN * (n - 1) + 1) / _BETWEEN, np.arange(n), time)
-    return fine, np.asarray(Akima1DInterpolator(time, values)(fine))
+    step = np.diff(time)
+    cut = np.flatnonzero((step <= 0) | (step > _PAUSE * np.median(step))) + 1
+    times, paths = [], []
+    for part in np.split(np.arange(len(time)), cut):
+        t, v = time[part], values[part]
+        if len(t) >= _FEWEST:
+            fine = np.interp(np.arange(_BETWEEN * (len(t) - 1) + 1) / _BETWEEN, part - part[0], t)
+            t, v = fine, np.asarray(Akima1DInterpolator(t, v)(fine))
+        times.append(t)
+        paths.append(v)
+    return np.concatenate(times), np.concatenate(paths)
 
 
 _BETWEEN, _FEWEST = 4, 4  # corners for each row; rows that have a curve
+_PAUSE = 3.0  # times the usual time from row to row

@@ -271,7 +271,8 @@ class Course:
             slow &= np.abs(speed(self.response)) < _RUNS_ON
         beside = np.pad(slow, 1)
         # a turning point alone is no hold; what was left out of one run for pieces together is
-        left_out = (np.diff(held) > 1) & (np.diff(self.rows.run[first]) == 0)
+        one_run = self.rows.run[first[1:] - 1] == self.rows.run[first[1:]]
+        left_out = (np.diff(held) > 1) & one_run
         stands = slow & (beside[:-2] | beside[2:] | left_out)
         return float(np.diff(held)[~stands].sum()) / max(count - 1, 1)
 

@@ -8,7 +8,8 @@ do, alone and beside them; what they explain best is `unknown`, and what it look
 jerks: the response jumps at rows found one after the other, and stays. damage: the stiffness that
 is lost grows with the largest load so far. softening: below the largest load so far it is softer,
 and back where it was at that load (Ogden, Roxburgh 1999). wanders: the stiffness goes its own way
-in time, as it does by fatigue, cure, humidity or a pressure that nobody holds.
+in time, as it does by fatigue, cure, humidity or a pressure that nobody holds; or it is another one
+in every run.
 """
 
 from __future__ import annotations
@@ -37,7 +38,6 @@ KNOTS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)  # of the largest load
 BELOW = (0.05, 0.15, 0.5)  # of the largest load: so far below what it bore it is as soft as it gets
 _FEWEST_ROWS = 30
 _PASSES, _LEAST_PIECES, _PIECES = 3, 3, 12  # of the load; of a path in time
-_RUNS = 2  # of fewer a drift is as likely
 _STAYS = 0.3  # of the way, when the load is gone: what only softens comes back
 _CURVE, _LOOP, _SLOW = 7, 4, 5  # degrees of a smooth response that jumps are looked for beside
 _NOTHING_NEW = 1e-6  # of its square is left of a jump beside what is known
@@ -51,7 +51,7 @@ def troubles_of(bench: Bench, base: Base, target: Array) -> list[Variant]:
     lasting = _damage(bench) if bench.course.returns else []
     if bench.course.returns and bench.course.stays < _STAYS:
         lasting += _softening(bench)
-    return [*lasting, *_wanders(bench), *_jerks(bench, base, target)]
+    return [*lasting, *_wanders(bench), *_of_runs(bench), *_jerks(bench, base, target)]
 
 
 def with_plain_trouble(found: SearchResult) -> SearchResult:
@@ -63,7 +63,9 @@ def with_plain_trouble(found: SearchResult) -> SearchResult:
     ahead = best.log_weight - max(found.explanations[0].log_weight, found.unknown)
     if ahead < PLAIN:
         return found
-    return replace(found, looks_like=Likeness(best.parts[0].word, None, best.log_weight))
+    first = best.parts[0]
+    kind = "slopes" if first.variant.label == EACH_RUN else first.word
+    return replace(found, looks_like=Likeness(kind, None, best.log_weight))
 
 
 def _largest(bench: Bench) -> Array:
@@ -94,27 +96,28 @@ def _softening(bench: Bench) -> list[Variant]:
 
 
 def _wanders(bench: Bench) -> list[Variant]:
-    """Of a load that comes and goes often enough to tell time from load: along a path, or another
-    one in every run."""
+    """Of a load that comes and goes often enough to tell time from load."""
     pieces = min(bench.course.passes - _PASSES, _PIECES)
     if not bench.course.returns or pieces < _LEAST_PIECES:
         return []
-    spring, runs = bench.slope * bench.load, np.unique(bench.rows.run)
-    path = [spring * hat for hat in free_path(bench, pieces).T]
-    each = [spring * (bench.rows.run == r) for r in runs] if len(runs) > _RUNS else []
-    kinds = [("in time", path, path_root(pieces)), ("each run", each, None)]
-    return [
-        variant(
-            WANDERS,
-            label,
-            [bench.add(bench.outside_column(c)) for c in columns],
-            LOSSES,
-            root,
-            positive=False,
-        )
-        for label, columns, root in kinds
-        if columns
-    ]
+    spring, hats = bench.slope * bench.load, free_path(bench, pieces)
+    columns = [bench.add(bench.outside_column(spring * hat)) for hat in hats.T]
+    return [variant(WANDERS, "in time", columns, LOSSES, path_root(pieces), positive=False)]
+
+
+def _of_runs(bench: Bench) -> list[Variant]:
+    """Every run has a stiffness of its own, as what is fastened anew; of loads that come again, and
+    of more than two runs: of fewer a drift is as likely."""
+    runs = np.unique(bench.rows.run)
+    if not (bench.course.comes_again and _FEW < len(runs) <= _MANY):
+        return []
+    spring = bench.slope * bench.load
+    columns = [bench.add(bench.outside_column(spring * (bench.rows.run == r))) for r in runs]
+    return [variant(WANDERS, EACH_RUN, columns, LOSSES, positive=False)]
+
+
+EACH_RUN = "each run"
+_FEW, _MANY = 2, 60  # runs; of more the path in time tells
 
 
 def _jerks(bench: Bench, base: Base, target: Array) -> list[Variant]:
