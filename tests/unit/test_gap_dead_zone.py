@@ -115,7 +115,7 @@ def test_a_curve_that_a_soft_play_beside_a_curve_meets_better_is_a_curve(name: s
 def test_a_play_that_is_passed_between_two_readings_is_no_curve() -> None:
     """Rounded as teeth are, and told by few readings of each pass what it is like."""
     u = to_and_fro(cycles=8)
-    force = np.asarray(np.interp(u, U + 0.02 * np.tanh(U / 0.004), U))
+    force = np.asarray(np.interp(u, U + 0.012 * np.tanh(U / 0.005), U))
     found = diagnose_gap(a_bench(force, u, "displacement").data)
     assert found.verdict == PLAY
 
