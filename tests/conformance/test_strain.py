@@ -109,6 +109,18 @@ def test_no_single_step_of_a_warming_path_stands_out(largest: float, stands_out:
     assert strain(engine, odd, 0.0) < LIMIT
 
 
+def test_a_force_that_drifts_has_done_so_since_it_was_tared() -> None:
+    """By the root of time it is far off before the first sample, and no tare is to blame."""
+    bench, variants, _ = of("force_drift", "rich")
+    engine = quick_engine(bench)
+    drifts = fit(engine, Explanation((Part(typical(variants), 1.0),), 0.0, 0.0, (0.0,), 0.0))
+    engine.structural = 1e-9
+    assert strain(engine, pulled(engine, "tare"), 0.0) == pytest.approx(FAR)
+    off = pulled(engine, "tare", drifts)
+    assert strain(engine, off, 0.0) == 0.0
+    assert what_is_strained(engine, off, 0.0) == ""
+
+
 def test_a_joint_with_play_rests_anywhere_in_it() -> None:
     bench, variants, _ = of("joint_backlash", "rich")
     engine = quick_engine(bench)

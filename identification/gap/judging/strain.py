@@ -72,8 +72,9 @@ def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     """(b,) Springs that are said to be off may be off, and so may that of a joint whose mechanism
     brings its own mean stiffness; a joint with play rests anywhere in it, and is sent to where its
-    reading should be; tares, and offsets of the joint readings, count as far as they
-    move a share of the gap that an explanation may not leave."""
+    reading should be; a force that drifts has done so since it was tared; tares, and offsets of the
+    joint readings, count as far as they move a share of the gap that an explanation may not leave.
+    """
     base, n, weight = engine.base, engine.bench.rows.n, engine.bench.rows.weight
     columns = base.columns[:n]
     where = np.maximum(weight @ (columns != 0), 1e-300)
@@ -89,6 +90,8 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     for i in base.index("offset"):
         if int(base.names[i].split()[-1]) - 1 in played:
             pulls[i] = 0.0
+    if any(p.word == "force_drift" for p in fitted.parts):
+        pulls[base.index("tare")] = 0.0
     constant = base.index("tare") + base.index("offset")
     size = moves[constant] * np.abs(fitted.base[constant])
     pulls[constant] *= np.minimum(size / max(REMAINDER * engine.structural, 1e-300), 1.0)

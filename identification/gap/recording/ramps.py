@@ -21,7 +21,9 @@ from identification.running import first_rows
 from identification.stairs import steps_of_stairs
 from identification.ways import AWAY, SEEN, elsewhere, leading_on
 
-_ABOUT = 2.0  # times as much of its range as the other channel of its own
+# Times as much of its range as the other channel of its own: what has yielded lets the displacement
+# come back by as little as a third of what the force does.
+_ABOUT = 4.0
 _GENTLY = 0.5  # of what a force had to go at the sample before
 _LAST = 0.25  # share of a hold whose mean is where it leads to
 _TO_GO = 0.25  # of a step
