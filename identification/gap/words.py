@@ -54,6 +54,7 @@ FRICTION = words_of("friction")
 DRIFTS = words_of("drift")
 BETWEEN_RUNS = DRIFTS | {"zero_shift"}  # what one run does so, no other run foretells
 SPRINGS = "joint_stiffness_error"  # the linear law of the joints' springs, which mechanisms share
+YIELD = "joint_yield"  # gives way for good, as friction does without coming back
 LATE = frozenset({"joint_creep", "time_lag"})  # what comes after the load
 
 # Troubles of running recordings that no word names (breaks.py): what they explain is `unknown`.

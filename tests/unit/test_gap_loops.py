@@ -184,3 +184,33 @@ def test_metal_in_growing_cycles_yields_and_does_not_creep(uncertainty_N: float)
     """Though creep beside the yield explains its changing loops, or foretells as much alone, and a
     spring takes over most of what either does."""
     assert diagnose_gap(strained(uncertainty_N)).verdict in ("joint_yield", "joint_hysteresis")
+
+
+def ratcheted(
+    force: Array, knee: float = 55.0, hardening: float = 4e5, recall: float = 6e3
+) -> Array:
+    """m of a bar whose yield surface follows as Armstrong and Frederick say: in cycles about a mean
+    load it walks a little further in each."""
+    back, plastic, out = 0.0, 0.0, []
+    for before, now in zip(np.append(0.0, force[:-1]), force, strict=True):
+        for f in np.linspace(before, now, 20)[1:]:
+            over, sense = abs(f - back) - knee, np.sign(f - back)
+            if over > 0:
+                step = over / (hardening - recall * back * sense) * sense
+                plastic += step
+                back += hardening * step - recall * back * abs(step)
+        out.append(f / SPRING + plastic)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("mean", [15.0, 0.0])
+def test_what_yields_walks_the_way_of_a_mean_load_and_heat_walks_without(mean: float) -> None:
+    cycles, n = 10, 600
+    force = mean + 65 * np.sin(2 * np.pi * cycles * np.arange(n) / n)
+    shown = ratcheted(force)
+    if not mean:  # nothing ratchets, and the room gets warm
+        shown = shown + 3e-4 * np.arange(n) / n
+    noise = np.random.default_rng(2).normal(0, 1e-6, n)
+    found = diagnose_gap(running(force, shown + noise, imposed="force", instruments=METER))
+    assert "thermal_drift" in found.names or "force_drift" in found.names
+    assert (found.verdict in ("joint_yield", "joint_hysteresis")) is (mean > 0)

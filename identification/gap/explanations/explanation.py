@@ -32,7 +32,8 @@ from identification.gap.explanations.penalties import (
     within_stated,
 )
 from identification.gap.explanations.priors import prior_of
-from identification.gap.words import CURVES, FRICTION, LINEAR
+from identification.gap.model.bench import Bench
+from identification.gap.words import CURVES, DRIFTS, FRICTION, LINEAR, YIELD
 
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
@@ -190,12 +191,19 @@ def _leading_of_two(engine: Engine, parts: tuple[Part, ...], level: int) -> int 
     - Beside a curve the friction, where most of the way is left when the load is gone: no curve
       keeps anything.
     - Beside creep at one rate the friction: creep then differs from it in details only.
+    - Beside a drift the friction or yield, where the driven load goes to and fro about a mean and
+      the drift is the way of that: what yields ratchets so (Armstrong and Frederick 1966).
     - Beside creep under an imposed stroke the one that the other can do less without: both bring a
       mean stiffness, and what a spring leaves of either says little.
     """
     bench, words = engine.bench, [p.word for p in parts]
     rubs = next((i for i, w in enumerate(words) if w in FRICTION), None)
-    if len(parts) != _PAIR or rubs is None:
+    gives = next((i for i, w in enumerate(words) if w in FRICTION | {YIELD}), None)
+    if len(parts) != _PAIR or gives is None:
+        return None
+    if DRIFTS & frozenset(words) and _walks(bench):
+        return gives
+    if rubs is None:
         return None
     curves, creeps = any(w in CURVES for w in words), "joint_creep" in words
     if (curves and bench.course.stays > _STAYS) or (creeps and bench.course.one_rate):
@@ -204,6 +212,19 @@ def _leading_of_two(engine: Engine, parts: tuple[Part, ...], level: int) -> int 
 
 
 _PAIR, _STAYS = 2, 0.5  # effects; of the way
+
+
+def _walks(bench: Bench) -> bool:
+    """Whether the response to a driven force that goes to and fro walks the way of its mean."""
+    load, n = bench.load, bench.rows.n
+    mean, third = (float(load.max()) + float(load.min())) / 2, n // 3
+    if bench.imposed or bench.course.passes < _CYCLES or abs(mean) < _ASIDE * np.ptp(load):
+        return False
+    left = bench.response - bench.slope * load
+    return bool((left[-third:].mean() - left[:third].mean()) * mean > 0)
+
+
+_CYCLES, _ASIDE = 6, 0.1  # passes of the load; of its range: so far its mean is from none
 
 
 def _toe_and_knee(parts: tuple[Part, ...]) -> bool:
