@@ -207,10 +207,12 @@ def test_the_search_closes_in_on_a_lag_between_those_of_the_grid(
     assert best.log_evidence > max(s.log_evidence for s in first) + gained
 
 
-def test_lags_of_a_running_recording_are_closed_in_on() -> None:
-    """A camera 2.35 samples late: between two lags of the grid."""
+@pytest.mark.parametrize(("swing", "gains"), [(15, False), (5, True)])
+def test_lags_of_a_running_recording_are_closed_in_on(swing: int, gains: bool) -> None:
+    """A camera 2.35 samples late: between two lags of the grid. Of slow swings a little less of a
+    longer lag says the same."""
     at, true = np.arange(400.0), 2.35
-    force, shown = (50 - 50 * np.cos(np.maximum(at - 9 - d, 0) / 5) for d in (0.0, true))
+    force, shown = (50 - 50 * np.cos(np.maximum(at - 9 - d, 0) / swing) for d in (0.0, true))
     bench = make_bench(running(force, shown / SPRING, imposed="force"))
     target = bench.observed - prediction(bench)
     variants = library(bench, ["time_lag"])
@@ -219,7 +221,7 @@ def test_lags_of_a_running_recording_are_closed_in_on() -> None:
     finer = refine(engine, first)
     best = max(score(engine, engine.levels, finer), key=lambda s: s.log_evidence)
     assert best.variant.info["lag_s"] == pytest.approx(true * bench.rows.time[1], rel=0.02)
-    assert best.log_evidence > max(s.log_evidence for s in first)
+    assert not gains or best.log_evidence > max(s.log_evidence for s in first)
 
 
 def test_flanks_that_approach_slowly_are_a_shape_of_a_play() -> None:
