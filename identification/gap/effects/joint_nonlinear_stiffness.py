@@ -52,54 +52,8 @@ def variants(bench: Bench) -> list[Variant]:
         top = float(np.abs(torque).max())
         if not top > 0:
             continue
-        x, c = torque / top, bench.compliance[j] * top
-        # a specimen that settles in its clamps has no contact inside
-        hinges = HINGES if bench.data.arm else PLACES
-        columns = [bench.add_joint(j, c * hinge(x, b)) for b in hinges]
-        info: dict[str, Any] = {"joint": j, "torque": top, "hinges": hinges}
-        line = bench.add_joint(j, c * x)
-        out.append(
-            variant(
-                WORD,
-                f"joint {j + 1} curve",
-                [line, *columns],
-                SCALES,
-                _root(len(hinges)),
-                positive=False,
-                prior=0.5,
-                kinds=("line", *hinges),
-                **info,
-            )
-        )
-        for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
-            column = bench.add_joint(j, c * shape)
-            out.append(
-                variant(
-                    WORD,
-                    f"joint {j + 1} {name}",
-                    [column],
-                    SCALES,
-                    positive=False,
-                    prior=0.1,
-                    kinds=(name,),
-                    **info,
-                )
-            )
-        for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
-            if np.mean(hinges[k : k + 2]) < _seen_from(bench, j, x):
-                continue
-            out.append(
-                variant(
-                    WORD,
-                    f"joint {j + 1} bend {hinges[k]}",
-                    [line, *columns[k : k + 2]],
-                    SCALES,
-                    positive=False,
-                    prior=0.2 / (len(PLACES) - 1),
-                    kinds=("line", *hinges[k : k + 2]),
-                    **info,
-                )
-            )
+        line = bench.add_joint(j, bench.compliance[j] * top * (torque / top))
+        out += _alike_both_ways(bench, j, line, top)
         if not bench.data.arm and bench.course.once and not bench.course.rests:
             out += _locks(bench, j, line, top) + _level_by_level(bench, j, line, top)
         elif not bench.data.arm and bench.rows.continuous and _came_back(bench):
@@ -108,6 +62,33 @@ def variants(bench: Bench) -> list[Variant]:
             out.append(_uneven(bench, j, line, top))
         if bench.feels_weight(j):
             out += _net(bench, j, line)
+    return out
+
+
+def _alike_both_ways(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
+    """A free curve of hinges over the size of the torque, powers of it, and single bends between
+    neighbouring hinges."""
+    x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
+    # a specimen that settles in its clamps has no contact inside
+    hinges = HINGES if bench.data.arm else PLACES
+    columns = [bench.add_joint(j, c * hinge(x, b)) for b in hinges]
+    info: dict[str, Any] = {"joint": j, "torque": top, "hinges": hinges, "positive": False}
+    kinds = ("line", *hinges)
+    free, root = [line, *columns], _root(len(hinges))
+    label = f"joint {j + 1} curve"
+    out = [variant(WORD, label, free, SCALES, root, prior=0.5, kinds=kinds, **info)]
+    for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
+        column = bench.add_joint(j, c * shape)
+        label = f"joint {j + 1} {name}"
+        out.append(variant(WORD, label, [column], SCALES, prior=0.1, kinds=(name,), **info))
+    seen, prior = _seen_from(bench, j, x), 0.2 / (len(PLACES) - 1)
+    for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
+        pair = hinges[k : k + 2]
+        if np.mean(pair) >= seen:
+            label, both = f"joint {j + 1} bend {pair[0]}", [line, *columns[k : k + 2]]
+            out.append(
+                variant(WORD, label, both, SCALES, prior=prior, kinds=("line", *pair), **info)
+            )
     return out
 
 
