@@ -231,8 +231,7 @@ def _shapes(
     # shapes that look alike to these data may differ elsewhere: joints and axes first, then laws
     kinds: dict[object, Variant] = {}
     for v in near:
-        info = v.info
-        kinds.setdefault((info.get("joint"), info.get("axis"), info.get("memory")), v)
+        kinds.setdefault(v.differs_by, v)
     order = [fitted, *kinds.values(), *(v for v in near if v not in kinds.values())][:_SHAPES]
     return tuple((v, *law_of(engine.bench, v), weight.get(id(v), best)) for v in order)
 

@@ -170,12 +170,11 @@ class _Shapes:
 
 def _named(variant: Variant) -> str:
     """The joint, or the axis of the base's motion, that a variant sits at."""
-    info = variant.info
     if variant.joint is not None:
         return f"joint {variant.joint + 1}"
-    if slides(info):
-        return f"sliding along {ACROSS[info['axis']]}"
-    return f"axis {info['axis']}" if "axis" in info else ""
+    if variant.axis is None:
+        return ""
+    return f"sliding along {ACROSS[variant.axis]}" if slides(variant) else f"axis {variant.axis}"
 
 
 def _moves(

@@ -10,7 +10,7 @@ Source: Coulomb friction in the bolted joint of the mounting, effective radius a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -62,9 +62,9 @@ def places() -> Iterator[tuple[str, float]]:
         yield axis, SLIDES_M
 
 
-def slides(info: Mapping[str, Any]) -> bool:
+def slides(v: Variant) -> bool:
     """Whether a shape of this word is of a stand that slides."""
-    return float(info.get("depth_m", 0.0)) >= SLIDES_M
+    return float(v.info.get("depth_m", 0.0)) >= SLIDES_M
 
 
 def lever_of(bench: Bench, axis: str, depth: float) -> Array:
@@ -121,7 +121,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
 def _named(bench: Bench, v: Variant, threshold: Parameter) -> dict[str, Parameter]:
     """Of a stand that slides the force across at which it does; of a slip about a lying axis, with
     what is not known of its depth."""
-    if slides(v.info):
+    if slides(v):
         return {"threshold_of_force": over(threshold, SLIDES_M)}
     if v.info["axis"] == "z":
         return {"threshold": threshold}

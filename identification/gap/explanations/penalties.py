@@ -232,8 +232,8 @@ _AS_LATE = 3.0  # times the lag: what comes as soon as that is the lag's own law
 
 def _as_late(one: Part, other: Part) -> bool:
     """Whether what creeps is over about when the lag is: by the mean of its times' logarithms."""
-    info = {**one.variant.info, **other.variant.info}
-    return float(np.exp(np.mean(np.log(info["times_s"])))) < _AS_LATE * float(info["lag_s"])
+    creeps, late = sorted((one.variant, other.variant), key=lambda v: v.lag_s)
+    return float(np.exp(np.mean(np.log(creeps.times_s)))) < _AS_LATE * late.lag_s
 
 
 def _only_rubs(engine: Engine, play: Part, curve: Part) -> bool:

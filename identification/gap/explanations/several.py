@@ -26,9 +26,9 @@ def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> l
     """Variants of a word that may stand beside other parts: not in a joint where it is already; and
     what creeps more than in proportion in one joint does so in all."""
     same = [p.variant for p in beside if p.word == word]
-    taken, bent = {v.joint for v in same} - {None}, {bool(v.info.get("bent")) for v in same}
+    taken, bent = {v.joint for v in same} - {None}, {v.exceeds_proportion for v in same}
     mine = (v for v in variants if v.word == word and v.joint not in taken)
-    return [v for v in mine if not bent or bool(v.info.get("bent")) in bent]
+    return [v for v in mine if not bent or v.exceeds_proportion in bent]
 
 
 def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:

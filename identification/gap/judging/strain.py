@@ -122,7 +122,7 @@ def _jumps(engine: Engine, part: Part, pulls: Array) -> Array:
     """The largest step (paths,) of every free path against its other ones, by the normal deviate
     that is as seldom: where steps are of one size, however large, none stands out. A steady path
     comes with a place and a rate; steps are what it turns by."""
-    pieces, first = part.variant.free_pieces, 2 * bool(part.variant.info["steady"])
+    pieces, first = part.variant.free_pieces, 2 * part.variant.steady
     seen = np.any(engine.columns(part.variant.columns)[: engine.bench.rows.n] != 0, axis=0)
     out = []
     for steps, there in zip(pulls.reshape(-1, pieces), seen.reshape(-1, pieces), strict=True):

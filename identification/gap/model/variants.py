@@ -90,6 +90,51 @@ class Variant:
         """Whether it gives way slowly beyond a threshold."""
         return float(self.info.get("flow_s", 0.0)) > 0
 
+    @property
+    def exceeds_proportion(self) -> bool:
+        """Whether it creeps by more than in proportion to the load."""
+        return bool(self.info.get("bent"))
+
+    @property
+    def times_s(self) -> Array:
+        """(k,) retardation times s of what creeps; none of others."""
+        return np.asarray(self.info.get("times_s", ()), dtype=float)
+
+    @property
+    def lag_s(self) -> float:
+        """s by which a channel lags; 0 where none does."""
+        return float(self.info.get("lag_s", 0.0))
+
+    @property
+    def late_channel(self) -> str | None:
+        """The channel that lags, force or displacement."""
+        return self.info.get("channel")
+
+    @property
+    def steady(self) -> bool:
+        """Whether a drift comes with a rate, and its pieces turn by steps of that."""
+        return bool(self.info.get("steady"))
+
+    @property
+    def period(self) -> float | None:
+        """Of a swing in s, of a wave in m."""
+        return self.info.get("period")
+
+    @property
+    def wanders(self) -> bool:
+        """Whether a stiffness changes within runs too."""
+        return "wanders" in self.info
+
+    @property
+    def axis(self) -> str | None:
+        """The axis about which the base moves."""
+        return self.info.get("axis")
+
+    @property
+    def differs_by(self) -> tuple[object, ...]:
+        """Joint, axis of the base and memory, by which shapes differ most in other designs."""
+        return tuple(self.info.get(key) for key in ("joint", "axis", "memory"))
+
     @cached_property
     def shape(self) -> tuple[object, ...]:
         """What its evidence follows from, but for the prior: of a word, variants of the same shape

@@ -43,7 +43,7 @@ def reading_all(engine: Engine, explanation: Explanation) -> list[Variant]:
 
 def _reads(bench: Bench, variant: Variant) -> bool:
     if variant.word == time_lag.WORD:
-        return bool(variant.info["channel"] == "displacement")
+        return variant.late_channel == "displacement"
     return bench.has_q and variant.word == displacement_scale.WORD
 
 

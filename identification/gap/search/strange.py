@@ -109,10 +109,8 @@ def likenesses(engine: Engine, strangers: list[Variant]) -> tuple[Likeness, ...]
         if size < LEAST_SIZE * engine.bench.noise.stated:
             continue
         looked_at = min(sum(s.variant.prior for s in mine), 1.0)
-        info = top.variant.info
-        out.append(
-            Likeness(kind, info.get("period"), marginal(mine) + log(looked_at), "wanders" in info)
-        )
+        found = marginal(mine) + log(looked_at)
+        out.append(Likeness(kind, top.variant.period, found, top.variant.wanders))
     return tuple(sorted(out, key=lambda x: -x.log_evidence))
 
 
