@@ -70,7 +70,7 @@ OTHERWISE = {
     "none": "noise, gains and stiffnesses within their stated uncertainty explain all",
     "unknown": "a gap that no effect of the library explains",
 }
-LEAST_PROBABILITY = 0.005  # of a word that is listed
+LEAST_PROBABILITY = 0.015  # of a word that is listed: doubt leaves about a hundredth to each
 
 
 def meanings(*, arm: bool) -> dict[str, str]:
@@ -199,8 +199,9 @@ def _effects(r: GapResult) -> str:
         lines += _one_effect(e, _title(e, [other.name for other in r.effects]))
     lines += [f"  {name}: {told}" for name, told in parameter_meanings(r).items()]
     ranked = sorted(r.probabilities.items(), key=lambda i: -i[1])
-    shown = ", ".join(f"{w} {likely(p)}" for w, p in ranked if p >= LEAST_PROBABILITY)
-    lines.append(f"Probability of being the main cause: {shown}")
+    shown = [f"{w} {likely(p)}" for w, p in ranked if p >= LEAST_PROBABILITY]
+    shown.append(f"all others together {likely(sum(p for _, p in ranked[len(shown) :]))}")
+    lines.append(f"Probability of being the main cause: {', '.join(shown)}")
     return "\n".join(lines)
 
 

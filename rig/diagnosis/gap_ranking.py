@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def probabilities(shown: Shown) -> Figure:
-    """Probability of every word above half a percent of being the main cause; verdict marked."""
+    """Probability of every likely word of being the main cause; verdict marked."""
     chances = ranked(shown, LEAST_PROBABILITY)
     alike = {w for e in shown.effects if e.name == shown.verdict for w in e.indistinguishable_from}
     figure = blank(7.5, 1.3 + 0.36 * max(len(chances), 3))

@@ -19,7 +19,7 @@ from identification.gap.model.base import prediction
 from rig import cli
 from rig.dataset import write
 from rig.diagnosis.diagnose import Diagnosis, diagnose
-from rig.diagnosis.diagnose_text import _share
+from rig.diagnosis.diagnose_text import LEAST_PROBABILITY, _share, render
 from rig.diagnosis.gap_curve import curve, legs
 from rig.diagnosis.gap_figures import draw
 from rig.diagnosis.gap_layout import blank, noise_axis
@@ -36,6 +36,7 @@ from rig.diagnosis.gap_points import (
     write_table,
 )
 from rig.diagnosis.gap_ranking import change, probabilities, withheld
+from rig.digits import likely
 from rig.report.gap_view import view_of
 from rig.tables import import_table
 
@@ -113,6 +114,16 @@ def test_table_of_points_has_units_and_names(slipped: Diagnosis) -> None:
     assert "simulated_after_N" not in t
     assert set(t["direction"]) == {"x", "y"}
     assert np.allclose(t["gap_after_mm"], t["displacement_mm"] - t["simulated_after_mm"])
+
+
+def test_words_that_share_the_doubt_are_told_together(slipped: Diagnosis) -> None:
+    r = slipped.result
+    line = next(t for t in render(r).splitlines() if t.startswith("Probability of being"))
+    likely_ones = [w for w, p in r.probabilities.items() if p >= LEAST_PROBABILITY]
+    assert all(f" {w} " in line for w in likely_ones)
+    assert line.count(" %") == len(likely_ones) + 1
+    rest = 1 - sum(r.probabilities[w] for w in likely_ones)
+    assert line.endswith(f"all others together {likely(rest)}")
 
 
 def test_withheld_table_begins_with_the_fit_and_ends_with_the_rivals(slipped: Diagnosis) -> None:
