@@ -187,6 +187,21 @@ def test_another_stiffness_in_every_run_is_nobody_s_word() -> None:
     assert "a stiffness of its own" in looks_like(found.looks_like, arm=False)
 
 
+@pytest.mark.parametrize(("runs", "tops", "told"), [(3, 1, True), (2, 1, False), (3, 3, False)])
+def test_a_stiffness_of_every_run_takes_three_runs_through_the_same_loads(
+    runs: int, tops: int, told: bool
+) -> None:
+    """Of runs that follow each other from load to load, what differs may as well be a curve."""
+    run = np.minimum(np.arange(N) // (N // runs), runs - 1)
+    within = np.linspace(0, runs, N, endpoint=False) % 1.0
+    stroke = 1e-3 * (run + within) if tops > 1 else 1e-3 * triangle(N, runs)
+    data = running(SPRING * stroke, stroke, imposed="displacement", run=run, repetition=run + 1)
+    bench = make_bench(data)
+    target = bench.observed - prediction(bench)
+    found = {v.label for v in troubles_of(bench, base_columns(bench), target)}
+    assert ("each run" in found) is told
+
+
 @pytest.mark.parametrize("stays", [0.0, 0.6])
 def test_what_stays_when_the_load_is_gone_does_not_only_soften(stays: float) -> None:
     """Rubber comes back; under a tip most of the way is left."""
