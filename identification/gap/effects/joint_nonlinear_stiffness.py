@@ -161,8 +161,9 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     j, top = int(found.info["joint"]), float(found.info["torque"])
     x, c = bench.true_torque[:, j] / top, bench.compliance[j] * top
     share, out = 0.2 / (len(PLACES) - 1) / len(_ABOUT), []
+    seen = _first_seen(bench, x)
     for b in (np.mean(places) + close * _ABOUT).tolist():
-        if b < _first_seen(bench, x):
+        if b < seen:
             continue
         columns = [found.columns[0], bench.add_joint(j, c * hinge(x, b))]
         out.append(

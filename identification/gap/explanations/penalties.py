@@ -163,8 +163,12 @@ def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
     if seen > 0:
         sizes = np.maximum(_sizes_that_show(parts, found), shown * seen + 1e-300)
         below = _SLOPE * float(np.maximum(np.log(seen / sizes), 0.0).sum())
-        loose = {"joint_nonlinear_stiffness"} if _diluted(engine.bench) else set()
-        share = [1.0 if p.variant.free_pieces or p.word in loose else _WANDERS for p in parts]
+        loose = [
+            p.variant.free_pieces
+            or (p.word == "joint_nonlinear_stiffness" and _diluted(engine.bench))
+            for p in parts
+        ]
+        share = [1.0 if free else _WANDERS for free in loose]
         return below + sum(_wall(w * seen / float(s)) for w, s in zip(share, sizes, strict=True))
     hidden = [p.word in _SHOWN_ELSEWHERE and not p.variant.bends for p in parts]
     elsewhere = np.array(hidden, dtype=bool)  # a gain that bends no spring hides

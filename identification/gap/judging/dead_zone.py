@@ -88,15 +88,8 @@ def _is_a_step(u: Array, force: Array) -> bool:
     there, as no curve does, and nobody sees what the ends are like."""
     soft = _soft(_stiffness(u, force))
     at = np.linspace(float(u.min()), float(u.max()), _POINTS)
-    return bool(soft) and all(
-        max(_lengths((u >= at[a]) & (u <= at[b - 1])), default=0) <= _UNSEEN for a, b in soft
-    )
-
-
-def _lengths(inside: Flags) -> list[int]:
-    """Of the stretches of rows (n,) that are inside."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
-    return [int(n) for n in np.diff(edges)[::2]]
+    inside = [_stretches((u >= at[a]) & (u <= at[b - 1])) for a, b in soft]
+    return bool(soft) and all(b - a <= _UNSEEN for each in inside for a, b in each)
 
 
 _UNSEEN = 3  # readings in a row
@@ -123,9 +116,14 @@ def _distinct(u: Array, force: Array) -> tuple[Array, Array]:
 
 
 def _soft(share: Array) -> list[tuple[int, int]]:
-    """First point of every stretch that is soft, and first behind it."""
-    soft = np.concatenate([[False], share < _SOFT, [False]])
-    return list(pairwise(np.flatnonzero(np.diff(soft.astype(int))).tolist()))[::2]
+    """The stretches of points that are soft."""
+    return _stretches(np.asarray(share < _SOFT))
+
+
+def _stretches(inside: Flags) -> list[tuple[int, int]]:
+    """First point, and first one behind it, of every stretch that is inside."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
+    return list(pairwise(edges.tolist()))[::2]
 
 
 def _is_play(share: Array, a: int, b: int, limits: Limits) -> bool:
