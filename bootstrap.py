@@ -2,6 +2,7 @@
 
     python3 bootstrap.py demo     the paper's procedure on the emulated station, then its analysis
     python3 bootstrap.py test     style, types, import rules and tests, as CI runs them
+    python3 bootstrap.py setup    nothing further
 
 Further words after `test` go to pytest: `python3 bootstrap.py test -m slow`.
 """
@@ -13,6 +14,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from subprocess import PIPE, STDOUT
 
 HOME = Path(__file__).resolve().parent
 VENV = HOME / ".venv"
@@ -22,18 +24,20 @@ SUPPORTED = ((3, 11), (3, 12))  # ur-rtde has wheels for no newer ones
 STAMP = VENV / "installed-for.txt"
 DEMO = HOME / "out" / "demo"
 WORKERS = min((os.cpu_count() or 2) + 1, 8)  # processes that test
+CHECKS = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"], ["lint-imports"])
 
 
 def main() -> int:
     """Runs what the command line asks for; returns its exit status."""
     words = sys.argv[1:]
-    if not words or words[0] not in ("demo", "test"):
+    if not words or words[0] not in ("demo", "test", "setup"):
         print(__doc__, file=sys.stderr)
         return 2
     if sys.version_info[:2] not in SUPPORTED:
         return _with_supported_python()
-    extras = "[dev]" if words[0] == "test" else ""
-    _install(extras)
+    _install("" if words[0] == "demo" else "[dev]")
+    if words[0] == "setup":
+        return 0
     return _demo() if words[0] == "demo" else _test(words[1:])
 
 
@@ -91,21 +95,35 @@ def _demo() -> int:
 
 
 def _test(words: list[str]) -> int:
-    checks = [
-        ["ruff", "check", "."],
-        ["ruff", "format", "--check", "."],
-        ["mypy"],
-        ["lint-imports"],
-        # whoever is done takes work from the others; one more than there are processors, because
-        # some tests wait long for devices
-        ["pytest", "-n", str(WORKERS), "--dist", "worksteal", *words],
+    # whoever is done takes work from the others; one more than there are processors, because some
+    # tests wait long for devices
+    tests = ["pytest", "-n", str(WORKERS), "--dist", "worksteal", *words]
+    return _checks() or _call(_told(tests))
+
+
+def _checks() -> int:
+    """Style, types and import rules, all at once, told one after the other; the status of the
+    first that fails."""
+    running = [
+        (command, subprocess.Popen(_path(command), cwd=HOME, text=True, stdout=PIPE, stderr=STDOUT))
+        for command in CHECKS
     ]
-    for check in checks:
-        print("+", " ".join(check), flush=True)
-        status = _call([str(BIN / check[0]), *check[1:]])
-        if status:
-            return status
-    return 0
+    failed = []
+    for command, process in running:
+        said, _ = process.communicate()
+        _told(command)
+        print(said, end="", flush=True)
+        failed.append(process.returncode)
+    return next((status for status in failed if status), 0)
+
+
+def _told(command: list[str]) -> list[str]:
+    print("+", " ".join(command), flush=True)
+    return _path(command)
+
+
+def _path(command: list[str]) -> list[str]:
+    return [str(BIN / command[0]), *command[1:]]
 
 
 if __name__ == "__main__":

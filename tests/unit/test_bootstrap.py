@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import bootstrap
 import pytest
 
 HOME = Path(__file__).parents[2]
@@ -42,3 +43,18 @@ sys.exit(bootstrap._call([sys.executable, '-c', {COMMAND!r}]))"""
     os.killpg(started.pid, signal.SIGINT)
     said, complaints = started.communicate(timeout=30)
     assert (said, complaints, started.returncode) == ("kept\n", "", 4)
+
+
+def test_a_check_that_fails_is_told_and_ends_in_its_status(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def path(command: list[str]) -> list[str]:
+        status = 3 if command == ["mypy"] else 0
+        return [sys.executable, "-c", f"print('of', {command!r}); raise SystemExit({status})"]
+
+    monkeypatch.setattr(bootstrap, "_path", path)
+    assert bootstrap._checks() == 3
+    said = capsys.readouterr().out.splitlines()
+    assert said[4:6] == ["+ mypy", "of ['mypy']"] and len(said) == 8
+    monkeypatch.setattr(bootstrap, "CHECKS", (["ruff"],))
+    assert bootstrap._checks() == 0
