@@ -8,8 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import bootstrap
 import pytest
+
+import bootstrap
 
 HOME = Path(__file__).parents[2]
 COMMAND = """
@@ -55,6 +56,7 @@ def test_a_check_that_fails_is_told_and_ends_in_its_status(
     monkeypatch.setattr(bootstrap, "_path", path)
     assert bootstrap._checks() == 3
     said = capsys.readouterr().out.splitlines()
-    assert said[4:6] == ["+ mypy", "of ['mypy']"] and len(said) == 8
+    assert said[4:6] == ["+ mypy", "of ['mypy']"]
+    assert len(said) == 8
     monkeypatch.setattr(bootstrap, "CHECKS", (["ruff"],))
     assert bootstrap._checks() == 0
