@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from subprocess import PIPE, STDOUT
+from subprocess import DEVNULL, PIPE, STDOUT
 
 HOME = Path(__file__).resolve().parent
 VENV = HOME / ".venv"
@@ -98,7 +98,12 @@ def _test(words: list[str]) -> int:
     # whoever is done takes work from the others; one more than there are processors, because some
     # tests wait long for devices
     tests = ["pytest", "-n", str(WORKERS), "--dist", "worksteal", *words]
-    return _checks() or _call(_told(tests))
+    # Compiled modules are kept, or every process that tests compiles all of them anew.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    compiled = subprocess.Popen(_path(["pytest", "--collect-only"]), cwd=HOME, stdout=DEVNULL)
+    status = _checks()
+    compiled.wait()
+    return status or _call(_told(tests))
 
 
 def _checks() -> int:
