@@ -112,7 +112,7 @@ def remainder(engine: Engine, fit: Fit) -> Remainder:
         visits=visits,
         unrepeated_rms=unrepeated,
     )
-    return replace(out, largest=_largest(bench, out, mean_of(bench.rows.measured_force)))
+    return replace(out, largest=_largest_level(bench, out, mean_of(bench.rows.measured_force)))
 
 
 def branches(bench: Bench) -> Ints:
@@ -220,7 +220,7 @@ def _mixture(p: Array, means: list[Array], roots: list[Array]) -> Array:
     return np.concatenate(out)
 
 
-def _largest(bench: Bench, m: Remainder, force: Array) -> Place | None:
+def _largest_level(bench: Bench, m: Remainder, force: Array) -> Place | None:
     """The largest remainder among the levels where it is clear."""
     clear = np.abs(m.mean) > CLEAR * m.sd
     if not clear.any() or not np.any(m.mean):

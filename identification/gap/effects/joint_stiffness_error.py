@@ -33,61 +33,67 @@ STIFFEST = -0.9  # relative change of what the spring gives (compliance; force, 
 
 def variants(bench: Bench) -> list[Variant]:
     """Each joint alone, any two, all of them, and all but one, which may have its own trouble."""
-    relative = bench.data.compliance_relative_sd
-    out, columns = [], []
-    for j in bench.moving_joints():
-        column = bench.add_joint(j, bench.elastic[:, j])
-        columns.append(column)
-        beyond = max(2 * float(relative[j]), 0.2)
-        scales = tuple(beyond * f for f in SCALES) + (() if bench.data.arm else BENCH_SCALES)
-        # a spring's compliance stays positive: a tenth of what is simulated at least
-        least, sign = (0.0, False) if bench.data.arm else (STIFFEST, True)
-        out.append(
-            variant(
-                WORD,
-                f"joint {j + 1}",
-                [column],
-                scales,
-                positive=sign,
-                least=least,
-                joint=j,
-                joints=[j],
-            )
-        )
+    columns = {j: bench.add_joint(j, bench.elastic[:, j]) for j in bench.moving_joints()}
+    out = [_of_one(bench, j, column) for j, column in columns.items()]
     if len(columns) > 1:
-        scales = tuple(max(2 * float(relative.max()), 0.2) * f for f in SCALES)
-        out.append(
-            variant(
-                WORD, "all joints", columns, scales, positive=False, joints=bench.moving_joints()
-            )
-        )
-    for a, b in combinations(range(len(columns)), 2) if len(columns) > 2 else ():
-        pair = [bench.moving_joints()[i] for i in (a, b)]
-        out.append(
-            variant(
-                WORD,
-                f"joints {pair[0] + 1} and {pair[1] + 1}",
-                [columns[a], columns[b]],
-                scales,
-                positive=False,
+        out.append(_of_several(bench, "all joints", columns))
+    if len(columns) > 2:
+        out += [
+            _of_several(
+                bench,
+                f"joints {a + 1} and {b + 1}",
+                {a: columns[a], b: columns[b]},
                 prior=PAIRS / comb(len(columns), 2),
-                joints=pair,
             )
-        )
-    for k, j in enumerate(bench.moving_joints() if len(columns) > 2 else ()):
-        rest = [i for i in bench.moving_joints() if i != j]
-        out.append(
-            variant(
-                WORD,
+            for a, b in combinations(columns, 2)
+        ]
+        out += [
+            _of_several(
+                bench,
                 f"all joints but {j + 1}",
-                columns[:k] + columns[k + 1 :],
-                scales,
-                positive=False,
+                {other: columns[other] for other in columns if other != j},
                 prior=0.5 / len(columns),
-                joints=rest,
             )
-        )
+            for j in columns
+        ]
     return out
+
+
+def _of_one(bench: Bench, j: int, column: int) -> Variant:
+    beyond = _beyond(float(bench.data.compliance_relative_sd[j]))
+    scales = tuple(beyond * f for f in SCALES) + (() if bench.data.arm else BENCH_SCALES)
+    # a spring's compliance stays positive: a tenth of what is simulated at least
+    least, sign = (0.0, False) if bench.data.arm else (STIFFEST, True)
+    return variant(
+        WORD,
+        f"joint {j + 1}",
+        [column],
+        scales,
+        positive=sign,
+        least=least,
+        joint=j,
+        joints=[j],
+    )
+
+
+def _of_several(bench: Bench, label: str, columns: dict[int, int], prior: float = 1.0) -> Variant:
+    """columns: by joint."""
+    beyond = _beyond(float(bench.data.compliance_relative_sd.max()))
+    scales = tuple(beyond * f for f in SCALES)
+    return variant(
+        WORD,
+        label,
+        list(columns.values()),
+        scales,
+        positive=False,
+        prior=prior,
+        joints=list(columns),
+    )
+
+
+def _beyond(stated: float) -> float:
+    """Relative size of what is no longer within a stated relative sd."""
+    return max(2 * stated, 0.2)
 
 
 def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:

@@ -137,10 +137,10 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
     """(size,) what a lag of a channel does: the one that answers shows the response to earlier
     loads; the one that is driven was in truth ahead of what was read."""
     if channel != _driven(bench):
-        line = _smooth(bench, bench.line)
+        line = _parabolas(bench, bench.line)
         return bench.stacked(_behind(bench, line[:, None], kind, lag)[:, 0] - line)
     if _way_shown(bench):
-        ahead = _ahead(bench, _smooth(bench, bench.load), kind, lag)
+        ahead = _ahead(bench, _parabolas(bench, bench.load), kind, lag)
     else:
         ahead = _true_force(bench, kind, lag) - bench.load
     if bench.imposed:
@@ -183,7 +183,7 @@ _PARABOLA = np.array([-21, 14, 39, 54, 59, 54, 39, 14, -21]) / 231
 _NOISE = 4.0  # standard deviations, by second differences
 
 
-def _smooth(bench: Bench, values: Array) -> Array:
+def _parabolas(bench: Bench, values: Array) -> Array:
     """Parabolas (n,) through the rows about each of a running recording (Savitzky and Golay 1964):
     noise of what is driven is in the response as well, and must not stand in the column that is to
     explain it; a fast swing is to keep its height. Where they are far from what was read, as about

@@ -47,10 +47,10 @@ def _integral(etas: Array, x: Array, y: Array, energy: float) -> float:
     """log of the integral of `exp(y(x))` under the prior of log sizes x."""
     edges = np.linspace(x[0], x[-1], (len(x) - 1) * _POINTS + 1)
     middle = (edges[1:] + edges[:-1]) / 2
-    return float(logsumexp(_smooth(x, y, middle) + log_share(etas, edges, energy)))
+    return float(logsumexp(_cubics(x, y, middle) + log_share(etas, edges, energy)))
 
 
-def _smooth(x: Array, y: Array, at: Array) -> Array:
+def _cubics(x: Array, y: Array, at: Array) -> Array:
     """Cubics between points with the slopes of their neighbours (Catmull and Rom 1974, uneven
     ends by parabolas). scipy.interpolate would do it, too, but its import takes 0.2 s, a tenth of a
     diagnosis."""

@@ -110,7 +110,7 @@ def log_odds_together(limits: Limits, which: Ints, sums: Array, roots: Array) ->
     out = np.full(len(z), np.inf)
     wrong = np.any((z < 0) & asked, axis=1)
     for i in np.flatnonzero(wrong & (asked.sum(axis=1) > 1)):
-        out[i] = _largest(z[i, asked[i]], unit[i, asked[i]])
+        out[i] = _most(z[i, asked[i]], unit[i, asked[i]])
     return out
 
 
@@ -119,10 +119,10 @@ def all_kept(limits: Sequence[tuple[Array, Array]]) -> float:
     in the prior, where all were independent: sums (m,) to be positive, and their roots (m, r)."""
     sums, roots = (np.concatenate(each) for each in zip(*limits, strict=True))
     size = np.linalg.norm(roots, axis=1) + _TINY
-    return _largest(sums / size, roots / size[:, None])
+    return _most(sums / size, roots / size[:, None])
 
 
-def _largest(z: Array, unit: Array) -> float:
+def _most(z: Array, unit: Array) -> float:
     """The same of sums (m,) in standard deviations, with roots (m, r) of their correlations."""
     from scipy.special import log_ndtr
 

@@ -168,7 +168,7 @@ def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
             or (p.word == "joint_nonlinear_stiffness" and _diluted(engine.bench))
             for p in parts
         ]
-        share = [1.0 if free else _WANDERS for free in loose]
+        share = [1.0 if free else _SLOW_PART for free in loose]
         return below + sum(_wall(w * seen / float(s)) for w, s in zip(share, sizes, strict=True))
     hidden = [p.word in _SHOWN_ELSEWHERE and not p.variant.bends for p in parts]
     elsewhere = np.array(hidden, dtype=bool)  # a gain that bends no spring hides
@@ -189,7 +189,7 @@ def _diluted(bench: Bench) -> bool:
 _SLOPE = 20.0  # nats per factor e below the noise
 
 
-_WANDERS = 0.5  # of the noise of a sample: as far as what is slow in it goes
+_SLOW_PART = 0.5  # of the noise of a sample: as far as what is slow in it goes
 # Lasers are off by a smooth micrometre or two, which is part of what is stated of a sample. Of 400
 # hidden cases the smallest effect that was there did 0.45 of that, linear arms with such a laser
 # were explained by 0.2 and 0.35 of it.

@@ -215,10 +215,10 @@ def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
         return {"none": 1.0}
     if not arm:
         return {explanation.parts[0].word: 1.0}
-    return _largest(explanation.troubles)
+    return _chance_to_be_largest(explanation.troubles)
 
 
-def _largest(sizes: Mapping[str, float]) -> dict[str, float]:
+def _chance_to_be_largest(sizes: Mapping[str, float]) -> dict[str, float]:
     """Word -> probability that its effect is the largest of an explanation; sizes: rms m of each,
     the logarithm of each known as well as `KNOWN` says."""
     from scipy.special import ndtr

@@ -111,10 +111,10 @@ def _needed(bench: Bench, load: Array, found: Flanks, left: float) -> bool:
     if left > ENOUGH_BESIDE * _left([load, rub], y, weight):
         return False
     sharp = found.kind == "held" or found.corner < SHARP * found.zone
-    return left < (1.0 if sharp else CORNERS) * _left([*_smooth(load), rub], y, weight)
+    return left < (1.0 if sharp else CORNERS) * _left([*_powers(load), rub], y, weight)
 
 
-def _smooth(load: Array) -> list[Array]:
+def _powers(load: Array) -> list[Array]:
     """Powers up to the seventh (Chebyshev, so that they are told apart)."""
     x = 2 * (load - load.min()) / np.ptp(load) - 1
     return list(np.polynomial.chebyshev.chebvander(x, 7)[:, 1:].T)

@@ -68,7 +68,7 @@ def with_plain_trouble(found: SearchResult) -> SearchResult:
     return replace(found, looks_like=Likeness(kind, None, best.log_weight))
 
 
-def _largest(bench: Bench) -> Array:
+def _load_so_far(bench: Bench) -> Array:
     """(n,) N: largest load so far in a row's setup."""
     out = np.abs(bench.load)
     for s in range(len(bench.data.setups)):
@@ -78,7 +78,7 @@ def _largest(bench: Bench) -> Array:
 
 
 def _damage(bench: Bench) -> list[Variant]:
-    spring, largest = bench.slope * bench.load, _largest(bench)
+    spring, largest = bench.slope * bench.load, _load_so_far(bench)
     at = np.array(KNOTS) * float(largest.max())
     lost = [np.clip((largest - a) / (b - a), 0.0, 1.0) for a, b in pairwise(at)]
     columns = [bench.add(bench.outside_column(spring * part)) for part in lost]
@@ -86,7 +86,7 @@ def _damage(bench: Bench) -> list[Variant]:
 
 
 def _softening(bench: Bench) -> list[Variant]:
-    spring, largest = bench.slope * bench.load, _largest(bench)
+    spring, largest = bench.slope * bench.load, _load_so_far(bench)
     top, out = float(largest.max()), []
     for share in BELOW:
         soft = spring * np.clip((largest - np.abs(bench.load)) / (share * top), 0.0, 1.0)

@@ -185,7 +185,7 @@ def _rough(bench: Bench, target: Array) -> list[Variant]:
     place = place.reshape(-1)
     if not int(place.max()) < _MOST_LEVELS:
         return []
-    if not bench.data.arm and _smooth(bench, place, target[: rows.n]):
+    if not bench.data.arm and _one_curve(bench, place, target[: rows.n]):
         return []
     columns = [
         bench.add(bench.outside_column((place == k).astype(float)))
@@ -194,7 +194,7 @@ def _rough(bench: Bench, target: Array) -> list[Variant]:
     return [variant("rough", "levels", columns, _scales(bench), positive=False)]
 
 
-def _smooth(bench: Bench, place: Ints, target: Array) -> bool:
+def _one_curve(bench: Bench, place: Ints, target: Array) -> bool:
     """Whether the levels (n,) lie near the line through their neighbours, by far nearer than their
     means of what is to be explained (n,) do to one line."""
     count = np.bincount(place, bench.rows.weight)
