@@ -13,7 +13,7 @@ import pytest
 from identification.arm import tool_offset
 from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.diagnose import GapResult
 from identification.gap.effects import load_misalignment
 from identification.gap.effects.load_misalignment import Shape
 from identification.gap.effects.pose_error import turned
@@ -33,6 +33,7 @@ from tests.conformance.gap_designs import (
     meta,
     noisy,
 )
+from tests.explained import explained
 
 MEDIUM, RICH = DESIGNS["medium"], DESIGNS["rich"]
 ARM, TOOL = load_robot("ur10e"), tool_offset(np.array(TCP_MM) * 1e-3)
@@ -96,7 +97,7 @@ def diagnosed(law: Law, design=MEDIUM, across: Array | None = None) -> GapResult
         for k, axis in enumerate(others if across is not None else ""):
             assert across is not None
             table.loc[mine, f"force_{axis}_N"] += across[mine, k]
-    return diagnose_gap(gap_data(imported(table, meta(design))))
+    return explained(gap_data(imported(table, meta(design))))
 
 
 def sticking(rows: pd.DataFrame) -> Array:
@@ -180,12 +181,12 @@ def test_a_vibration_that_the_samples_follow_is_no_noise_of_the_instruments() ->
     """Once in 6.3 samples, twice what is stated; white noise of the same size is none."""
     swinging = noisy(RICH)
     swinging["displacement_mm"] += 0.006 * np.sin(np.arange(len(swinging)))
-    found = diagnose_gap(gap_data(imported(swinging, meta(RICH))))
+    found = explained(gap_data(imported(swinging, meta(RICH))))
     assert found.verdict == "unknown"
     assert any("a vibration" in n for n in found.notes)
     rough = noisy(RICH)
     rough["displacement_mm"] += np.random.default_rng(1).normal(0, 0.0042, len(rough))
-    found = diagnose_gap(gap_data(imported(rough, meta(RICH))))
+    found = explained(gap_data(imported(rough, meta(RICH))))
     assert found.verdict == "none"
     assert not any("a vibration" in n for n in found.notes)
 
@@ -283,7 +284,7 @@ def test_twice_the_stated_noise_is_no_effect(seed: int) -> None:
     """Of force and displacement: a lag of a third of a sample averages two readings, and a spring
     that fits exactly is as good as one with a little more of anything."""
     design = replace(DESIGNS["bench"], steps=20, hold=12)
-    found = diagnose_gap(gap_data(imported(noisy(design, seed=seed, noise=2.0), meta(design))))
+    found = explained(gap_data(imported(noisy(design, seed=seed, noise=2.0), meta(design))))
     assert found.verdict == "none"
 
 
@@ -294,7 +295,7 @@ def test_joint_readings_that_scatter_more_are_no_structure() -> None:
     for j in range(6):
         table[f"q{j + 1}_rad"] += rng.normal(0, 1.3e-5, len(table))
     data = gap_data(imported(table, meta(design)))
-    assert diagnose_gap(data).verdict == "none"
+    assert explained(data).verdict == "none"
     np.testing.assert_allclose(make_bench(data).noise.q, np.hypot(1e-5, 1.3e-5), rtol=0.3)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from identification.gap.answer.parameters import parameters
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.diagnose import GapResult
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.evidence.signs import Limits
@@ -33,6 +33,7 @@ from tests.conformance.effect_benches import (
 from tests.conformance.gap_designs import (
     linear,
 )
+from tests.explained import explained
 
 # --- recovery ----------------------------------------------------------------------------------
 
@@ -132,7 +133,7 @@ def recovered(word: str, design: str) -> str:
     bench, variants, columns = of(word, design)
     v = typical(variants)
     w = strength(bench, v, columns, TIMES)
-    found = diagnose_gap(with_effect(design, v, columns[:, list(v.columns)] @ w, bench))
+    found = explained(with_effect(design, v, columns[:, list(v.columns)] @ w, bench))
     named = {e.name: e for e in found.effects}
     alike = {a for e in found.effects for a in e.indistinguishable_from}
     if word not in named:

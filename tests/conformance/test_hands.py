@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.evidence.imperfection import PATH
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
@@ -20,6 +19,7 @@ from rig.diagnosis.gap_data import gap_data
 from tests.conformance.effect_benches import of, quick_engine
 from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, meta, noisy
 from tests.conformance.test_effect_recovery import typical
+from tests.explained import explained
 
 LATE_S = 1.3
 
@@ -62,7 +62,7 @@ def lagging(channel: str) -> GapData:
 
 @pytest.mark.parametrize("channel", ["displacement", "force"])
 def test_a_lag_is_one_however_the_hand_went(channel: str) -> None:
-    found = diagnose_gap(lagging(channel))
+    found = explained(lagging(channel))
     assert found.verdict == "time_lag"
     assert found.fit.parts[0].variant.info["channel"] == channel
     if channel == "force":  # which is known again as soon as it stands

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.laws.lost_motion import _side
 from rig.diagnosis.gap_data import gap_data
 from rig.worlds.arm import place
 from tests.conformance.gap_designs import DESIGNS, TCP_MM, TRUE, Array, Q, imported, meta, noisy
+from tests.explained import explained
 
 JOINT, WIDTH_RAD, STRENGTH_NM = 3, 1.5e-3, 0.9
 
@@ -40,7 +40,7 @@ def jumps(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
 
 
 def test_a_play_in_which_friction_holds_the_joint() -> None:
-    found = diagnose_gap(measured(jumps, "rich"))
+    found = explained(measured(jumps, "rich"))
     assert [e.name for e in found.effects] == ["joint_backlash"]
     assert found.where.joints == (JOINT + 1,)
     width = found.effects[0].parameters["width"]
@@ -66,7 +66,7 @@ def test_seats_of_other_shapes(kind: str) -> None:
     def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
         return 1e-6 * SEATS[kind](rows["force_N"].to_numpy()), np.zeros((len(rows), 6))
 
-    found = diagnose_gap(measured(law))
+    found = explained(measured(law))
     assert [e.name for e in found.effects] == ["contact_seating"]
     assert kind in found.effects[0].label
     depth = found.effects[0].parameters["depth"]
@@ -101,7 +101,7 @@ def test_a_tip_that_drags_on_its_pad_is_a_load_askew() -> None:
         mine = (table["direction"] == direction).to_numpy()
         for k, axis in enumerate(others):
             table.loc[mine, f"force_{axis}_N"] += across[mine, k]
-    found = diagnose_gap(gap_data(imported(table, meta(design))))
+    found = explained(gap_data(imported(table, meta(design))))
     assert found.verdict == "load_misalignment"
     assert found.probabilities["load_misalignment"] > 0.8
     assert found.after < 1.1 * found.noise

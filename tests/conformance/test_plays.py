@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from identification.gap.answer.parameters import parameters
-from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.diagnose import GapResult
 from identification.gap.effects import joint_backlash, library
 from identification.gap.evidence.parts import Part
 from identification.gap.laws.interval import Parameter
@@ -23,6 +23,7 @@ from rig.diagnosis.gap_data import gap_data
 from rig.worlds.arm import place
 from rig.worlds.hidden.memory import play
 from tests.conformance.gap_designs import DESIGNS, Array, Design, Q, imported, linear, meta, noisy
+from tests.explained import explained
 
 JOINT, WIDTH_RAD = 3, 1.2e-3
 RICH = DESIGNS["rich"]
@@ -51,7 +52,7 @@ def diagnosed(shape: Place, design: Design = RICH, gain: float = 1.0) -> GapResu
 
     table = noisy(design, law)
     table["displacement_mm"] *= gain
-    return diagnose_gap(gap_data(imported(table, meta(design))))
+    return explained(gap_data(imported(table, meta(design))))
 
 
 @pytest.mark.parametrize("shape", [uneven, rubbed])

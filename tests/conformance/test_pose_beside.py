@@ -8,7 +8,6 @@ import pytest
 
 from identification.arm import tool_offset
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine, eta_levels
@@ -27,6 +26,7 @@ from tests.conformance.gap_designs import (
     meta,
     noisy,
 )
+from tests.explained import explained
 
 OFFSET_M = np.array([0.04, -0.023, 0.014])
 TURN_RAD = 0.0168  # by which joint 1 stands off
@@ -61,7 +61,7 @@ def measured(tilt: float) -> GapData:
 
 @pytest.mark.parametrize("tilt", [0.0, TILT])
 def test_a_tool_elsewhere_is_found_beside_what_else_is_off(tilt: float) -> None:
-    result = diagnose_gap(measured(tilt))
+    result = explained(measured(tilt))
     names = {e.name for e in result.effects}
     assert names == ({"pose_error", "base_compliance"} if tilt else {"pose_error"})
     assert result.after < 1.05 * result.noise

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.diagnose import GapResult
 from identification.gap.evidence.parts import Part, Sizes
 from identification.gap.explanations.explanation import Explanation, explain
 from identification.gap.explanations.penalties import minor_parts
@@ -20,6 +20,7 @@ from rig.diagnosis.diagnose_text import render
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.effect_benches import quick_engine
 from tests.conformance.gap_designs import DESIGNS, TRUE, Array, imported, meta, noisy
+from tests.explained import explained
 
 RADII = (0.05, 0.15, 0.35)  # of the largest torque of a joint
 
@@ -51,7 +52,7 @@ def rubbing(*joints: int) -> GapData:
 
 @cache
 def result(*joints: int) -> GapResult:
-    return diagnose_gap(rubbing(*joints))
+    return explained(rubbing(*joints))
 
 
 def test_friction_in_two_joints_is_one_word_in_both() -> None:

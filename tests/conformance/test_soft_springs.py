@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
@@ -21,6 +20,7 @@ from rig.diagnosis.gap_data import gap_data
 from rig.worlds.arm import place
 from tests.conformance.effect_benches import quick_engine
 from tests.conformance.gap_designs import DESIGNS, TCP_MM, TRUE, Array, Q, imported, meta, noisy
+from tests.explained import explained
 
 SOFTER = np.array([1.9, 2.1, 1.8, 2.2, 1.7, 1.0])  # times as simulated
 GAIN = 0.012  # four standard deviations
@@ -85,7 +85,7 @@ def test_the_gain_of_the_laser_acts_on_what_it_read() -> None:
 
 @pytest.mark.parametrize("law", ["turning", "soft"])
 def test_wrong_springs_alone_are_named(law: str) -> None:
-    result = diagnose_gap(data(law))
+    result = explained(data(law))
     assert result.verdict == "joint_stiffness_error"
     assert [e.name for e in result.effects] == ["joint_stiffness_error"]
     assert result.remainder < result.bench.noise.stated  # springs are laws: exact

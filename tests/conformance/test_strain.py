@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
@@ -18,6 +17,7 @@ from identification.gap.words import WORDS
 from tests.conformance.effect_benches import of, quick_engine
 from tests.conformance.gap_designs import linear
 from tests.conformance.test_effect_recovery import strength, typical, with_effect
+from tests.explained import explained
 
 FAR = 7.0  # standard deviations
 
@@ -158,9 +158,9 @@ def askew() -> GapData:
 
 def test_what_no_word_may_name_is_not_put_down_to_the_instruments() -> None:
     """A force across that only cross-talk of many standard deviations would make."""
-    assert diagnose_gap(askew()).verdict == "load_misalignment"
-    assert not any("believed" in note for note in diagnose_gap(askew()).notes)
-    found = diagnose_gap(askew(), withhold=["load_misalignment"])
+    assert explained(askew()).verdict == "load_misalignment"
+    assert not any("believed" in note for note in explained(askew()).notes)
+    found = explained(askew(), withhold=["load_misalignment"])
     assert found.verdict == "unknown"
     assert "META" in found.notes[-1]
     assert "it was not believed" in found.notes[-1]
@@ -198,9 +198,9 @@ NAMED = {
 def test_springs_far_beyond_what_was_stated_are_not_nothing() -> None:
     """`none` has priors, too."""
     data = linear("rich")
-    assert diagnose_gap(data).verdict == "none"
+    assert explained(data).verdict == "none"
     others = [w for w in WORDS if w != "time_lag"]
     for sd, nothing_at_all in ((0.01, True), (0.005, False)):
         stated = replace(data, compliance_relative_sd=np.full(6, sd))
-        found = diagnose_gap(stated, withhold=others)
+        found = explained(stated, withhold=others)
         assert found.verdict == ("none" if nothing_at_all else "unknown")

@@ -10,9 +10,9 @@ import pytest
 from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.model.bench import make_bench
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 STEPS, RUNS, HOLD = 9, 3, 6
@@ -48,7 +48,7 @@ def pressed(
 
 
 def test_a_slant_that_turns_is_seen_by_the_force_across() -> None:
-    found = diagnose_gap(pressed(0.15))
+    found = explained(pressed(0.15))
     assert found.verdict == "load_misalignment"
     tangents = [found.effects[0].parameters[f"tangent_x_{k}"].value for k in (1, 2)]
     assert np.abs(tangents) == pytest.approx([0.15, 0.045], rel=0.1)
@@ -57,7 +57,7 @@ def test_a_slant_that_turns_is_seen_by_the_force_across() -> None:
 
 def test_a_curve_is_no_slant_where_nothing_acts_across() -> None:
     """Cross-talk shows across; what is given goes with what is read there."""
-    assert diagnose_gap(pressed(0.004, turns=False, bends=0.06)).verdict == (
+    assert explained(pressed(0.004, turns=False, bends=0.06)).verdict == (
         "joint_nonlinear_stiffness"
     )
 
@@ -67,11 +67,11 @@ def test_a_block_that_gives_nothing_across_shows_a_slant_by_its_force(
     tangent: float, verdict: str
 ) -> None:
     """Beyond what dynamometers mix up; nothing moves by it, as is said."""
-    found = diagnose_gap(pressed(tangent, turns=False, gives=0.0))
+    found = explained(pressed(tangent, turns=False, gives=0.0))
     assert found.verdict == verdict
     said = any("the displacement does not move by it" in n for n in found.notes)
     assert said is (verdict == "load_misalignment")
-    assert not any("acts askew" in n for n in diagnose_gap(pressed(0.15)).notes)
+    assert not any("acts askew" in n for n in explained(pressed(0.15)).notes)
 
 
 def test_a_hook_that_is_hung_anew_for_every_run_moves_the_target_as_it_pulls_across() -> None:
@@ -85,11 +85,11 @@ def test_a_hook_that_is_hung_anew_for_every_run_moves_the_target_as_it_pulls_acr
         displacement=straight.displacement + 1e-5 * across @ np.array([0.4, -0.2]),
         tangential=across + rng.normal(0, 0.1, across.shape),
     )
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "load_misalignment"
     assert found.after < 1.2 * found.noise
     bent = 3e-9 * straight.force**2  # what else there is has to be foretold
-    assert diagnose_gap(replace(data, displacement=data.displacement + bent)).verdict != (
+    assert explained(replace(data, displacement=data.displacement + bent)).verdict != (
         "load_misalignment"
     )
     bench = make_bench(data)
@@ -106,7 +106,7 @@ def test_a_hook_that_is_hung_anew_for_every_run_moves_the_target_as_it_pulls_acr
 def test_without_components_nobody_speaks_of_a_slant() -> None:
     mute = replace(pressed(0.15), tangential=None)
     assert library(make_bench(mute), ["load_misalignment"]) == []
-    assert diagnose_gap(mute).verdict != "load_misalignment"
+    assert explained(mute).verdict != "load_misalignment"
 
 
 def test_its_law_makes_the_same_columns() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.model.bench import make_bench
+from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 
 ANGLES = np.array([[0.1, -0.08], [0.05, 0.12], [-0.13, 0.02], [0.03, -0.1]])  # tangents, by setup
@@ -40,7 +40,7 @@ def test_what_is_set_up_anew_in_every_pose_may_be_askew_otherwise_there(recorded
         tangential=None if recorded == "joint readings" else data.tangential,
         q=None if recorded == "force across" else data.q,
     )
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "load_misalignment"
     assert found.fit.parts[0].variant.label.startswith("each pose")
     given = {name: p.value for name, p in found.effects[0].parameters.items()}

@@ -10,13 +10,14 @@ from scipy.special import erf
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.diagnose import GapResult
 from identification.gap.explanations.priors import LOG_UNKNOWN, prior_of
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.search.breaks import _just_turned, jump_rows, troubles_of
 from identification.gap.words import DAMAGE, JERKS, NAMELESS, SOFTENING, WANDERS, WORDS
 from rig.diagnosis.diagnose_text import LOOKS_LIKE, looks_like
+from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running, triangle
@@ -92,7 +93,7 @@ def test_no_jump_is_looked_for_where_a_run_begins() -> None:
 )
 def test_what_no_word_names_is_unknown_and_told(force: object, kind: str) -> None:
     assert callable(force)
-    found = diagnose_gap(pulled(force()))
+    found = explained(pulled(force()))
     assert found.verdict == "unknown"
     assert found.probabilities["unknown"] > 0.7
     assert found.looks_like is not None
@@ -119,7 +120,7 @@ def sticking(stiffness: float, limit: float) -> Array:
     ],
 )
 def test_what_a_word_names_is_not_taken_for_them(force: Array, word: str) -> None:
-    found = diagnose_gap(pulled(force))
+    found = explained(pulled(force))
     assert found.verdict == word
     assert found.looks_like is None
     assert {e.name for e in found.effects} <= set(WORDS)
@@ -132,7 +133,7 @@ def named(found: GapResult) -> set[str]:
 def test_a_word_beside_which_a_smaller_one_stands_stays_the_main_cause() -> None:
     """A curved spring whose grip slipped once, by less."""
     curve = SPRING * STROKE * (1 + 400 * STROKE) - 2.0 * (np.arange(N) > 600)
-    found = diagnose_gap(pulled(curve))
+    found = explained(pulled(curve))
     assert found.verdict == "joint_nonlinear_stiffness"
     assert {JERKS, "joint_nonlinear_stiffness"} in [e.words for e in found.found.nameless]
     assert not named(found) & set(NAMELESS)
@@ -166,7 +167,7 @@ def test_a_stiffness_that_goes_its_own_way_in_time_is_nobody_s_word(
     target = bench.observed - prediction(bench)
     assert (WANDERS in {v.word for v in troubles_of(bench, base_columns(bench), target)}) is told
     if told:
-        found = diagnose_gap(data)
+        found = explained(data)
         assert found.verdict == "unknown"
         assert found.looks_like is not None
         assert "its own way in time" in looks_like(found.looks_like, arm=False)
@@ -180,7 +181,7 @@ def test_another_stiffness_in_every_run_is_nobody_s_word() -> None:
     force = SPRING * stroke * (1 + softer[run])
     noise = np.random.default_rng(8).normal(0, NOISE_N, N)
     data = running(force + noise, stroke, imposed="displacement", run=run, repetition=run + 1)
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "unknown"
     assert found.probabilities["unknown"] > 0.7
     assert found.looks_like is not None

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.evidence.engine import Engine
 from identification.gap.judging.dead_zone import (
     CURVE,
@@ -22,6 +21,7 @@ from identification.gap.judging.dead_zone import (
     spoken_for,
 )
 from identification.gap.model.bench import Bench
+from tests.explained import explained
 from tests.unit.test_gap_flanks import a_bench, held, to_and_fro
 
 U = np.linspace(-1.0, 1.0, 600)
@@ -100,7 +100,7 @@ def test_where_a_play_is_likelier_softer_ends_are_enough() -> None:
 @pytest.mark.parametrize("name", ["wide", "teeth pressed as by Hertz"])
 def test_a_play_that_a_free_curve_meets_as_well_is_a_play(name: str, cycles: int) -> None:
     u = to_and_fro(cycles=cycles)
-    found = diagnose_gap(a_bench(PLAYS[name](u), u, "displacement").data)
+    found = explained(a_bench(PLAYS[name](u), u, "displacement").data)
     assert found.verdict == PLAY
     assert found.probabilities[PLAY] > 0.6
 
@@ -108,7 +108,7 @@ def test_a_play_that_a_free_curve_meets_as_well_is_a_play(name: str, cycles: int
 @pytest.mark.parametrize("name", ["contact", "cubic"])
 def test_a_curve_that_a_soft_play_beside_a_curve_meets_better_is_a_curve(name: str) -> None:
     u = to_and_fro(cycles=8)
-    found = diagnose_gap(a_bench(CURVES[name](u), u, "displacement").data)
+    found = explained(a_bench(CURVES[name](u), u, "displacement").data)
     assert found.verdict == CURVE
 
 
@@ -116,7 +116,7 @@ def test_a_play_that_is_passed_between_two_readings_is_no_curve() -> None:
     """Rounded as teeth are, and told by few readings of each pass what it is like."""
     u = to_and_fro(cycles=8)
     force = np.asarray(np.interp(u, U + 0.012 * np.tanh(U / 0.005), U))
-    found = diagnose_gap(a_bench(force, u, "displacement").data)
+    found = explained(a_bench(force, u, "displacement").data)
     assert found.verdict == PLAY
 
 
@@ -129,7 +129,7 @@ def bolted() -> Bench:
 
 def test_friction_beside_it_does_not_hide_a_play() -> None:
     """What goes two ways has a middle; from one side nothing is said."""
-    result = diagnose_gap(bolted().data)
+    result = explained(bolted().data)
     assert result.verdict == PLAY
     ranked = result.found.explanations
     both = next(e for e in ranked if e.words == {CURVE, FRICTION} and e.parts[0].word == CURVE)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import EFFECTS, base_slip, library
 from identification.gap.evidence.compare import Scored, score
 from identification.gap.laws import flows, knees_closer
@@ -17,6 +16,7 @@ from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant, place_of
 from identification.gap.search.refine import refine
 from tests.conformance.gap_designs import linear
+from tests.explained import explained
 from tests.unit.test_gap_closer import assert_lawful, engine_with
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_running import SPRING, running
@@ -100,7 +100,7 @@ def test_a_stand_that_slides_is_told_by_the_force_across() -> None:
         state = min(max(state, force - at), force + at)
         slid.append(state)
     moved = 5e-7 * across * np.array(slid)
-    found = diagnose_gap(replace(data, displacement=data.displacement + moved))
+    found = explained(replace(data, displacement=data.displacement + moved))
     (effect,) = found.effects
     assert effect.name == "base_slip"
     assert effect.places["sliding along x"] > 0.9
@@ -182,7 +182,7 @@ def test_without_readings_a_joint_is_not_named_for_having_been_looked_at_closely
     moved = bench.slope * bench.load + size * effect[: bench.rows.n]
     noise = np.random.default_rng(5).normal(0, 1e-6, len(data.force))
     moved = np.repeat(moved, bench.rows.weight.astype(int)) + noise
-    told = diagnose_gap(replace(data, displacement=moved), withhold=["base_slip"])
+    told = explained(replace(data, displacement=moved), withhold=["base_slip"])
     assert told.verdict == "joint_yield"
     assert set(told.effects[0].places) == {"joint 2", "joint 3", "joint 4"}
     assert sum(told.effects[0].places.values()) == pytest.approx(1.0, abs=0.03)

@@ -12,7 +12,6 @@ from bench.dense_model import dense
 from bench.nested_cases import case_data
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import _weighed
 from identification.gap.model.base import base_columns, prediction
@@ -22,6 +21,7 @@ from identification.gap.recording.holds import hold_ids, rest_ids
 from identification.gap.recording.rows import reduce_rows
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import Design, imported, meta, noisy
+from tests.explained import explained
 
 RUN, SETUP = 4e-6, 9e-6  # rad; a reading scatters by 1e-5
 DESIGN = Design(("P1", "P2"), repetitions=4, steps=4, hold=8)
@@ -125,7 +125,7 @@ def test_of_few_elements_nothing_is_said() -> None:
 
 def test_readings_that_are_off_together_are_no_effect() -> None:
     """Thousands of readings tell that to many standard deviations, in every joint."""
-    found = diagnose_gap(off(plain(1), RUN, SETUP, 1))
+    found = explained(off(plain(1), RUN, SETUP, 1))
     assert found.verdict == "none"
     assert found.probabilities["none"] > 0.8
 

@@ -9,7 +9,6 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part, Sizes
 from identification.gap.explanations.penalties import unbent_curves
@@ -17,6 +16,7 @@ from identification.gap.explanations.priors import prior_of
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.ends import after_break, without_ends
 from identification.gap.recording.faults import BROKEN, found_in
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
 
@@ -40,7 +40,7 @@ def broken(at: int, left: float = 5.0) -> Array:
 
 
 def test_a_few_readings_after_a_break_are_set_aside_and_said() -> None:
-    found = diagnose_gap(recording(broken(N - 6)))
+    found = explained(recording(broken(N - 6)))
     assert len(found.bench.data.force) == N - 6
     assert found.verdict == "none"
     (note,) = [n for n in found.notes if "a break" in n]
@@ -59,7 +59,7 @@ def test_a_break_that_takes_two_readings_ends_where_most_of_it_falls() -> None:
 def test_a_recording_that_goes_on_long_after_a_break_is_unknown() -> None:
     data = recording(broken(N - 50))
     assert without_ends(data) is data
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "unknown"
     assert any("31 % of the readings come after that: a break" in n for n in found.notes)
 
@@ -103,7 +103,7 @@ def test_what_goes_on_or_back_has_not_broken(what: str) -> None:
 def test_a_reading_from_before_the_force_was_zeroed_is_set_aside_and_said() -> None:
     force, u = line(), np.linspace(0.0, 1e-3, N)
     force[0], u[0] = -70.0, u[1]
-    found = diagnose_gap(recording(force, u))
+    found = explained(recording(force, u))
     assert len(found.bench.data.force) == N - 1
     assert found.verdict == "none"
     assert any(n.startswith("1 reading at the beginning set aside") for n in found.notes)
@@ -150,14 +150,14 @@ def test_a_line_far_off_that_bends_within_the_noise_is_a_spring(
     u += np.random.default_rng(2).normal(0, 1e-6, len(u))
     meter = Instruments(0.01, 1e-5, 0.005, 0.003)
     branch = np.repeat([1, 2], 48)
-    found = diagnose_gap(bench_data(100.0 * x, u, step=step, branch=branch, instruments=meter))
+    found = explained(bench_data(100.0 * x, u, step=step, branch=branch, instruments=meter))
     assert (found.verdict == "joint_nonlinear_stiffness") == curve
     alone = next(e for e in found.found.explanations if e.words == {"joint_nonlinear_stiffness"})
     assert (alone.log_weight > found.found.explanations[0].log_weight - 8.0) == curve
     line = next(v for v in library(found.bench, list(alone.words)) if "line" in v.info["kinds"])
     sizes = Sizes(np.array([4e-6]), np.array([1.5e-4 if off > 1 else 1.5e-5]), 0.0)
     assert (unbent_curves(found.engine, (Part(line, 1.0),), sizes) == 0.0) == curve
-    measured = diagnose_gap(recording(SPRING * np.linspace(0.0, 1e-3, 600))).engine
+    measured = explained(recording(SPRING * np.linspace(0.0, 1e-3, 600))).engine
     assert measured.bench.noise.sure
     noise = measured.bench.noise.stated
     sizes = Sizes(np.array([0.4 * noise]), np.array([1.5e-4]), 0.0)

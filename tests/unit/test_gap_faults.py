@@ -9,7 +9,6 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.faults import (
     SIGNS,
@@ -22,6 +21,7 @@ from identification.gap.recording.faults import (
     saturates,
     silent,
 )
+from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_levels import creeping, one_hold
 from tests.unit.test_gap_operators import bench_data
@@ -99,7 +99,7 @@ def test_a_reading_that_stands_still_under_more_load_than_ever_is_a_fault() -> N
     force, u = lost_target()
     data = running(force, u, imposed="displacement")  # creep, if that were possible
     assert frozen_since(data) == 60.0
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "unknown"
     assert any("lost its target" in note for note in found.notes)
 
@@ -127,7 +127,7 @@ def test_a_laser_that_says_nothing_while_the_load_goes_is_a_fault() -> None:
     noise = np.random.default_rng(1).normal(0, given.instruments.displacement, len(mine))
     data = replace(given, displacement=np.where(mine, noise, given.displacement))
     assert silent(data, "displacement") == ("P1/x", "P2/x")
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "unknown"
     assert found.looks_like is None
     (note,) = (n for n in found.notes if "does not answer" in n)
@@ -194,7 +194,7 @@ def misread(**changes: object) -> GapData:
 
 def test_a_displacement_that_goes_back_under_more_force_was_misread() -> None:
     assert goes_back(misread()) == 6
-    found = diagnose_gap(misread())
+    found = explained(misread())
     assert found.verdict == "unknown"
     (note,) = (n for n in found.notes if "misread" in n)
     assert "At 6 N the displacement goes back, from 0.05 to 0.03 mm" in note
@@ -263,7 +263,7 @@ def test_a_number_to_which_readings_jump_again_and_again_is_no_reading() -> None
     force, u = dropping_out()
     data = bench_data(force, u, step=np.repeat([1, 2, 3], 30))
     assert jumps_to(data) == 4e-4
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "unknown"
     assert any("jumps to one and the same number, 0.4 mm" in note for note in found.notes)
     assert jumps_to(running(force, u)) == 4e-4
@@ -327,7 +327,7 @@ def test_channels_that_count_in_opposite_senses_are_told_where_they_do() -> None
     assert "P2/y" in fault.text
     assert found_in(everywhere) == (fault,)
     assert course.faults is course.faults  # looked for once
-    found = diagnose_gap(everywhere)
+    found = explained(everywhere)
     assert (found.verdict, found.looks_like) == ("unknown", None)
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.recording.glitches import without_glitches
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 N = 300
@@ -64,7 +64,7 @@ def test_many_of_them_are_how_the_rig_behaves() -> None:
 def test_the_diagnosis_sets_them_aside_and_says_so() -> None:
     force = 100 * (triangle() + 0.3 * triangle() ** 2)
     force[[60, 61, 200]] += 12.0
-    found = diagnose_gap(recording(triangle(), force))
+    found = explained(recording(triangle(), force))
     assert found.bench.rows.n == N - 3
     assert any(note.startswith("3 of 300 readings jump off") for note in found.notes)
 
@@ -83,7 +83,7 @@ def test_a_reading_at_rest_that_jumps_off_is_set_aside() -> None:
     kept = without_glitches(resting({84: 30e-6, 140: -20e-6}))
     assert len(kept.force) == 8 * N // 10 - 2
     assert kept.aside[0].startswith("2 of 240 readings jump off")
-    assert diagnose_gap(resting({84: 30e-6})).verdict == "none"  # one that is off is no effect
+    assert explained(resting({84: 30e-6})).verdict == "none"  # one that is off is no effect
 
 
 def test_first_readings_of_a_level_and_spells_stay() -> None:

@@ -10,10 +10,10 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.model.bench import displacement_imposed, make_bench
 from identification.gap.recording.imposed import _Channel, _slides, displacement_simpler
 from tests.conformance.gap_designs import linear
+from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import running
@@ -289,7 +289,7 @@ def test_an_arm_that_is_read_at_rest_answers_the_force_that_was_read() -> None:
     """Whatever its screw holds: the displacement is linear in what the springs give way."""
     data = replace(arm_data(), imposed="displacement")
     assert not displacement_imposed(data)
-    assert any("at rest the joints bear the force" in n for n in diagnose_gap(data).notes)
+    assert any("at rest the joints bear the force" in n for n in explained(data).notes)
     assert displacement_imposed(replace(data, step=np.full(len(data.step), -1)))
 
 
@@ -302,7 +302,7 @@ def test_what_is_held_at_no_displacement_may_still_be_pulled() -> None:
     late = (data.step == 0) & (data.time > data.time.mean())
     pulled = np.where(late, -5.0, data.force)
     moved = np.where(late, data.displacement - 5.0 * 1.1e-5, data.displacement)
-    found = diagnose_gap(replace(gripped, force=pulled, displacement=moved))
+    found = explained(replace(gripped, force=pulled, displacement=moved))
     assert "force_drift" not in [e.name for e in found.effects]
 
 
@@ -314,7 +314,7 @@ def test_an_arm_whose_readings_scatter_more_than_stated_is_not_explained(
     data = linear("rich")
     shaken = np.random.default_rng(8).normal(0, (times**2 - 1) ** 0.5, len(data.force))
     sd = data.instruments.displacement
-    found = diagnose_gap(replace(data, displacement=data.displacement + sd * shaken))
+    found = explained(replace(data, displacement=data.displacement + sd * shaken))
     assert found.verdict == verdict
     noted = [n for n in found.notes if "6 times as much as stated" in n]
     assert bool(noted) == found.bench.noise.misjudged == (verdict == "unknown")

@@ -11,7 +11,6 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.joint_creep import times
 from identification.gap.evidence.engine import Engine
@@ -27,6 +26,7 @@ from rig.dataset import load
 from rig.diagnosis.gap_data import gap_data
 from rig.tables import import_table
 from tests.conformance.gap_designs import linear
+from tests.explained import explained
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_weights import UP, hanging
@@ -282,7 +282,7 @@ def test_an_arm_whose_force_is_stated_far_too_uncertain_is_none(stated: float) -
     """Nothing is wrong, and the noise that could be there reaches beyond all that was seen."""
     data = linear("medium")
     assert (
-        diagnose_gap(replace(data, instruments=replace(data.instruments, force=stated))).verdict
+        explained(replace(data, instruments=replace(data.instruments, force=stated))).verdict
         == "none"
     )
 
@@ -304,7 +304,7 @@ def test_a_gain_beyond_three_of_its_stated_deviations_is_off(gain: float, verdic
         compliance_relative_sd=np.array([0.005]),
         instruments=Instruments(0.1, 1e-6, 0.1, 0.003),
     )
-    assert diagnose_gap(data).verdict == verdict
+    assert explained(data).verdict == verdict
 
 
 def of_three(sd: float, goes_on: float = 0.0, arm: bool = False) -> GapData:
@@ -341,4 +341,4 @@ def test_three_readings_of_a_level_show_their_noise() -> None:
     ):
         data = of_three(sd, goes_on, arm)
         assert make_bench(data).noise.response[0] == pytest.approx(found, rel=0.15)
-    assert diagnose_gap(of_three(3e-6)).verdict == "none"
+    assert explained(of_three(3e-6)).verdict == "none"

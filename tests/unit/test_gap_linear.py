@@ -11,7 +11,6 @@ import pytest
 
 from identification.gap.answer.locate import _joints
 from identification.gap.data import Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import moments
 from identification.gap.evidence.engine import Engine
@@ -22,6 +21,7 @@ from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
 from identification.gap.model.variants import Variant
+from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
@@ -232,7 +232,7 @@ def test_gains_of_a_bench_may_be_far_off_where_little_is_stated_of_them() -> Non
             instruments=Instruments(0.1, 1e-6, force_gain, 0.002),
             compliance_relative_sd=np.array([0.01]),
         )
-        assert diagnose_gap(data).verdict == verdict
+        assert explained(data).verdict == verdict
 
 
 def test_every_component_of_the_force_has_a_gain_of_its_own() -> None:

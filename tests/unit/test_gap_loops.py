@@ -7,13 +7,13 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.explanations.priors import prior_of
 from identification.gap.laws.flow_back import BACK_FROM
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import play
 from identification.gap.recording.loops import lost
+from tests.explained import explained
 from tests.unit.test_gap_running import SPRING, running
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)
@@ -183,7 +183,7 @@ def strained(uncertainty_N: float) -> GapData:
 def test_metal_in_growing_cycles_yields_and_does_not_creep(uncertainty_N: float) -> None:
     """Though creep beside the yield explains its changing loops, or foretells as much alone, and a
     spring takes over most of what either does."""
-    assert diagnose_gap(strained(uncertainty_N)).verdict in ("joint_yield", "joint_hysteresis")
+    assert explained(strained(uncertainty_N)).verdict in ("joint_yield", "joint_hysteresis")
 
 
 def ratcheted(
@@ -211,6 +211,6 @@ def test_what_yields_walks_the_way_of_a_mean_load_and_heat_walks_without(mean: f
     if not mean:  # nothing ratchets, and the room gets warm
         shown = shown + 3e-4 * np.arange(n) / n
     noise = np.random.default_rng(2).normal(0, 1e-6, n)
-    found = diagnose_gap(running(force, shown + noise, imposed="force", instruments=METER))
+    found = explained(running(force, shown + noise, imposed="force", instruments=METER))
     assert "thermal_drift" in found.names or "force_drift" in found.names
     assert (found.verdict in ("joint_yield", "joint_hysteresis")) is (mean > 0)

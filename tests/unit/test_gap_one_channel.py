@@ -10,10 +10,10 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import joint_hysteresis, time_lag
 from identification.gap.laws.curves import from_level_to_level, hinge
 from identification.gap.model.bench import make_bench
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import running
 
@@ -73,7 +73,7 @@ def test_a_force_that_turns_where_it_turned_before_hardly_drifts(drifts: str) ->
     in_force = drifts == "force"
     data = cycling(of_force=5.0 * path) if in_force else cycling(of_laser=5.0 * SPRING * path)
     assert make_bench(data).course.turns_alike != in_force
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == ("force_drift" if in_force else "thermal_drift")
     other = "thermal_drift" if in_force else "force_drift"
     assert any(e.words == {other} for e in found.found.explanations)  # it is weighed all the same
@@ -103,7 +103,7 @@ def pulled(knee: bool, imposed: str = "force") -> GapData:
 @pytest.mark.parametrize("knee", [True, False])
 def test_what_holds_half_the_load_before_it_gives_way_has_yielded(knee: bool, imposed: str) -> None:
     data = pulled(knee, imposed)
-    assert diagnose_gap(data).verdict == ("joint_yield" if knee else "joint_hysteresis")
+    assert explained(data).verdict == ("joint_yield" if knee else "joint_hysteresis")
     if imposed == "displacement":
         return
     bench = make_bench(data)
@@ -132,13 +132,13 @@ def test_a_table_that_was_read_once_shows_a_curve_whatever_its_form(size: float)
     """Slow, sudden, slow again: no formula gives that, and yet it is a curve of the load; a bend
     that leaves something of it says the same."""
     moved = np.cumsum([0, 1, 4, 2, 9, 38, 16, 14, 6, 12, 9, 5, 3, 1]) * size
-    found = diagnose_gap(read_once(moved))
+    found = explained(read_once(moved))
     assert found.verdict == "joint_nonlinear_stiffness"
     (effect,) = found.effects
     assert ("level to level" in effect.label) == (size == 1e-5)
     back = moved.copy()
     back[7] -= 25 * size  # a curve of a load does not go back
-    labels = [v.label for v in diagnose_gap(read_once(back)).fit.parts]
+    labels = [v.label for v in explained(read_once(back)).fit.parts]
     assert not any("level to level" in p for p in labels)
 
 
@@ -149,7 +149,7 @@ def test_a_table_that_scatters_is_no_curve() -> None:
     data = read_once(np.arange(14) * 1e-4 + off)
     assert np.all(np.diff(data.displacement) > 0)
     assert not make_bench(data).course.only_a_curve
-    assert diagnose_gap(data).verdict == "unknown"
+    assert explained(data).verdict == "unknown"
 
 
 def test_the_curvefrom_level_to_level_is_as_rough_everywhere() -> None:
@@ -176,6 +176,6 @@ def test_noise_that_is_not_white_may_be_as_wrong_as_anything_stated() -> None:
     data = running(force + rng.normal(0, 0.01, n), SPRING * force + off, imposed="force")
     data = replace(data, instruments=replace(data.instruments, force=0.01))
     assert not make_bench(data).noise.sure
-    assert diagnose_gap(data).verdict == "none"
+    assert explained(data).verdict == "none"
     white = replace(data, displacement=SPRING * force + rng.normal(0, 1.5e-6, n))
     assert make_bench(white).noise.sure

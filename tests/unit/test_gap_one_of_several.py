@@ -9,13 +9,13 @@ import pytest
 
 from identification.arm import tool_offset
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.effects.base_compliance import bent_column, moments
 from identification.gap.effects.force_scale import component
 from identification.gap.model.bench import make_bench
 from rig.models.robot import load_robot
 from tests.conformance.gap_designs import TCP_MM, TRUE, Array, Q, linear
+from tests.explained import explained
 from tests.unit.test_gap_running import SPRING, running
 
 
@@ -28,7 +28,7 @@ def of_each(data: GapData, values: list[Array] | list[float]) -> Array:
 def test_the_gain_of_one_component_is_no_gain_of_all(axis: int) -> None:
     data = linear("rich")
     reads = of_each(data, [1.12 if s.unit_vector[axis] else 1.0 for s in data.setups])
-    found = diagnose_gap(replace(data, force=reads * data.force))
+    found = explained(replace(data, force=reads * data.force))
     assert found.names == ("force_scale",)
     factor = found.effects[0].parameters[f"factor_{'xyz'[axis]}"]
     assert factor.low < 1.12 < factor.high
@@ -80,7 +80,7 @@ def test_an_arm_that_stands_elsewhere_in_one_pose_or_unread(
     assert data.q is not None
     q = data.q + (torque - lever * data.force[:, None]) / TRUE
     q = q + read * np.outer(there[data.setup], off)
-    found = diagnose_gap(replace(data, displacement=data.displacement + moved, q=q))
+    found = explained(replace(data, displacement=data.displacement + moved, q=q))
     assert found.verdict == "pose_error"
     angle = found.effects[0].parameters["angle_joint2"]
     assert angle.value == pytest.approx(0.035, rel=0.05)
@@ -91,9 +91,7 @@ def test_faces_that_seat_one_after_the_other() -> None:
     data = linear("rich")
     push = np.abs(data.force)
     depth = 2e-5 * (1 - np.exp(-push / 6)) + 5e-5 / (1 + np.exp(-(push - 34) / 3))
-    found = diagnose_gap(
-        replace(data, displacement=data.displacement + depth * np.sign(data.force))
-    )
+    found = explained(replace(data, displacement=data.displacement + depth * np.sign(data.force)))
     assert found.names == ("contact_seating",)
     assert found.effects[0].parameters["depth"].value == pytest.approx(70e-3, rel=0.1)  # mm
 
@@ -117,7 +115,7 @@ def test_what_is_bedded_in_may_stay_so(design: str, until: str, label: str) -> N
         most[i] = so_far
     top = float(push.max())
     depth = sum(3e-5 * (1 - np.exp(-size / (0.1 * top))) for size in (push, most))
-    found = diagnose_gap(replace(data, displacement=data.displacement + depth))
+    found = explained(replace(data, displacement=data.displacement + depth))
     assert found.verdict == "contact_seating"
     assert found.effects[0].label == f"exponential 0.1, {label}"
     assert found.effects[0].parameters["depth"].value == pytest.approx(60e-3, rel=0.1)  # mm
@@ -153,7 +151,7 @@ def test_a_plate_may_open_anywhere() -> None:
 def test_a_laser_that_changes_its_range_has_two_gains() -> None:
     data = linear("rich")
     beyond = np.sign(data.displacement) * np.maximum(np.abs(data.displacement) - 0.8e-3, 0.0)
-    found = diagnose_gap(replace(data, displacement=data.displacement + 0.15 * beyond))
+    found = explained(replace(data, displacement=data.displacement + 0.15 * beyond))
     assert found.verdict == "displacement_scale"
     assert found.effects[0].label.startswith("gain that changes at")
 
@@ -174,7 +172,7 @@ def test_a_joint_that_hardens_alike_in_both_senses_gives_way_to_new_loads_only()
     give = np.array(flowed) / TRUE[0]
     assert data.q is not None
     q = data.q + np.outer(give, np.eye(6)[0])
-    found = diagnose_gap(replace(data, displacement=data.displacement + lever * give, q=q))
+    found = explained(replace(data, displacement=data.displacement + lever * give, q=q))
     assert found.verdict == "joint_yield"
     assert found.where.joints == (1,)
 
@@ -189,7 +187,7 @@ def test_what_no_joint_does_no_reading_shows(encoder: str, seen: bool | None) ->
         output_encoder=encoder == "output",
         q=data.q if encoder else None,
     )
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "contact_seating"
     assert found.where.seen_by_encoders is seen
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import joint_backlash, library
 from identification.gap.effects.joint_backlash import TOOLS_KG
 from identification.gap.evidence.compare import score
@@ -22,6 +21,7 @@ from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
 from identification.gap.search.refine import refine
+from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
@@ -213,7 +213,7 @@ def test_a_stage_of_a_gear_is_no_play(softer: float, verdict: str) -> None:
     u = (load + (softer - 1) * np.clip(load, -12, 12)) / SPRING
     rng = np.random.default_rng(5)
     data = running(load + rng.normal(0, 0.1, 1200), u + rng.normal(0, 1e-6, 1200), imposed="force")
-    assert diagnose_gap(data).verdict == verdict
+    assert explained(data).verdict == verdict
 
 
 def test_a_play_is_soft_beside_the_spring_of_its_own_direction() -> None:

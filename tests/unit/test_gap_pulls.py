@@ -10,7 +10,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.diagnose import GapResult
 from identification.gap.effects import contact_seating, library
 from identification.gap.effects.contact_seating import refined
 from identification.gap.evidence.engine import Engine
@@ -23,6 +23,7 @@ from identification.gap.model.bench import make_bench
 from identification.gap.search.strange import strangers
 from identification.gap.words import WORDS
 from rig.diagnosis.diagnose_text import meanings, render
+from tests.explained import explained
 from tests.unit.test_gap_linear import charged
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
@@ -35,7 +36,7 @@ def pulled(
     force: Array, u: Array, imposed: str | None = "displacement", **changes: object
 ) -> GapResult:
     noise = np.random.default_rng(5).normal(0, METER.force, len(u))
-    return diagnose_gap(running(force + noise, u, imposed=imposed, instruments=METER, **changes))
+    return explained(running(force + noise, u, imposed=imposed, instruments=METER, **changes))
 
 
 def voce(u: Array, knee: float = 30.0, more: float = 40.0) -> Array:
@@ -199,7 +200,7 @@ def test_a_dent_that_stays_yields_from_the_first_load_on(left: float, under_a_ti
     labels = [v.label for v in library(make_bench(data), ["joint_yield"])]
     assert ("joint 1 hardened beyond 0.01" in labels) is under_a_tip
     if under_a_tip:
-        assert diagnose_gap(data).verdict == "joint_yield"
+        assert explained(data).verdict == "joint_yield"
 
 
 def test_cracks_under_an_imposed_stroke_are_no_drift_of_it() -> None:
@@ -342,7 +343,7 @@ def pulled_and_pressed(again: bool = False) -> GapData:
 
 
 def test_pull_and_press_may_each_have_a_curve_of_its_own() -> None:
-    found = diagnose_gap(pulled_and_pressed())
+    found = explained(pulled_and_pressed())
     assert found.verdict == "joint_nonlinear_stiffness"
     assert "uneven" in found.effects[0].label
     assert not found.bench.course.comes_again  # no load was met twice: that no stiffness wanders
@@ -376,7 +377,7 @@ def test_what_stiffens_from_the_first_weight_on_is_a_curve(imposed: str) -> None
     labels = [v.label for v in library(make_bench(data))]
     assert any("stops" in label for label in labels) == (imposed == "force")
     if imposed == "force":
-        found = diagnose_gap(data)
+        found = explained(data)
         assert found.verdict == "joint_nonlinear_stiffness"
         assert "stops" in found.effects[0].label
 

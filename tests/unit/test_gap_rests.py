@@ -10,7 +10,6 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine, eta_levels
 from identification.gap.evidence.parts import Part
@@ -20,6 +19,7 @@ from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import variant
 from identification.gap.recording.glitches import picked
 from identification.gap.search.strange import strangers
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 
@@ -42,8 +42,8 @@ def levels(scatter: float, readings: int = 3, seed: int = 0) -> GapData:
 
 
 def test_what_is_stated_of_a_bench_is_known_to_a_factor_of_two() -> None:
-    within = [diagnose_gap(levels(1.8, seed=seed)).verdict for seed in range(10)]
-    beyond = [diagnose_gap(levels(6.0, seed=seed)).verdict for seed in range(3)]
+    within = [explained(levels(1.8, seed=seed)).verdict for seed in range(10)]
+    beyond = [explained(levels(6.0, seed=seed)).verdict for seed in range(3)]
     assert within.count("none") >= 8  # with what is stated taken at its word: 3
     assert beyond.count("none") == 0
 
@@ -109,8 +109,8 @@ def nothing_loaded(moved: Array) -> GapData:
 def test_a_drift_on_any_path_explains_no_short_table(seed: int) -> None:
     """Readings anywhere, up to twice the stated noise or far beyond: a path through is no law."""
     anywhere = np.random.default_rng(seed).standard_normal(24) * 1e-6
-    assert diagnose_gap(nothing_loaded(1.5 * anywhere)).verdict == "none"
-    assert diagnose_gap(nothing_loaded(6.0 * anywhere)).verdict == "unknown"
+    assert explained(nothing_loaded(1.5 * anywhere)).verdict == "none"
+    assert explained(nothing_loaded(6.0 * anywhere)).verdict == "unknown"
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_a_drift_on_any_path_explains_no_short_table(seed: int) -> None:
 def test_what_rests_may_swing(periods: float, verdict: str) -> None:
     at = np.linspace(0.0, 1.0, 400)
     noise = np.random.default_rng(2).standard_normal(400) * 1e-6
-    result = diagnose_gap(nothing_loaded(3e-5 * np.sin(2 * np.pi * periods * at) + noise))
+    result = explained(nothing_loaded(3e-5 * np.sin(2 * np.pi * periods * at) + noise))
     assert result.verdict == verdict
     if verdict == "unknown":
         assert result.looks_like is not None
@@ -157,7 +157,7 @@ def test_a_room_may_swing_often_but_slowly(every_s: float, verdict: str) -> None
     at = np.linspace(0.0, 1.0, 600)
     noise = 1e-6 * np.random.default_rng(4).standard_normal(600)
     moved = 1e-4 * at + 3e-5 * np.sin(2 * np.pi * 14 * at) + noise
-    result = diagnose_gap(under_a_weight(moved, every_s))
+    result = explained(under_a_weight(moved, every_s))
     assert result.verdict == verdict
 
 
@@ -180,7 +180,7 @@ def test_creep_in_coloured_noise_or_a_little_swing_is_creep() -> None:
         wander[i] = 0.8 * wander[i - 1] + step
     for beside in (wander, 1e-6 * np.sin(60 * at)):
         white = 3e-7 * rng.standard_normal(2000)
-        assert diagnose_gap(under_a_weight(creep + beside + white)).verdict == "joint_creep"
+        assert explained(under_a_weight(creep + beside + white)).verdict == "joint_creep"
 
 
 @pytest.mark.parametrize("read", [False, True])
@@ -193,4 +193,4 @@ def test_weights_are_written_down_and_do_not_drift(read: bool) -> None:
     words = {v.word for v in library(make_bench(data), ["force_drift", "thermal_drift"])}
     assert words == ({"force_drift", "thermal_drift"} if read else {"thermal_drift"})
     if not read:
-        assert diagnose_gap(data).verdict == "thermal_drift"
+        assert explained(data).verdict == "thermal_drift"

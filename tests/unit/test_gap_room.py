@@ -10,13 +10,13 @@ import pytest
 from identification.arrays import Array
 from identification.gap.answer.parameters import parameters
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part
 from identification.gap.laws.drift import _goes, own_clock
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import followed
 from identification.gap.recording.bins import Bins
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 
@@ -48,7 +48,7 @@ def test_a_frame_follows_the_room_late(late_s: float) -> None:
     warm = room(n, every_s)
     moved = 1e-5 * (followed(warm, every_s * np.arange(n), np.array([late_s or 1e-3]))[:, 0])
     moved += 1e-6 * np.random.default_rng(4).standard_normal(n)
-    result = diagnose_gap(hung(moved, every_s, temperature=20 + warm[:, None]))
+    result = explained(hung(moved, every_s, temperature=20 + warm[:, None]))
     assert result.verdict == "thermal_drift"
     (effect,) = result.effects
     assert ("late" in effect.label) is (late_s > 0)
@@ -102,11 +102,11 @@ def test_a_long_hold_shows_what_swings_in_it() -> None:
     """Though most of the session is one level, and nothing tells the temperature."""
     n, every_s = 1000, 120.0
     swing = 2e-5 * room(n, every_s) + 1e-6 * np.random.default_rng(4).standard_normal(n)
-    assert diagnose_gap(hung(swing, every_s)).verdict == "thermal_drift"
+    assert explained(hung(swing, every_s)).verdict == "thermal_drift"
     creep = 4e-5 * (1 - np.exp(-np.arange(n) / 200)) + 1e-6 * np.random.default_rng(4).normal(
         size=n
     )
-    assert diagnose_gap(hung(creep, every_s)).verdict == "joint_creep"
+    assert explained(hung(creep, every_s)).verdict == "joint_creep"
 
 
 def test_swings_that_come_again_and_again_may_be_small_and_quick() -> None:
@@ -118,7 +118,7 @@ def test_swings_that_come_again_and_again_may_be_small_and_quick() -> None:
     swings = slow + 7e-6 * np.sin(2 * np.pi * 8 * at)
     assert not own_clock(make_bench(hung(slow + noise, every_s)))
     assert own_clock(make_bench(hung(swings + noise, every_s)))
-    assert diagnose_gap(hung(swings + noise, every_s)).verdict == "thermal_drift"
+    assert explained(hung(swings + noise, every_s)).verdict == "thermal_drift"
     # the load reads alike all the time, and nobody turns a screw
     assert not library(make_bench(hung(swings + noise, every_s)), ["force_drift"])
 
@@ -168,7 +168,7 @@ def test_what_moves_before_any_load_does_not_creep(before: bool, verdict: str) -
     clock = every_s * np.arange(n)
     data = bench_data(force, moved, step=step, branch=step, time=clock, session=clock)
     assert own_clock(make_bench(data)) is before
-    assert diagnose_gap(data).verdict == verdict
+    assert explained(data).verdict == verdict
 
 
 @pytest.mark.parametrize("n", [75, 300, 1000])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.laws.drift import paths, rates
 from identification.gap.model.bench import make_bench
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 DIAL = 25.4e-6  # m, a thousandth of an inch
@@ -42,14 +42,14 @@ def test_readings_that_a_dial_rounds_share_their_error() -> None:
 
 @pytest.mark.parametrize("weight", [11.9, 14.3, 23.7])  # N
 def test_divisions_of_a_dial_are_no_effect(weight: float) -> None:
-    assert diagnose_gap(stepped(0.02 * DIAL, weight=weight)).verdict == "none"
+    assert explained(stepped(0.02 * DIAL, weight=weight)).verdict == "none"
 
 
 def test_a_reading_next_to_an_edge_is_a_whole_division_off() -> None:
     edges = stepped(0.02 * DIAL, weight=2.5 * DIAL * SPRING)  # every second level lies on one
     bench = make_bench(edges)
     assert bench.noise.response * bench.rows.weight**0.5 == pytest.approx(DIAL / 12**0.5, rel=0.05)
-    assert diagnose_gap(edges).verdict == "none"
+    assert explained(edges).verdict == "none"
 
 
 def test_a_drift_is_over_only_after_some_readings() -> None:

@@ -12,7 +12,6 @@ import pytest
 from identification.arrays import Array
 from identification.gap.answer.parameters import parameters
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.priors import prior_of
@@ -25,6 +24,7 @@ from identification.gap.recording.rows import reduce_rows
 from identification.gap.recording.turns import passes, turns
 from identification.gap.words import STANDING
 from rig.diagnosis.diagnose_text import render
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 SPRING = 1e5  # N/m
@@ -104,7 +104,7 @@ def test_under_a_load_that_stands_creep_may_be_as_slow_and_large_as_was_seen(jit
     creep = library(bench, ["joint_creep"])
     assert max(v.info["times_s"].max() for v in creep) > 300
     assert max(v.scales[-1] for v in creep) > 0.06 / (100 / SPRING)
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "joint_creep"
     assert found.after < 0.05 * found.before
 
@@ -141,7 +141,7 @@ def test_a_stiffening_specimen_that_relaxes_creeps() -> None:
         compliance=np.array([1e-3 / 8]),
         imposed="displacement",
     )
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict in ("joint_creep", "joint_nonlinear_stiffness")
     assert "joint_creep" in {e.name for e in found.effects}
 
@@ -159,7 +159,7 @@ def test_a_pull_whose_force_falls_is_not_said_to_be_elastic(falls: bool) -> None
         instruments=Instruments(0.02, 1e-6, 0.005, 0.003),
         compliance=np.array([1e-3 / force[10] * x[10]]),
     )
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == ("unknown" if falls else "joint_nonlinear_stiffness")
 
 
@@ -179,7 +179,7 @@ def test_a_curve_off_its_zero_that_comes_again_is_elastic() -> None:
     u = 1e-3 * np.sin(t / 20)
     force = 2e5 * (np.maximum(u - 1e-4, 0) - np.maximum(-6e-4 - u, 0)) + 2e4 * u
     force += np.random.default_rng(5).normal(0, 0.1, 400)
-    said = diagnose_gap(running(force, u, imposed="displacement"))
+    said = explained(running(force, u, imposed="displacement"))
     assert said.verdict in ("joint_nonlinear_stiffness", "joint_backlash")
     assert said.after < 0.1 * said.before
     labels = [v.label for v in library(make_bench(running(force, u, imposed="displacement")))]
@@ -217,7 +217,7 @@ def test_one_factor_is_shared_as_calibrations_are_stated() -> None:
             instruments=meter,
             compliance_relative_sd=np.array([0.05]),
         )
-        p = diagnose_gap(data).probabilities
+        p = explained(data).probabilities
         others = {"joint_stiffness_error", "force_scale", "displacement_scale"} - {sure}
         assert p[sure] > max(p[w] for w in others)
 
@@ -248,9 +248,9 @@ def test_what_is_below_the_noise_of_a_sample_is_no_effect_of_a_running_recording
     force = 100 * triangle(3000, 6)
     wander = 4e-7 * np.sin(np.linspace(0, 9, 3000))
     u = force / SPRING + wander + rng.normal(0, 1e-6, 3000)
-    found = diagnose_gap(running(force, u, imposed="force"))
+    found = explained(running(force, u, imposed="force"))
     assert found.verdict == "none"
-    larger = diagnose_gap(running(force, u + 20 * wander, imposed="force"))
+    larger = explained(running(force, u + 20 * wander, imposed="force"))
     assert larger.verdict in ("thermal_drift", "force_drift")
 
 
@@ -269,7 +269,7 @@ def test_a_ball_on_a_plate_seats_by_the_law_of_hertz() -> None:
     rng = np.random.default_rng(12)
     force = 100 * triangle(600, 3)
     u = force / SPRING + 6e-5 * (force / 100) ** (2 / 3) + rng.normal(0, 1e-6, 600)
-    found = diagnose_gap(running(force, u, imposed="force"))
+    found = explained(running(force, u, imposed="force"))
     assert found.verdict == "contact_seating"
     assert found.effects[0].label.startswith("Hertz")
     depth = found.effects[0].parameters["depth"]
@@ -306,7 +306,7 @@ def test_every_shape_of_a_bench_has_parameters(imposed: str) -> None:
 
 
 def test_a_single_sample_is_diagnosed_as_nothing() -> None:
-    found = diagnose_gap(running(np.array([5.0]), np.array([5e-5])))
+    found = explained(running(np.array([5.0]), np.array([5e-5])))
     assert found.verdict in ("none", "unknown")
 
 
@@ -398,7 +398,7 @@ def test_a_cell_at_rest_says_nothing_of_any_stiffness() -> None:
     bench = make_bench(running(force, np.zeros(250), imposed="force"))
     assert bench.course.stands
     assert {v.word for v in library(bench)} <= set(STANDING)
-    found = diagnose_gap(running(force, np.zeros(250), imposed="force"))
+    found = explained(running(force, np.zeros(250), imposed="force"))
     assert found.verdict in ("none", "force_drift")
 
 
@@ -437,7 +437,7 @@ def test_a_melt_that_flows_on_creeps_however_far() -> None:
     creep = library(bench, ["joint_creep"])
     assert max(v.info["times_s"].max() for v in creep) > 3000
     assert max(v.scales[-1] for v in creep) > 1000
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "joint_creep"
     assert found.after < 0.1 * found.before
 
@@ -459,7 +459,7 @@ def test_a_straight_line_read_with_noise_bends_at_its_ends_and_is_no_curve(seed:
     data = running(read, shown, imposed="force", instruments=Instruments(1.0, 1e-6, 0.005, 0.003))
     noise = make_bench(data).noise.response
     assert np.quantile(noise, 0.01) > 5e-6  # of 10 um that the force makes
-    assert diagnose_gap(data).verdict == "none"
+    assert explained(data).verdict == "none"
 
 
 @pytest.mark.parametrize("runs", [1, 2])
@@ -535,7 +535,7 @@ def test_what_goes_through_friction_is_told_with_what_it_is_counted_against(
     other = way + 0.5 * held if imposed == "displacement" else way - 0.5 * held
     force, u = (other, way) if imposed == "displacement" else (way, other)
     rng, meter = np.random.default_rng(1), Instruments(0.1, 1e-6, 0.005, 0.003)
-    found = diagnose_gap(
+    found = explained(
         running(
             100 * force + rng.normal(0, 0.1, len(way)),
             1e-3 * u + rng.normal(0, 1e-6, len(way)),

@@ -7,8 +7,8 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.recording.slack import without_slack
+from tests.explained import explained
 from tests.unit.test_gap_running import SPRING, running, triangle
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)
@@ -47,7 +47,7 @@ def test_a_part_that_relaxes_and_lets_go_creeps() -> None:
     assert gone == pytest.approx(np.sum(pulls < -1.0), rel=0.2)
     assert kept.aside[-1].startswith("The part lets go of the rig before the stroke is back")
     assert f"{gone} readings" in kept.aside[-1]
-    assert diagnose_gap(free).verdict == "joint_creep"
+    assert explained(free).verdict == "joint_creep"
 
 
 def test_what_is_met_and_let_go_at_one_place_stays() -> None:
@@ -94,7 +94,7 @@ def test_what_lets_go_is_no_lag(cycles: int, time_s: float) -> None:
         kept = without_slack(data)
         assert kept.lets_go
         assert kept.imposed == "displacement"
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.bench.imposed
     assert found.verdict in ("joint_creep", "joint_hysteresis", "unknown")
     assert found.probabilities["time_lag"] < 0.05

@@ -11,7 +11,6 @@ import pytest
 from identification.arrays import Array
 from identification.gap.answer.parameters import parameters
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part
 from identification.gap.judging.leftover import COMES_BACK, _judged
@@ -20,6 +19,7 @@ from identification.gap.laws.interval import NOMINAL
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.snaps import TOGETHER, let_go
 from identification.gap.recording.wandering import wanders
+from tests.explained import explained
 from tests.unit.test_gap_running import SPRING, running, triangle
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)
@@ -81,7 +81,7 @@ def test_a_force_that_is_driven_is_let_go_by_who_drives_it() -> None:
 
 
 def test_no_law_explains_what_sticks_and_slips() -> None:
-    found = diagnose_gap(stroke(*saw(0.4), imposed="displacement"))
+    found = explained(stroke(*saw(0.4), imposed="displacement"))
     assert found.verdict == "unknown"
     assert found.probabilities["unknown"] > 0.7
     (note,) = [n for n in found.notes if "at once" in n]
@@ -115,7 +115,7 @@ def test_the_channel_that_moves_without_load(force: float, u: float, channel: st
 
 def test_a_channel_that_comes_back_has_not_drifted() -> None:
     data = resting(0 * WALK, 2e-5 * WALK + np.random.default_rng(3).normal(0, 1e-6, N))
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "thermal_drift"
     engine, ranked = found.engine, found.found.explanations
     weights = [e.log_weight for e in ranked]
@@ -142,7 +142,7 @@ def leaf(share: float = 0.1) -> tuple[Array, Array]:
 
 
 def test_friction_in_proportion_to_the_load_is_hysteresis() -> None:
-    found = diagnose_gap(stroke(*leaf(), imposed="displacement"))
+    found = explained(stroke(*leaf(), imposed="displacement"))
     assert found.verdict == "joint_hysteresis"
     part = found.fit.parts[0]
     assert part.variant.info["law"] in BY_LOAD
@@ -169,7 +169,7 @@ def test_a_wrong_spring_that_rubs_within_the_noise_is_a_wrong_spring() -> None:
     u += np.random.default_rng(6).normal(0, 4e-6, len(u))
     meter = Instruments(0.01, 4e-6, 0.005, 0.003)
     data = replace(running(100 * x, u, instruments=meter), step=on, branch=1 + back.astype(int))
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict in ("joint_stiffness_error", "force_scale", "displacement_scale")
 
 

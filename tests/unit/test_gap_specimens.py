@@ -9,13 +9,13 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.laws import knees_closer
 from identification.gap.laws.knees import is_sharp
 from identification.gap.laws.specimens import PLATEAU, off, own_stiffness, plateaus
 from identification.gap.model.bench import make_bench
 from identification.gap.model.pool import Pool
+from tests.explained import explained
 from tests.unit.test_gap_model import survive
 from tests.unit.test_gap_running import SPRING, running
 
@@ -64,7 +64,7 @@ def test_a_knee_lies_where_the_specimens_own_spring_puts_it(stiffer: float) -> N
     u = with_unloadings(stiffer * SPRING)
     data = measured(u, yielding(u, stiffer * SPRING))
     assert own_stiffness(make_bench(data)) == pytest.approx(stiffer, rel=0.1)
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict in ("joint_yield", "joint_stiffness_error")
     effect = next(e for e in found.effects if e.name == "joint_yield")
     assert effect.parameters["threshold"].value == pytest.approx(KNEE_N, rel=0.1)
@@ -81,7 +81,7 @@ def test_a_spring_that_is_about_as_stated_has_no_thresholds_of_its_own() -> None
 
 
 def test_a_yield_point_and_its_plateau_are_a_yield() -> None:
-    found = diagnose_gap(measured(U, yield_point()))
+    found = explained(measured(U, yield_point()))
     assert found.verdict == "joint_yield"
     assert found.after < 4 * found.noise  # a knee that is only rounded leaves six times it
 

@@ -9,7 +9,6 @@ import pytest
 
 from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import EFFECTS, library
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine
@@ -18,6 +17,7 @@ from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
 from identification.gap.model.variants import Variant
 from identification.gap.search.refine import refine
+from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING
@@ -162,7 +162,7 @@ def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
         imposed="force",
     )
     data = replace(data, instruments=replace(data.instruments, displacement=noise))
-    (effect,) = diagnose_gap(data).effects
+    (effect,) = explained(data).effects
     key, told = ("factor_x", times) if times > 1 else ("factor", 1 / times)
     factor = effect.parameters[key]
     assert factor.value == pytest.approx(told, rel=0.1)
@@ -199,4 +199,4 @@ def test_nothing_is_wrong_as_long_as_a_spring_is_about_as_stiff_as_stated(
     )
     meter = replace(data.instruments, displacement=1e-3 * float(u.max()))
     stated = replace(data, instruments=meter, compliance_relative_sd=np.array([sd]))
-    assert diagnose_gap(stated).verdict == word
+    assert explained(stated).verdict == word

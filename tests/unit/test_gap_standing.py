@@ -9,12 +9,12 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import Instruments
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.model.bench import make_bench
 from identification.gap.model.driven import driven, standing
 from identification.gap.model.history import sampling_time
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.recording.white import white_noise
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running, triangle
 
@@ -72,7 +72,7 @@ def test_levels_that_shake_more_than_stated_are_not_explained(times: float, verd
     force = 30.0 * step
     off = rng.normal(0, 1e-6 * times, len(step))
     data = bench_data(force, force / SPRING + off, step=step, branch=np.where(step > 0, 1, 0))
-    found = diagnose_gap(replace(data, imposed="force"))
+    found = explained(replace(data, imposed="force"))
     assert found.verdict == verdict
     assert any("times as much as stated" in n for n in found.notes) == (times > 3)
 
@@ -82,7 +82,7 @@ def test_a_spring_that_shakes_more_than_stated_is_not_explained(times: float, ve
     rng = np.random.default_rng(4)
     force = 100 * triangle(1200, 3)
     data = running(force, force / SPRING + rng.normal(0, 1e-6 * times, 1200), imposed="force")
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == verdict
     assert any("10 times as much as stated" in n for n in found.notes) == (verdict == "unknown")
 
@@ -156,7 +156,7 @@ def test_steps_of_a_coarse_reading_are_its_noise() -> None:
     data = running(force, moved, imposed="force", instruments=meter)
     rows = reduce_rows(data)
     assert np.std(driven(data, rows, imposed=False) - true) < 0.5 * np.std(force - true)
-    assert diagnose_gap(data).verdict == "none"
+    assert explained(data).verdict == "none"
 
 
 def test_a_dense_pull_is_as_uncertain_as_its_displacement_makes_it() -> None:
@@ -168,7 +168,7 @@ def test_a_dense_pull_is_as_uncertain_as_its_displacement_makes_it() -> None:
     meter = Instruments(0.001, 1e-6, 0.005, 0.003)
     data = running(force, moved, imposed="displacement", instruments=meter)
     assert np.median(make_bench(data).noise.response) == pytest.approx(1e-6, rel=0.15)
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "none"
 
 
@@ -254,7 +254,7 @@ def test_a_creep_rack_is_driven_by_its_weight_and_creeps() -> None:
     bench = make_bench(data)
     assert not bench.course.approaches
     assert not bench.imposed
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "joint_creep"
     assert found.after < 0.1 * found.before
 

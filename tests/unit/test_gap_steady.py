@@ -9,7 +9,6 @@ import pytest
 
 from identification.arrays import Array
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, _beyond_scatter, part_sizes
@@ -17,6 +16,7 @@ from identification.gap.judging.strain import JUMP, _jumps
 from identification.gap.laws.drift import FreePath
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import displacement_imposed, make_bench
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 RUNS, LENGTH, GAP = 7, 500, 400.0  # samples at 10 Hz; s between starts
@@ -59,13 +59,13 @@ def stepped(drift: Array) -> Array:
 
 
 def test_what_goes_on_between_runs_as_it_went_in_them_is_a_drift() -> None:
-    assert diagnose_gap(measured(wave())).verdict == "thermal_drift"
+    assert explained(measured(wave())).verdict == "thermal_drift"
 
 
 def test_what_stands_within_runs_and_jumps_between_is_the_datum() -> None:
     rng = np.random.default_rng(3)
     jumps = np.repeat(rng.normal(0, 12 * NOISE, RUNS), LENGTH)
-    assert diagnose_gap(measured(jumps)).verdict == "zero_shift"
+    assert explained(measured(jumps)).verdict == "zero_shift"
 
 
 @pytest.mark.parametrize("swap", [False, True])

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library, time_lag
 from identification.gap.effects.joint_backlash import variants as plays
 from identification.gap.effects.time_lag import late
@@ -18,6 +17,7 @@ from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from identification.gap.search.refine import refine
 from identification.gap.search.search import search
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running, triangle, words_with
 from tests.unit.test_gap_weights import hanging
@@ -32,7 +32,7 @@ def test_friction_whose_first_slope_was_simulated_is_friction() -> None:
         state = np.clip(state + stiff * step, -limits, limits)
         force[i] = state.sum()
     force += np.random.default_rng(9).normal(0, 0.05, 500)
-    said = diagnose_gap(running(force, u, imposed="displacement"))
+    said = explained(running(force, u, imposed="displacement"))
     assert said.verdict == "joint_hysteresis"
     assert said.effects[0].name == "joint_hysteresis"
 
@@ -245,7 +245,7 @@ def test_growing_presses_of_a_tip_yield_from_the_first_load_on() -> None:
     largest = np.maximum.accumulate(load)
     rng = np.random.default_rng(6)
     pressed = 1e-5 * load + 4e-7 * largest**1.5 + rng.normal(0, 1e-6, len(load))
-    said = diagnose_gap(running(load, pressed, imposed="force"))
+    said = explained(running(load, pressed, imposed="force"))
     assert said.verdict == "joint_yield"
     assert said.fit.parts[0].variant.info["centre"] < 10.0  # N
     once = make_bench(running(load[:80], load[:80] / SPRING, imposed="force"))

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.recording.holds import steadied
 from identification.gap.recording.ramps import ramps_told
 from identification.gap.recording.rows import reduce_rows
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 SPRING, HOLD, LEVELS = 1e-5, 16, 12
@@ -87,7 +87,7 @@ def test_noise_within_rows_is_left_whatever_is_foreseen() -> None:
 
 def test_after_of_a_rig_that_settles_does_not_count_its_settling() -> None:
     bench, _ = settling(size=6e-5, noise=5e-7)
-    found = diagnose_gap(bench.data)
+    found = explained(bench.data)
     assert found.verdict in ("joint_creep", "time_lag")
     moves = np.sqrt(bench.rows.weight @ bench.scatter / bench.rows.weight.sum())
     assert found.after < 0.7 * moves

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.recording.wraps import wraps
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 from tests.unit.test_gap_running import SPRING, running
 
@@ -25,7 +25,7 @@ def counted(u: Array) -> Array:
 def test_a_counter_that_wraps_is_told_and_nothing_explains_it() -> None:
     data = running(FORCE, counted(FORCE / SPRING), imposed="force")
     assert wraps(data) == pytest.approx(TURN, rel=0.05)
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "unknown"
     assert any("jumps by 0." in note and "Unwrap it" in note for note in found.notes)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from identification.gap.data import LOADING, UNLOADING, ZERO, GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.model.bench import make_bench
+from tests.explained import explained
 from tests.unit.test_gap_operators import bench_data
 
 SPRING, HOLD = 1e5, 8
@@ -39,7 +39,7 @@ def shapes(data: GapData) -> set[str]:
 def test_a_force_that_reads_otherwise_without_load_has_drifted_along_any_slow_path() -> None:
     data = staircase(-40.0)
     assert shapes(data) > {"linear", "root"}
-    found = diagnose_gap(data)
+    found = explained(data)
     assert found.verdict == "force_drift"
     drift = found.effects[0].parameters["drift_over_session"]
     assert drift.value == pytest.approx(-40.0 * (1 - np.exp(-2.5)), rel=0.1)
