@@ -100,7 +100,8 @@ def _test(words: list[str]) -> int:
     tests = ["pytest", "-n", str(WORKERS), "--dist", "worksteal", *words]
     # Compiled modules are kept, or every process that tests compiles all of them anew.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    compiled = subprocess.Popen(_path(["pytest", "--collect-only"]), cwd=HOME, stdout=DEVNULL)
+    collect = _path(["pytest", "--collect-only", *words])
+    compiled = subprocess.Popen(collect, cwd=HOME, stdout=DEVNULL)
     status = _checks()
     compiled.wait()
     return status or _call(_told(tests))
