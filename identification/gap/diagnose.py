@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log
 
@@ -41,6 +41,7 @@ from identification.gap.search.breaks import troubles_of, with_plain_trouble
 from identification.gap.search.refine import refine
 from identification.gap.search.search import force, search
 from identification.gap.search.strange import with_strangers
+from identification.gap.search.unseen import unseen
 from identification.gap.words import WORDS
 
 # Nats within which two words explain data equally well: odds of 100 to 1 prove nothing while the
@@ -140,16 +141,14 @@ def explain_gap(
     check_words(withheld | forced)
     tell("preparing", 0.0)
     bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(data)))))
-    bench = knowing(bench, known)
-    base = base_columns(bench)
-    target = bench.observed - prediction(bench)
-    variants = library(bench, [w for w in WORDS if w not in withheld])
+    engine, variants = _prepared(bench, known, withheld)
     _check_shown(forced, variants)
     tell("comparing effects", 0.2)
-    engine = Engine(bench, base, target, eta_levels(bench, base, target))
     found = _searched(engine, variants)
+    found, variants = _with_unseen(found, variants, known, withheld)
+    engine = found.engine
     tell("withheld data", 0.7)
-    found = earned(looked_up(found))
+    found = earned(found)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     plain = chosen_of(found, verdict)
     chosen = force(engine, variants, found.explanations, plain, forced)
@@ -167,6 +166,17 @@ def explain_gap(
     return result, whole
 
 
+def _prepared(
+    bench: Bench, known: Sequence[Form], withheld: Collection[str]
+) -> tuple[Engine, list[Variant]]:
+    """What explanations are scored by, and the library's variants."""
+    bench = knowing(bench, known)
+    base = base_columns(bench)
+    target = bench.observed - prediction(bench)
+    variants = library(bench, [w for w in WORDS if w not in withheld])
+    return Engine(bench, base, target, eta_levels(bench, base, target)), variants
+
+
 def _searched(engine: Engine, variants: list[Variant]) -> SearchResult:
     """The search over explanations; the variants then hold finer ones as well, and those of
     troubles that no word names."""
@@ -177,7 +187,35 @@ def _searched(engine: Engine, variants: list[Variant]) -> SearchResult:
         if fresh:
             variants += fresh
             singles += score(engine, engine.levels, fresh)
-    return with_strangers(with_plain_trouble(search(engine, variants, singles)))
+    found = with_strangers(with_plain_trouble(search(engine, variants, singles)))
+    return looked_up(found)
+
+
+def _with_unseen(
+    found: SearchResult,
+    variants: list[Variant],
+    known: Sequence[Form],
+    withheld: Collection[str],
+) -> tuple[SearchResult, list[Variant]]:
+    """The search once more, and from there again, with loads between readings, where these explain
+    more than it costs to say which they are."""
+    paid = 0.0
+    for _ in range(_PATHS):
+        more = unseen(found)
+        if more is None:
+            break
+        bench = found.engine.bench
+        rows = replace(bench.rows, overshoot=more.overshoot)
+        engine, others = _prepared(make_bench(bench.data, rows=rows), known, withheld)
+        again = _searched(engine, others)
+        gain = again.explanations[0].log_weight - found.explanations[0].log_weight
+        if gain < more.cost - paid:
+            break
+        found, variants, paid = again, others, more.cost
+    return found, variants
+
+
+_PATHS = 2  # tries: the first explanation that remembers may have been another
 
 
 class NotShown(ValueError):

@@ -69,6 +69,14 @@ def _remarks(bench: Bench) -> Iterator[str]:
         )
     if bench.course.let_go:
         yield _let_go(bench.course.let_go, float(np.ptp(bench.data.force)))
+    beyond = int(np.count_nonzero(bench.rows.overshoot))
+    if beyond:
+        yield (
+            f"Before {beyond} of {len(bench.rows.edges)} levels the load seems to have gone too "
+            "far, and back, while nothing was read: what remembers stands on its other branch "
+            "there. This was put in from the displacement itself, and these levels don't count "
+            "as withheld. Come to each level from one side, or record the way there."
+        )
     if bench.imposed:
         yield "The displacement is imposed: force is predicted from it."
     elif bench.data.imposed == "displacement":

@@ -27,7 +27,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.arrays import Array, Flags
+from identification.arrays import Array
 from identification.gap.laws import friction_law
 from identification.gap.laws.closer import Word, places
 from identification.gap.laws.effect import Effect
@@ -40,7 +40,7 @@ from identification.gap.laws.friction_law import (
 from identification.gap.laws.law import Laws
 from identification.gap.laws.specimens import with_other_springs
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import Path, bristles, play, worked_in
+from identification.gap.model.path import Path, bent, worked_in
 from identification.gap.model.variants import (
     LASTING,
     SET_UP_ANEW,
@@ -82,26 +82,24 @@ def variants(bench: Bench) -> list[Variant]:
         span = bench.reach_of(bench.true_torque[:, j])
         if not span > 0:
             continue
-        for memory, how in _memories(bench, j).items():
-            out += _laws(bench, j, span, memory, *how)
+        for memory, path in _memories(bench, j).items():
+            out += _laws(bench, j, span, memory, path)
     return out + _with_other_springs(bench, out)
 
 
-_How = tuple[Flags, Path | None, Array | None]  # where it is fresh, a path worked in, weights
-
-
-def _memories(bench: Bench, joint: int) -> dict[str, _How]:
+def _memories(bench: Bench, joint: int) -> dict[str, Path]:
     """What a joint's friction may remember."""
-    out: dict[str, _How] = {"": (bench.moved, None, None)}
+    torque = bench.true_torque[:, joint]
+    out = {"": bench.path(torque)}
     if not bench.course.once:
-        out[WORKED_IN] = (bench.moved, worked_in(bench.true_torque[:, joint], bench.moved), None)
+        out[WORKED_IN] = worked_in(out[""])
     if np.sum(bench.rebuilt) > np.sum(bench.moved):
-        out[SET_UP_ANEW] = (bench.rebuilt, None, None)
+        out[SET_UP_ANEW] = bench.path(torque, bench.rebuilt)
     # friction that never was seen to turn, and of which nothing stays, is a curve
     if np.sum(bench.rest) > np.sum(bench.moved) and (bench.course.unloads or not bench.data.arm):
-        out[" rested"] = (bench.moved | bench.rest, None, None)
+        out[" rested"] = bench.path(torque, bench.moved | bench.rest)
     if bench.feels_weight(joint):
-        out[UNDER_WEIGHT] = (bench.moved, None, bench.weight(joint))
+        out[UNDER_WEIGHT] = bench.path(torque, weight=bench.weight(joint))
     return out
 
 
@@ -130,11 +128,11 @@ def refined(bench: Bench, found: Variant) -> list[Variant]:
     joint = int(found.info["joint"])
     if not hangs(found) or not np.any(bench.weight_per_kg(joint)):
         return []
-    span, out = bench.reach_of(bench.true_torque[:, joint]), []
+    torque, out = bench.true_torque[:, joint], []
     for kg in TOOLS_KG:
         name = f"joint {joint + 1}{UNDER_WEIGHT} tool {kg:g} kg"
-        weight = bench.weight(joint, kg)
-        for v in _spectra(bench, joint, name, span, bench.moved, None, weight):
+        hung = bench.path(torque, weight=bench.weight(joint, kg))
+        for v in _spectra(bench, joint, name, bench.reach_of(torque), hung):
             info = {**v.info, "memory": UNDER_WEIGHT.strip(), "tool_kg": kg}
             out.append(replace(v, prior=v.prior / len(TOOLS_KG), info=info))
     return out
@@ -145,25 +143,25 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
     a specimen's spectrum, the strengths between the strengths as well."""
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
     span = bench.reach_of(bench.true_torque[:, joint])
-    name, how = _as_found(bench, found)
+    name, path = _as_found(bench, found)
     if found.info["law"] in LAWS:
         low, high = found.info["radius"]
         reach = np.geomspace(0.9 * float(low), 1.1 * float(high), _CLOSER)
         reach /= NEARER if found.info["law"] in BY_LOAD else 1.0
-        finer = _exponential(bench, joint, name, reach / span, *how)
+        finer = _exponential(bench, joint, name, reach / span, path)
     elif not bench.data.arm and bench.course.unloads:
-        finer = _spectra(bench, joint, name, span, *how, BETWEEN)
+        finer = _spectra(bench, joint, name, span, path, BETWEEN)
     else:
         return []
     out = [replace(v, label=f"{v.label} fine", info={**v.info, "memory": memory}) for v in finer]
     return out + _with_other_springs(bench, out)
 
 
-def _as_found(bench: Bench, found: Variant) -> tuple[str, _How]:
-    """Joint and memory of a friction that was found: what labels begin with, and how."""
+def _as_found(bench: Bench, found: Variant) -> tuple[str, Path]:
+    """Joint and memory of a friction that was found: what labels begin with, and the path."""
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
-    how = next(h for m, h in _memories(bench, joint).items() if m.strip() == memory)
-    return f"joint {joint + 1}{' ' * bool(memory)}{memory}", how
+    path = next(p for m, p in _memories(bench, joint).items() if m.strip() == memory)
+    return f"joint {joint + 1}{' ' * bool(memory)}{memory}", path
 
 
 def outlasting(bench: Bench, found: Variant) -> list[Variant]:
@@ -172,8 +170,10 @@ def outlasting(bench: Bench, found: Variant) -> list[Variant]:
     if np.sum(bench.moved) < 2:
         return []
     joint = int(found.info["joint"])
-    span, never = bench.reach_of(bench.true_torque[:, joint]), np.zeros(bench.rows.n, dtype=bool)
-    finer = _spectra(bench, joint, f"joint {joint + 1}{LASTING}", span, never, None, None)
+    torque = bench.true_torque[:, joint]
+    lasting = bench.path(torque, np.zeros(bench.rows.n, dtype=bool))
+    name = f"joint {joint + 1}{LASTING}"
+    finer = _spectra(bench, joint, name, bench.reach_of(torque), lasting)
     return _remembering(finer, LASTING)
 
 
@@ -189,15 +189,13 @@ def growing(bench: Bench, found: Variant) -> list[Variant]:
     if not bench.data.arm or bench.course.once:
         return []
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
-    name, (fresh, path, weight) = _as_found(bench, found)
+    name, path = _as_found(bench, found)
     torque, unit = bench.true_torque[:, joint], -bench.sense * bench.compliance[joint]
     carries = np.abs(torque + bench.weight(joint))
     top, out = float(carries.max()), []
     reach = bench.reach_of(torque) * np.geomspace(REACHES[0], REACHES[-1], _GROWING)
     for law in friction_law.exponential_laws(bench):
-        load, anew = (torque, fresh) if path is None else (path.load, path.fresh)
-        z = bristles(load, reach, anew, law.startswith("Bouc-Wen"), weight)
-        held = reach * (z if path is None else z[path.kept])
+        held = reach * path.bristles(reach, law.startswith("Bouc-Wen"))
         slips = torque[:, None] if law in SLIPPING else 0.0
         both = zip((held - slips).T, (held * carries[:, None] / top - slips).T, strict=True)
         for r, states in zip(reach, both, strict=True):
@@ -223,22 +221,14 @@ def growing(bench: Bench, found: Variant) -> list[Variant]:
 _GROWING = 6  # reaches
 
 
-def _laws(
-    bench: Bench,
-    joint: int,
-    span: float,
-    memory: str,
-    fresh: Flags,
-    path: Path | None,
-    weight: Array | None,
-) -> list[Variant]:
+def _laws(bench: Bench, joint: int, span: float, memory: str, path: Path) -> list[Variant]:
     """All laws of one joint and memory."""
     name = f"joint {joint + 1}{memory}"
-    found = _spectra(bench, joint, name, span, fresh, path, weight)
+    found = _spectra(bench, joint, name, span, path)
     found += _pairs(bench, joint, name, span, found[0])
     if not bench.course.once:  # a curve that saturates would be taken for friction
         reaches = np.array(REACHES if bench.course.unloads else REACHES[:2])
-        found += _exponential(bench, joint, name, reaches, fresh, path, weight)
+        found += _exponential(bench, joint, name, reaches, path)
     return _remembering(found, memory)
 
 
@@ -247,9 +237,7 @@ def _spectra(
     joint: int,
     name: str,
     span: float,
-    fresh: Flags,
-    path: Path | None,
-    weight: Array | None,
+    path: Path,
     strengths: tuple[float, ...] = RADII,
 ) -> list[Variant]:
     """The whole spectrum of strengths, which holds back what the spring would deflect; on an arm
@@ -260,15 +248,11 @@ def _spectra(
     radius = span * np.array(ARM_RADII if bench.data.arm else seen)
     radius = bench.radii(torque, radius) if bench.course.unloads else radius
     radius = np.append(radius, NEVER * span)
-    if path is None:
-        slips = bench.plays(torque, radius, fresh, weight)
-    else:
-        tiled = np.tile(path.load[:, None], (1, len(radius)))
-        slips = play(tiled, radius, path.fresh, path.fresh)[path.kept]
+    slips = path.plays(radius)
     laws = [("Iwan", radius, slips - torque[:, None])]
     if bench.data.arm:
         laws.append(("Prandtl", radius[:-1], slips[:, :-1]))
-    reach = 1.0 if path is None else 2.0  # what was cycled before goes all the way back first
+    reach = 2.0 if path.worked_in else 1.0  # what was cycled before goes all the way back first
     out = []
     for law, radii, states in laws:
         columns = [bench.add_joint(joint, unit * state) for state in states.T]
@@ -316,15 +300,7 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
     return out
 
 
-def _exponential(
-    bench: Bench,
-    joint: int,
-    name: str,
-    reaches: Array,
-    fresh: Flags,
-    path: Path | None,
-    weight: Array | None,
-) -> list[Variant]:
+def _exponential(bench: Bench, joint: int, name: str, reaches: Array, path: Path) -> list[Variant]:
     """Dahl's and Bouc and Wen's laws, with neighbouring reaches (k,) of the range of torque."""
     torque, c = bench.true_torque[:, joint], bench.compliance[joint]
     span, out = bench.reach_of(torque), []
@@ -332,13 +308,8 @@ def _exponential(
     for law in friction_law.exponential_laws(bench):
         by_load, elastic = law in BY_LOAD, law.startswith("Bouc-Wen")
         reach = span * reaches * (NEARER if by_load else 1.0)
-        load = torque if path is None else path.load
-        load = by_ratio(load, span) if by_load else load
-        if path is None:
-            z = bristles(load, reach, fresh, elastic, weight)
-        else:
-            z = bristles(load, reach, path.fresh, elastic)[path.kept]
-        held = z * (np.abs(torque)[:, None] if by_load else reach)
+        way = bent(path, by_ratio(path.load, span)) if by_load else path
+        held = way.bristles(reach, elastic) * (np.abs(torque)[:, None] if by_load else reach)
         held -= torque[:, None] if law in SLIPPING else 0.0
         columns = [bench.add_joint(joint, -bench.sense * c * h) for h in held.T]
         for k in range(len(reach) - 1):

@@ -5,7 +5,8 @@ repetition of a setup is never withheld: where something slipped or yielded in i
 later ones do not show what happened, and the datum is set in it. The zero-load rows of a withheld
 run stay in: they carry its datum (of the laser, and of a drift), which no model can know; as do the
 forces that it was pushed across with. The datum of a withheld direction, of a laser that is zeroed
-before each run, or of a run that was never read without load is taken from its own mean.
+before each run, or of a run that was never read without load is taken from its own mean. Holds that
+tell themselves that the load went beyond them before (`search.unseen`) are not judged.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def held_out(
     what they may do within a fold is told by that fold itself."""
     bench, n = engine.bench, engine.bench.rows.n
     before, after, scatter = np.zeros(n), np.zeros(n), np.zeros(n)
-    judged = ~bench.rows.zero & (fold != ALWAYS_IN)
+    judged = ~bench.rows.zero & ~bench.rows.gone_beyond & (fold != ALWAYS_IN)
     within = judged & _within(bench)
     if name == "repetition" and within.any():
         judged = within

@@ -88,7 +88,8 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     if _swings(fitted) or _hurries(engine, fitted):
         share *= SWINGS
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
-    if explanation.eta > STEP * allowed:  # so much the grid may be off
+    hands = engine.bench.rows.rms(open_to_hands(engine, fitted))
+    if explanation.eta > STEP * float(np.hypot(allowed, hands)):  # so much the grid may be off
         good = min(good, explanation.log_good)
     asked = strain(engine, fitted, explanation.eta)
     return _unstrained(replace(explanation, log_good=good), asked)

@@ -18,7 +18,7 @@ from identification.gap.laws.law import (
     fresh_after,
 )
 from identification.gap.model.bench import TOOL_KG, Bench
-from identification.gap.model.history import bristles, play, worked_in
+from identification.gap.model.path import bent, worked_in
 from identification.gap.model.variants import LASTING, SET_UP_ANEW, UNDER_WEIGHT, Variant
 
 SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
@@ -69,26 +69,21 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     joint, at_strength = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
     size = np.array([t.shape["strength" if at_strength else "reach"] for t in law.terms if t.shape])
-    load, kept = torque, np.ones(len(torque), dtype=bool)
-    rest, weight = bench.rest, None
-    if c["memory"] == HUNG:
-        weight = bench.weight(joint, c.get("tool", TOOL_KG))
-    if c["memory"] == WORKED:
-        path = worked_in(torque, fresh)
-        load, fresh, kept, rest = path.load, path.fresh, path.kept, path.fresh
+    weight = bench.weight(joint, c.get("tool", TOOL_KG)) if c["memory"] == HUNG else None
+    path = bench.path(torque, fresh, weight)
+    path = worked_in(path) if c["memory"] == WORKED else path
     if at_strength:
-        tiled = np.tile(load[:, None], (1, len(size)))
-        state = play(tiled, size, rest, fresh, 0.0 if weight is None else weight[:, None])
-        held = (-state if c["law"] == "Prandtl" else load[:, None] - state)[kept]
+        state = path.plays(size)
+        held = -state if c["law"] == "Prandtl" else torque[:, None] - state
     else:
         by_load = c["law"] in BY_LOAD
         span = c.get("measured_to", bench.reach_of(torque))  # a file may lack it
-        way = by_ratio(load, span) if by_load else load
-        z = bristles(way, size, fresh, c["law"].startswith("Bouc-Wen"), weight)
-        held = (z * (np.abs(load)[:, None] if by_load else size))[kept]
+        way = bent(path, by_ratio(path.load, span)) if by_load else path
+        z = way.bristles(size, c["law"].startswith("Bouc-Wen"))
+        held = z * (np.abs(torque)[:, None] if by_load else size)
         grown = np.array([_grown(bench, law, t) for t in law.terms if t.shape])
         held = held * grown.reshape(len(size), bench.rows.n).T
-        held -= load[kept][:, None] if c["law"] in SLIPPING else 0.0
+        held -= torque[:, None] if c["law"] in SLIPPING else 0.0
     each = iter(held.T)
     return [
         bench.joint_column(joint, -bench.sense * next(each) if t.shape else torque)

@@ -9,6 +9,7 @@ observation is `y = prior simulation + base columns + effect columns + imperfect
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -17,9 +18,10 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.data import GapData
 from identification.gap.model.driven import driven
-from identification.gap.model.history import moves, play, rests
+from identification.gap.model.history import moves, rests
 from identification.gap.model.layout import Layout, layout_of
 from identification.gap.model.noise import Noise, estimate_noise
+from identification.gap.model.path import Path, path_of
 from identification.gap.model.pool import Pool
 from identification.gap.recording.course import Course
 from identification.gap.recording.imposed import displacement_imposed
@@ -285,14 +287,27 @@ class Bench:
     def _unit_elastic(self) -> Array:
         return self.lever * self.compliance
 
+    def path(self, load: Array, fresh: Flags | None = None, weight: Array | None = None) -> Path:
+        """Of a load (n,), with what no row shows of it; fresh: where the memory is lost, by default
+        where the arm goes to another pose. weight (n,): that acts beside the load."""
+        lost = self.moved if fresh is None else fresh
+        return path_of(load, self.rest, lost, weight, self.rows.overshoot)
+
+    def along(self, overshoot: Array) -> Bench:
+        """The bench with loads (n,) that no row shows (`Rows.overshoot`); what is known of it else
+        stays, and its pool."""
+        out = copy(self)  # with what has been worked out of rows and loads
+        rows = copy(self.rows)
+        object.__setattr__(rows, "overshoot", overshoot)
+        for name, value in (("rows", rows), ("flows", {}), ("lags", {})):
+            object.__setattr__(out, name, value)
+        return out
+
     def plays(
         self, load: Array, radius: Array, fresh: Flags | None = None, weight: Array | None = None
     ) -> Array:
-        """Play states (n, k) of a load (n,) for radii (k,); fresh: where the memory is lost, by
-        default where the arm goes to another pose. weight (n,): that acts beside the load."""
-        tiled = np.tile(load[:, None], (1, len(radius)))
-        lost = self.moved if fresh is None else fresh
-        return play(tiled, radius, self.rest, lost, 0.0 if weight is None else weight[:, None])
+        """Play states (n, k) of the path of a load (n,), for radii (k,)."""
+        return self.path(load, fresh, weight).plays(radius)
 
     def weight(self, joint: int, tool_kg: float = TOOL_KG) -> Array:
         """(n,) Nm: what the weights of arm and tool do to a joint."""

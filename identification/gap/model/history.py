@@ -69,27 +69,6 @@ def _clipped(values: Array | float, low: Array, high: Array) -> Array:
     return np.asarray(np.minimum(np.maximum(values, low), high))
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
-    """A load path with a cycle put before every fresh start; kept: the rows that were there."""
-
-    load: Array
-    fresh: Flags
-    kept: Flags
-
-
-def worked_in(load: Array, fresh: Flags) -> Path:
-    """The path (n,) with a cycle to its largest load and back before every fresh start."""
-    starts = np.flatnonzero(fresh)
-    parts, begins, kept = [], [], []
-    for a, b in zip(starts, np.append(starts[1:], len(load)), strict=True):
-        top = load[a + int(np.abs(load[a:b]).argmax())]
-        parts.append(np.concatenate([[top, 0.0], load[a:b]]))
-        begins.append(np.concatenate([[True], np.zeros(b - a + 1, dtype=bool)]))
-        kept.append(np.concatenate([[False, False], np.ones(b - a, dtype=bool)]))
-    return Path(np.concatenate(parts), np.concatenate(begins), np.concatenate(kept))
-
-
 def beginnings(fresh: Flags) -> Flags:
     """Rows (n,) from which a memory counts: where it is fresh (n,), and the first one."""
     return np.asarray(fresh | (np.arange(len(fresh)) == 0))
@@ -171,15 +150,30 @@ def retarded(
     ramp = phases.ramp[:, None] / times
     held = np.exp(-phases.stands[:, None] / times)
     during = np.exp(-ramp)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(ramp > 0, -np.expm1(-ramp) / ramp, 1.0)
-    ramped = load * (1 - share) + before * (share - during)  # of a ramp, z = 0 before it
+    ramped = _ramped(before, load, ramp)
+    beyond = np.flatnonzero(rows.overshoot)
+    if beyond.size:
+        peak = load[beyond] * (1 + rows.overshoot[beyond, None])
+        there, back = PEAK * ramp[beyond], (1 - PEAK) * ramp[beyond]
+        gone = _ramped(before[beyond], peak, there) * np.exp(-back)
+        ramped[beyond] = gone + _ramped(peak, load[beyond], back)
     decayed = np.exp(-phases.step[:, None] / times)
     keep = held * during * np.where(rest[:, None], decayed, paused)
     if fresh is not None:
         keep[fresh] = 0.0
     stood = during * before * (1 - paused)
     return _prefix(keep, held * (ramped + stood) + load * (1 - held))
+
+
+def _ramped(before: Array, after: Array, ramp: Array) -> Array:
+    """What a lag follows of a load that ramps from before to after (n, k) in `ramp` (n, k) of its
+    time, from nothing."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(ramp > 0, -np.expm1(-ramp) / ramp, 1.0)
+    return np.asarray(after * (1 - share) + before * (share - np.exp(-ramp)))
+
+
+PEAK = 5 / 8  # of the time on the way to a hold: there the load has gone furthest beyond it
 
 
 def followed(values: Array, clock: Array, times: Array) -> Array:
@@ -252,13 +246,22 @@ def flowing_play(
         if phases.pause[i] > 0:
             state = flown(state, paused[i], before + below[i], before + above[i])
         if phases.ramp[i] > 0:
-            at = before + share[parts[i]] * (x - before)
+            at = _on_the_way(before, x, share[parts[i]], rows.overshoot[i])
             for least, most in zip(at + below[i], at + above[i], strict=True):
                 state = flown(state, during[i], least, most)
         if phases.stands[i] > 0:
             state = flown(state, stood[i], low[i], high[i])
         out[i], before = state, x
     return out - hung
+
+
+def _on_the_way(before: Array, after: Array, share: Array, beyond: float) -> Array:
+    """(p, k) loads at shares (p, 1) of the time in which it goes from before to after (k,)."""
+    if beyond == 0:
+        return np.asarray(before + share * (after - before))
+    peak = after * (1 + beyond)
+    there, back = share / PEAK, (share - PEAK) / (1 - PEAK)
+    return np.where(back < 0, before + there * (peak - before), peak + back * (after - peak))
 
 
 def _flowing(over: Array, square: Flags | bool) -> Array:
@@ -363,8 +366,13 @@ def _paths(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]
         if not rows.continuous:
             new = rows.hold_starts[a:b]
             last = half * rows.weight[a:b][:-1]
-            t = np.concatenate([t, t[new] - half, (t[:-1] + last)[new[1:]]])
-            v = np.concatenate([v, v[new], v[:-1][new[1:]]])
+            leaves, comes = (t[:-1] + last)[new[1:]], t[1:][new[1:]] - half
+            beyond = rows.overshoot[a + 1 : b][new[1:]]
+            peaks = beyond != 0
+            peak = (v[1:][new[1:]].T * (1 + beyond)).T[peaks]
+            turns = (leaves + PEAK * (comes - leaves))[peaks]
+            t = np.concatenate([t, t[new] - half, leaves, turns])
+            v = np.concatenate([v, v[new], v[:-1][new[1:]], peak])
             order = np.argsort(t, kind="stable")
             t, v = t[order], v[order]
         elif len(t) > 1:

@@ -40,6 +40,8 @@ class Rows:
     force_scatter, displacement_scatter (n,): mean squares of the samples about their row, N^2 and
     m^2; of rows of holds also spread (n,) s^2: of their times; force_trend,
     displacement_trend (n,): mean products of time and channel about the row, N s and m s.
+    overshoot (n,): share of a row's load by which the load went beyond it before, on the way there,
+    that no row shows: found, not recorded (`search.unseen`), and 0 until then.
     """
 
     time: Array
@@ -74,6 +76,7 @@ class Rows:
     continuous: bool
     starts: Flags  # first row of a run
     hold_starts: Flags
+    overshoot: Array
 
     @property
     def n(self) -> int:
@@ -89,6 +92,11 @@ class Rows:
     def run_edges(self) -> Ints:
         """(runs + 1,) first row of every run, and the one after the last."""
         return np.append(np.flatnonzero(self.starts), self.n)
+
+    @cached_property
+    def gone_beyond(self) -> Flags:
+        """(n,) rows of holds beyond which the load is taken to have gone before."""
+        return np.asarray(np.isin(self.hold, self.hold[self.overshoot != 0]))
 
     @cached_property
     def _share_of_setup(self) -> Array:
@@ -187,6 +195,7 @@ def reduce_rows(data: GapData) -> Rows:
         continuous=bins.running,
         starts=_changes(run),
         hold_starts=_changes(holds),
+        overshoot=np.zeros(len(holds)),
     )
 
 

@@ -1,0 +1,145 @@
+"""A hand that turns the screw too far and back, while nothing is read: what remembers shows it."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from identification.gap.diagnose import GapResult
+from identification.gap.judging.heldout import folds, held_out
+from identification.gap.search.unseen import Unseen
+from rig.diagnosis.gap_data import gap_data
+from tests.conformance.gap_designs import (
+    DESIGNS,
+    TOP_N,
+    TRUE,
+    Array,
+    Law,
+    imported,
+    levers,
+    meta,
+    noisy,
+)
+from tests.explained import explained
+
+JOINT = 1
+STRENGTHS_NM, SHARES = (3.0, 9.0, 25.0), (0.1, 0.1, 0.1)
+TOO_FAR, EVERY = 0.1, 0.25  # of the largest load; share of the holds
+
+
+def overshoots(rows: pd.DataFrame, chance: float) -> Array:
+    """(n,) N by which the load went beyond a hold, at its first row: back to none at most."""
+    rng, force = np.random.default_rng(11), rows["force_N"].to_numpy(float)
+    change = np.diff(force, prepend=0.0)
+    new = (change != 0) & (force > 0) & (rows["step"] > 0).to_numpy()
+    new &= np.diff(rows["time_s"], prepend=0.0) > 0  # not after the rest between two runs
+    top = np.array([TOP_N[d] for d in rows["direction"]])
+    further = np.sign(change) * TOO_FAR * top
+    return np.where(new & (rng.random(len(rows)) < chance), np.maximum(further, -force), 0.0)
+
+
+def slipped(rows: pd.DataFrame, lever: Array, chance: float) -> tuple[Array, Array]:
+    """Elements that slip at a strength each and spring back (Prandtl 1928), element by element and
+    load by load, and what the joint gives way by them."""
+    force, further = rows["force_N"].to_numpy(float), overshoots(rows, chance)
+    out = np.zeros((len(rows), 6))
+    for strength, share in zip(STRENGTHS_NM, SHARES, strict=True):
+        carried = slip = 0.0
+        for i, arm in enumerate(lever[:, JOINT]):
+            for load in ([arm * (force[i] + further[i])] if further[i] else []) + [arm * force[i]]:
+                carried = float(np.clip(load - slip, -strength, strength))
+                slip = load - carried
+            out[i, JOINT] += share * slip / TRUE[JOINT]
+    return np.zeros(len(rows)), out
+
+
+def too_late(rows: pd.DataFrame, lever: Array, chance: float) -> tuple[Array, Array]:
+    """A laser that is late: in the first reading of a hold the hand seems to go on, and where it
+    went too far it seems to go back."""
+    force, further = rows["force_N"].to_numpy(float), overshoots(rows, chance)
+    change = np.where(np.diff(rows["time_s"], prepend=0.0) > 0, np.diff(force, prepend=0.0), 0.0)
+    behind = np.where(further != 0, further, -change) * 0.3
+    return np.sum(lever**2 / TRUE, axis=1) * behind, np.zeros((len(rows), 6))
+
+
+def scattering(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+    """Beside that friction every level stands off by chance, which no hand does."""
+    hold = (rows["force_N"].diff().fillna(1.0) != 0).cumsum().to_numpy()
+    off = np.random.default_rng(3).normal(0, 12e-6, hold.max() + 1)
+    return off[hold] * (rows["step"] > 0), slipped(rows, lever, 0.0)[1]
+
+
+@cache
+def diagnosed(law: Law) -> GapResult:
+    design = DESIGNS["medium"]
+    return explained(gap_data(imported(noisy(design, law), meta(design))))
+
+
+FRICTION, CALM = partial(slipped, chance=EVERY), partial(slipped, chance=0.0)
+LATE = partial(too_late, chance=EVERY)
+
+
+def told(found: GapResult) -> bool:
+    return any("gone too far, and back" in note for note in found.notes)
+
+
+def test_friction_is_found_and_so_is_where_the_hand_went_too_far() -> None:
+    found = diagnosed(FRICTION)
+    assert found.verdict == "joint_hysteresis"
+    assert found.after < 1.2 * found.noise
+    rows, table = found.bench.rows, noisy(DESIGNS["medium"])
+    table["force_N"] = np.round(table["force_N"])  # as it was meant
+    first = np.cumsum(rows.hold_weight[rows.edges]).astype(int) - DESIGNS["medium"].hold
+    seen = rows.overshoot[rows.edges] != 0
+    true = overshoots(table, EVERY)[first] != 0
+    assert not np.any(seen & ~true)
+    lever = levers(table)
+    far, calm = (slipped(table, lever, c)[1][:, JOINT] for c in (EVERY, 0.0))
+    shows = true & (np.abs((lever[:, JOINT] * (far - calm))[first]) > 5e-6)
+    assert np.sum(seen & shows) > 0.8 * np.sum(shows) > 0
+    assert told(found)
+
+
+def test_a_calm_hand_is_not_said_to_have_gone_too_far() -> None:
+    found = diagnosed(CALM)
+    assert found.verdict == "joint_hysteresis"
+    assert not found.bench.rows.overshoot.any()
+    assert not told(found)
+
+
+def test_a_lag_is_found_however_far_the_hand_went() -> None:
+    assert diagnosed(LATE).verdict == "time_lag"
+
+
+def test_levels_that_scatter_are_no_hand() -> None:
+    assert diagnosed(scattering).verdict == "unknown"
+
+
+def test_what_a_hold_told_itself_is_not_judged_as_withheld() -> None:
+    found = diagnosed(FRICTION)
+    (name, fold), *_ = folds(found.engine).items()
+    explanation = found.found.explanations[0]
+    before = held_out(found.engine, explanation, name, fold).after
+    mine = found.bench.rows.gone_beyond
+    assert mine.any()
+    moved = found.engine.target
+    moved[: len(mine)][mine] += 1e-3
+    try:
+        far_off = held_out(found.engine, explanation, name, fold).after
+    finally:
+        moved[: len(mine)][mine] -= 1e-3
+    assert before < 2 * found.noise
+    assert far_off != before
+
+
+def test_more_places_and_more_of_them_cost_more() -> None:
+    def cost(count: int, of: int) -> float:
+        return Unseen(np.zeros(1), count, of).cost
+
+    assert cost(0, 40) == pytest.approx(np.log(41))
+    assert cost(1, 40) == pytest.approx(np.log(41 * 40 * 4))
+    assert cost(5, 40) > cost(4, 40)
+    assert cost(5, 80) > cost(5, 40)
