@@ -197,25 +197,17 @@ def _with_unseen(
     known: Sequence[Form],
     withheld: Collection[str],
 ) -> tuple[SearchResult, list[Variant]]:
-    """The search once more, and from there again, with loads between readings, where these explain
-    more than it costs to say which they are."""
-    paid = 0.0
-    for _ in range(_PATHS):
-        more = unseen(found)
-        if more is None:
-            break
-        bench = found.engine.bench
-        rows = replace(bench.rows, overshoot=more.overshoot)
-        engine, others = _prepared(make_bench(bench.data, rows=rows), known, withheld)
-        again = _searched(engine, others)
-        gain = again.explanations[0].log_weight - found.explanations[0].log_weight
-        if gain < more.cost - paid:
-            break
-        found, variants, paid = again, others, more.cost
-    return found, variants
-
-
-_PATHS = 2  # tries: the first explanation that remembers may have been another
+    """The search once more with loads between readings, where these explain more than it costs to
+    say which they are."""
+    more = unseen(found)
+    if more is None:
+        return found, variants
+    bench = found.engine.bench
+    rows = replace(bench.rows, overshoot=more.overshoot)
+    engine, others = _prepared(make_bench(bench.data, rows=rows), known, withheld)
+    again = _searched(engine, others)
+    gain = again.explanations[0].log_weight - found.explanations[0].log_weight
+    return (again, others) if gain > more.cost else (found, variants)
 
 
 class NotShown(ValueError):

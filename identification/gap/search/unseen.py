@@ -27,8 +27,9 @@ from identification.gap.recording.rows import Rows
 
 SIZES = (0.03, 0.06, 0.12, 0.24)  # of the largest load, by which it goes beyond a level
 _FEWEST = 8  # holds that a load was brought to: of fewer nobody tells chance from habit
+_MOST = 250_000  # holds times rows: of more it would last longer than all the rest
 _LOOKED_AT = 12  # explanations
-_SWEEPS = 4
+_SWEEPS = 3
 _LOADED = 0.02  # of the largest load: less is none, and nobody pulls at a contact
 _OFF = 2.0  # standard deviations: holds that are nearer to what is expected are left alone
 _PLAIN = 10.0  # nats that are gained at least, for all to be searched once more
@@ -52,21 +53,21 @@ class Unseen:
 
 def unseen(found: SearchResult) -> Unseen | None:
     """What the best explanation that remembers says of the loads between the readings of levels;
-    None where nothing is gained, or no more than is known already."""
+    None where nothing is gained."""
     engine = found.engine
     rows = engine.bench.rows
     if rows.continuous or engine.bench.imposed:
         return None
     at = _brought_to(rows)
-    if len(at) < _FEWEST:
+    if len(at) < _FEWEST or len(at) * rows.n > _MOST:
         return None
     for explanation in found.explanations[:_LOOKED_AT]:
         path = _Paths(engine, explanation, at)
         if path.remembers:
             out, gain = path.found()
             more = Unseen(out, int(np.count_nonzero(out)), len(at))
-            news = not np.array_equal(out, rows.overshoot)
-            return more if news and gain > more.cost + _PLAIN else None
+            behind = found.explanations[0].log_weight - explanation.log_weight
+            return more if gain > more.cost + behind + _PLAIN else None
     return None
 
 
@@ -111,16 +112,15 @@ class _Paths:
         self._root = block(root)
 
     def found(self) -> tuple[Array, float]:
-        """(n,) overshoot that the data gain by, from the one that is known on, and nats gained
-        against none."""
-        rows = self._engine.bench.rows
-        out = rows.overshoot.copy()
+        """(n,) overshoot that the data gain by, and nats gained."""
+        out = np.zeros(self._engine.bench.rows.n)
+        none = self._fit(out).square
         for _ in range(_SWEEPS):
             before = out.copy()
             self._sweep(out)
             if np.array_equal(out, before):
                 break
-        return out, (self._fit(np.zeros(rows.n)).square - self._fit(out).square) / 2
+        return out, (none - self._fit(out).square) / 2
 
     def _fit(self, overshoot: Array) -> _Fitted:
         effect = self._effect(overshoot)
