@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from identification.arrays import Flags
 from identification.gap.diagnose import GapResult
-from identification.gap.judging.heldout import folds, held_out
+from identification.gap.judging.heldout import ALWAYS_IN, folds, held_out, stated_prediction
 from identification.gap.search.unseen import Unseen
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import (
@@ -133,6 +134,22 @@ def test_what_a_hold_told_itself_is_not_judged_as_withheld() -> None:
         moved[: len(mine)][mine] -= 1e-3
     assert before < 2 * found.noise
     assert far_off != before
+
+
+def test_the_gap_of_withheld_levels_counts_no_level_that_told_itself() -> None:
+    found = diagnosed(FRICTION)
+    (name, fold), *_ = folds(found.engine).items()
+    bench = found.bench
+    gap = bench.response - stated_prediction(found.engine)
+    gap = np.sqrt(gap**2 + bench.scatter_about(bench.response - gap))
+    withheld = ~bench.rows.zero & (fold != ALWAYS_IN)
+    said = held_out(found.engine, found.found.explanations[0], name, fold).before
+
+    def rms(rows: Flags) -> float:
+        return float(np.sqrt(np.average(gap[rows] ** 2, weights=bench.rows.weight[rows])))
+
+    assert said == pytest.approx(rms(withheld & ~bench.rows.gone_beyond))
+    assert said != pytest.approx(rms(withheld))
 
 
 def test_more_places_and_more_of_them_cost_more() -> None:

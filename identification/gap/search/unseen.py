@@ -20,7 +20,6 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import IMPERFECTION
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult
-from identification.gap.laws.law import Law, Laws
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import block
 from identification.gap.recording.rows import Rows
@@ -100,16 +99,13 @@ class _Paths:
         further = np.sign(load - bench.load[at - 1]) * top / load
         # back to none at most: a screw does not pull
         self._beyond = np.maximum(np.multiply.outer(np.array(SIZES), further), -1.0)  # (s, holds)
-        self._parts = [_Column(bench, p) for p in explanation.parts]
         everywhere = np.zeros(bench.rows.n)
         everywhere[at] = self._beyond[-1]
-        for part in self._parts:
-            part.look(everywhere)
+        self._parts = [_Columns(bench, p, everywhere) for p in explanation.parts]
         self.remembers = any(p.remembers for p in self._parts)
         size = IMPERFECTION * max(explanation.sizes, default=0.0)
         self._white = _White(engine, size)
-        root = [np.diag(engine.base.sd), *(p.root for p in explanation.parts)]
-        self._root = block(root)
+        self._root = block([np.diag(engine.base.sd), *(p.root for p in explanation.parts)])
 
     def found(self) -> tuple[Array, float]:
         """(n,) overshoot that the data gain by, and nats gained."""
@@ -157,27 +153,25 @@ class _Paths:
         return np.hstack([p.along(overshoot) for p in self._parts])
 
 
-class _Column:
-    """Columns of one part of an explanation, along any path."""
+class _Columns:
+    """Columns (size, k) of one part of an explanation, along any path; remembers: whether a path
+    makes a difference to them."""
 
-    def __init__(self, bench: Bench, part: Part) -> None:
-        self._bench = bench
-        self._laws: Laws = EFFECTS[part.word].laws
-        self._law: Law
+    def __init__(self, bench: Bench, part: Part, everywhere: Array) -> None:
+        """everywhere (n,): a path that goes beyond every hold."""
+        self._bench, self._laws = bench, EFFECTS[part.word].laws
         self._law, self._scale = self._laws.of(bench, part.variant)
-        self._plain = self._laws.rows(bench.along(np.zeros(bench.rows.n)), self._law) * self._scale
-        self.remembers = False
-
-    def look(self, overshoot: Array) -> None:
-        """Whether a path makes a difference to it."""
-        self.remembers = True
-        self.remembers = not np.allclose(self.along(overshoot), self._plain)
+        self._straight = self._made(bench)
+        self.remembers = not np.allclose(self._made(bench.along(everywhere)), self._straight)
 
     def along(self, overshoot: Array) -> Array:
-        """(size, k) columns along a path."""
+        """Along a path (n,)."""
         if not self.remembers or not overshoot.any():
-            return self._plain
-        return self._laws.rows(self._bench.along(overshoot), self._law) * self._scale
+            return self._straight
+        return self._made(self._bench.along(overshoot))
+
+    def _made(self, bench: Bench) -> Array:
+        return self._laws.rows(bench, self._law) * self._scale
 
 
 class _White:
