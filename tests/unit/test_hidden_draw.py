@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ import pytest
 from rig.errors import InputError
 from rig.meta import Meta
 from rig.worlds.hidden import draw
+from rig.worlds.hidden.design import draw_plan
 from rig.worlds.hidden.draw import WORDS, HiddenCase, draw_case
+from rig.worlds.hidden.scene import make_scene
 
 
 @pytest.fixture(scope="module")
@@ -172,3 +175,21 @@ def test_nothing_of_identification_is_imported() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
     )
     assert done.stdout.strip() == "[]"
+
+
+def test_some_hands_turn_past_a_level_and_back() -> None:
+    """No sample shows it; what is read is the level."""
+    random = np.random.default_rng(5)
+    plan = replace(draw_plan(random, "medium"), beyond=0.5)
+    history = make_scene(plan, random).history
+    load = history.load
+    past, levels = 0, np.flatnonzero(np.diff(history.step, prepend=0) != 0)
+    for before, at in zip(history.sample[levels - 1], history.sample[levels], strict=True):
+        way = load[before : at + 1]
+        past += bool(way.max() > max(way[0], way[-1]) or way.min() < min(way[0], way[-1]))
+        assert way.min() >= 0.0
+    assert 0.3 < past / len(levels) < 0.7
+    calm = make_scene(replace(plan, beyond=0.0), random).history
+    for before, at in zip(calm.sample[:-1], calm.sample[1:], strict=True):
+        way = np.diff(calm.load[before : at + 1])
+        assert np.all(way >= 0) or np.all(way <= 0)

@@ -80,12 +80,12 @@ def _brought_to(rows: Rows) -> Ints:
 
 class _Fitted(NamedTuple):
     """coefficients (k,) of an explanation, its effect (size,) by them, what that leaves (white),
-    and the square of all that is left or asked of the prior."""
+    and the log evidence, but for what no path and no imperfection change."""
 
     coefficients: Array
     effect: Array
     left: Array
-    square: float
+    log_evidence: float
 
 
 class _Paths:
@@ -103,35 +103,41 @@ class _Paths:
         everywhere[at] = self._beyond[-1]
         self._parts = [_Columns(bench, p, everywhere) for p in explanation.parts]
         self.remembers = any(p.remembers for p in self._parts)
-        size = IMPERFECTION * max(explanation.sizes, default=0.0)
-        self._white = _White(engine, size)
+        # along the right path a law misses no more than laws do
+        self._white = _White(engine, IMPERFECTION * max(explanation.sizes, default=0.0))
+        self._missed = explanation.eta
         self._root = block([np.diag(engine.base.sd), *(p.root for p in explanation.parts)])
 
     def found(self) -> tuple[Array, float]:
         """(n,) overshoot that the data gain by, and nats gained."""
         out = np.zeros(self._engine.bench.rows.n)
-        none = self._fit(out).square
+        none = self._fit(out, _White(self._engine, self._missed)).log_evidence
         for _ in range(_SWEEPS):
             before = out.copy()
             self._sweep(out)
             if np.array_equal(out, before):
                 break
-        return out, (none - self._fit(out).square) / 2
+        sizes = [e for e in self._engine.etas.tolist() if e <= self._missed]
+        then = max(self._fit(out, _White(self._engine, e)).log_evidence for e in sizes)
+        return out, then - none
 
-    def _fit(self, overshoot: Array) -> _Fitted:
+    def _fit(self, overshoot: Array, whitened: _White) -> _Fitted:
         effect = self._effect(overshoot)
-        white = self._white(np.hstack([self._engine.base.columns, effect]) @ self._root)
-        target = self._white(self._engine.target[:, None])[:, 0]
-        inner = np.linalg.solve(white.T @ white + np.eye(white.shape[1]), white.T @ target)
+        white = whitened(np.hstack([self._engine.base.columns, effect]) @ self._root)
+        target = whitened(self._engine.target[:, None])[:, 0]
+        precision = white.T @ white + np.eye(white.shape[1])
+        inner = np.linalg.solve(precision, white.T @ target)
         w = (self._root @ inner)[self._engine.base.columns.shape[1] :]
         left = target - white @ inner
-        return _Fitted(w, effect @ w, left, float(left @ left + inner @ inner))
+        square = float(left @ left + inner @ inner)
+        freedom = float(np.linalg.slogdet(precision)[1])
+        return _Fitted(w, effect @ w, left, -(square + freedom + whitened.log_variance) / 2)
 
     def _sweep(self, out: Array) -> None:
         """Puts in, takes out or changes what gains, hold after hold, with coefficients as they
         fit in the beginning."""
         cost = 2 * log(len(self._at) * len(SIZES))  # twice the nats: of a sum of squares
-        first = self._fit(out)
+        first = self._fit(out, self._white)
         now, left = first.effect, first.left
         off = self._white.off(left, self._at)
         for i, k in enumerate(self._at.tolist()):
@@ -176,7 +182,8 @@ class _Columns:
 
 class _White:
     """Stacked values (size, k) over their standard deviations: rows about the means of their holds,
-    and these means, which a law misses by `size` m."""
+    and these means, which a law misses by `size` m. log_variance: log of the determinant of the
+    rows' covariance (m^2)."""
 
     def __init__(self, engine: Engine, size: float) -> None:
         bench = engine.bench
@@ -188,6 +195,8 @@ class _White:
         self._share = (self._root[:, 0] ** 2 / information[self._rows.hold])[:, None]
         common = np.hypot(bench.noise.hold[edges], size)
         self._mean_sd = np.sqrt(1 / information + common**2)[:, None]
+        within = float(np.log1p(common**2 * information).sum())
+        self.log_variance = 2 * float(np.log(noise).sum()) + within
 
     def __call__(self, values: Array) -> Array:
         n, edges = self._rows.n, self._rows.edges

@@ -12,6 +12,7 @@ from rig.worlds.arm import place
 
 DESIGNS = ("rich", "medium", "paper")
 _DESIGN_SHARES = (0.4, 0.35, 0.25)
+_HASTY = 0.15  # of the hands turn past a level now and then
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _TOP_N = {"x": (165.0, 220.0), "y": (82.0, 102.0), "z": (70.0, 115.0)}
@@ -61,7 +62,8 @@ class Plan:
 
     poses: name -> commanded joint angles (6) rad; tcp_mm (3) in the flange frame; steps up to the
     largest load; hold and zero in samples; springs Nm/rad as the simulator believes them, and as
-    they are. tool_kg: mass of what is screwed to the flange; nobody wrote it down.
+    they are. tool_kg: mass of what is screwed to the flange; nobody wrote it down. beyond: share of
+    the levels that the hand first turns past, and then back to, before anything is read.
     """
 
     name: str
@@ -80,6 +82,7 @@ class Plan:
     relative_sd: float
     springs: Array
     tool_kg: float
+    beyond: float
 
 
 def draw_plan(random: Generator, design: str | None) -> Plan:
@@ -111,6 +114,7 @@ def draw_plan(random: Generator, design: str | None) -> Plan:
         relative_sd=relative_sd,
         springs=springs,
         tool_kg=round(random.uniform(0.0, 3.0), 2),
+        beyond=round(random.uniform(0.05, 0.4), 2) if random.random() < _HASTY else 0.0,
     )
 
 

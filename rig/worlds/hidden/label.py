@@ -55,6 +55,7 @@ def answers(
         "gap_before_rms_mm": rounded(_before(scene, effects)),
         "design": scene.plan.name,
         "samples": len(scene.history.sample),
+        "turned_past": scene.plan.beyond,
         "true_joint_stiffness": rounded(scene.plan.springs),
         "recorded": {
             "q": recorded.q,

@@ -22,6 +22,8 @@ from rig.worlds.hidden.design import Plan
 Index = NDArray[np.int64]
 TURN_STEPS = 12  # instants while the screw turns from one force to the next
 SETTLED_S = 0.5  # from the end of a turn to the first sample
+_BEYOND = (0.02, 0.2)  # of the largest load, by which a hand turns past a level
+_BACK = 2 / 3  # of a turn, when the hand that went too far turns back
 BRANCHES = ("zero", "loading", "unloading")
 
 
@@ -212,16 +214,26 @@ class _Clock:
         for branch, step in levels:
             aim = 0.0 if step == 0 else top * step / plan.steps
             aim += (0.2 + 0.003 * aim) * self._random.standard_normal() if step else 0.0
-            self._turn(load, aim, setup, run)
+            self._turn(load, aim, setup, run, self._past(aim - load, top) if step else 0.0)
             load = aim
             count = plan.hold if step else plan.zero_after
             self._hold(count, load, setup, run, (branch, step, repetition), start)
 
-    def _turn(self, old: float, new: float, setup: int, run: int) -> None:
+    def _past(self, change: float, top: float) -> float:
+        """How far (N) the hand goes past a level that it turns to by `change`: mostly nothing."""
+        if self._random.random() >= self._plan.beyond:
+            return 0.0
+        return float(np.sign(change) * top * self._random.uniform(*_BEYOND))
+
+    def _turn(self, old: float, new: float, setup: int, run: int, past: float = 0.0) -> None:
+        """past: N by which the load goes past the new one; never to where a screw would pull."""
         seconds = self._turn_s * self._random.uniform(0.7, 1.5)
-        for k in range(1, TURN_STEPS + 1):
+        shares = np.arange(1, TURN_STEPS + 1) / TURN_STEPS
+        corners = (0.0, _BACK, 1.0) if past else (0.0, 1.0)
+        loads = (old, max(new + past, 0.0), new) if past else (old, new)
+        for load in np.interp(shares, corners, loads).tolist():
             self._now += seconds / TURN_STEPS
-            self._note(old + (new - old) * k / TURN_STEPS, setup, run)
+            self._note(load, setup, run)
 
     def _hold(
         self,
