@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 import pytest
+from scipy.special import erf
 
 from identification.arrays import Array
 from identification.gap.evidence.engine import Engine
@@ -22,7 +23,7 @@ from identification.gap.judging.dead_zone import (
 )
 from identification.gap.model.bench import Bench
 from tests.explained import explained
-from tests.unit.test_gap_flanks import a_bench, held, to_and_fro
+from tests.unit.test_gap_flanks import N, a_bench, held, to_and_fro
 
 U = np.linspace(-1.0, 1.0, 600)
 FRICTION = "joint_hysteresis"
@@ -117,6 +118,13 @@ def test_a_play_that_is_passed_between_two_readings_is_no_curve() -> None:
     u = to_and_fro(cycles=8)
     force = np.asarray(np.interp(u, U + 0.012 * np.tanh(U / 0.005), U))
     found = explained(a_bench(force, u, "displacement").data)
+    assert found.verdict == PLAY
+
+
+def test_a_step_with_no_reading_inside_is_a_play_however_steep_it_looks() -> None:
+    """From the reading before to the one behind, 2 % of the range away, it looks half as stiff."""
+    force = np.sin(2 * np.pi * np.arange(N) / 300)
+    found = explained(a_bench(force, force + 0.025 * erf(force / 0.012), "force").data)
     assert found.verdict == PLAY
 
 

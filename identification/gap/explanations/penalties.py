@@ -208,7 +208,10 @@ def _sizes_that_show(parts: tuple[Part, ...], found: Sizes) -> Array:
 def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     """Both are friction of one joint, or would be, for all that the data show; or one is the
     linear part of the other: a mechanism's law brings its own mean stiffness."""
-    same = bool(set(one.variant.joints) & set(other.variant.joints))
+    mine, others = set(one.variant.joints), set(other.variant.joints)
+    same = bool(mine & others)
+    if not engine.bench.data.arm and mine and others and not same:
+        return False  # each in a direction of its own, which no spring shares
     words = {one.word, other.word}
     holds = "joint_creep" in words and not engine.bench.course.always_moves
     bench = engine.bench  # without any return all memory is hidden; arms are let go between runs

@@ -12,6 +12,7 @@ from identification.gap.evidence.compare import closest, marginal, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, explain, up_to_likeliest
+from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 from identification.gap.words import IN_JOINTS
 
@@ -34,10 +35,8 @@ def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> l
 def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
     """With its joint mechanisms in further joints, as far as that is worth it."""
     bench = engine.bench
-    if not bench.data.arm:
-        return start
     best = start
-    for word in sorted(start.words & (IN_JOINTS if bench.has_q else _BY_ITSELF)):
+    for word in sorted(start.words & (IN_JOINTS if _each_seen(bench) else _BY_ITSELF)):
         for _ in range(MOST - 1):
             if best.eta <= bench.noise.stated:
                 break  # there is nothing left for another joint to do
@@ -46,6 +45,12 @@ def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) 
                 break
             best = found
     return best
+
+
+def _each_seen(bench: Bench) -> bool:
+    """Whether every joint is read; the compliances of a rig without an arm, one in each direction,
+    are."""
+    return bench.has_q or not bench.data.arm
 
 
 def _in_one_more(

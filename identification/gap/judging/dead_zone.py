@@ -84,9 +84,9 @@ def has_dead_zone(u: Array, force: Array, limits: Limits) -> bool:
 
 
 def _is_a_step(u: Array, force: Array) -> bool:
-    """Whether all that is soft along a fit is passed between a few readings: the displacement jumps
-    there, as no curve does, and nobody sees what the ends are like."""
-    soft = _soft(_stiffness(u, force))
+    """Whether all that is softer than the flanks of a fit is passed between a few readings: the
+    displacement jumps there, as no curve does, and nobody sees what the ends are like."""
+    soft = _stretches(_stiffness(u, force) <= _BACK)
     at = np.linspace(float(u.min()), float(u.max()), _POINTS)
     inside = [_stretches((u >= at[a]) & (u <= at[b - 1])) for a, b in soft]
     return bool(soft) and all(b - a <= _UNSEEN for each in inside for a, b in each)
