@@ -21,6 +21,7 @@ from identification.gap.diagnose import GapResult, diagnose_gap
 from identification.gap.effects import EFFECTS, library
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
+from identification.gap.search.unseen import unseen
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
 from rig.diagnosis.diagnose import diagnose
@@ -298,6 +299,12 @@ def test_onset_where_a_direction_reaches_the_threshold() -> None:
     found = result_of("yield").effects[0].parameters
     assert found["onset_y"].value == pytest.approx(45.0 / abs(tip[1, 0]), rel=0.05)
     assert "onset_x" not in found  # never so much on joint 1
+
+
+def test_what_the_law_of_a_yield_misses_is_no_hand_that_went_too_far() -> None:
+    found = result_of("yield").found
+    assert found.explanations[0].eta > 0
+    assert unseen(found) is None
 
 
 def test_creep_fraction_and_time() -> None:

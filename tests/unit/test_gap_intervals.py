@@ -24,6 +24,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.laws.interval import NOMINAL, Parameter
+from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_parameters import known_of, sd
@@ -121,8 +122,9 @@ def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> No
 
 
 def test_an_effect_does_not_move_to_a_joint_where_it_would_do_nothing() -> None:
-    """Two that share a joint are charged for that; but what leaves it must still be an effect."""
-    bench = small_bench()
+    """Two that share a joint are charged for that; but what leaves it must still be an effect. (Of
+    an arm: a rig without one has no second joint in the same direction.)"""
+    bench = make_bench(replace(small_bench().data, arm=True))
     engine = small_engine(bench)
     idle = bench.add(1e-9 * engine.bench.columns[1])
     target = engine.target + 4.0 * bench.columns[0]

@@ -111,15 +111,18 @@ class _Paths:
     def found(self) -> tuple[Array, float]:
         """(n,) overshoot that the data gain by, and nats gained."""
         out = np.zeros(self._engine.bench.rows.n)
-        none = self._fit(out, _White(self._engine, self._missed)).log_evidence
+        none = self._log_evidence(out)
         for _ in range(_SWEEPS):
             before = out.copy()
             self._sweep(out)
             if np.array_equal(out, before):
                 break
+        return out, self._log_evidence(out) - none if out.any() else 0.0
+
+    def _log_evidence(self, overshoot: Array) -> float:
+        """At what the law is likeliest to miss along a path, no more than along the straight one."""
         sizes = [e for e in self._engine.etas.tolist() if e <= self._missed]
-        then = max(self._fit(out, _White(self._engine, e)).log_evidence for e in sizes)
-        return out, then - none
+        return max(self._fit(overshoot, _White(self._engine, e)).log_evidence for e in sizes)
 
     def _fit(self, overshoot: Array, whitened: _White) -> _Fitted:
         effect = self._effect(overshoot)
