@@ -66,7 +66,7 @@ def unseen(found: SearchResult) -> Unseen | None:
             out, gain = path.found()
             more = Unseen(out, int(np.count_nonzero(out)), len(at))
             behind = found.explanations[0].log_weight - explanation.log_weight
-            return more if gain > more.cost + behind + _PLAIN else None
+            return more if gain > behind + _PLAIN else None
     return None
 
 
