@@ -24,7 +24,9 @@ SUPPORTED = ((3, 11), (3, 12))  # ur-rtde has wheels for no newer ones
 STAMP = VENV / "installed-for.txt"
 DEMO = HOME / "out" / "demo"
 WORKERS = min((os.cpu_count() or 2) + 1, 8)  # processes that test
-CHECKS = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"], ["lint-imports"])
+QUIET = ("--quiet", "--disable-pip-version-check")
+# Style, import rules and types, which take the longest.
+CHECKS = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["lint-imports"], ["mypy"])
 
 
 def main() -> int:
@@ -69,7 +71,8 @@ def _install(extras: str) -> None:
     print("Setting up .venv (some minutes the first time)", file=sys.stderr, flush=True)
     if not STAMP.exists():  # also where an earlier attempt was interrupted
         subprocess.check_call([sys.executable, "-m", "venv", str(VENV)])
-    install = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    # What is imported compiles itself, and most of what is installed never is.
+    install = [str(PYTHON), "-m", "pip", "install", "--no-compile", *QUIET]
     subprocess.check_call([*install, "-c", "constraints.txt", "-e", f".{extras}"], cwd=HOME)
     STAMP.write_text(wanted)
 
@@ -100,27 +103,27 @@ def _test(words: list[str]) -> int:
     tests = ["pytest", "-n", str(WORKERS), "--dist", "worksteal", *words]
     # Compiled modules are kept, or every process that tests compiles all of them anew.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    collect = _path(["pytest", "--collect-only", *words])
-    compiled = subprocess.Popen(collect, cwd=HOME, stdout=DEVNULL)
-    status = _checks()
-    compiled.wait()
-    return status or _call(_told(tests))
+    checks = [(check, _started(check)) for check in CHECKS]
+    subprocess.call(_path(["pytest", "--collect-only", *words]), cwd=HOME, stdout=DEVNULL)
+    *quick, types = checks  # which take long enough to go on beside the tests
+    failed = [_status(*check) for check in quick]
+    if any(failed):
+        types[1].kill()
+        return max(failed)
+    tested = _call(_told(tests))
+    return _status(*types) or tested
 
 
-def _checks() -> int:
-    """Style, types and import rules, all at once, told one after the other; the status of the
-    first that fails."""
-    running = [
-        (command, subprocess.Popen(_path(command), cwd=HOME, text=True, stdout=PIPE, stderr=STDOUT))
-        for command in CHECKS
-    ]
-    failed = []
-    for command, process in running:
-        said, _ = process.communicate()
-        _told(command)
-        print(said, end="", flush=True)
-        failed.append(process.returncode)
-    return next((status for status in failed if status), 0)
+def _started(check: list[str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(_path(check), cwd=HOME, text=True, stdout=PIPE, stderr=STDOUT)
+
+
+def _status(check: list[str], running: subprocess.Popen[str]) -> int:
+    """Exit status of a check, whose words are then told."""
+    said, _ = running.communicate()
+    _told(check)
+    print(said, end="", flush=True)
+    return running.returncode
 
 
 def _told(command: list[str]) -> list[str]:

@@ -214,7 +214,7 @@ JUNK = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(word=st.sampled_from(WORDS), pick=st.integers(0, 10**6), junk=JUNK, deep=st.booleans())
 def test_damaged_entries_are_refused_or_work(word: str, pick: int, junk: Any, deep: bool) -> None:
     """One value of a good entry replaced by anything: a message, or an effect that can be used."""

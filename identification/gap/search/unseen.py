@@ -120,7 +120,7 @@ class _Paths:
         return out, self._log_evidence(out) - none if out.any() else 0.0
 
     def _log_evidence(self, overshoot: Array) -> float:
-        """At what the law is likeliest to miss along a path, no more than along the straight one."""
+        """At what the law likeliest misses along a path: no more than along the straight one."""
         sizes = [e for e in self._engine.etas.tolist() if e <= self._missed]
         return max(self._fit(overshoot, _White(self._engine, e)).log_evidence for e in sizes)
 
