@@ -46,17 +46,26 @@ sys.exit(bootstrap._call([sys.executable, '-c', {COMMAND!r}]))"""
     assert (said, complaints, started.returncode) == ("kept\n", "", 4)
 
 
+@pytest.mark.parametrize(("fails", "tested"), [("ruff", False), ("mypy", True), ("", True)])
 def test_a_check_that_fails_is_told_and_ends_in_its_status(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    fails: str, tested: bool, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def path(command: list[str]) -> list[str]:
-        status = 3 if command == ["mypy"] else 0
+        status = 3 if command[0] == fails else 0
         return [sys.executable, "-c", f"print('of', {command!r}); raise SystemExit({status})"]
 
     monkeypatch.setattr(bootstrap, "_path", path)
-    assert bootstrap._checks() == 3
-    said = capsys.readouterr().out.splitlines()
-    assert said[4:6] == ["+ mypy", "of ['mypy']"]
-    assert len(said) == 8
-    monkeypatch.setattr(bootstrap, "CHECKS", (["ruff"],))
-    assert bootstrap._checks() == 0
+    assert bootstrap._test(["-k", "x"]) == (3 if fails else 0)
+    said = capfd.readouterr().out
+    assert ("of ['pytest', '-n'" in said) == tested
+    assert ("of ['mypy']" in said) == tested  # which goes on beside the tests
+    assert "of ['ruff', 'check', '.']" in said
+    assert "of ['lint-imports']" in said
+
+
+def test_tests_that_fail_end_in_their_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    def path(command: list[str]) -> list[str]:
+        return [sys.executable, "-c", f"raise SystemExit({2 if '-n' in command else 0})"]
+
+    monkeypatch.setattr(bootstrap, "_path", path)
+    assert bootstrap._test([]) == 2
