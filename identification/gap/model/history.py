@@ -300,10 +300,10 @@ def settling_share(rows: Rows) -> Array:
 
 def standing_on(rows: Rows) -> Array:
     """(n,) s: how long the old load still stood after the time of the row before, 0 within holds:
-    the time of a row is the middle of its samples, the load moves half a sample after the last."""
+    the time of a row is the mean of its samples', the load moves half a sample after the last."""
     if rows.continuous:
         return np.zeros(rows.n)
-    last = half_sample(rows) * np.concatenate([[0.0], rows.weight[:-1]])
+    last = half_sample(rows) + np.concatenate([[0.0], rows.lasts[:-1]])
     return np.where(rows.hold_starts, last, 0.0)
 
 

@@ -47,6 +47,11 @@ class Bins:
         """(k, ...) values (n, ...) where the bins begin."""
         return values[self.edges]
 
+    def last(self, values: NDArray[_T]) -> NDArray[_T]:
+        """(k, ...) of the last sample in each bin."""
+        ends: Ints = np.append(self.edges[1:], self.n) - 1
+        return values[ends]
+
     def mean(self, values: Array) -> Array:
         """(k, ...) of values (n, ...)."""
         sums = np.add.reduceat(values, self.edges, axis=0)

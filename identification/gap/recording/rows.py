@@ -32,9 +32,10 @@ class Rows:
 
     level: same setup, branch and step (or class of force and sense of motion): what repeats from
     repetition to repetition shares a level. on_the_way (n,): rows of ramps that were recorded
-    before holds. session (n,) s is always there: `clock` says whether
-    it was recorded. force: of a hold whose samples scatter by no more than their noise, the mean
-    of the hold in all its rows (its noise would else pass for a small friction or a lag);
+    before holds. session (n,) s is always there: `clock` says whether it was recorded; lasts (n,)
+    s: from there to the last sample of a row. force: of a hold whose samples scatter by no more
+    than their noise, the mean of the hold in all its rows (its noise would else pass for a small
+    friction or a lag);
     measured_force: as it is. steady (n,): such holds. rested (n,) m: the displacement with its
     mean likewise; rests (n,): such holds. hold_weight (n,): samples of the row's hold;
     force_scatter, displacement_scatter (n,): mean squares of the samples about their row, N^2 and
@@ -46,6 +47,7 @@ class Rows:
 
     time: Array
     session: Array
+    lasts: Array
     clock: bool
     run: Ints
     setup: Ints
@@ -162,9 +164,11 @@ def reduce_rows(data: GapData) -> Rows:
     time, stands = mean(data.time), steady & ~at_zero
     steadied = steadied * (1 + relaxed(force, displacement, time, holds, weight, stands))
     rested, rests = still(data.displacement, meter.displacement)
+    session = _session(data)
     return Rows(
         time=time,
-        session=mean(_session(data)),
+        session=mean(session),
+        lasts=bins.last(session) - mean(session),
         clock=data.session is not None,
         run=run,
         setup=setup,
