@@ -53,7 +53,8 @@ Progress = Callable[[str, float], None]
 @dataclass(frozen=True, eq=False)
 class EffectFound:
     """One effect of the chosen explanation; probability: that it is present at all. places:
-    "joint 3" or "axis y" -> probability that it sits there, the likeliest first."""
+    "joint 3", "axis y" or, without an arm, "direction x" -> probability that it sits there, the
+    likeliest first."""
 
     name: str
     label: str
@@ -296,13 +297,21 @@ def _effects(
                 label=part.variant.label,
                 probability=min(1.0, present / total),
                 parameters=known[i].parameters,
-                places=known[i].places if found.engine.bench.data.arm else {},
+                places=_placed(found.engine.bench.data, known[i].places),
                 indistinguishable_from=_alike(found, chosen, part.word),
                 share_of_gap=float(squares[i] / power) if power > 0 else 1.0 / len(squares),
                 size=float(chosen.sizes[i]),
             )
         )
     return tuple(out)
+
+
+def _placed(data: GapData, places: dict[str, float]) -> dict[str, float]:
+    """Of a rig without an arm the direction in which an effect sits, where there are several."""
+    if data.arm:
+        return places
+    sits = {f"joint {j + 1}": f"direction {data.spring_name(j)}" for j in range(data.joints)}
+    return {sits[p]: share for p, share in places.items() if p in sits and data.joints > 1}
 
 
 def _with_twins(result: GapResult, chosen: Explanation, withheld: set[str]) -> GapResult:

@@ -67,7 +67,8 @@ def test_the_same_trouble_in_every_direction_is_one_word(part: Part, word: str) 
     found = diagnosed(x=part, y=part)
     assert found.verdict == word
     assert [e.name for e in found.effects] == [word, word]
-    assert {d for p in found.fit.parts for d in p.variant.joints} == {0, 1}
+    assert {place for e in found.effects for place in e.places} == {"direction x", "direction y"}
+    assert found.where.directions == ("x", "y")
     assert found.after < 1.2 * found.noise
 
 
@@ -80,4 +81,5 @@ def test_two_troubles_in_two_directions_are_two() -> None:
 def test_what_one_direction_shows_is_not_said_of_the_other() -> None:
     found = diagnosed(y=softens)
     assert [e.name for e in found.effects] == ["joint_nonlinear_stiffness"]
+    assert found.effects[0].places == {"direction y": pytest.approx(1)}
     assert found.where.directions == ("y",)

@@ -35,10 +35,11 @@ NOWHERE = Where((), (), {}, (), (), (), None, 0.0)
 
 
 def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Where:
-    """From the main effect's contribution; without one, from the gap (n,) that springs leave.
-    sizes: of the effects, rms m."""
+    """From what the main effect does, in all joints and directions in which it sits; without one,
+    from the gap (n,) that springs leave. sizes: of the effects, rms m."""
     bench, n = engine.bench, engine.bench.rows.n
-    main = fit.contribution(engine, 0)[:n] if fit.parts else gap
+    same = [i for i, p in enumerate(fit.parts) if p.word == fit.parts[0].word]
+    main = sum((fit.contribution(engine, i)[:n] for i in same), np.zeros(n)) if same else gap
     per_setup = _size_per_setup(engine, _visible(engine, fit, main))
     top = per_setup.max()
     if not top > 0:
