@@ -109,7 +109,8 @@ def _test(words: list[str]) -> int:
     failed = [_status(*check) for check in quick]
     if any(failed):
         types[1].kill()
-        return max(failed)
+        types[1].wait()
+        return next(status for status in failed if status)
     tested = _call(_told(tests))
     return _status(*types) or tested
 

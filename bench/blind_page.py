@@ -26,7 +26,8 @@ Earlier runs, and test sets that were written independently: [blind_history.md](
 
 A case holds one effect, two (a mixture), none, or something outside the vocabulary (`unknown`). Its **gap over noise** is the rms of what the best
 six springs within three stated standard deviations leave of the noise-free displacement, over the rms of what is random in it. Figures count cases
-with at least `--snr-min` (3), and those without an effect; the table by size counts all.
+with at least `--snr-min` (3), and those without an effect; the table by size counts all. With an arm every seventh hand turns past some levels, and
+back, before anything is read (`turned_past` in the answers).
 
 | term | definition |
 | --- | --- |

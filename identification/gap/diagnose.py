@@ -310,8 +310,9 @@ def _placed(data: GapData, places: dict[str, float]) -> dict[str, float]:
     """Of a rig without an arm the direction in which an effect sits, where there are several."""
     if data.arm:
         return places
-    sits = {f"joint {j + 1}": f"direction {data.spring_name(j)}" for j in range(data.joints)}
-    return {sits[p]: share for p, share in places.items() if p in sits and data.joints > 1}
+    sits = {f"joint {j + 1}": s.direction for s in data.setups for j in np.flatnonzero(s.lever)}
+    several = len(sits) > 1
+    return {f"direction {sits[p]}": share for p, share in places.items() if several and p in sits}
 
 
 def _with_twins(result: GapResult, chosen: Explanation, withheld: set[str]) -> GapResult:

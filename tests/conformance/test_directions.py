@@ -21,8 +21,8 @@ STROKE = {d: top / 9.3e4 for d, top in TOP_N.items()}  # m
 Part = Callable[[pd.DataFrame, Array], Array]
 
 
-def diagnosed(**parts: Part) -> GapResult:
-    """parts: direction -> what is added along it."""
+def diagnosed(only: str = "xy", **parts: Part) -> GapResult:
+    """parts: direction -> what is added along it. only: directions that were measured."""
 
     def law(rows: pd.DataFrame, _: Array) -> tuple[Array, Array]:
         more = np.zeros(len(rows))
@@ -32,7 +32,8 @@ def diagnosed(**parts: Part) -> GapResult:
             more[mine] = STROKE[d] * part(rows[mine], share)
         return more, np.zeros((len(rows), 6))
 
-    return explained(gap_data(imported(noisy(RIG, law), META)))
+    rows = noisy(RIG, law)
+    return explained(gap_data(imported(rows[rows.direction.isin(list(only))], META)))
 
 
 def softens(_: pd.DataFrame, share: Array) -> Array:
@@ -74,7 +75,10 @@ def test_the_same_trouble_in_every_direction_is_one_word(part: Part, word: str) 
 
 def test_two_troubles_in_two_directions_are_two() -> None:
     found = diagnosed(x=softens, y=creeps)
-    assert {e.name for e in found.effects} == {"joint_nonlinear_stiffness", "joint_creep"}
+    assert {e.name: set(e.places) for e in found.effects} == {
+        "joint_nonlinear_stiffness": {"direction x"},
+        "joint_creep": {"direction y"},
+    }
     assert found.after < 1.2 * found.noise
 
 
@@ -83,3 +87,9 @@ def test_what_one_direction_shows_is_not_said_of_the_other() -> None:
     assert [e.name for e in found.effects] == ["joint_nonlinear_stiffness"]
     assert found.effects[0].places == {"direction y": pytest.approx(1)}
     assert found.where.directions == ("y",)
+
+
+def test_a_direction_that_was_never_measured_is_no_place() -> None:
+    found = diagnosed(only="x", x=softens)
+    assert [e.name for e in found.effects] == ["joint_nonlinear_stiffness"]
+    assert found.effects[0].places == {}  # there is but one

@@ -303,7 +303,10 @@ def test_onset_where_a_direction_reaches_the_threshold() -> None:
 
 def test_what_the_law_of_a_yield_misses_is_no_hand_that_went_too_far() -> None:
     found = result_of("yield").found
-    assert found.explanations[0].eta > 0
+    best, bench = found.explanations[0], found.engine.bench
+    assert best.eta > 0
+    assert best.words == {"joint_yield"}  # which remembers
+    assert len(bench.rows.edges) > 50  # enough to be looked at
     assert unseen(found) is None
 
 

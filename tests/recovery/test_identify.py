@@ -301,7 +301,7 @@ def recover(
 
 
 def test_recovery_in_short(tmp_path: Path) -> None:
-    """Five sets: far from a coverage, but a factor of two in the uncertainty shows."""
+    """Five sets: far from a coverage."""
     coverage, errors, identified = recover(5, tmp_path)
     assert coverage >= 0.8
     assert identified >= 12

@@ -55,6 +55,7 @@ def test_a_check_that_fails_is_told_and_ends_in_its_status(
         return [sys.executable, "-c", f"print('of', {command!r}); raise SystemExit({status})"]
 
     monkeypatch.setattr(bootstrap, "_path", path)
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")  # as it is afterwards
     assert bootstrap._test(["-k", "x"]) == (3 if fails else 0)
     said = capfd.readouterr().out
     assert ("of ['pytest', '-n'" in said) == tested
@@ -68,4 +69,16 @@ def test_tests_that_fail_end_in_their_status(monkeypatch: pytest.MonkeyPatch) ->
         return [sys.executable, "-c", f"raise SystemExit({2 if '-n' in command else 0})"]
 
     monkeypatch.setattr(bootstrap, "_path", path)
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     assert bootstrap._test([]) == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_check_that_is_killed_is_no_check_that_passed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def path(command: list[str]) -> list[str]:
+        code = "import os; os.kill(os.getpid(), 9)" if command[0] == "ruff" else ""
+        return [sys.executable, "-c", code]
+
+    monkeypatch.setattr(bootstrap, "_path", path)
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    assert bootstrap._test([]) != 0

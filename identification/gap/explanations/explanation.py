@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations
 from math import log
 
 import numpy as np
@@ -27,6 +28,7 @@ from identification.gap.explanations.penalties import (
     TOE_AND_KNEE,
     below_noise,
     cancelling,
+    in_directions_of_their_own,
     minor_parts,
     unbent_curves,
     within_stated,
@@ -174,8 +176,10 @@ def explain(
 
 def _ranking_sizes(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) -> Array:
     """Sizes (p,) m by which parts are ranked: what each does to the gap, but on a rig without an
-    arm, whose one spring may hide most of any mechanism, see the rules below."""
-    if engine.bench.data.arm:
+    arm, whose one spring in a direction may hide most of any mechanism, see the rules below."""
+    bench = engine.bench
+    apart = any(in_directions_of_their_own(bench, a, b) for a, b in combinations(parts, 2))
+    if bench.data.arm or apart:
         return sizes.gap
     leads = _leading_of_two(engine, parts, level)
     if leads is not None:

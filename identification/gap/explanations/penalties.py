@@ -205,13 +205,18 @@ def _sizes_that_show(parts: tuple[Part, ...], found: Sizes) -> Array:
     return np.where(linear, found.moved, found.gap)
 
 
+def in_directions_of_their_own(bench: Bench, one: Part, other: Part) -> bool:
+    """Of a rig without an arm: each part in a direction that shares no spring with the other's."""
+    mine, others = set(one.variant.joints), set(other.variant.joints)
+    return bool(not bench.data.arm and mine and others and not mine & others)
+
+
 def _same_element(engine: Engine, one: Part, other: Part) -> bool:
     """Both are friction of one joint, or would be, for all that the data show; or one is the
     linear part of the other: a mechanism's law brings its own mean stiffness."""
-    mine, others = set(one.variant.joints), set(other.variant.joints)
-    same = bool(mine & others)
-    if not engine.bench.data.arm and mine and others and not same:
-        return False  # each in a direction of its own, which no spring shares
+    if in_directions_of_their_own(engine.bench, one, other):
+        return False
+    same = bool(set(one.variant.joints) & set(other.variant.joints))
     words = {one.word, other.word}
     holds = "joint_creep" in words and not engine.bench.course.always_moves
     bench = engine.bench  # without any return all memory is hidden; arms are let go between runs
@@ -245,6 +250,8 @@ def _as_late(one: Part, other: Part) -> bool:
 
 def _only_rubs(engine: Engine, play: Part, curve: Part) -> bool:
     """Without an arm a curve may take back what a play does but for its friction."""
+    if in_directions_of_their_own(engine.bench, play, curve):
+        return False
     return not engine.bench.data.arm and play.word == "joint_backlash" and curve.word in CURVES
 
 

@@ -3,7 +3,8 @@
 A joint mechanism sits in one joint of a variant. Where that leaves what the same mechanism in
 another joint would do, the explanation takes both, as one word: one trouble, seen twice. Only the
 joint readings can tell that from a second mechanism, so nothing is looked for without them; but
-nothing else goes on as creep does while the load stands.
+nothing else goes on as creep does while the load stands, and of a rig without an arm every
+direction, which has a compliance of its own, is read.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 from identification.gap.words import IN_JOINTS
 
-MOST = 3  # joints of one word
+MOST = 3  # joints of an arm's word
 _BY_ITSELF = frozenset({"joint_creep"})
 # Nats that a joint more has to bring: the choice among the first one's shapes is not counted again.
 WORTH = 6.0
@@ -34,10 +35,10 @@ def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> l
 
 def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
     """With its joint mechanisms in further joints, as far as that is worth it."""
-    bench = engine.bench
-    best = start
+    bench, best = engine.bench, start
+    most = MOST if bench.data.arm else bench.data.joints
     for word in sorted(start.words & (IN_JOINTS if _each_seen(bench) else _BY_ITSELF)):
-        for _ in range(MOST - 1):
+        for _ in range(most - 1):
             if best.eta <= bench.noise.stated:
                 break  # there is nothing left for another joint to do
             found = _in_one_more(engine, variants, best, word)

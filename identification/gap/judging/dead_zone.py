@@ -18,6 +18,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
 from identification.gap.explanations.verdict import FLANKS
+from identification.gap.model.bench import Bench
 
 PLAY, CURVE = "joint_backlash", "joint_nonlinear_stiffness"
 
@@ -34,7 +35,7 @@ class Limits(NamedTuple):
 PLAINLY, SOMEHOW = Limits(0.2, 0.2), Limits(0.3, 0.35)
 _POINTS = 400  # over the way of the displacement
 _STIFF = 0.75  # quantile of the stiffness that counts as that of the flanks
-_SOFT, _BACK = 0.4, 0.6  # of it: at the ends of the play; beyond them
+_SOFT, _BACK = 0.4, 0.6  # of it: at the ends of the play; beyond them, and across a step
 _WIDTHS = (0.01, 0.7)  # of the way
 _FEWEST = 100  # places that were read, of the points
 
@@ -48,7 +49,8 @@ def spoken_for(
     best, bench = ranked[0], engine.bench
     if not best.parts or best.parts[0].word not in FLANKS:
         return {}
-    if bench.course.one_sided or len(_distinct(np.sort(bench.load), bench.load)[0]) < _FEWEST:
+    load = bench.load[_where(bench, best)]
+    if bench.course.one_sided or len(_distinct(np.sort(load), load)[0]) < _FEWEST:
         return {}
     rest, word = best.words - FLANKS, best.parts[0].word
     others = {min(e.words & FLANKS): e for e in ranked if _is_one_beside(e, rest)}
@@ -69,11 +71,21 @@ def _is_one_beside(explanation: Explanation, rest: frozenset[str]) -> bool:
 
 
 def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:
-    """Displacement (n,) and force (n,) of a fit, in the units of the load."""
+    """Displacement (m,) and force (m,) of a fit, in the units of the load, in the direction in
+    which its largest effect sits."""
     bench, fitted = engine.bench, fit(engine, explanation)
     response = bench.response - engine.target[: bench.rows.n] + fitted.response
     response = response / bench.slope
-    return (bench.load, response) if bench.imposed else (response, bench.load)
+    mine = _where(bench, explanation)
+    both = bench.load[mine], response[mine]
+    return both if bench.imposed else both[::-1]
+
+
+def _where(bench: Bench, explanation: Explanation) -> Flags:
+    """(n,) rows of the direction in which the largest effect sits."""
+    joint = explanation.parts[0].variant.joint
+    everywhere = np.ones(bench.rows.n, dtype=bool)
+    return everywhere if joint is None else np.asarray(bench.lever[:, joint] != 0)
 
 
 def has_dead_zone(u: Array, force: Array, limits: Limits) -> bool:

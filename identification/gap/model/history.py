@@ -303,7 +303,7 @@ def standing_on(rows: Rows) -> Array:
     the time of a row is the mean of its samples', the load moves half a sample after the last."""
     if rows.continuous:
         return np.zeros(rows.n)
-    last = half_sample(rows) + np.concatenate([[0.0], rows.lasts[:-1]])
+    last = half_sample(rows) + np.concatenate([[0.0], rows.to_last[:-1]])
     return np.where(rows.hold_starts, last, 0.0)
 
 
@@ -365,7 +365,7 @@ def _paths(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]
         t, v = rows.time[a:b], values[a:b]
         if not rows.continuous:
             new = rows.hold_starts[a:b]
-            last = half * rows.weight[a:b][:-1]
+            last = half + rows.to_last[a:b][:-1]
             leaves, comes = (t[:-1] + last)[new[1:]], t[1:][new[1:]] - half
             beyond = rows.overshoot[a + 1 : b][new[1:]]
             peaks = beyond != 0

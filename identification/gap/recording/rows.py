@@ -32,8 +32,8 @@ class Rows:
 
     level: same setup, branch and step (or class of force and sense of motion): what repeats from
     repetition to repetition shares a level. on_the_way (n,): rows of ramps that were recorded
-    before holds. session (n,) s is always there: `clock` says whether it was recorded; lasts (n,)
-    s: from there to the last sample of a row. force: of a hold whose samples scatter by no more
+    before holds. session (n,) s is always there: `clock` says whether it was recorded; to_last
+    (n,) s: from a row's time to its last sample. force: of a hold whose samples scatter by no more
     than their noise, the mean of the hold in all its rows (its noise would else pass for a small
     friction or a lag);
     measured_force: as it is. steady (n,): such holds. rested (n,) m: the displacement with its
@@ -47,7 +47,7 @@ class Rows:
 
     time: Array
     session: Array
-    lasts: Array
+    to_last: Array
     clock: bool
     run: Ints
     setup: Ints
@@ -168,7 +168,7 @@ def reduce_rows(data: GapData) -> Rows:
     return Rows(
         time=time,
         session=mean(session),
-        lasts=bins.last(session) - mean(session),
+        to_last=bins.last(session) - mean(session),
         clock=data.session is not None,
         run=run,
         setup=setup,

@@ -52,7 +52,7 @@ class Unseen:
 
 def unseen(found: SearchResult) -> Unseen | None:
     """What the best explanation that remembers says of the loads between the readings of levels;
-    None where nothing is gained."""
+    None where that gains no more than a few nats and what better explanations are ahead."""
     engine = found.engine
     rows = engine.bench.rows
     if rows.continuous or engine.bench.imposed:
@@ -105,7 +105,8 @@ class _Paths:
         self.remembers = any(p.remembers for p in self._parts)
         # along the right path a law misses no more than laws do
         self._white = _White(engine, IMPERFECTION * max(explanation.sizes, default=0.0))
-        self._missed = explanation.eta
+        likely = engine.etas[engine.etas <= explanation.eta].tolist()
+        self._likely = [_White(engine, eta) for eta in likely]
         self._root = block([np.diag(engine.base.sd), *(p.root for p in explanation.parts)])
 
     def found(self) -> tuple[Array, float]:
@@ -121,11 +122,10 @@ class _Paths:
 
     def _log_evidence(self, overshoot: Array) -> float:
         """At what the law likeliest misses along a path: no more than along the straight one."""
-        sizes = [e for e in self._engine.etas.tolist() if e <= self._missed]
-        return max(self._fit(overshoot, _White(self._engine, e)).log_evidence for e in sizes)
-
-    def _fit(self, overshoot: Array, whitened: _White) -> _Fitted:
         effect = self._effect(overshoot)
+        return max(self._fit(effect, white).log_evidence for white in self._likely)
+
+    def _fit(self, effect: Array, whitened: _White) -> _Fitted:
         white = whitened(np.hstack([self._engine.base.columns, effect]) @ self._root)
         target = whitened(self._engine.target[:, None])[:, 0]
         precision = white.T @ white + np.eye(white.shape[1])
@@ -140,7 +140,7 @@ class _Paths:
         """Puts in, takes out or changes what gains, hold after hold, with coefficients as they
         fit in the beginning."""
         cost = 2 * log(len(self._at) * len(SIZES))  # twice the nats: of a sum of squares
-        first = self._fit(out, self._white)
+        first = self._fit(self._effect(out), self._white)
         now, left = first.effect, first.left
         off = self._white.off(left, self._at)
         for i, k in enumerate(self._at.tolist()):
