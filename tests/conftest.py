@@ -21,3 +21,9 @@ def cache_of_its_own() -> Iterator[None]:
         os.environ["RIG_CACHE"] = folder
         yield
         del os.environ["RIG_CACHE"]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What waits for devices and pages comes first: one process waits then while the others
+    compute, where in the end all of them would wait."""
+    items.sort(key=lambda item: item.path.parent.name not in ("wire", "browser"))
