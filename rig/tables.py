@@ -178,7 +178,14 @@ class _Table:
         if column.finite:
             bad = np.flatnonzero(~np.isfinite(values))
             if len(bad):
-                raise self._cell(file, block, column.name, bad[0], "every row needs a finite value")
+                raise self._cell(
+                    file,
+                    block,
+                    column.name,
+                    bad[0],
+                    "every row needs a finite value",
+                    " Leave rows without one out of the table.",
+                )
         bad = np.flatnonzero(np.abs(values) > column.largest)
         if len(bad):
             limit = f"{column.largest:.0f} {column.unit}"

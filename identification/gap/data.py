@@ -53,6 +53,15 @@ class Setup:
     turned_offset: Array | float = 0.0
     outside: float = 0.0
 
+    @property
+    def loads(self) -> Flags:
+        """(3,) axes of the base frame along which the force acts; what a direction cosine of a
+        hundredth puts there is rounding, or how squarely a plate was bolted down."""
+        return np.asarray(np.abs(self.unit_vector) > _LITTLE)
+
+
+_LITTLE = 0.02
+
 
 @dataclass(frozen=True, eq=False)
 class Instruments:
@@ -116,6 +125,10 @@ class GapData:
     def outside_of(self, setup: Ints) -> Array:
         """(n,) m/N: compliance outside the springs, of the setups of rows (n,)."""
         return np.array([s.outside for s in self.setups])[setup]
+
+    def moment(self, i: int) -> str:
+        """When reading i was taken; which one it is, without a clock."""
+        return f"at {self.time[i]:.4g} s" if self.timed else f"at reading {i + 1}"
 
     @property
     def joints(self) -> int:

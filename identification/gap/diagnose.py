@@ -230,7 +230,7 @@ def _silent(_: str, __: float) -> None:
 
 def check_words(words: set[str] | frozenset[str]) -> None:
     """Raises ValueError for a word that is no effect."""
-    for word in words:
+    for word in sorted(words):
         if word not in WORDS:
             raise ValueError(f'"{word}" is no effect; known: {", ".join(WORDS)}')
 
@@ -416,7 +416,7 @@ def _disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
     asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
     if not asks:
         return ()
-    words = " and ".join(p.word for p in best.parts)
+    words = " and ".join(best.troubles)
     what = f"What explains the gap best ({words})" if words else "Without any effect, the best fit"
     text = (
         f"{what} asks for {asks}: it was not believed. "

@@ -107,7 +107,7 @@ def test_a_laser_that_reads_wrong_beside_creep_is_met_to_the_noise(gain: float) 
     engine = engine_of(read_low(gain))
     variants = library(engine.bench, ["displacement_scale", "joint_creep", "joint_hysteresis"])
     before = len(variants)
-    best = search(engine, variants).best
+    best = search(engine, variants).explanations[0]
     assert best.words == {"displacement_scale", "joint_creep"}
     label = next(p.variant.label for p in best.parts if p.word == "displacement_scale")
     assert label.endswith("of all that moves")

@@ -20,6 +20,7 @@ from identification.times import MOUNT_S, SCREW_S, SETTLE_S, UNLOAD_S
 
 APPROACH_S = SCREW_S + SETTLE_S  # of a level
 _MOST_LEVELS = 10
+_MOST_A_HOLD = 60  # samples that a plan has: faster ones count as means of several
 _WEIGHT_GAIN, _GAUGE_GAIN = 0.01, 0.002  # a known weight, a gauge block: standard uncertainties
 
 
@@ -82,6 +83,7 @@ def present_design(bench: Bench) -> Design:
     else:
         once = max(bench.course.session_span / max(len(np.unique(rows.run)), 1), 1e-6)
         hold, approach, zero, sample = once / 20, 0.0, 0.0, once / 100
+    thinned = max(1.0, hold / (_MOST_A_HOLD * sample))
     sizes = np.sign(bench.load) * (np.abs(bench.load) > 0.2 * np.abs(bench.load).max())
     return Design(
         setups=data.setups,
@@ -91,14 +93,20 @@ def present_design(bench: Bench) -> Design:
         both_senses=bool({-1.0, 1.0} <= set(sizes.tolist())),
         cycles=(1.0,),
         hold_s=hold,
-        sample_s=sample,
+        sample_s=thinned * sample,
         approach_s=approach,
         zero_s=zero,
         rest_s=_rest_s(bench),
         readings=bench.has_q,
         components=rows.tangential is not None,
-        instruments=data.instruments,
+        instruments=_averaging(data.instruments, thinned),
     )
+
+
+def _averaging(meter: Instruments, samples: float) -> Instruments:
+    """Instruments whose readings are means of as many samples."""
+    less = samples**-0.5
+    return replace(meter, force=meter.force * less, displacement=meter.displacement * less)
 
 
 def _unloads(bench: Bench) -> bool:
@@ -268,12 +276,14 @@ def _paths(design: Design) -> Iterator[Candidate]:
         "without load shows there.",
         replace(design, zero_s=plateau),
     )
-    yield Candidate(
-        "reversed",
-        "Load along the opposite sense of every direction as well: thresholds and curves with a "
-        "sense, weight and datum behave differently there.",
-        _with_setups(design, tuple(reverse(s) for s in design.setups)),
-    )
+    one_way = [s for s in design.setups if not any(_opposite(s, t) for t in design.setups)]
+    if one_way:
+        yield Candidate(
+            "reversed",
+            "Load along the opposite sense of every direction as well: thresholds and curves with "
+            "a sense, weight and datum behave differently there.",
+            _with_setups(design, tuple(reverse(s) for s in one_way)),
+        )
     yield Candidate(
         "steps",
         "Repeat with half the step size, up and down: thresholds, corners and curves separate.",
@@ -355,6 +365,11 @@ def _scaled(design: Design, setup: Setup) -> tuple[float, ...]:
     before, after = (float(np.abs(s.lever).max()) for s in (design.setups[model], setup))
     factor = float(np.clip(before / max(after, 1e-9), 0.5, 1.5))
     return tuple(v * factor for v in design.levels[model])
+
+
+def _opposite(a: Setup, b: Setup) -> bool:
+    """Whether two setups load one place in opposite senses."""
+    return a.pose == b.pose and bool(np.allclose(a.unit_vector, -b.unit_vector, atol=1e-6))
 
 
 def reverse(setup: Setup) -> Setup:

@@ -2,7 +2,9 @@
 
 The library searches on grids relative to the data. A `Form` is the same law in newton metres,
 seconds and radians per newton metre; `describe` makes it from a fitted part, `realise` gives what
-it does on another bench. On the bench that it came from, it is the fitted contribution again.
+it does on another bench. On the bench that it came from, it is the fitted contribution again, but
+for instruments that read what other effects do (`search.readings`): their form is that of the
+springs alone.
 """
 
 from __future__ import annotations

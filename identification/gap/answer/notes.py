@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.gap.data import GapData
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import NOISY
 from identification.gap.recording.snaps import Snaps
@@ -59,6 +60,8 @@ def _undecided(bench: Bench) -> Iterator[str]:
         yield "No session clock: drifts are seen only within runs and from run to run."
     if bench.course.timeless:
         yield "No time was recorded: lags, creep and how fast it flowed are left out."
+    elif not data.timed:
+        yield "No time was recorded: readings are counted as one a second, and so are all times."
 
 
 def _remarks(bench: Bench) -> Iterator[str]:
@@ -68,7 +71,7 @@ def _remarks(bench: Bench) -> Iterator[str]:
             "gap: no law is met better than that."
         )
     if bench.course.let_go:
-        yield _let_go(bench.course.let_go, float(np.ptp(bench.data.force)))
+        yield _let_go(bench.course.let_go, bench.data)
     beyond = int(np.count_nonzero(bench.rows.overshoot))
     if beyond:
         yield (
@@ -86,10 +89,11 @@ def _remarks(bench: Bench) -> Iterator[str]:
         )
 
 
-def _let_go(snaps: Snaps, span: float) -> str:
+def _let_go(snaps: Snaps, data: GapData) -> str:
+    span = float(np.ptp(data.force))
     times = "once" if snaps.count == 1 else f"{snaps.count} times"
     return (
         f"The force falls at once while the stroke goes on, {times}, by up to "
-        f"{snaps.largest * span:.3g} N (first at {snaps.first:.4g} s): it sticks and slips, snaps, "
-        "cracks or is torn off, as no effect of the library does."
+        f"{snaps.largest * span:.3g} N (first {data.moment(snaps.first)}): it sticks and slips, "
+        "snaps, cracks or is torn off, as no effect of the library does."
     )

@@ -64,6 +64,8 @@ def variants(bench: Bench) -> list[Variant]:
         both = 2 * m[:, 0] * m[:, 1]  # of loads that turn it about both
         info: dict[str, Any] = {"depth_m": depth, "turned": False}
         seen = [a for a in range(3) if np.abs(m[:, a]).max() > 1e-3]
+        if not seen:
+            continue  # every push goes through the axes
         out.append(
             variant(
                 WORD,

@@ -50,8 +50,8 @@ def variants(bench: Bench) -> list[Variant]:
 def _loaded(bench: Bench) -> list[int]:
     """Components of the force of which one may be off while others are right: each that some
     setup loads, and not every one."""
-    units = np.stack([s.unit_vector for s in bench.data.setups])
-    return [a for a in range(3) if np.any(units[:, a]) and not np.all(units[:, a])]
+    loaded = np.stack([s.loads for s in bench.data.setups])
+    return [a for a in range(3) if loaded[:, a].any() and not loaded[:, a].all()]
 
 
 def _of_one(bench: Bench, axis: int) -> Variant:

@@ -125,7 +125,6 @@ class SearchResult:
     explanations: tuple[Explanation, ...]
     alone: dict[str, float]
     probabilities: dict[str, float]
-    best: Explanation
     unknown: float
     unknown_eta: float
     kept: Mapping[frozenset[str], float] = field(default_factory=dict)

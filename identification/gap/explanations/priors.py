@@ -102,4 +102,4 @@ def _by_calibration(words: frozenset[str], bench: Bench) -> float:
     total = sum(stated.values())
     if bench.data.arm or not total > 0:
         return 0.0
-    return sum(log(max(3 * stated[w] / total, 1e-3)) for w in words & stated.keys())
+    return sum(log(max(3 * stated[w] / total, 1e-3)) for w in stated if w in words)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +25,9 @@ class Base:
     names: tuple[str, ...]
 
     def index(self, prefix: str) -> list[int]:
-        """Columns whose name begins so."""
-        return [i for i, name in enumerate(self.names) if name.startswith(prefix)]
+        """Columns whose name begins so; a number at the end of that is a whole one."""
+        begins = re.compile(re.escape(prefix) + (r"(?!\d)" if prefix[-1:].isdigit() else ""))
+        return [i for i, name in enumerate(self.names) if begins.match(name)]
 
 
 def prediction(bench: Bench) -> Array:
@@ -128,11 +130,7 @@ def _gains(bench: Bench) -> list[_Part]:
 def _askew(bench: Bench) -> bool:
     """Whether an arm is pushed along more than one axis of the dynamometer at once. What single
     axes read too much, differently, the springs give way for."""
-    units = np.stack([s.unit_vector for s in bench.data.setups])
-    return bench.data.arm and bool(np.any(np.sum(np.abs(units) > _LITTLE, axis=1) > 1))
-
-
-_LITTLE = 0.02
+    return bench.data.arm and any(np.count_nonzero(s.loads) > 1 for s in bench.data.setups)
 
 
 def component(bench: Bench, axis: int) -> Array:

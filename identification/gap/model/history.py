@@ -308,10 +308,11 @@ def standing_on(rows: Rows) -> Array:
 
 
 def half_sample(rows: Rows) -> float:
-    """Half of the time between two samples of a hold, s."""
-    step = np.diff(rows.time)
-    inner = step[~rows.hold_starts[1:] & (step > 0)]
-    return float(np.min(inner)) / 2 if inner.size else 0.5
+    """Half of the time between two samples of a hold, s: between its first two rows, which are
+    single readings; of most holds, since one stamp may be wrong."""
+    first = np.flatnonzero(rows.hold_starts[:-1] & ~rows.hold_starts[1:])
+    step = np.diff(rows.time)[first]
+    return float(np.median(step[step > 0])) / 2 if np.any(step > 0) else 0.5
 
 
 def sampling_time(rows: Rows) -> float:

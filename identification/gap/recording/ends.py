@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.arrays import Array, Flags, Ints
 from identification.gap.data import GapData
-from identification.gap.recording.glitches import picked, when
+from identification.gap.recording.glitches import picked
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.turns import way_back
 
@@ -33,8 +33,8 @@ def without_ends(data: GapData) -> GapData:
     notes = []
     if after.any():
         notes.append(
-            f"The force falls at once while the stroke goes on ({when(data, after)}): a break. "
-            f"{_readings(after)} after it set aside."
+            "The force falls at once while the stroke goes on "
+            f"({data.moment(int(after.argmax()))}): a break. {_readings(after)} after it set aside."
         )
     if before.any():
         notes.append(

@@ -17,7 +17,6 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.data import LOADING, GapData
 from identification.gap.recording.ends import after_break
-from identification.gap.recording.glitches import when
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.white import QUARTILE
 from identification.gap.recording.wraps import wraps
@@ -138,9 +137,9 @@ def _broken(data: GapData) -> str:
     if not broken.any():
         return ""
     return (
-        f"The force falls at once while the stroke goes on ({when(data, broken)}), and "
-        f"{100 * broken.mean():.0f} % of the readings come after that: a break. End the "
-        "recording there to learn of what was before."
+        "The force falls at once while the stroke goes on "
+        f"({data.moment(int(broken.argmax()))}), and {100 * broken.mean():.0f} % of the readings "
+        "come after that: a break. End the recording there to learn of what was before."
     )
 
 

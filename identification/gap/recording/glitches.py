@@ -1,7 +1,7 @@
 """Single readings that jump off and come back at once: set aside, and said.
 
 Converters drop a bit, a clamp knocks at a turning point. A handful of such readings, far off beside
-hundreds that follow a law, is no effect of the rig; but where they are most of what a straight line
+hundreds that follow a law, is no effect of the rig; but where many are most of what a straight line
 leaves of a running recording, they are the gap, and stay. At rest only what lies between two
 readings of its hold is looked at: the first of a hold may lag.
 """
@@ -23,6 +23,7 @@ _NOISE, _STEPS, _RANGE = 6.0, 3.0, 0.02  # a glitch is off by more than each: st
 # typical changes from one reading to the next, share of the range
 _LONGEST = 3  # readings in a row
 _MOST = 0.05  # of all readings: more of them are how this rig behaves
+_STRAY = 0.002  # of all readings: so few are stray, however far off they are
 _MINOR = 0.8  # of the rms that a straight line leaves without them
 _FEWEST = 40
 
@@ -40,16 +41,9 @@ def without_glitches(data: GapData) -> GapData:
     count = int(off.sum())
     note = (
         f"{count} of {len(off)} readings jump off and come back at once: set aside as glitches "
-        f"(the first {when(data, off)}). See to cables, converter and clamps."
+        f"(the first {data.moment(int(off.argmax()))}). See to cables, converter and clamps."
     )
     return picked(data, ~off, note)
-
-
-def when(data: GapData, which: Flags) -> str:
-    """At what time the first of some readings (n,) was taken; which one it is, without a clock."""
-    if data.timed:
-        return f"at {data.time[which][0]:.4g} s"
-    return f"at reading {int(which.argmax()) + 1}"
 
 
 def _while_running(data: GapData) -> Flags:
@@ -57,7 +51,8 @@ def _while_running(data: GapData) -> Flags:
     if data.arm:
         return np.zeros(len(data.force), dtype=bool)
     off = _off(data.force, data.run) | _off(data.displacement, data.run)
-    return off & bool(off.mean() <= _MOST and _minor(data, off))
+    share = off.mean()
+    return off & bool(share <= _STRAY or (share <= _MOST and _minor(data, off)))
 
 
 def _at_rest(data: GapData, hold: Ints) -> Flags:

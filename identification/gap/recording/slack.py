@@ -15,7 +15,7 @@ import numpy as np
 
 from identification.arrays import Flags, Ints
 from identification.gap.data import GapData
-from identification.gap.recording.glitches import picked, when
+from identification.gap.recording.glitches import picked
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.imposed import displacement_imposed
 from identification.gap.recording.white import white_sd
@@ -40,7 +40,7 @@ def without_slack(data: GapData) -> GapData:
         return data
     note = (
         f"The part lets go of the rig before the stroke is back where it was met "
-        f"({when(data, off)}): {int(off.sum())} readings without force set aside."
+        f"({data.moment(int(off.argmax()))}): {int(off.sum())} readings without force set aside."
     )
     return replace(picked(data, ~off, note), imposed="displacement", lets_go=True)
 

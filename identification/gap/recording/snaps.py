@@ -20,12 +20,12 @@ from identification.gap.recording.white import white_noise
 @dataclass(frozen=True)
 class Snaps:
     """How often the force lets go, and by how much at the most and together, as shares of the range
-    of the force; where that was first (s)."""
+    of the force; number of the reading, from 0, where it first does."""
 
     count: int
     largest: float
     together: float
-    first: float
+    first: int
 
 
 _WITHIN = 2  # readings in which it falls
@@ -52,7 +52,7 @@ def let_go(data: GapData) -> Snaps | None:
         return None
     events = np.split(at, np.flatnonzero(np.diff(at) > _WITHIN) + 1)
     sizes = [float(fall[e].max()) / span for e in events]
-    found = Snaps(len(sizes), max(sizes), sum(sizes), float(data.time[at[0]]))
+    found = Snaps(len(sizes), max(sizes), sum(sizes), int(at[0]))
     return found if found.together > TOGETHER else None
 
 

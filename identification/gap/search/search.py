@@ -74,7 +74,6 @@ def search(
         nameless=tuple(e for e in ranked if e not in named),
         alone={w: v - none for w, v in alone.items() if w not in NAMELESS},
         probabilities={},
-        best=named[0],
         unknown=log_mean([lv.log_base for lv in strange]) + log_unknown(engine.bench.course),
         unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
     )
