@@ -65,7 +65,7 @@ def found(e: Engine, *explanations: Explanation) -> SearchResult:
     none = Explanation((), -500.0, 0.0, (), -500.0)
     words = {w: 0.0 for x in explanations for w in x.words}
     ranked = (*sorted(explanations, key=lambda x: -x.log_weight), none)
-    return with_posterior(SearchResult(e, ranked, words, {}, ranked[0], -400.0, 1e-6), {})
+    return with_posterior(SearchResult(e, ranked, words, {}, -400.0, 1e-6), {})
 
 
 def test_the_first_repetition_is_never_withheld() -> None:
