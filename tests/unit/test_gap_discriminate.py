@@ -27,6 +27,7 @@ from rig.diagnosis.gap_data import arm_setup
 from rig.models.robot import load_robot
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
+from tests.unit.test_gap_operators import bench_data
 
 
 def test_a_place_loaded_the_other_way_is_the_setup_of_that_direction() -> None:
@@ -102,3 +103,29 @@ def test_procedures_are_looked_at_from_the_quickest_until_none_can_be_worth_more
         return len(looked) - 1
 
     assert proposal(100.0) < proposal(ENOUGH - 1) == len(every)
+
+
+def test_what_was_pushed_both_ways_is_not_to_be_reversed() -> None:
+    design = present_design(make_bench(arm_data()))
+    both = replace(
+        design,
+        setups=(*design.setups, *(reverse(s) for s in design.setups[1:])),
+        levels=(*design.levels, *design.levels[1:]),
+    )
+    (turned,) = (c.design for c in candidates(both, True, ()) if c.kind == "reversed")
+    names = [(s.pose, s.direction) for s in turned.setups]
+    assert len(names) == 2 * len(design.setups)
+    assert len(set(names)) == len(names)
+    assert "reversed" not in [c.kind for c in candidates(turned, True, ())]
+
+
+def test_a_plan_for_fast_sampling_has_few_samples_that_average_as_many() -> None:
+    step = np.repeat([1, 2, 3, 4], 500)
+    draw = np.random.default_rng(2)
+    force = 20.0 * step + draw.normal(0, 0.1, len(step))
+    time = 1e-3 * np.arange(len(step))
+    data = bench_data(force, 1e-5 * force, step=step, time=time)
+    design = present_design(make_bench(data))
+    assert design.hold_s == pytest.approx(0.5, rel=0.01)
+    assert design.hold_s / design.sample_s == pytest.approx(60)
+    assert design.instruments.force == pytest.approx(data.instruments.force * (60 / 500) ** 0.5)

@@ -92,3 +92,12 @@ def test_first_readings_of_a_level_and_spells_stay() -> None:
     assert not without_glitches(resting({84: 30e-6, 85: 30e-6})).aside  # it stayed there
     assert not without_glitches(resting(dict.fromkeys(range(3, 240, 72), 60e-6))).aside  # 1.7%
     assert not without_glitches(resting({84: 6e-6})).aside  # noise does that
+
+
+def test_a_stray_reading_in_a_thousand_is_set_aside_however_far_it_is_off() -> None:
+    """It is most of what a clean spring leaves, and still nothing of the rig."""
+    draw = np.random.default_rng(8)
+    force = 100 * np.tile(triangle(), 5) + 0.05 * draw.standard_normal(5 * N)
+    force[[310, 900]] += 20.0
+    kept = without_glitches(recording(np.tile(triangle(), 5), force))
+    assert len(kept.force) == 5 * N - 2

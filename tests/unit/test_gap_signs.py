@@ -272,3 +272,20 @@ def test_no_law_is_met_more_closely_than_its_least_imperfection() -> None:
     assert np.all(share[np.exp(edges[1:]) < least] < -600)
     assert np.all(share[np.exp(edges[:-1]) > 1.1 * least] > -40)
     assert least_size(etas, 1e-14) == -np.inf  # so small that any will do
+
+
+def test_many_means_at_once_are_as_far_as_each_alone() -> None:
+    """Of few and of many sums that are in the way, some of which are free."""
+    draw = np.random.default_rng(7)
+    n, m = 200, 9
+    asked = draw.random((n, m)) < 0.8
+    roots = draw.normal(size=(n, m, m))
+    roots[:, 1] = roots[:, 0] + 1e-3 * roots[:, 1]  # two are nearly one
+    sums = draw.normal(-0.5, 2.0, (n, m))
+    limits = Limits(np.zeros((n, m, m)), np.zeros(n), asked)
+    found = log_odds_together(limits, np.arange(n), sums, roots)
+    looked = np.flatnonzero(np.isfinite(found))
+    assert len(looked) > n / 2
+    for i in looked:
+        alone = all_kept([(sums[i, asked[i]], roots[i, asked[i]])])
+        assert found[i] == pytest.approx(alone, rel=1e-5, abs=1e-5)
