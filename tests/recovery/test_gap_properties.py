@@ -18,11 +18,12 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.diagnose import GapResult
 from identification.gap.explanations.verdict import BENCH_DOUBT
 from rig import cli
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import DESIGNS, STATED, Design, imported, meta, noisy
+from tests.explained import explained
 
 Array = NDArray[np.float64]
 ARM = Design(repetitions=2, steps=6, hold=3)
@@ -57,7 +58,7 @@ def data_of(rows: pd.DataFrame, text: str) -> GapData:
 
 @cache
 def arm_result() -> GapResult:
-    return diagnose_gap(data_of(table(), meta(ARM)))
+    return explained(data_of(table(), meta(ARM)))
 
 
 @cache
@@ -67,7 +68,7 @@ def bench_data(law: str = "seating") -> GapData:
 
 @cache
 def bench_result(law: str = "seating") -> GapResult:
-    return diagnose_gap(bench_data(law))
+    return explained(bench_data(law))
 
 
 def alike(one: GapResult, other: GapResult, within: float = SAME) -> None:
@@ -79,7 +80,7 @@ def alike(one: GapResult, other: GapResult, within: float = SAME) -> None:
 
 
 def test_same_data_same_answer_to_the_last_bit() -> None:
-    again = diagnose_gap(data_of(table().copy(), meta(ARM)))
+    again = explained(data_of(table().copy(), meta(ARM)))
     one = arm_result()
     assert again.probabilities == one.probabilities
     assert [(e.name, e.parameters, e.size) for e in again.effects] == [
@@ -96,7 +97,7 @@ def test_names_of_poses_and_directions_do_not_matter() -> None:
     text = (
         meta(ARM).replace("P1:", "Z9:").replace("x: [1", "out: [1").replace("y: [0", "a side: [0")
     )
-    renamed = diagnose_gap(data_of(rows, text))
+    renamed = explained(data_of(rows, text))
     assert renamed.probabilities == arm_result().probabilities
     names = {"x": "out", "y": "a side"}
     assert renamed.where.directions == tuple(names[d] for d in arm_result().where.directions)
@@ -104,14 +105,14 @@ def test_names_of_poses_and_directions_do_not_matter() -> None:
 
 def test_order_of_directions_in_meta_does_not_matter() -> None:
     text = meta(ARM).replace("{x: [1, 0, 0], y: [0, 1, 0]}", "{y: [0, 1, 0], x: [1, 0, 0]}")
-    assert diagnose_gap(data_of(table(), text)).probabilities == arm_result().probabilities
+    assert explained(data_of(table(), text)).probabilities == arm_result().probabilities
 
 
 def test_order_in_which_directions_were_measured_does_not_matter() -> None:
     """Without a session clock: with one, it is another history."""
     rows = table().drop(columns="session_s")
     turned = pd.concat([rows[rows.direction == "y"], rows[rows.direction == "x"]])
-    one, other = (diagnose_gap(data_of(r, meta(ARM))) for r in (rows, turned))
+    one, other = (explained(data_of(r, meta(ARM))) for r in (rows, turned))
     alike(one, other, within=0.02)
 
 
@@ -119,7 +120,7 @@ def test_origin_of_time_does_not_matter() -> None:
     data = bench_data("creep")
     assert data.session is not None
     moved = replace(data, time=data.time + 4096.0, session=data.session + 65536.0)
-    alike(bench_result("creep"), diagnose_gap(moved), within=1e-4)
+    alike(bench_result("creep"), explained(moved), within=1e-4)
 
 
 @pytest.mark.parametrize("law", ["seating", "creep"])
@@ -128,7 +129,7 @@ def test_unit_of_time_does_not_matter(law: str, unit: float) -> None:
     data = bench_data(law)
     assert data.session is not None
     other = replace(data, time=data.time * unit, session=data.session * unit)
-    found, before = diagnose_gap(other), bench_result(law)
+    found, before = explained(other), bench_result(law)
     alike(found, before, within=0.05)
     if law == "creep":
         time, first = (r.effects[0].parameters["retardation_time"] for r in (found, before))
@@ -142,7 +143,7 @@ def test_units_of_force_and_displacement_do_not_matter() -> None:
         force=data.instruments.force * a,
         displacement=data.instruments.displacement * b,
     )
-    other = diagnose_gap(
+    other = explained(
         replace(
             data,
             force=data.force * a,
@@ -166,7 +167,7 @@ def test_noise_lowers_confidence_and_invents_nothing() -> None:
     for times in (1.0, 4.0, 64.0):
         rows = noisy(BENCH, seating, seed=3, noise=times)
         text = meta(BENCH).replace("0.05", f"{0.05 * times}").replace("0.002", f"{0.002 * times}")
-        found = diagnose_gap(data_of(rows, text))
+        found = explained(data_of(rows, text))
         seen.append(found.probabilities["contact_seating"])
         others = {w: p for w, p in found.probabilities.items() if w != "contact_seating"}
         invented = {w: p for w, p in others.items() if w not in ("none", "unknown")}
@@ -178,7 +179,7 @@ def test_noise_lowers_confidence_and_invents_nothing() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_alone_is_no_effect(seed: int) -> None:
-    found = diagnose_gap(data_of(noisy(BENCH, None, seed=seed), meta(BENCH)))
+    found = explained(data_of(noisy(BENCH, None, seed=seed), meta(BENCH)))
     assert found.verdict == "none"
 
 

@@ -10,7 +10,6 @@ import pandas as pd
 import pytest
 
 from identification.gap.data import GapData
-from identification.gap.diagnose import diagnose_gap
 from identification.gap.evidence.compare import score
 from identification.gap.evidence.engine import Engine, eta_levels
 from identification.gap.explanations.explanation import Likeness
@@ -32,6 +31,7 @@ from tests.conformance.gap_designs import (
     meta,
     noisy,
 )
+from tests.explained import explained
 
 SIZE_M = 30e-6
 SMALL = Design(repetitions=2, steps=7, hold=3)
@@ -115,7 +115,7 @@ KINDS: dict[str, Added] = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_no_word_names_is_unknown_and_told(kind: str) -> None:
-    result = diagnose_gap(measured(KINDS[kind]))
+    result = explained(measured(KINDS[kind]))
     assert result.verdict == "unknown"
     like = result.looks_like
     assert like is not None
@@ -130,7 +130,7 @@ FINE = Design(repetitions=2, steps=16, hold=1, readings=False)
 
 
 def test_a_wave_over_the_stroke_is_found_with_its_length() -> None:
-    result = diagnose_gap(measured(wave(0.31e-3), design=FINE))
+    result = explained(measured(wave(0.31e-3), design=FINE))
     assert result.verdict == "unknown"
     like = result.looks_like
     assert like is not None
@@ -141,7 +141,7 @@ def test_a_wave_over_the_stroke_is_found_with_its_length() -> None:
 
 def test_below_the_noise_there_is_no_gap() -> None:
     """However plainly many samples show it."""
-    assert diagnose_gap(measured(swing(61.0), 1.2e-6, DESIGNS["medium"])).verdict == "none"
+    assert explained(measured(swing(61.0), 1.2e-6, DESIGNS["medium"])).verdict == "none"
 
 
 def test_waves_fit_into_the_shortest_stroke_at_least_twice() -> None:
@@ -167,7 +167,7 @@ def test_periods_that_were_not_looked_at_count_as_looked_at_in_vain() -> None:
 
 @pytest.mark.parametrize("name", ["medium", "paper", "bench"])
 def test_nothing_strange_is_seen_in_noise(name: str) -> None:
-    result = diagnose_gap(linear(name))
+    result = explained(linear(name))
     assert result.verdict == "none"
     assert result.looks_like is None
 
@@ -175,7 +175,7 @@ def test_nothing_strange_is_seen_in_noise(name: str) -> None:
 def test_slow_swings_are_left_to_the_drifts() -> None:
     """One and a half periods over the session are a warm-up and what follows."""
     span = float(np.ptp(measured(slopes).session))
-    result = diagnose_gap(measured(swing(span / 1.5)))
+    result = explained(measured(swing(span / 1.5)))
     assert result.verdict == "thermal_drift"
 
 

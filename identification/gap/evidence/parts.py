@@ -104,8 +104,8 @@ def _gained(engine: Engine, parts: tuple[Part, ...], level: int) -> float:
 
 
 def _beyond_springs(engine: Engine, moved: Array) -> float:
-    """rms (m) of a linear effect beyond what the springs give within three standard deviations;
-    beside an effect that hardly shows, some of what it moves counts whatever they give."""
+    """rms (m) of a linear effect beyond what the springs give within BOUND; beside an effect that
+    hardly shows, some of what it moves counts whatever they give."""
     base, n = engine.base, engine.bench.rows.n
     root = np.sqrt(engine.bench.rows.weight / engine.bench.rows.weight.sum())
     if "springs" not in engine.cache:
@@ -115,11 +115,12 @@ def _beyond_springs(engine: Engine, moved: Array) -> float:
     t = engine.cache["to springs"] @ (moved * root)
     left = float(np.linalg.norm(moved * root - engine.cache["springs"] @ t))
     most = float(np.abs(t).max()) if t.size else 0.0
-    beyond = max(0.0, 1 - 3 / most) if most > 0 else 1.0
+    beyond = max(0.0, 1 - BOUND / most) if most > 0 else 1.0
     return max(left, max(beyond, _COUNTS) * float(np.sqrt(np.sum((moved * root) ** 2))))
 
 
 _COUNTS = 0.03
+BOUND = 3.0  # standard deviations of what was stated that a spring may be off
 
 
 def _beyond_scatter(engine: Engine, moved: Array) -> float:

@@ -40,7 +40,7 @@ from identification.gap.words import CURVES, DRIFTS, FRICTION, LINEAR, YIELD
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain.
 REMAINDER = 0.25
-SOFT = 8.0  # how fast, per factor e beyond that, it loses what it explains to `unknown`
+_SOFT = 8.0  # how fast, per factor e beyond a limit, weight is lost to `unknown`
 # Nor can a law be met better than to a few percent of what it does, where that is no more than such
 # a share of the gap: effects that cancel each other explain nothing.
 LAW_REMAINDER = 0.03
@@ -152,9 +152,9 @@ def explain(
         REMAINDER * engine.structural / max(len(together), 1),
         min(LAW_REMAINDER * float(each.max(initial=0.0)), REMAINDER * engine.structural),
     )
-    good = 1 / (1 + (np.array([lv.eta for lv in levels]) / least) ** SOFT)
     share = np.exp(logs - logs.max())
-    fraction = float(share @ good / share.sum())
+    good = sum(s * kept_within(lv.eta, least) for s, lv in zip(share, levels, strict=True))
+    fraction = float(good / share.sum())
     order = _order(parts, each)
     if taken is not None:
         log_evidence += evidence_correction(engine, parts, taken, bases)
@@ -171,6 +171,12 @@ def explain(
         tuple(float(each[i]) for i in order),
         weight + log(max(fraction, 1e-300)),
     )
+
+
+def kept_within(value: float, limit: float) -> float:
+    """Share of its weight that what is judged by a value keeps: all far within the limit, half of
+    it there, and ever less beyond."""
+    return float(1 / (1 + (value / limit) ** _SOFT))
 
 
 def _ranking_sizes(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level: int) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.arrays import Array, Ints
 from identification.gap.evidence.engine import Engine
-from identification.gap.explanations.explanation import Explanation, SearchResult
+from identification.gap.explanations.explanation import Explanation, SearchResult, kept_within
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import foresaw, with_posterior
 from identification.gap.judging.hands import open_to_hands
@@ -26,7 +26,6 @@ from identification.gap.words import BETWEEN_RUNS, DRIFTS, FRICTION, LATE, LINEA
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
 CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
-SHARP = 8.0  # how fast weight is lost about the limit, per factor e
 _LOOKED_AT, _WITHIN = 6, 9.0  # explanations, and nats below the best, that are looked at
 
 
@@ -117,7 +116,7 @@ def _kept(found: SearchResult, explanation: Explanation, fold: Ints) -> float:
     seen = CLOSED * _moved(engine, fitted)
     unseen = engine.bench.rows.rms(open_to_hands(engine, fitted))
     limit = max(FAILS * noise_of(engine.bench), float(np.hypot(seen, unseen)))
-    return float(1 / (1 + (after / limit) ** SHARP))
+    return kept_within(after, limit)
 
 
 def _own_tips(engine: Engine, explanation: Explanation, fitted: Fit) -> bool:

@@ -19,9 +19,9 @@ from identification.gap.evidence.imperfection import STEP
 from identification.gap.explanations.explanation import (
     LAW_REMAINDER,
     REMAINDER,
-    SOFT,
     Explanation,
     SearchResult,
+    kept_within,
 )
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import with_posterior
@@ -84,7 +84,7 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     beyond: another channel, which the rows of the response do not show, asks for them."""
     allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.words))
     fitted = fit(engine, explanation)
-    share = _share(_left(engine, fitted), allowed)
+    share = kept_within(_left(engine, fitted), allowed)
     if _swings(fitted) or _hurries(engine, fitted):
         share *= SWINGS
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
@@ -97,7 +97,7 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
 
 def _unstrained(explanation: Explanation, asked: float) -> Explanation:
     """With as much of its weight as what it asks of its priors allows it."""
-    kept = float(np.log(max(_share(asked, LIMIT), 1e-300)))
+    kept = float(np.log(max(kept_within(asked, LIMIT), 1e-300)))
     return replace(explanation, log_good=explanation.log_good + kept)
 
 
@@ -111,7 +111,7 @@ def _as_simulated(engine: Engine, none: Explanation, fitted: Fit) -> Explanation
             continue
         whole = 1 + change if name.startswith("spring") else 1 - change
         off = max(off, abs(change) / sd, abs(change / max(whole, _TINY)) / sd)
-    lost = float(np.log(max(_share(off, AS_STATED), 1e-300)))
+    lost = float(np.log(max(kept_within(off, AS_STATED), 1e-300)))
     return replace(none, log_weight=none.log_weight + lost, log_good=none.log_good + lost)
 
 
@@ -170,11 +170,6 @@ def _allowed(engine: Engine, explanation: Explanation, unseen: float, words: int
     return float(max(REMAINDER * engine.structural / words**0.5, law, unseen))
 
 
-def _share(left: float, allowed: float) -> float:
-    """Of the weight that is kept by what is left, or asked for, against what is allowed."""
-    return float(1 / (1 + (left / allowed) ** SOFT))
-
-
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     """With the share of its weight that it keeps by what it leaves beyond the noise."""
     course = engine.bench.course
@@ -184,7 +179,7 @@ def _judged(engine: Engine, explanation: Explanation) -> Explanation:
     left = _left(engine, fit(engine, explanation))
     if course.only_a_curve and explanation.words <= CURVES:
         left = 0.0  # a curve as well: no reading of such a table stands off the next ones
-    share = _share(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
+    share = kept_within(left, _allowed(engine, explanation, UNSURE * engine.bench.noise.stated))
     fall = course.fall
     gives = (fall > _FALL and explanation.words & CURVES) or (
         fall > _LOST and explanation.words & FRICTION

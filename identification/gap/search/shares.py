@@ -13,10 +13,10 @@ import numpy as np
 
 from identification.arrays import Ints
 from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import BOUND
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import Fit, fit
 
-BOUND = 3.0  # standard deviations of what was stated that a spring may be off
 _NATS = 15.0  # below the best: explanations that no longer matter
 _COUNTS = 0.05  # of what an effect moves: so much of it is a gap, whatever the springs could give
 
