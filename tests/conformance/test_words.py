@@ -5,13 +5,17 @@ A word that one of the tables lacks is missed here, before data show it.
 
 from __future__ import annotations
 
+import ast
 from collections import defaultdict
 from collections.abc import Collection
+from difflib import get_close_matches
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import identification.gap
 from identification.gap.answer.parameters import parameters
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
@@ -180,3 +184,17 @@ def test_lengths_and_what_is_not_negative_are_parameters_of_their_word(word: str
 def test_what_is_scored_is_a_parameter_of_its_word(word: str, key: str) -> None:
     stem = judge.SHARED[word, key].split("{")[0].rstrip("123456")  # of directions, or joints
     assert any(n.startswith(stem) for n in names()[word])
+
+
+def test_no_word_is_misspelt_anywhere_in_the_library() -> None:
+    """Rules that speak of single words compare strings: a typo would change probabilities, and
+    nothing would say so."""
+    known = {*WORDS, *NOT_WORDS}
+    for path in sorted(Path(identification.gap.__path__[0]).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                near = get_close_matches(node.value, WORDS, 1, 0.8)
+                assert not near or node.value in known, f"{path.name}:{node.lineno} {node.value}"
+
+
+NOT_WORDS = ("joint_stiffness",)

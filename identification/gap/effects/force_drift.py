@@ -189,8 +189,8 @@ def _axes(bench: Bench) -> dict[str, tuple[float, float, float]]:
     """Components of the force that are recorded, or that some direction loads."""
     if bench.rows.tangential is not None:
         return AXES
-    units = np.stack([s.unit_vector for s in bench.data.setups])
-    return {name: a for name, a in AXES.items() if np.any(np.abs(units @ np.array(a)) > 0.1)}
+    loaded = np.any([s.loads for s in bench.data.setups], axis=0)
+    return {name: a for (name, a), there in zip(AXES.items(), loaded, strict=True) if there}
 
 
 def _alike(bench: Bench) -> tuple[float, float, float]:

@@ -239,20 +239,19 @@ def _true_force(bench: Bench, kind: str, lag: float) -> Array:
 def _still(bench: Bench, kind: str, lag: float) -> tuple[Array, Array]:
     """That force (n,), and what its readings with the lag leave (n,) of those that there are."""
     rows = bench.rows
-    first = rows.hold[rows.starts][np.cumsum(rows.starts) - 1]
-    within = rows.hold - first  # number of the hold in its run
+    within = rows.hold - rows.hold[rows.starts][np.cumsum(rows.starts) - 1]  # number in its run
     holds = np.eye(int(within.max()) + 1)[within]
     shown, out = _behind(bench, holds, kind, lag), bench.load.copy()
     missed = np.zeros(rows.n)
-    for run in np.unique(rows.run):
-        mine = rows.run == run
-        used, number = np.unique(within[mine], return_inverse=True)
-        A = shown[mine][:, used]
+    for mine in (slice(a, b) for a, b in pairwise(rows.run_edges)):
+        number = within[mine]
+        used = int(number[-1]) + 1
+        A = shown[mine, :used]
         mean = np.bincount(number, weights=bench.load[mine]) / np.bincount(number)
         left = bench.load[mine] - A @ mean
         settled = np.abs(A[np.arange(len(A)), number] - 1) < _SETTLED
         seen = A.T * (rows.weight[mine] * np.where(settled, 1.0, _ON_THE_WAY))
-        change = np.linalg.solve(seen @ A + _HOLDS_BACK**2 * np.eye(len(used)), seen @ left)
+        change = np.linalg.solve(seen @ A + _HOLDS_BACK**2 * np.eye(used), seen @ left)
         out[mine] = (mean + change)[number]
         missed[mine] = left - A @ change
     return out, missed

@@ -69,7 +69,8 @@ class NoiseLevel:
 
 
 class Engine:
-    """Evidence for the pool of one bench; `levels[i].eta` ascending, the first is 0."""
+    """Evidence for the pool of one bench; `levels[i].eta` ascending, the first is 0. level_root
+    (levels, levels): Cholesky factor of `level_covariance`."""
 
     def __init__(self, bench: Bench, base: Base, target: Array, etas: Array) -> None:
         """target: stacked observation minus the simulation's prediction."""
@@ -101,6 +102,7 @@ class Engine:
         self._weights = [self._left(float(eta)) for eta in etas]
         self._first = self._whiten(np.column_stack([target, base.columns]))
         self._second = self._whiten(np.column_stack([level_columns(bench), run_columns(bench)]))
+        self.level_root = np.linalg.cholesky(level_covariance(bench))
         self._bases = self._integrated(etas, self._weights)
         self._finer: dict[float, tuple[Weights, _Integrated]] = {}
         self._taken = Gathered(self._whiten(self.columns([])))
@@ -279,13 +281,12 @@ class Engine:
         from scipy.linalg import solve_triangular
 
         kb = self.base.columns.shape[1]
-        covariance = level_covariance(self.bench)
-        levels = covariance.shape[0]
+        levels = len(self.level_root)
         count = gram.shape[0] - 1 - kb if eta > 0 else 0
         root = np.zeros((kb + count, kb + count))
         root[:kb, :kb] = np.diag(self.base.sd)
         if count:
-            root[kb : kb + levels, kb : kb + levels] = eta * np.linalg.cholesky(covariance)
+            root[kb : kb + levels, kb : kb + levels] = eta * self.level_root
             root[kb + levels :, kb + levels :] = RUN_PART * eta * np.eye(count - levels)
         b = slice(1, 1 + kb + count)
         factor = factor_of(np.eye(kb + count) + root.T @ gram[b, b] @ root)

@@ -14,7 +14,6 @@ from identification.gap.evidence.engine import (
     Engine,
     hold_part,
     level_columns,
-    level_covariance,
     run_columns,
 )
 from identification.gap.evidence.parts import Part
@@ -110,7 +109,7 @@ def _imperfection_columns(engine: Engine, parts: tuple[Part, ...], w: Array, eta
     holds have in common: in their first rows and in later ones, after rises and falls of the load,
     the same everywhere and a share of what the law itself does there."""
     if "imperfection" not in engine.cache:
-        levels = level_columns(engine.bench) @ np.linalg.cholesky(level_covariance(engine.bench))
+        levels = level_columns(engine.bench) @ engine.level_root
         runs = RUN_PART * run_columns(engine.bench)
         begin = [engine.bench.stacked(m.astype(float)) for m in _phases(engine)]
         engine.cache["imperfection"] = np.column_stack([levels, runs, *begin])
