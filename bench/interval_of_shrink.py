@@ -45,8 +45,8 @@ def session(design: Design, seed: int) -> HeldOut:
     base, target = base_columns(bench), bench.observed - prediction(bench)
     variants = library(bench, ["contact_seating"])
     engine = Engine(bench, base, target, eta_levels(bench, base, target))
-    found = search(engine, variants, deepest=1)
-    return held_out(engine, found.best, "repetition", folds(engine)["repetition"])
+    found = search(engine, variants)
+    return held_out(engine, found.explanations[0], "repetition", folds(engine)["repetition"])
 
 
 def main() -> None:

@@ -142,12 +142,11 @@ def explain_gap(
     check_words(withheld | forced)
     tell("preparing", 0.0)
     bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(data)))))
-    engine, variants = _prepared(bench, known, withheld)
-    _check_shown(forced, variants)
+    engine, library_of_it = _prepared(bench, known, withheld)
+    _check_shown(forced, library_of_it)
     tell("comparing effects", 0.2)
-    found = _searched(engine, variants)
-    found, variants = _with_unseen(found, variants, known, withheld)
-    engine = found.engine
+    found = _with_unseen(_searched(engine, library_of_it), known, withheld)
+    engine, variants = found.engine, found.variants
     tell("withheld data", 0.7)
     found = earned(found)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
@@ -160,7 +159,7 @@ def explain_gap(
 
     def whole() -> GapResult:
         tell("what to measure next", 0.9)
-        following = _next(found, variants, chosen, result, others)
+        following = _next(found, chosen, result, others)
         tell("done", 1.0)
         return replace(result, next_measurement=following)
 
@@ -178,44 +177,39 @@ def _prepared(
     return Engine(bench, base, target, eta_levels(bench, base, target)), variants
 
 
-def _searched(engine: Engine, variants: list[Variant]) -> SearchResult:
-    """The search over explanations; the variants then hold finer ones as well, and those of
-    troubles that no word names."""
+def _searched(engine: Engine, variants: Sequence[Variant]) -> SearchResult:
+    """The search over explanations, with finer variants as well, and those of troubles that no word
+    names."""
     singles = score(engine, engine.levels, variants)
     finer = refine(engine, singles)
     nameless = troubles_of(engine.bench, engine.base, engine.target)
     for fresh in (finer, nameless):
         if fresh:
-            variants += fresh
             singles += score(engine, engine.levels, fresh)
-    found = with_strangers(with_plain_trouble(search(engine, variants, singles)))
-    return looked_up(found)
+    found = search(engine, [*variants, *finer, *nameless], singles)
+    return looked_up(with_strangers(with_plain_trouble(found)))
 
 
 def _with_unseen(
-    found: SearchResult,
-    variants: list[Variant],
-    known: Sequence[Form],
-    withheld: Collection[str],
-) -> tuple[SearchResult, list[Variant]]:
+    found: SearchResult, known: Sequence[Form], withheld: Collection[str]
+) -> SearchResult:
     """The search once more with loads between readings, where these explain more than it costs to
     say which they are."""
     more = unseen(found)
     if more is None:
-        return found, variants
+        return found
     bench = found.engine.bench
     rows = replace(bench.rows, overshoot=more.overshoot)
-    engine, others = _prepared(make_bench(bench.data, rows=rows), known, withheld)
-    again = _searched(engine, others)
+    again = _searched(*_prepared(make_bench(bench.data, rows=rows), known, withheld))
     gain = again.explanations[0].log_weight - found.explanations[0].log_weight
-    return (again, others) if gain > more.cost else (found, variants)
+    return again if gain > more.cost else found
 
 
 class NotShown(ValueError):
     """A word that the data at hand could not show."""
 
 
-def _check_shown(forced: frozenset[str], variants: list[Variant]) -> None:
+def _check_shown(forced: frozenset[str], variants: Sequence[Variant]) -> None:
     shown = dict.fromkeys(v.word for v in variants)
     for word in sorted(forced - shown.keys()):
         raise NotShown(
@@ -364,7 +358,6 @@ def _runners_up(
 
 def _next(
     found: SearchResult,
-    variants: list[Variant],
     chosen: Explanation,
     result: GapResult,
     others: Others | None,
@@ -373,13 +366,13 @@ def _next(
     verdict, effects, probabilities = result.verdict, result.effects, result.probabilities
     for e in effects:
         for other in sorted(e.indistinguishable_from, key=lambda w: -probabilities[w]):
-            proposal = next_measurement(found, variants, chosen, (e.name, other), others)
+            proposal = next_measurement(found, chosen, (e.name, other), others)
             if proposal is not None:
                 return proposal
     ranked = sorted(probabilities.items(), key=lambda i: -i[1])
     words = [w for w, p in ranked[:2] if p > 0.02 and w in WORDS]
     if verdict in WORDS and len(words) == 2:
-        return next_measurement(found, variants, chosen, (words[0], words[1]), others)
+        return next_measurement(found, chosen, (words[0], words[1]), others)
     return None
 
 

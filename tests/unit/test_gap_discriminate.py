@@ -98,7 +98,7 @@ def test_procedures_are_looked_at_from_the_quickest_until_none_can_be_worth_more
         looked.clear()
         monkeypatch.setattr(discriminate, "_discrimination", given)
         pair = ("joint_creep", "joint_stiffness_error")
-        assert next_measurement(found, variants, chosen, pair) is not None
+        assert next_measurement(found, chosen, pair) is not None
         assert looked[1:] == sorted(looked[1:])
         return len(looked) - 1
 

@@ -86,7 +86,6 @@ Others = Callable[[], Sequence[Elsewhere]]
 
 def next_measurement(
     found: SearchResult,
-    variants: Sequence[Variant],
     chosen: Explanation,
     pair: tuple[str, str],
     others: Others | None = None,
@@ -99,11 +98,11 @@ def next_measurement(
     engine = found.engine
     if not engine.bench.reach > 0 or not np.ptp(engine.bench.load) > 0:
         return None
-    first = _rival(found, variants, chosen, pair[0], pair[0])
+    first = _rival(found, chosen, pair[0], pair[0])
     if first is None:
         return None
     second = _same_elsewhere(found, chosen, first, pair[1]) or _rival(
-        found, variants, chosen, pair[0], pair[1]
+        found, chosen, pair[0], pair[1]
     )
     if second is None:
         return None
@@ -170,9 +169,7 @@ def _nats(value: float) -> str:
 # --- the two explanations ------------------------------------------------------------------------
 
 
-def _rival(
-    found: SearchResult, variants: Sequence[Variant], chosen: Explanation, first: str, word: str
-) -> _Rival | None:
+def _rival(found: SearchResult, chosen: Explanation, first: str, word: str) -> _Rival | None:
     """The explanation with `word` in the place of `first`, else by itself."""
     wanted = (chosen.words - {first}) | {word}
     by_words = {e.words: e for e in found.explanations}
@@ -187,7 +184,7 @@ def _rival(
         for i, p in enumerate(explanation.parts)
         if p.word == word
     ]
-    shapes = _shapes(engine, [v for v in variants if v.word == word], part.variant)
+    shapes = _shapes(engine, [v for v in found.variants if v.word == word], part.variant)
     return _Rival(word, tuple(forms), _springs(engine, fitted), shapes)
 
 

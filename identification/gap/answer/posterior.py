@@ -43,7 +43,10 @@ _MOST, _LEAST_SHARE = 10, 0.01  # shapes that count, and their least share of th
 
 
 def settled(
-    engine: Engine, variants: list[Variant], chosen: Explanation, rivals: Iterable[Explanation] = ()
+    engine: Engine,
+    variants: Sequence[Variant],
+    chosen: Explanation,
+    rivals: Iterable[Explanation] = (),
 ) -> tuple[Explanation, list[Known]]:
     """The explanation with its effects at their likeliest joints or axes (a grid's best shape may
     sit where few others do), and parameters and places of each.
@@ -63,7 +66,7 @@ def settled(
     return chosen, _known(engine, chosen, each, rivals)
 
 
-def _all_shapes(engine: Engine, variants: list[Variant], chosen: Explanation) -> list[_Shapes]:
+def _all_shapes(engine: Engine, variants: Sequence[Variant], chosen: Explanation) -> list[_Shapes]:
     return [_Shapes(engine, variants, chosen, i) for i in range(len(chosen.parts))]
 
 
@@ -107,7 +110,7 @@ class _Shapes:
     every[0] is the explanation itself, read: parameters of all effects in those that count."""
 
     def __init__(
-        self, engine: Engine, variants: list[Variant], chosen: Explanation, index: int
+        self, engine: Engine, variants: Sequence[Variant], chosen: Explanation, index: int
     ) -> None:
         self.engine, self.chosen, self.index = engine, chosen, index
         self.every = _open(engine, variants, chosen, index)
@@ -271,7 +274,7 @@ def _beside(every: _Weighed, open_: _Weighed, index: int) -> Explanation | None:
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 
 
-def _open(engine: Engine, variants: list[Variant], chosen: Explanation, index: int) -> _Weighed:
+def _open(engine: Engine, variants: Sequence[Variant], chosen: Explanation, index: int) -> _Weighed:
     """What the data may leave open, the chosen shape first: explanations with other shapes of the
     effect and other sizes of imperfection, with their log weights."""
     part = chosen.parts[index]
@@ -298,7 +301,7 @@ def _petty(engine: Engine, parts: tuple[Part, ...], level: int) -> float:
     return minor_parts(engine, parts, part_sizes(engine, parts, level)) if len(parts) > 1 else 0.0
 
 
-def _representatives(scored: list[Scored]) -> list[tuple[Scored, float]]:
+def _representatives(scored: Sequence[Scored]) -> list[tuple[Scored, float]]:
     """The likeliest shapes of every place that counts, as many as its share of the posterior, and
     by how many nats each stands for more of its place than itself: the many shapes of a joint that
     was looked at closely push no other joint out."""

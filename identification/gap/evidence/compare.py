@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from math import log
@@ -31,7 +32,7 @@ class Scored(NamedTuple):
 
 
 def score(
-    engine: Engine, levels: list[NoiseLevel], variants: list[Variant], already: float = 0.0
+    engine: Engine, levels: list[NoiseLevel], variants: Sequence[Variant], already: float = 0.0
 ) -> list[Scored]:
     """Evidence of every variant on top of `levels` (base, or base and an effect already chosen).
 
@@ -152,7 +153,7 @@ def log_mean(values: list[float], weights: list[float] | None = None) -> float:
     return float(top + np.log(np.sum(w * np.exp(v - top)) / w.sum()))
 
 
-def by_word(scored: list[Scored]) -> dict[str, list[Scored]]:
+def by_word(scored: Sequence[Scored]) -> dict[str, list[Scored]]:
     """Word -> its variants."""
     out: dict[str, list[Scored]] = {}
     for s in scored:
@@ -160,14 +161,14 @@ def by_word(scored: list[Scored]) -> dict[str, list[Scored]]:
     return out
 
 
-def marginal(scored: list[Scored]) -> float:
+def marginal(scored: Sequence[Scored]) -> float:
     """log evidence of a word: mean over its variants, weighted by their prior."""
     weights = [s.variant.prior for s in scored]
     values = [s.log_evidence - log(s.variant.prior) for s in scored]
     return log_mean(values, weights)
 
 
-def closest(scored: list[Scored]) -> Scored:
+def closest(scored: Sequence[Scored]) -> Scored:
     """Of the shapes of a word that are about equally likely, the one that needs least
     imperfection: a word is judged by how well it can explain, not by its crudest shape."""
     best = max(s.log_evidence for s in scored)

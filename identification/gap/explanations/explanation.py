@@ -35,6 +35,7 @@ from identification.gap.explanations.penalties import (
 )
 from identification.gap.explanations.priors import prior_of
 from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant
 from identification.gap.words import CURVES, DRIFTS, FRICTION, LINEAR, YIELD
 
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
@@ -119,7 +120,8 @@ class SearchResult:
     gap that no law explains, what share of its weight withheld data leave an explanation, and what
     a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
     that no word names, best first. speakers: words of an explanation -> the one that speaks for it:
-    fewer of its effects that foretell withheld data better, or a play in a curve's place."""
+    fewer of its effects that foretell withheld data better, or a play in a curve's place. variants:
+    all that were compared, those that were made on the way with them."""
 
     engine: Engine
     explanations: tuple[Explanation, ...]
@@ -131,6 +133,7 @@ class SearchResult:
     looks_like: Likeness | None = None
     nameless: tuple[Explanation, ...] = ()
     speakers: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
+    variants: tuple[Variant, ...] = ()
 
 
 def explain(

@@ -9,6 +9,8 @@ direction, which has a compliance of its own, is read.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from identification.gap.evidence.compare import closest, marginal, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
@@ -24,7 +26,7 @@ WORTH = 6.0
 _HOPELESS = 2000.0  # nats below, from which no other choice of shapes has been seen to come back
 
 
-def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> list[Variant]:
+def family_of(variants: Sequence[Variant], word: str, beside: tuple[Part, ...]) -> list[Variant]:
     """Variants of a word that may stand beside other parts: not in a joint where it is already; and
     what creeps more than in proportion in one joint does so in all."""
     same = [p.variant for p in beside if p.word == word]
@@ -33,7 +35,7 @@ def family_of(variants: list[Variant], word: str, beside: tuple[Part, ...]) -> l
     return [v for v in mine if not bent or v.exceeds_proportion in bent]
 
 
-def in_more_joints(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+def in_more_joints(engine: Engine, variants: Sequence[Variant], start: Explanation) -> Explanation:
     """With its joint mechanisms in further joints, as far as that is worth it."""
     bench, best = engine.bench, start
     most = MOST if bench.data.arm else bench.data.joints
@@ -55,7 +57,7 @@ def _each_seen(bench: Bench) -> bool:
 
 
 def _in_one_more(
-    engine: Engine, variants: list[Variant], start: Explanation, word: str
+    engine: Engine, variants: Sequence[Variant], start: Explanation, word: str
 ) -> Explanation | None:
     others = [v for v in family_of(variants, word, start.parts) if v.joint is not None]
     if not others or any(p.word == word and p.variant.joint is None for p in start.parts):
@@ -70,7 +72,7 @@ def _in_one_more(
     return polished(engine, variants, found)
 
 
-def polished(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+def polished(engine: Engine, variants: Sequence[Variant], start: Explanation) -> Explanation:
     """Lets every part choose its variant anew, the others given."""
     best = start
     for index in range(len(start.parts)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,14 +42,14 @@ _WINDOW = 12.0  # nats below the best that a word may lie and still be condition
 
 
 def search(
-    engine: Engine, variants: list[Variant], singles: list[Scored] | None = None
+    engine: Engine, variants: Sequence[Variant], singles: Sequence[Scored] = ()
 ) -> SearchResult:
     """All single effects, then sets around the best ones, each re-fitted jointly. Where no levels
-    repeat from run to run, a third effect is but freedom of the other two's laws. variants: grow by
-    what is looked at beside others; singles: their scores one by one, where they are known."""
+    repeat from run to run, a third effect is but freedom of the other two's laws. singles: scores
+    of the variants one by one, where they are known."""
     deepest = 2 if engine.bench.rows.continuous else 3
-    levels = engine.levels
-    families = by_word(singles or score(engine, levels, variants))
+    levels, all_of_them = engine.levels, list(variants)
+    families = by_word(singles or score(engine, levels, all_of_them))
     alone = {w: marginal(s) for w, s in families.items()}
     pool: dict[frozenset[str], Explanation] = {}
     for word, scored in families.items():
@@ -59,9 +60,9 @@ def search(
     empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
     seeds = _SEEDS if engine.bench.data.arm else _BENCH_SEEDS
-    front = _in_more_joints(engine, variants, pool, _seeds(pool, seeds))
+    front = _in_more_joints(engine, all_of_them, pool, _seeds(pool, seeds))
     for depth in range(2, deepest + 1):
-        front = _deepen(engine, variants, pool, front, depth, max(2, seeds // depth))
+        front = _deepen(engine, all_of_them, pool, front, depth, max(2, seeds // depth))
         if not front:
             break
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
@@ -76,6 +77,7 @@ def search(
         probabilities={},
         unknown=log_mean([lv.log_base for lv in strange]) + log_unknown(engine.bench.course),
         unknown_eta=max(strange, key=lambda lv: lv.log_base).eta,
+        variants=tuple(all_of_them),
     )
     return with_posterior(found, {})
 
@@ -111,7 +113,7 @@ def _hidden(engine: Engine) -> float:
 
 def force(
     engine: Engine,
-    variants: list[Variant],
+    variants: Sequence[Variant],
     pool: tuple[Explanation, ...],
     start: Explanation,
     words: frozenset[str],
@@ -155,7 +157,7 @@ def _deepen(
     kept: int,
 ) -> list[Explanation]:
     """Adds one more effect to each explanation of the front; those that gain, up to `kept`, are the
-    next front."""
+    next front. The variants grow by what is looked at beside others."""
     best = max(e.log_weight for e in pool.values())
     grown: dict[frozenset[str], Explanation] = {}
     for start in front:
