@@ -10,6 +10,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -93,7 +94,7 @@ def main() -> None:
             timed(
                 f"stiffness map, {name}, {words}, cells",
                 len(points),
-                lambda s=stance, c=coupling: maps.stiffness_map(arm, points, s, [1, 0, 0], c),
+                partial(maps.stiffness_map, arm, points, stance, [1, 0, 0], coupling),
                 repeat=1,
             )
     timed(

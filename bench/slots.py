@@ -146,6 +146,7 @@ def plain_loop(seconds: int, folder: Path) -> int:
 
     station = load_station(str(folder / "stations" / "bench.yaml"), None)
     with EmulatedRig(station, {}, {}) as live:
+        assert live.robot and live.laser and live.dynamometer and live.dynamometer.grpc_server
         robot = RTDEReceiveInterface(live.robot.host, 125.0, ["timestamp", "actual_q"])
         port = serial.Serial(live.laser.port, live.laser.baud, timeout=0)
         channel = grpc.insecure_channel(live.dynamometer.grpc_server)
