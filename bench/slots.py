@@ -146,10 +146,14 @@ def plain_loop(seconds: int, folder: Path) -> int:
 
     station = load_station(str(folder / "stations" / "bench.yaml"), None)
     with EmulatedRig(station, {}, {}) as live:
-        assert live.robot and live.laser and live.dynamometer and live.dynamometer.grpc_server
+        assert live.robot is not None
+        assert live.laser is not None
+        assert live.dynamometer is not None
+        server = live.dynamometer.grpc_server
+        assert server is not None
         robot = RTDEReceiveInterface(live.robot.host, 125.0, ["timestamp", "actual_q"])
         port = serial.Serial(live.laser.port, live.laser.baud, timeout=0)
-        channel = grpc.insecure_channel(live.dynamometer.grpc_server)
+        channel = grpc.insecure_channel(server)
         with nidaqmx.Task(grpc_options=GrpcSessionOptions(channel, "")) as task:
             task.ai_channels.add_ai_voltage_chan("Dev1/ai0:7", min_val=-10, max_val=10)
             task.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
