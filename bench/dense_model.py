@@ -103,11 +103,8 @@ def nuisances(bench: Bench) -> list[tuple[str, Array, float]]:
         only[:, j] = pull[:, j] * force
         sd = float(data.compliance_relative_sd[j])
         out.append((f"spring {j}", stacked(bench, lever[:, j] * only[:, j], only), sd))
-    units = np.array([data.setups[s].unit_vector for s in rows.setup])
-    # every axis has an amplifier of its own; without readings the springs give way for it
-    for axis, part in enumerate((units**2).T if bench.has_q else [np.ones(len(force))]):
-        less = stacked(bench, -slope * part * force, -pull * (part * force)[:, None])
-        out.append((f"gain of force {axis}", less, meter.force_gain))
+    less = stacked(bench, -slope * force, -pull * force[:, None])
+    out.append(("gain of force", less, meter.force_gain))
     out.append(("gain of laser", stacked(bench, _read(bench)), meter.displacement_gain))
     ends = [np.ptp(slope * force), np.ptp(rows.displacement), np.abs(rows.displacement).max()]
     wide = float(max(*ends, np.abs(slope * force).max()))

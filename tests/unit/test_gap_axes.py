@@ -1,14 +1,13 @@
-"""Axes along which a force acts, and what each of their amplifiers may be off."""
+"""Axes along which a force acts, and springs by number."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from identification.gap.effects import force_scale, library
-from identification.gap.model.base import Base, base_columns
+from identification.gap.model.base import Base
 from identification.gap.model.bench import make_bench
 from tests.unit.test_gap_forms import arm_data
 
@@ -22,16 +21,6 @@ def test_the_last_digit_of_a_direction_says_nothing() -> None:
     ]
     assert labels[0] == labels[1]
     assert "gain of x" in labels[0]
-
-
-@pytest.mark.parametrize("read", [True, False])
-def test_every_amplifier_may_be_off_on_its_own_where_joints_are_read(read: bool) -> None:
-    """Without readings the springs give way for it."""
-    data = arm_data() if read else replace(arm_data(), q=None)
-    base = base_columns(make_bench(data))
-    names = [n for n in base.names if n.startswith("gain force")]
-    assert names == (["gain force x", "gain force y"] if read else ["gain force"])
-    assert np.all(base.sd[base.index("gain force")] == data.instruments.force_gain)
 
 
 def test_pushes_through_the_axes_of_a_mount_do_not_turn_it() -> None:

@@ -297,15 +297,18 @@ REFUSED: list[tuple[str | bytes, str]] = [
     ),
     (
         HEAD + GOOD + "1,x,1,loading,1,,1\n",
-        ":3: column force_N: an empty cell is not allowed; every row needs a finite value.",
+        ":3: column force_N: an empty cell is not allowed; every row needs a finite value."
+        " Leave rows without one out of the table.",
     ),
     (
         HEAD + GOOD + "1,x,1,loading,1,5,nan\n",
-        ':3: column displacement_mm: "nan" (mm) is not allowed; every row needs a finite value.',
+        ':3: column displacement_mm: "nan" (mm) is not allowed; every row needs a finite value.'
+        " Leave rows without one out of the table.",
     ),
     (
         HEAD + GOOD + "1,x,1,loading,1,-inf,0\n",
-        ':3: column force_N: "-inf" (N) is not allowed; every row needs a finite value.',
+        ':3: column force_N: "-inf" (N) is not allowed; every row needs a finite value.'
+        " Leave rows without one out of the table.",
     ),
     (
         HEAD + GOOD + "1,x,1,loading,1,-2e7,0\n",
@@ -324,11 +327,13 @@ REFUSED: list[tuple[str | bytes, str]] = [
     ),
     (
         HEAD + GOOD + "1,x,1,loading,1,1e999,0\n",
-        ':3: column force_N: "1e999" (N) is not allowed; every row needs a finite value.',
+        ':3: column force_N: "1e999" (N) is not allowed; every row needs a finite value.'
+        " Leave rows without one out of the table.",
     ),
     (
         HEAD + GOOD + ",x,1,loading,1,5,0\n",
-        ":3: column time_s: an empty cell is not allowed; every row needs a finite value.",
+        ":3: column time_s: an empty cell is not allowed; every row needs a finite value."
+        " Leave rows without one out of the table.",
     ),
     (
         HEAD + GOOD + "1,x,1,laoding,1,5,0\n",

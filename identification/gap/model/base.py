@@ -115,7 +115,7 @@ def _gains(bench: Bench) -> list[_Part]:
         both = float(np.hypot(meter.force_gain, meter.displacement_gain))
         return [("gain force", bench.stacked(line), both)]
     force = [("gain force", shown(bench, bench.load), meter.force_gain)]
-    if _axis_by_axis(bench):
+    if _askew(bench):  # every component has a sensor and an amplifier of its own
         force = [
             (f"gain force {'xyz'[a]}", component(bench, a), meter.force_gain) for a in range(3)
         ]
@@ -127,12 +127,10 @@ def _gains(bench: Bench) -> list[_Part]:
     ]
 
 
-def _axis_by_axis(bench: Bench) -> bool:
-    """Whether it shows on an arm that every component of the force has a sensor and an amplifier of
-    its own: where it is pushed along several axes of the dynamometer at once, or the joints are
-    read. Else the springs give way for what single axes read too much, differently."""
-    askew = any(np.count_nonzero(s.loads) > 1 for s in bench.data.setups)
-    return bench.data.arm and (askew or bench.has_q)
+def _askew(bench: Bench) -> bool:
+    """Whether an arm is pushed along more than one axis of the dynamometer at once. What single
+    axes read too much, differently, the springs give way for."""
+    return bench.data.arm and any(np.count_nonzero(s.loads) > 1 for s in bench.data.setups)
 
 
 def component(bench: Bench, axis: int) -> Array:
