@@ -142,20 +142,19 @@ def explain_gap(
     check_words(withheld | forced)
     tell("preparing", 0.0)
     bench = make_bench(without_slack(without_glitches(without_ends(ramps_told(data)))))
-    engine, library_of_it = _prepared(bench, known, withheld)
-    _check_shown(forced, library_of_it)
+    engine, variants = _prepared(bench, known, withheld)
+    _check_shown(forced, variants)
     tell("comparing effects", 0.2)
-    found = _with_unseen(_searched(engine, library_of_it), known, withheld)
-    engine, variants = found.engine, found.variants
+    found = _with_unseen(_searched(engine, variants), known, withheld)
     tell("withheld data", 0.7)
     found = earned(found)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     plain = chosen_of(found, verdict)
-    chosen = force(engine, variants, found.explanations, plain, forced)
-    chosen, each = settled(engine, variants, chosen, found.explanations)
+    chosen = force(found.engine, found.variants, found.explanations, plain, forced)
+    chosen, each = settled(found.engine, found.variants, chosen, found.explanations)
     result = _with_twins(_result(found, verdict, chosen, each), chosen, withheld)
     if not forced <= plain.words:
-        result = replace(result, without_added=left_of(engine, fit(engine, plain)))
+        result = replace(result, without_added=left_of(found.engine, fit(found.engine, plain)))
 
     def whole() -> GapResult:
         tell("what to measure next", 0.9)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from identification.gap.answer.discriminate import _BESIDES, _DECISIVE, ENOUGH, Option, _settled
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import library
 from identification.gap.evidence import compare
 from identification.gap.evidence.compare import score
@@ -17,7 +18,6 @@ from identification.gap.evidence.table import EvidenceTable
 from identification.gap.model.bench import make_bench
 from identification.gap.model.growing import Growing
 from identification.gap.model.pool import Pool
-from tests.explained import explained
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_forms import arm_data
 
@@ -99,7 +99,7 @@ def test_procedures_that_take_too_long_to_be_worth_more_are_left_out() -> None:
 
 def test_nothing_keeps_a_diagnosis_alive() -> None:
     """A campaign makes hundreds of them in one process, of a hundred megabytes each."""
-    found = explained(arm_data())
+    found = diagnose_gap(arm_data())
     bench = ref(found.bench)
     del found
     collect()

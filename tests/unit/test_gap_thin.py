@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from identification.gap import diagnose as module
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.imposed import displacement_imposed
@@ -20,7 +21,6 @@ from rig.diagnosis.gap_data import gap_data
 from rig.tables import import_table
 from tests.conformance.effect_benches import quick_engine
 from tests.conformance.gap_designs import DESIGNS, imported, linear, meta, noisy
-from tests.explained import explained
 from tests.unit.cli_bench import META, TABLE
 from tests.unit.test_gap_operators import bench_data
 
@@ -55,7 +55,7 @@ def test_a_few_readings_are_diagnosed_as_nothing(name: str, rows: int) -> None:
     table = noisy(design)
     first = 3 if design.continuous else 0
     data = gap_data(imported(table[first : first + rows], meta(design)))
-    assert explained(data).verdict in ("none", "unknown")
+    assert diagnose_gap(data).verdict in ("none", "unknown")
 
 
 @pytest.mark.parametrize(

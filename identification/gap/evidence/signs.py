@@ -146,7 +146,7 @@ def _distances(z: Array, unit: Array) -> Array:
     """(n,) the same of many means, z (n, m), inf for a sum that is free, unit (n, m, r): few sums
     are in the way of most, those that the way to the others meets first. What these do not settle
     is left to `distance`, of which a call takes ten times as long."""
-    out, left = np.empty(len(z)), z
+    out, left = np.full(len(z), np.nan), z
     todo, on = np.arange(len(z)), np.empty((len(z), 0), dtype=np.intp)
     for held in range(1, _HELD + 1):
         on = np.column_stack([on, left.argmin(axis=1)])
@@ -158,20 +158,14 @@ def _distances(z: Array, unit: Array) -> Array:
         pushed = np.all(pushes[:, :, 0] >= 0, axis=1)
         there = pushed & np.all(left >= -_REACHED, axis=1)
         out[todo[there]] = np.linalg.norm(way[there], axis=1)
-        for i in todo[~pushed]:
-            out[i] = _of_one(z[i], unit[i])
         further = pushed & ~there
         todo, on, left = todo[further], on[further], left[further]
         if not todo.size:
-            return out
-    for i in todo:
-        out[i] = _of_one(z[i], unit[i])
+            break
+    for i in np.flatnonzero(np.isnan(out)):
+        asked = z[i] < np.inf
+        out[i] = distance(z[i, asked], unit[i, asked])
     return out
-
-
-def _of_one(z: Array, unit: Array) -> float:
-    """`distance` without the sums that are free."""
-    return distance(z[z < np.inf], unit[z < np.inf])
 
 
 _HELD = 5  # sums that are held at zero, one more at a time: these settle nineteen in twenty
