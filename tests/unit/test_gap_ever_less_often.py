@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.model.history import delayed, half_sample, standing_on
+from identification.gap.model.history import delayed, standing_on
 from identification.gap.recording.rows import reduce_rows
 from tests.unit.test_gap_operators import bench_data
 
@@ -26,7 +26,7 @@ def test_a_load_stands_until_after_the_last_reading() -> None:
     last = STANDS_S * np.arange(len(begins)) + LAST_S
     after_the_row = last - rows.session[begins - 1]
     assert np.all(after_the_row > 100.0)
-    leaves = last + half_sample(rows)
+    leaves = last + rows.half_sample
     assert standing_on(rows)[begins] == pytest.approx(leaves - rows.session[begins - 1])
     # and so for what only comes late: between leaving one load and coming to the next all is on its
     # way, and nothing before

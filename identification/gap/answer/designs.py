@@ -14,7 +14,6 @@ import numpy as np
 
 from identification.gap.data import LOADING, UNLOADING, ZERO, GapData, Instruments, Setup
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import half_sample
 from identification.gap.recording.rows import REST_S
 from identification.times import MOUNT_S, SCREW_S, SETTLE_S, UNLOAD_S
 
@@ -76,7 +75,7 @@ class Elsewhere:
 def present_design(bench: Bench) -> Design:
     """The design behind a measurement, as nearly as its rows tell."""
     rows, data = bench.rows, bench.data
-    sample = 2 * half_sample(rows)
+    sample = 2 * rows.half_sample
     hold, approach, zero = 5 * sample, APPROACH_S, _zero_s(bench, sample)
     if not rows.continuous:
         hold = float(np.median(rows.hold_weight[~rows.zero])) * sample if ~rows.zero.all() else hold

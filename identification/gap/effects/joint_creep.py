@@ -26,7 +26,7 @@ from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import ANEW, Law, Laws, Term
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import half_sample, retarded, row_time
+from identification.gap.model.history import retarded, row_time
 from identification.gap.model.variants import SET_UP_ANEW, Variant, smooth_root, variant
 
 WORD = "joint_creep"
@@ -44,7 +44,7 @@ def times(bench: Bench) -> np.ndarray:
     step = row_time(bench.rows) or 1.0
     longest = min(bench.course.session_span / 3, _LONGEST * max(step, 1.0))
     if not (bench.data.arm or bench.rows.continuous):
-        step = 2 * half_sample(bench.rows)  # of rows there are the fewer, the longer it stood
+        step = 2 * bench.rows.half_sample  # of rows there are the fewer, the longer it stood
     if not (bench.data.arm or bench.course.always_moves):
         longest = 3 * bench.course.session_span
     first = max(step * 3 if bench.course.always_moves else step, 1e-6)

@@ -27,7 +27,6 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.history import (
     averaged,
     delayed,
-    half_sample,
     retarded,
     sampling_time,
     settling_share,
@@ -294,7 +293,7 @@ def _turning_sd(bench: Bench, lag: float) -> float:
     begins = rows.hold_starts & ~rows.starts
     if rows.continuous or not begins.any():
         return 0.0
-    half = half_sample(rows)
+    half = rows.half_sample
     gaps = np.diff(rows.session, prepend=rows.session[0])
     way = float(np.median((gaps - settling_share(rows) - standing_on(rows))[begins]))
     return 0.5 * half / max(way, half) * max(lag - half, 0.0)

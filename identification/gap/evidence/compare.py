@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from math import log
 from typing import NamedTuple
@@ -38,19 +38,51 @@ def score(
 
     already: mean square (m^2) of that effect: it brings imperfection of its own.
     """
-    out: dict[Variant, tuple[float, float, int]] = {}
-    by_size: dict[int, dict[str, list[Variant]]] = {}
-    first: dict[object, Variant] = {}
-    shapes = [first.setdefault(v.shape, v) for v in variants]
-    for v in first.values():
-        words = by_size.setdefault(_size(len(v.columns)), {})
-        words.setdefault(v.word, []).append(v)
-    for k, words in by_size.items():
-        out |= _score_batch(engine, levels, list(words.values()), k, already)
-    return [
-        Scored(v, out[s][0] + log(v.prior), *out[s][1:])
-        for v, s in zip(variants, shapes, strict=True)
-    ]
+    some = _arranged(engine, tuple(variants))
+    count = len(some.log_scales)
+    total, scale, level = np.empty(count), np.empty(count), np.empty(count, dtype=np.intp)
+    for places, stacks in some.batches:
+        total[places], scale[places], level[places] = _evidence(engine, levels, stacks, already)
+    total -= some.log_scales
+    made = total[some.shape] + some.log_prior
+    found = (values[some.shape].tolist() for values in (scale, level))
+    return list(map(Scored, variants, made.tolist(), *found))
+
+
+@dataclass(frozen=True, eq=False)
+class _Arranged:
+    """Variants (n,) by the different shapes (m,) that they take: shape (n,), log_prior (n,),
+    log_scales (m,) of the number of scales. batches: stacks of about one size, word by word, and
+    the shapes (b,) in them."""
+
+    shape: Ints
+    log_prior: Array
+    log_scales: Array
+    batches: list[tuple[Ints, list[Stack]]]
+
+
+def _arranged(engine: Engine, variants: tuple[Variant, ...]) -> _Arranged:
+    """Made once: the same ones are compared again with every effect that is added."""
+    if variants not in engine.arranged:
+        number: dict[object, int] = {}
+        shape = [number.setdefault(v.shape, len(number)) for v in variants]
+        first = np.unique(shape, return_index=True)[1].tolist()
+        by_size: dict[int, dict[str, list[int]]] = {}
+        for i, v in enumerate(variants[f] for f in first):
+            by_size.setdefault(_size(len(v.columns)), {}).setdefault(v.word, []).append(i)
+        batches = []
+        for k, words in by_size.items():
+            families = [tuple(variants[first[i]] for i in family) for family in words.values()]
+            places = np.concatenate(list(words.values()))
+            batches.append((places, [_stack(engine, family, k) for family in families]))
+        engine.arranged[variants] = _Arranged(
+            np.array(shape, dtype=np.intp),
+            np.array([log(v.prior) for v in variants]),
+            np.log([len(variants[f].scales) for f in first]),
+            batches,
+        )
+    found: _Arranged = engine.arranged[variants]
+    return found
 
 
 # Variants of nearby sizes are padded to the same: a few large batches take less time than many.
@@ -62,22 +94,17 @@ def _size(k: int) -> int:
     return next((s for s in _SIZES if s >= k), k)
 
 
-def _score_batch(
-    engine: Engine, levels: list[NoiseLevel], families: list[list[Variant]], k: int, already: float
-) -> dict[Variant, tuple[float, float, int]]:
-    """Of variants with up to k coefficients each, word by word: log evidence, scale and level that
-    contribute most."""
-    table = EvidenceTable(engine, levels, [_stack(engine, tuple(f), k) for f in families], already)
+def _evidence(
+    engine: Engine, levels: list[NoiseLevel], stacks: list[Stack], already: float
+) -> tuple[Array, Array, Ints]:
+    """Of all variants (v,) in stacks of one size: log of the sum of the evidence over scales and
+    levels; the scale, and the number of the level, that contribute most."""
+    table = EvidenceTable(engine, levels, stacks, already)
     table.look()
     table.limit()
-    batch = [v for family in families for v in family]
-    flat = table.logs.transpose(1, 0, 2).reshape(len(batch), -1)
-    number = table.logs.shape[2]
-    total = (logsumexp(flat) - np.log([len(v.scales) for v in batch])).tolist()
-    return {
-        v: (t, v.scales[b % number], b // number)
-        for v, t, b in zip(batch, total, flat.argmax(axis=1).tolist(), strict=True)
-    }
+    flat = table.logs.transpose(1, 0, 2).reshape(table.logs.shape[1], -1)
+    level, number = np.divmod(flat.argmax(axis=1), table.logs.shape[2])
+    return logsumexp(flat), table.scales[np.arange(len(number)), number], level
 
 
 def _stack(engine: Engine, family: tuple[Variant, ...], k: int) -> Stack:

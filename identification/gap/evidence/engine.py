@@ -78,6 +78,7 @@ class Engine:
         self.sigma = bench.sigma
         self.cache: dict[object, Array] = {}
         self.stacks: dict[object, Any] = {}  # of variants that are compared again and again
+        self.arranged: dict[object, Any] = {}  # by shape and size
         self.limits: dict[object, Any] = {}
         self.structural = structural_rms(bench, base, target)
         self.most = _variance(bench)

@@ -50,7 +50,8 @@ class Stack:
 
 
 class EvidenceTable:
-    """logs (l, v, s): log evidence by level, variant and scale, -inf where it can't count."""
+    """logs (l, v, s): log evidence by level, variant and scale, -inf where it can't count; scales
+    (v, s), 0 where a variant has fewer."""
 
     def __init__(
         self, engine: Engine, levels: list[NoiseLevel], stacks: list[Stack], already: float
@@ -60,12 +61,12 @@ class EvidenceTable:
         self._engine, self._levels, self._stacks, self._already = engine, levels, stacks, already
         self._columns = np.concatenate([s.columns for s in stacks])
         self._root = np.concatenate([s.root for s in stacks])
-        self._scales = padded([s.scales for s in stacks])
+        self.scales = padded([s.scales for s in stacks])
         self._limits = Limits.joined([s.limits for s in stacks])
         self._plain = np.concatenate([s.plain for s in stacks])
         self._edges = np.cumsum([0, *(len(s.columns) for s in stacks)]).tolist()
         v, k = self._columns.shape
-        size = len(levels), v, self._scales.shape[1]
+        size = len(levels), v, self.scales.shape[1]
         self.logs, self._best = np.full(size, -np.inf), np.full(v, -np.inf)
         self._seen = np.zeros(size[:2], dtype=bool)
         self._ceiling = np.array([lv.log_base + 0.5 * lv.misfit for lv in levels])
@@ -131,7 +132,7 @@ class EvidenceTable:
         values, vectors = np.linalg.eigh(self._gram(level, which, root))
         values = np.maximum(values, 0.0)
         beta = np.einsum("vji,vj->vi", vectors, moment)
-        s2 = self._scales[which][:, :, None] ** 2  # (w, s, 1)
+        s2 = self.scales[which][:, :, None] ** 2  # (w, s, 1)
         gain = 1 + s2 * values[:, None, :]
         mean = s2 * beta[:, None, :] / gain
         taken = np.sum(mean * beta[:, None, :], axis=2)
@@ -178,7 +179,7 @@ class EvidenceTable:
         new = np.append(True, (np.diff(level) != 0) | (np.diff(which) != 0))
         place = np.cumsum(new) - 1  # scales of one variant at one level share the rest
         rows = self._limits.rows[which[new]] @ self._root[which[new]]  # (u, m, k), of unit
-        before = np.linalg.norm(rows[:, 0], axis=1)[place] * self._scales[which, scale]
+        before = np.linalg.norm(rows[:, 0], axis=1)[place] * self.scales[which, scale]
         rows = (rows @ self._vectors[level[new], which[new]])[place]  # and along the eigenvectors
         sums = np.einsum("wmk,wk->wm", rows, self._mean[level, which, scale])
         rows *= np.sqrt(self._variance[level, which, scale])[:, None]

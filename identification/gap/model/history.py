@@ -295,7 +295,7 @@ def settling_share(rows: Rows) -> Array:
     """(n,) s: how long the load has stood before a row: half a sample at the start of a hold."""
     if rows.continuous:
         return np.zeros(rows.n)
-    return np.where(rows.hold_starts, half_sample(rows), 0.0)
+    return np.where(rows.hold_starts, rows.half_sample, 0.0)
 
 
 def standing_on(rows: Rows) -> Array:
@@ -303,21 +303,13 @@ def standing_on(rows: Rows) -> Array:
     the time of a row is the mean of its samples', the load moves half a sample after the last."""
     if rows.continuous:
         return np.zeros(rows.n)
-    last = half_sample(rows) + np.concatenate([[0.0], rows.to_last[:-1]])
+    last = rows.half_sample + np.concatenate([[0.0], rows.to_last[:-1]])
     return np.where(rows.hold_starts, last, 0.0)
-
-
-def half_sample(rows: Rows) -> float:
-    """Half of the time between two samples of a hold, s: between its first two rows, which are
-    single readings; of most holds, since one stamp may be wrong."""
-    first = np.flatnonzero(rows.hold_starts[:-1] & ~rows.hold_starts[1:])
-    step = np.diff(rows.time)[first]
-    return float(np.median(step[step > 0])) / 2 if np.any(step > 0) else 0.5
 
 
 def sampling_time(rows: Rows) -> float:
     """Time between two samples of a hold; of a running recording, between most of its rows, s."""
-    return (row_time(rows) or 1.0) if rows.continuous else 2 * half_sample(rows)
+    return (row_time(rows) or 1.0) if rows.continuous else 2 * rows.half_sample
 
 
 def row_time(rows: Rows) -> float:
@@ -361,7 +353,7 @@ def averaged(values: Array, window: float, rows: Rows) -> Array:
 def _paths(values: Array, rows: Rows) -> Iterator[tuple[int, int, Array, Array]]:
     """Of every run its first row and the one after its last, and corners of its path: times (m,)
     and values (m,) or (m, k). From hold to hold it is straight."""
-    half = half_sample(rows)
+    half = rows.half_sample
     for a, b in pairwise(rows.run_edges.tolist()):
         t, v = rows.time[a:b], values[a:b]
         if not rows.continuous:

@@ -10,7 +10,6 @@ from identification.arrays import Array, Ints
 from identification.gap.data import GapData
 from identification.gap.model.driven import steepness
 from identification.gap.model.encoders import readings_of
-from identification.gap.model.history import half_sample
 from identification.gap.recording.holds import (
     ENOUGH,
     hold_ids,
@@ -140,7 +139,7 @@ def _apart(rows: Rows) -> Array:
     time, way = np.diff(rows.time), np.abs(np.diff(rows.displacement))
     speed = np.divide(way, time, out=np.zeros(len(way)), where=(time > 0) & ~rows.hold_starts[1:])
     either_side = np.maximum(np.append(speed, 0.0), np.append(0.0, speed))
-    return np.asarray(_TOGETHER * 2 * half_sample(rows) * either_side)
+    return np.asarray(_TOGETHER * 2 * rows.half_sample * either_side)
 
 
 _TOGETHER = 0.02

@@ -96,6 +96,14 @@ class Rows:
         return np.append(np.flatnonzero(self.starts), self.n)
 
     @cached_property
+    def half_sample(self) -> float:
+        """Half of the time between two samples of a hold, s: between its first two rows, which are
+        single readings; of most holds, since one stamp may be wrong."""
+        first = np.flatnonzero(self.hold_starts[:-1] & ~self.hold_starts[1:])
+        step = np.diff(self.time)[first]
+        return float(np.median(step[step > 0])) / 2 if np.any(step > 0) else 0.5
+
+    @cached_property
     def gone_beyond(self) -> Flags:
         """(n,) rows of holds beyond which the load is taken to have gone before."""
         return np.asarray(np.isin(self.hold, self.hold[self.overshoot != 0]))
