@@ -140,16 +140,24 @@ def _predictions(levers: Array, force: Array, stiffness: Array, plan: Plan) -> t
         return h, np.sqrt(12 / plan.levels) * one / (s * force)
 
 
+_DRAWS = 40  # at the most, each of as many poses as are wanted
+
+
 def _candidates(arm: Arm, plan: Plan, seed: int, count: int) -> tuple[Array, Array, Array]:
     """Poses (n, 6) that meet the limits; levers (3 n, 6) and forces (3 n,) along x, y, z."""
     rng = np.random.default_rng(seed)
     low, high = np.maximum(arm.q_min, -np.pi), np.minimum(arm.q_max, np.pi)
-    q = rng.uniform(low, high, (40 * count, JOINTS))
-    q = q[_allowed_places(arm, q, plan)]
-    J = arm.jacobian(q, plan.tool)
-    keep = np.linalg.svd(J, compute_uv=False)[:, -1] >= plan.least_singular
-    q, J = q[keep][:count], J[keep][:count]
-    if q.shape[0] == 0:
+    q, J = np.empty((0, JOINTS)), np.empty((0, 6, JOINTS))
+    for _ in range(_DRAWS):
+        drawn = rng.uniform(low, high, (count, JOINTS))
+        drawn = drawn[_allowed_places(arm, drawn, plan)]
+        seen = arm.jacobian(drawn, plan.tool)
+        keep = np.linalg.svd(seen, compute_uv=False)[:, -1] >= plan.least_singular
+        q, J = np.concatenate([q, drawn[keep]]), np.concatenate([J, seen[keep]])
+        if len(q) >= count:
+            break
+    q, J = q[:count], J[:count]
+    if not len(q):
         raise ValueError(f"no pose of {arm.name} meets the limits of the plan; widen them")
     levers = J[:, :3, :].reshape(-1, JOINTS)
     spare = plan.torque_share * arm.torque_limit - np.abs(arm.gravity_torques(q))
