@@ -72,6 +72,7 @@ def test_columns_of_a_turned_base_are_exact_where_it_is(axis: int) -> None:
     np.testing.assert_allclose(column[bench.layout.q], own, atol=1e-8 * np.abs(own).max())
 
 
+@pytest.mark.slow
 def test_a_base_that_stands_turned_is_found() -> None:
     angle = 0.15
 
@@ -131,6 +132,7 @@ def askew(pulls: Callable[[pd.DataFrame], Array]) -> GapResult:
     return diagnosed(law, design, pulls(noisy(design)))
 
 
+@pytest.mark.slow
 def test_a_tip_that_sticks_as_the_load_goes_back_is_a_load_askew() -> None:
     found = askew(sticking)
     assert found.verdict == "load_misalignment"

@@ -82,6 +82,7 @@ def dragging(rows: pd.DataFrame) -> Array:
     return np.column_stack([0.12 * turned, -0.07 * turned])
 
 
+@pytest.mark.slow
 def test_a_tip_that_drags_on_its_pad_is_a_load_askew() -> None:
     design = DESIGNS["rich"]
 

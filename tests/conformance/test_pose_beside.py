@@ -59,7 +59,7 @@ def measured(tilt: float) -> GapData:
     return gap_data(imported(noisy(design, law), meta(design)))
 
 
-@pytest.mark.parametrize("tilt", [0.0, TILT])
+@pytest.mark.parametrize("tilt", [0.0, pytest.param(TILT, marks=pytest.mark.slow)])
 def test_a_tool_elsewhere_is_found_beside_what_else_is_off(tilt: float) -> None:
     result = explained(measured(tilt))
     names = {e.name for e in result.effects}

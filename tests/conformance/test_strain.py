@@ -158,8 +158,9 @@ def askew() -> GapData:
 
 def test_what_no_word_may_name_is_not_put_down_to_the_instruments() -> None:
     """A force across that only cross-talk of many standard deviations would make."""
-    assert explained(askew()).verdict == "load_misalignment"
-    assert not any("believed" in note for note in explained(askew()).notes)
+    found = explained(askew())
+    assert found.verdict == "load_misalignment"
+    assert not any("believed" in note for note in found.notes)
     found = explained(askew(), withhold=["load_misalignment"])
     assert found.verdict == "unknown"
     assert "META" in found.notes[-1]

@@ -111,10 +111,12 @@ def test_a_calm_hand_is_not_said_to_have_gone_too_far() -> None:
     assert not told(found)
 
 
+@pytest.mark.slow
 def test_a_lag_is_found_however_far_the_hand_went() -> None:
     assert diagnosed(LATE).verdict == "time_lag"
 
 
+@pytest.mark.slow
 def test_levels_that_scatter_are_no_hand() -> None:
     assert diagnosed(scattering).verdict == "unknown"
 

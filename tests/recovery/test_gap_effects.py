@@ -275,7 +275,12 @@ def result_of(name: str) -> GapResult:
         return diagnose(measure(Path(folder), CASES[name][0])).result
 
 
-@pytest.mark.parametrize("name", list(CASES))
+LONG = ("ripple", "slip", "wander")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in LONG else []) for n in CASES]
+)
 def test_verdict(name: str) -> None:
     assert result_of(name).verdict == CASES[name][1]
 
@@ -329,6 +334,7 @@ def yields_far(samples: list[Sample], torque: np.ndarray, lever: np.ndarray) -> 
     return joints, np.zeros(len(samples))
 
 
+@pytest.mark.slow
 def test_what_a_model_has_is_no_gap_of_the_next_measurement(tmp_path: Path) -> None:
     """Nor what such a law leaves of millimetres; what is new beside it is found."""
     first, second, third = (tmp_path / n for n in ("first", "second", "third"))
@@ -353,7 +359,7 @@ def test_what_a_model_has_is_no_gap_of_the_next_measurement(tmp_path: Path) -> N
     assert diagnose(measure(third, jumped, seed=2), model=model).result.verdict == "zero_shift"
 
 
-@pytest.mark.parametrize("drop", [("q",), ()])
+@pytest.mark.parametrize("drop", [("q",), pytest.param((), marks=pytest.mark.slow)])
 def test_two_joints_that_creep_are_told_without_their_readings(
     tmp_path: Path, drop: tuple[str, ...]
 ) -> None:
@@ -391,7 +397,9 @@ def test_deleted_word_leaves_unknown(tmp_path: Path) -> None:
     assert found.verdict == "unknown"
 
 
-@pytest.mark.parametrize("word", ["joint_hysteresis", "load_misalignment"])
+@pytest.mark.parametrize(
+    "word", [pytest.param("joint_hysteresis", marks=pytest.mark.slow), "load_misalignment"]
+)
 def test_an_effect_that_is_added_takes_no_other_s_place(tmp_path: Path, word: str) -> None:
     """Nor is more left with it: the search may like the word alone better than both, for fewer."""
     with_it = diagnose(measure(tmp_path, yields), add=[word]).result

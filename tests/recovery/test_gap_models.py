@@ -216,6 +216,7 @@ def test_springs_of_the_file_are_the_fitted_ones(
     assert dataset.uuid in read.note
 
 
+@pytest.mark.slow
 def test_a_model_with_its_effects_closes_the_gap_that_it_came_from(
     planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path
 ) -> None:

@@ -113,7 +113,12 @@ KINDS: dict[str, Added] = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+LONG = ("jumps", "swings")
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=[pytest.mark.slow] if k in LONG else []) for k in KINDS]
+)
 def test_what_no_word_names_is_unknown_and_told(kind: str) -> None:
     result = explained(measured(KINDS[kind]))
     assert result.verdict == "unknown"

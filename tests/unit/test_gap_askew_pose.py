@@ -32,7 +32,13 @@ def askew() -> GapData:
     )
 
 
-@pytest.mark.parametrize("recorded", ["both", "force across", "joint readings"])
+@pytest.mark.parametrize(
+    "recorded",
+    [
+        "both",
+        *(pytest.param(r, marks=pytest.mark.slow) for r in ("force across", "joint readings")),
+    ],
+)
 def test_what_is_set_up_anew_in_every_pose_may_be_askew_otherwise_there(recorded: str) -> None:
     data = askew()
     data = replace(

@@ -159,6 +159,7 @@ def test_flows_made_in_one_go_are_those_made_one_by_one() -> None:
         assert np.ptp(flows.states(alone, one)) > 0
 
 
+@pytest.mark.slow
 def test_without_readings_a_joint_is_not_named_for_having_been_looked_at_closely() -> None:
     """Flow that lies between the times of the grid: only one joint was looked at that closely."""
     data = replace(arm_data(), q=None)

@@ -255,11 +255,18 @@ def _remainder(found: Diagnosis) -> Any:
 @pytest.mark.parametrize(
     "rows",
     [
-        "x,1,loading,1,0,10,0.1\n",
-        "".join(f"x,1,loading,{i},{i},50,0.5\n" for i in range(9)),
-        "".join(f"x,1,loading,{i},{i},0,0\n" for i in range(50)),
+        pytest.param("x,1,loading,1,0,10,0.1\n", id="one sample"),
+        pytest.param(
+            "".join(f"x,1,loading,{i},{i},50,0.5\n" for i in range(9)),
+            id="constant force",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "".join(f"x,1,loading,{i},{i},0,0\n" for i in range(50)),
+            id="all zero",
+            marks=pytest.mark.slow,
+        ),
     ],
-    ids=["one sample", "constant force", "all zero"],
 )
 def test_thin_data_are_drawn_too(rows: str, tmp_path: Path) -> None:
     text = table().splitlines()[0] + "\n" + rows

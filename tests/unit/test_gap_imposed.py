@@ -285,6 +285,7 @@ def test_strokes_slide_however_finely_they_are_read_in_noise() -> None:
     assert _slides(_Channel(time, rubs, 0.001), _Channel(time, noisy, 0.02))
 
 
+@pytest.mark.slow
 def test_an_arm_that_is_read_at_rest_answers_the_force_that_was_read() -> None:
     """Whatever its screw holds: the displacement is linear in what the springs give way."""
     data = replace(arm_data(), imposed="displacement")
@@ -293,6 +294,7 @@ def test_an_arm_that_is_read_at_rest_answers_the_force_that_was_read() -> None:
     assert displacement_imposed(replace(data, step=np.full(len(data.step), -1)))
 
 
+@pytest.mark.slow
 def test_what_is_held_at_no_displacement_may_still_be_pulled() -> None:
     """A tip that is gripped, and a joint that has slipped: no amplifier drifts there."""
     data = arm_data()

@@ -56,7 +56,8 @@ def test_means_of_holds_count_every_sample() -> None:
 
 
 @pytest.mark.parametrize(
-    ("poses", "read", "label"), [("P2", True, "in P2"), ("P1 P2", False, "unread")]
+    ("poses", "read", "label"),
+    [pytest.param("P2", True, "in P2", marks=pytest.mark.slow), ("P1 P2", False, "unread")],
 )
 def test_an_arm_that_stands_elsewhere_in_one_pose_or_unread(
     poses: str, read: bool, label: str
@@ -148,6 +149,7 @@ def test_a_plate_may_open_anywhere() -> None:
         assert np.linalg.norm(left) < 0.06 * np.linalg.norm(opened)
 
 
+@pytest.mark.slow
 def test_a_laser_that_changes_its_range_has_two_gains() -> None:
     data = linear("rich")
     beyond = np.sign(data.displacement) * np.maximum(np.abs(data.displacement) - 0.8e-3, 0.0)
@@ -156,6 +158,7 @@ def test_a_laser_that_changes_its_range_has_two_gains() -> None:
     assert found.effects[0].label.startswith("gain that changes at")
 
 
+@pytest.mark.slow
 def test_a_joint_that_hardens_alike_in_both_senses_gives_way_to_new_loads_only() -> None:
     """Whichever way they push: what had been borne before is borne again (isotropic hardening)."""
     data = linear("rich")

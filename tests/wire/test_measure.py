@@ -31,8 +31,8 @@ def steps_of(dataset: Dataset) -> list[tuple[int, int]]:
 
 
 def slots_of(dataset: Dataset) -> int:
-    """Sampling slots of a measurement, served or missed."""
-    return dataset.rows + int(np.sum(dataset.columns["slots_missed"]))
+    """Sampling slots of a measurement, served or missed; none where it ended before the first."""
+    return dataset.rows and dataset.rows + int(np.sum(dataset.columns["slots_missed"]))
 
 
 def no_process_left(folder: Path) -> bool:
