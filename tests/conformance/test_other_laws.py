@@ -61,7 +61,9 @@ SEATS = {
 }
 
 
-@pytest.mark.parametrize("kind", list(SEATS))
+@pytest.mark.parametrize(
+    "kind", ["Hertz", pytest.param("logarithmic", marks=pytest.mark.slow), "slack"]
+)
 def test_seats_of_other_shapes(kind: str) -> None:
     def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
         return 1e-6 * SEATS[kind](rows["force_N"].to_numpy()), np.zeros((len(rows), 6))

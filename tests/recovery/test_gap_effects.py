@@ -417,11 +417,6 @@ def test_two_words_may_be_added_to_nothing() -> None:
     assert found.without_added is not None
 
 
-def test_same_data_same_answer(tmp_path: Path) -> None:
-    again = diagnose(measure(tmp_path, seats)).result
-    assert again.probabilities == result_of("seat").probabilities
-
-
 def test_unknown_word_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r'"magic" is no effect\. Known: '):
         diagnose(measure(tmp_path, nothing), withhold=["magic"])
@@ -507,17 +502,6 @@ def test_a_million_samples_of_friction_on_a_bench() -> None:
     # strengths that never slip here and the spring itself are one to these data
     assert share.value == pytest.approx(1.0, abs=0.05)
     assert share.high - share.low < 0.1
-
-
-def test_renamed_poses_and_permuted_directions_change_nothing(tmp_path: Path) -> None:
-    dataset = measure(tmp_path, seats)
-    text = (tmp_path / "samples.csv").read_text().replace(",P1,", ",Q7,")
-    meta = (tmp_path / "meta.yaml").read_text().replace("P1:", "Q7:")
-    (tmp_path / "samples.csv").write_text(text)
-    (tmp_path / "meta.yaml").write_text(meta)
-    renamed = diagnose(import_table(tmp_path / "samples.csv", tmp_path / "meta.yaml"))
-    assert dataset.rows == renamed.result.bench.rows.weight.sum()
-    assert renamed.result.probabilities == result_of("seat").probabilities
 
 
 THIN = "direction,repetition,branch,step,force_N,displacement_mm\n"

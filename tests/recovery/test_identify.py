@@ -352,6 +352,7 @@ def chance(first: IdentifyResult, rng: np.random.Generator) -> list[tuple[Array,
     return [(q[i // 3], AXES[i % 3], float(force[i])) for i in rows]
 
 
+@pytest.mark.slow
 def test_proposals_help_when_measured(tmp_path: Path) -> None:
     kept, better = zip(*(duel(tmp_path, n) for n in range(2)), strict=True)
     assert min(kept) >= 0.5

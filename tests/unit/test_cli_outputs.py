@@ -116,7 +116,13 @@ def arm(rig: Rig, files: Path) -> Path:
     return files
 
 
-@pytest.mark.parametrize(("words", "name", "kind"), WRITTEN)
+LONG = ("diagnose a.h5 --next", "report a.h5 --no-gap --pdf")
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "kind"),
+    [pytest.param(*w, marks=[pytest.mark.slow] if w[0] in LONG else []) for w in WRITTEN],
+)
 def test_a_result_replaces_its_own_kind_only_and_says_so(
     rig: Rig, arm: Path, words: str, name: str, kind: str
 ) -> None:
@@ -137,6 +143,7 @@ def test_a_result_replaces_its_own_kind_only_and_says_so(
         assert (arm / name).read_bytes() == (arm / other).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_report_under_its_own_name_says_what_it_replaced(rig: Rig, arm: Path) -> None:
     told = "a_report.html: replaced; an earlier page stood there"
     for earlier in (False, True):

@@ -115,7 +115,9 @@ def sticking(stiffness: float, limit: float) -> Array:
     ("force", "word"),
     [
         (0.6 * SPRING * STROKE + sticking(0.4 * SPRING, 6.0), "joint_hysteresis"),
-        (sticking(SPRING, 45.0) + 0.1 * SPRING * STROKE, "joint_yield"),
+        pytest.param(
+            sticking(SPRING, 45.0) + 0.1 * SPRING * STROKE, "joint_yield", marks=pytest.mark.slow
+        ),
         (SPRING * STROKE * (1 + 400 * STROKE), "joint_nonlinear_stiffness"),
     ],
 )

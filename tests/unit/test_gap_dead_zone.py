@@ -97,7 +97,7 @@ def test_where_a_play_is_likelier_softer_ends_are_enough() -> None:
     assert not has_dead_zone(U, stages(3.0, 0.3)(U), SOMEHOW)
 
 
-@pytest.mark.parametrize("cycles", [4, 8])
+@pytest.mark.parametrize("cycles", [4, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["wide", "teeth pressed as by Hertz"])
 def test_a_play_that_a_free_curve_meets_as_well_is_a_play(name: str, cycles: int) -> None:
     u = to_and_fro(cycles=cycles)

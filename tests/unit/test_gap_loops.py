@@ -179,7 +179,7 @@ def strained(uncertainty_N: float) -> GapData:
     )
 
 
-@pytest.mark.parametrize("uncertainty_N", [30.0, 100.0])
+@pytest.mark.parametrize("uncertainty_N", [pytest.param(30.0, marks=pytest.mark.slow), 100.0])
 def test_metal_in_growing_cycles_yields_and_does_not_creep(uncertainty_N: float) -> None:
     """Though creep beside the yield explains its changing loops, or foretells as much alone, and a
     spring takes over most of what either does."""

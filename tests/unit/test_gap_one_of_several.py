@@ -24,7 +24,7 @@ def of_each(data: GapData, values: list[Array] | list[float]) -> Array:
     return np.asarray(values)[data.setup]
 
 
-@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("axis", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_gain_of_one_component_is_no_gain_of_all(axis: int) -> None:
     data = linear("rich")
     reads = of_each(data, [1.12 if s.unit_vector[axis] else 1.0 for s in data.setups])
@@ -100,7 +100,7 @@ def test_faces_that_seat_one_after_the_other() -> None:
 @pytest.mark.parametrize(
     ("design", "until", "label"),
     [
-        ("rich", "setup", "some stays"),
+        pytest.param("rich", "setup", "some stays", marks=pytest.mark.slow),
         ("bench", "setup", "some stays"),
         ("rich", "run", "some stays until the next run"),
     ],
@@ -180,7 +180,10 @@ def test_a_joint_that_hardens_alike_in_both_senses_gives_way_to_new_loads_only()
     assert found.where.joints == (1,)
 
 
-@pytest.mark.parametrize(("encoder", "seen"), [("output", False), ("motor", False), ("", None)])
+@pytest.mark.parametrize(
+    ("encoder", "seen"),
+    [pytest.param("output", False, marks=pytest.mark.slow), ("motor", False), ("", None)],
+)
 def test_what_no_joint_does_no_reading_shows(encoder: str, seen: bool | None) -> None:
     data = linear("rich")
     depth = 3e-5 * np.sign(data.force) * (1 - np.exp(-np.abs(data.force) / 6))

@@ -204,7 +204,7 @@ def test_what_is_slack_and_smooth_under_a_load_from_one_side_is_a_seat(pulled: b
     ("softer", "verdict"),
     [
         (1.7, "joint_nonlinear_stiffness"),
-        (8.0, "joint_backlash"),
+        pytest.param(8.0, "joint_backlash", marks=pytest.mark.slow),
     ],
 )
 def test_a_stage_of_a_gear_is_no_play(softer: float, verdict: str) -> None:

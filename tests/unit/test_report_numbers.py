@@ -81,7 +81,7 @@ def last_digit(text: str) -> float:
     return 10.0 ** (int(exponent or 0) - decimals)
 
 
-@pytest.mark.parametrize("which", ["of_arm", "of_bench"])
+@pytest.mark.parametrize("which", ["of_arm", pytest.param("of_bench", marks=pytest.mark.slow)])
 def test_every_number_stands_in_the_json(which: str, request: pytest.FixtureRequest) -> None:
     report: Report = request.getfixturevalue(which)
     data = clean(report.to_json())

@@ -69,6 +69,7 @@ def test_a_short_run_ends_complete_and_marked_as_emulated(tmp_path: Path) -> Non
     assert no_process_left(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_speed_that_no_machine_keeps_is_said_to_be_too_high(tmp_path: Path) -> None:
     for speed in (400, 300, 200):  # so fast devices may seem to fail before there is much to count
         folder = tmp_path / str(speed)
