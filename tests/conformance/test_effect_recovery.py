@@ -156,19 +156,15 @@ def recovered(word: str, design: str) -> str:
 QUICK = (
     "joint_backlash",
     "joint_hysteresis",
-    "link_flexibility",
     "base_compliance",
     "load_misalignment",
-    "force_drift",
-    "displacement_scale",
-    "pose_error",
 )
 
 
 def marks(word: str, design: str) -> tuple[pytest.MarkDecorator, ...]:
     if design == "bench" or (design == "medium" and word in QUICK):
         return ()
-    return () if (word, design) == ("base_compliance", "rich") else (pytest.mark.slow,)
+    return (pytest.mark.slow,)
 
 
 @pytest.mark.parametrize(

@@ -108,6 +108,7 @@ def test_order_of_directions_in_meta_does_not_matter() -> None:
     assert explained(data_of(table(), text)).probabilities == arm_result().probabilities
 
 
+@pytest.mark.slow
 def test_order_in_which_directions_were_measured_does_not_matter() -> None:
     """Without a session clock: with one, it is another history."""
     rows = table().drop(columns="session_s")
@@ -260,7 +261,12 @@ THIN: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
 }
 
 
-@pytest.mark.parametrize("name", list(THIN))
+LONG = ("constant", "no clock", "one sample a step")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in LONG else []) for n in THIN]
+)
 def test_thin_data_say_what_they_cannot_decide(told: Rig, name: str) -> None:
     thin, note = THIN[name]
     status, said, found = told(thin(table()), meta(ARM))

@@ -116,7 +116,7 @@ def arm(rig: Rig, files: Path) -> Path:
     return files
 
 
-LONG = ("diagnose a.h5 --next", "report a.h5 --no-gap --pdf")
+LONG = ("diagnose a.h5 --write-model", "diagnose a.h5 --next", "report a.h5 --no-gap --pdf")
 
 
 @pytest.mark.parametrize(

@@ -193,6 +193,7 @@ def test_shapes_name_directions_where_there_are_no_joints(
     assert replace(slipped, result=shown).to_json()["effects"][0]["form"] == said
 
 
+@pytest.mark.slow
 def test_what_a_report_draws_travels_without_the_samples(tmp_path: Path) -> None:
     sizes = []
     for samples in (2, 60):  # of a hold

@@ -86,6 +86,7 @@ def test_a_speed_that_no_machine_keeps_is_said_to_be_too_high(tmp_path: Path) ->
     assert noted == said[1:]
 
 
+@pytest.mark.slow
 def test_an_amplifier_without_a_line_is_switched_by_the_emulated_hand(tmp_path: Path) -> None:
     words = write_files(tmp_path, reset_line="null", speed=60)
     outcome = run_rig(*words, cwd=tmp_path)
@@ -171,6 +172,7 @@ def test_a_full_disk_ends_with_what_to_do_and_resumes(tmp_path: Path) -> None:
     assert steps_of(load(tmp_path / "run.h5")) == STEPS
 
 
+@pytest.mark.slow
 def test_the_speed_that_was_asked_for_is_told_and_kept(tmp_path: Path) -> None:
     process = started(tmp_path, [*write_files(tmp_path), "--speed", "20"])
     process.send_signal(signal.SIGINT)
