@@ -21,7 +21,6 @@ from identification.gap.explanations.verdict import (
     BENCH_DOUBT,
     DOUBT,
     EXPLAINED,
-    MOST_PLACES,
     TAKES_MORE,
     TAKES_TWO,
     THREE,
@@ -150,20 +149,6 @@ def test_three_troubles_at_once_leave_room_for_one_that_is_not_known() -> None:
         two = said(three[1:], (2e-5, 1e-6), -share * LAW_REMAINDER**2 * 1e6)
         both = replace(found, explanations=(third, two, none), unknown=-1e5, alone={})
         assert with_posterior(both, {}).probabilities["unknown"] == pytest.approx(unknown, abs=0.1)
-
-
-def test_what_sits_in_more_than_four_places_is_a_fit_and_no_cause() -> None:
-    bench = small_bench()
-    of_bench = search(small_engine_of(bench), library(bench, ["joint_creep"]))
-    on_arm = replace_bench(of_bench.engine, replace(bench, data=replace(bench.data, arm=True)))
-    curved = tuple(part("joint_nonlinear_stiffness", [0]) for _ in range(MOST_PLACES))
-    for parts, share in ((curved, 0.0), ((*curved, part("force_scale", [0])), 1 - THREE)):
-        one = said(parts, (1e-5,) * len(parts), 0.0, 0.0)
-        alone = replace(of_bench, explanations=(one,), unknown=-800.0, alone={})
-        left = share - UNKNOWN_DOUBT * share * max(0.0, 2 * share - 1)
-        found = with_posterior(replace(alone, engine=on_arm), {}).probabilities["unknown"]
-        assert found == pytest.approx(left)
-        assert with_posterior(alone, {}).probabilities["unknown"] < 0.01  # it has one spring
 
 
 def test_of_an_arm_a_second_effect_that_brings_little_is_not_the_main_one() -> None:

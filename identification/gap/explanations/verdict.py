@@ -68,7 +68,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         fewer = _simpler(e, ranked, kept, arm)
         said = found.speakers.get(e.words) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
-        many = _kept_of_many(said, closely) if arm else 1.0
+        many = (THREE_CLOSELY if closely else THREE) if arm and _tells_of_three(said) else 1.0
         for word, share in _main(_of(e, fewer.words) if fewer is said else said, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
@@ -142,10 +142,6 @@ STATED = 0.1  # so much is left of `none` where what was stated does not explain
 # threes in draws of the blind check, with words taken out in half of their cases, and in five sets
 # of other people's arms, 13 were two effects and what their laws lack.
 THREE, THREE_CLOSELY = 0.1, 0.75
-# None of 370 gaps of arms that were explained (a run of the blind check, three sets of others) took
-# more than three places; one of no word, a reading that jumps at one load in all directions, was
-# met down to the noise in six.
-MOST_PLACES = 4
 TELLING = LEAST_SHARE  # of the largest: what is smaller is no trouble beside it
 # Nats that a second effect has to bring before it may be the main one: of 700 cases such an effect
 # stood in three times for what another law left, by 2, 5 and 13 nats, and was never the larger one
@@ -187,15 +183,6 @@ def _simpler(
 
 
 _TWO, _MANY = 2, 3
-
-
-def _kept_of_many(explanation: Explanation, closely: bool) -> float:
-    """Share of its weight that an arm's explanation keeps for how many troubles it takes."""
-    if len(explanation.parts) > MOST_PLACES:
-        return THREE
-    if not _tells_of_three(explanation):
-        return 1.0
-    return THREE_CLOSELY if closely else THREE
 
 
 def _tells_of_three(explanation: Explanation) -> bool:
