@@ -152,10 +152,12 @@ def recovered(word: str, design: str) -> str:
     )
 
 
-# The others are found on data of other laws in recovery/test_gap_effects.py.
+# The others are found on a bench, or on data of other laws in recovery/test_gap_effects.py and
+# test_pose_beside.py.
 QUICK = (
     "joint_backlash",
     "joint_hysteresis",
+    "link_flexibility",
     "base_compliance",
     "load_misalignment",
 )
@@ -164,7 +166,7 @@ QUICK = (
 def marks(word: str, design: str) -> tuple[pytest.MarkDecorator, ...]:
     if design == "bench" or (design == "medium" and word in QUICK):
         return ()
-    return (pytest.mark.slow,)
+    return () if (word, design) == ("base_compliance", "rich") else (pytest.mark.slow,)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from rig.diagnosis.gap_data import gap_data
 from rig.worlds.arm import place
 from tests.conformance.gap_designs import DESIGNS, TCP_MM, TRUE, Array, Q, imported, meta, noisy
 from tests.explained import explained
+from tests.slow import slow_ones
 
 JOINT, WIDTH_RAD, STRENGTH_NM = 3, 1.5e-3, 0.9
 
@@ -61,9 +62,7 @@ SEATS = {
 }
 
 
-@pytest.mark.parametrize(
-    "kind", ["Hertz", pytest.param("logarithmic", marks=pytest.mark.slow), "slack"]
-)
+@pytest.mark.parametrize("kind", slow_ones(SEATS, ("logarithmic",)))
 def test_seats_of_other_shapes(kind: str) -> None:
     def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
         return 1e-6 * SEATS[kind](rows["force_N"].to_numpy()), np.zeros((len(rows), 6))

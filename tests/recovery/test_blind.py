@@ -23,6 +23,7 @@ from rig.blind.score import report
 from rig.dataset import load
 from rig.diagnosis.diagnose import diagnose
 from rig.errors import InputError
+from tests.slow import slow_ones
 from tests.unit.blind_cases import EFFECTS, FakeCase, draw
 
 
@@ -165,9 +166,7 @@ def test_the_data_set_holds_no_trace_of_the_answers(tmp_path: Path) -> None:
     assert secret in traces(tmp_path / "open.h5", open_book)
 
 
-@pytest.mark.parametrize(
-    "number", [3, *(pytest.param(k, marks=pytest.mark.slow) for k in range(3))]
-)
+@pytest.mark.parametrize("number", slow_ones(range(4), range(3)))
 def test_the_worlds_of_the_project_leave_no_trace(number: int, tmp_path: Path) -> None:
     case, path = generator("hidden")[0](2, number), tmp_path / "a.h5"
     keys = ("truth", "forms", "parameters", "true_joint_stiffness", "snr", "snr_each")

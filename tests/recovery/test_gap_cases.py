@@ -10,6 +10,7 @@ import pytest
 
 from rig.diagnosis.diagnose import diagnose
 from rig.tables import import_table
+from tests.slow import slow_ones
 
 SHARED = Path(__file__).parents[2] / "../shared"
 CASES, REAL = SHARED / "gap-cases", SHARED / "real"
@@ -32,7 +33,10 @@ def verdict(folder: Path) -> str:
     return str(found.to_json()["verdict"])
 
 
-@pytest.mark.parametrize("case", ["40a4306f41", "827cbeb4a5"])
+SHORT, LONGER = ("40a4306f41", "827cbeb4a5"), ("1c1067c6ee", "d6694f0c58")
+
+
+@pytest.mark.parametrize("case", slow_ones((*SHORT, *LONGER), LONGER))
 def test_short_labelled_cases(case: str) -> None:
     known = labels()  # skips where there are none
     assert verdict(CASES / case) in known[case]["accept"]

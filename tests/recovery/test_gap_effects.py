@@ -31,6 +31,7 @@ from rig.errors import InputError
 from rig.models.robot import load_robot
 from rig.tables import import_table
 from tests.conformance.gap_designs import linear
+from tests.slow import slow_ones
 
 Q = {
     "P1": [0.256, -1.664, -1.684, -1.365, 1.571, -1.336],
@@ -275,12 +276,7 @@ def result_of(name: str) -> GapResult:
         return diagnose(measure(Path(folder), CASES[name][0])).result
 
 
-LONG = ("ripple", "slip", "wander")
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in LONG else []) for n in CASES]
-)
+@pytest.mark.parametrize("name", slow_ones(CASES, ("ripple", "slip", "wander")))
 def test_verdict(name: str) -> None:
     assert result_of(name).verdict == CASES[name][1]
 
@@ -502,6 +498,18 @@ def test_a_million_samples_of_friction_on_a_bench() -> None:
     # strengths that never slip here and the spring itself are one to these data
     assert share.value == pytest.approx(1.0, abs=0.05)
     assert share.high - share.low < 0.1
+
+
+@pytest.mark.slow
+def test_renamed_poses_and_permuted_directions_change_nothing(tmp_path: Path) -> None:
+    dataset = measure(tmp_path, seats)
+    text = (tmp_path / "samples.csv").read_text().replace(",P1,", ",Q7,")
+    meta = (tmp_path / "meta.yaml").read_text().replace("P1:", "Q7:")
+    (tmp_path / "samples.csv").write_text(text)
+    (tmp_path / "meta.yaml").write_text(meta)
+    renamed = diagnose(import_table(tmp_path / "samples.csv", tmp_path / "meta.yaml"))
+    assert dataset.rows == renamed.result.bench.rows.weight.sum()
+    assert renamed.result.probabilities == result_of("seat").probabilities
 
 
 THIN = "direction,repetition,branch,step,force_N,displacement_mm\n"

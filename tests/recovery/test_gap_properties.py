@@ -24,6 +24,7 @@ from rig import cli
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import DESIGNS, STATED, Design, imported, meta, noisy
 from tests.explained import explained
+from tests.slow import slow_ones
 
 Array = NDArray[np.float64]
 ARM = Design(repetitions=2, steps=6, hold=3)
@@ -261,12 +262,7 @@ THIN: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
 }
 
 
-LONG = ("constant", "no clock", "one sample a step")
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in LONG else []) for n in THIN]
-)
+@pytest.mark.parametrize("name", slow_ones(THIN, ("constant", "no clock", "one sample a step")))
 def test_thin_data_say_what_they_cannot_decide(told: Rig, name: str) -> None:
     thin, note = THIN[name]
     status, said, found = told(thin(table()), meta(ARM))

@@ -32,6 +32,7 @@ from tests.conformance.gap_designs import (
     noisy,
 )
 from tests.explained import explained
+from tests.slow import slow_ones
 
 SIZE_M = 30e-6
 SMALL = Design(repetitions=2, steps=7, hold=3)
@@ -113,12 +114,7 @@ KINDS: dict[str, Added] = {
 }
 
 
-LONG = ("jumps", "swings")
-
-
-@pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=[pytest.mark.slow] if k in LONG else []) for k in KINDS]
-)
+@pytest.mark.parametrize("kind", slow_ones(KINDS, ("jumps", "swings")))
 def test_what_no_word_names_is_unknown_and_told(kind: str) -> None:
     result = explained(measured(KINDS[kind]))
     assert result.verdict == "unknown"

@@ -108,7 +108,6 @@ def test_the_knee_in_y_is_found_in_every_session_and_none_in_x() -> None:
         assert {11, 12} <= {e.step for e in s.y.excluded} <= {10, 11, 12}
 
 
-@pytest.mark.slow
 def test_the_intervals_cover_the_truth_in_40_sessions() -> None:
     """36 of 40 at least. An interval that covers 95 % does so in 95 of 100 tests like this."""
     found = coverage(range(40))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.slow import slow_ones
 from tests.unit.cli_bench import HOME, TABLE, Rig
 
 
@@ -121,7 +122,7 @@ LONG = ("diagnose a.h5 --write-model", "diagnose a.h5 --next", "report a.h5 --no
 
 @pytest.mark.parametrize(
     ("words", "name", "kind"),
-    [pytest.param(*w, marks=[pytest.mark.slow] if w[0] in LONG else []) for w in WRITTEN],
+    slow_ones(WRITTEN, LONG),
 )
 def test_a_result_replaces_its_own_kind_only_and_says_so(
     rig: Rig, arm: Path, words: str, name: str, kind: str

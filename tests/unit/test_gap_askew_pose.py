@@ -11,6 +11,7 @@ from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.model.bench import make_bench
 from tests.explained import explained
+from tests.slow import slow_ones
 from tests.unit.test_gap_forms import arm_data
 
 ANGLES = np.array([[0.1, -0.08], [0.05, 0.12], [-0.13, 0.02], [0.03, -0.1]])  # tangents, by setup
@@ -34,10 +35,7 @@ def askew() -> GapData:
 
 @pytest.mark.parametrize(
     "recorded",
-    [
-        "both",
-        *(pytest.param(r, marks=pytest.mark.slow) for r in ("force across", "joint readings")),
-    ],
+    slow_ones(("both", "force across", "joint readings"), ("force across", "joint readings")),
 )
 def test_what_is_set_up_anew_in_every_pose_may_be_askew_otherwise_there(recorded: str) -> None:
     data = askew()

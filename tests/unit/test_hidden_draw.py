@@ -21,7 +21,7 @@ from rig.worlds.hidden.scene import make_scene
 
 @pytest.fixture(scope="module")
 def cases() -> list[HiddenCase]:
-    return [draw_case(21, k) for k in range(3)]
+    return [draw_case(21, k) for k in range(5)]
 
 
 def test_the_same_seed_and_number_give_the_same_case(cases: list[HiddenCase]) -> None:

@@ -326,7 +326,6 @@ def test_all_samples_discarded(tmp_path: Path) -> None:
     assert "No sample in use" in text
 
 
-@pytest.mark.slow
 def test_a_measurement_that_was_cut_off(tmp_path: Path) -> None:
     """There is a journal only; it is the truth, and the checksum is of it."""
     path = tmp_path / "cut.h5"

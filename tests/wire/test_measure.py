@@ -32,7 +32,9 @@ def steps_of(dataset: Dataset) -> list[tuple[int, int]]:
 
 def slots_of(dataset: Dataset) -> int:
     """Sampling slots of a measurement, served or missed; none where it ended before the first."""
-    return dataset.rows and dataset.rows + int(np.sum(dataset.columns["slots_missed"]))
+    if not dataset.rows:
+        return 0
+    return dataset.rows + int(np.sum(dataset.columns["slots_missed"]))
 
 
 def no_process_left(folder: Path) -> bool:
@@ -86,7 +88,6 @@ def test_a_speed_that_no_machine_keeps_is_said_to_be_too_high(tmp_path: Path) ->
     assert noted == said[1:]
 
 
-@pytest.mark.slow
 def test_an_amplifier_without_a_line_is_switched_by_the_emulated_hand(tmp_path: Path) -> None:
     words = write_files(tmp_path, reset_line="null", speed=60)
     outcome = run_rig(*words, cwd=tmp_path)
@@ -172,7 +173,6 @@ def test_a_full_disk_ends_with_what_to_do_and_resumes(tmp_path: Path) -> None:
     assert steps_of(load(tmp_path / "run.h5")) == STEPS
 
 
-@pytest.mark.slow
 def test_the_speed_that_was_asked_for_is_told_and_kept(tmp_path: Path) -> None:
     process = started(tmp_path, [*write_files(tmp_path), "--speed", "20"])
     process.send_signal(signal.SIGINT)

@@ -64,21 +64,20 @@ class _Arranged:
 def _arranged(engine: Engine, variants: tuple[Variant, ...]) -> _Arranged:
     """Made once: the same ones are compared again with every effect that is added."""
     if variants not in engine.arranged:
-        number: dict[object, int] = {}
-        shape = [number.setdefault(v.shape, len(number)) for v in variants]
-        first = np.unique(shape, return_index=True)[1].tolist()
-        by_size: dict[int, dict[str, list[int]]] = {}
-        for i, v in enumerate(variants[f] for f in first):
-            by_size.setdefault(_size(len(v.columns)), {}).setdefault(v.word, []).append(i)
+        first: dict[object, Variant] = {}
+        like = [first.setdefault(v.shape, v) for v in variants]
+        number = {v: i for i, v in enumerate(first.values())}
+        by_size: dict[int, dict[str, list[Variant]]] = {}
+        for v in number:
+            by_size.setdefault(_size(len(v.columns)), {}).setdefault(v.word, []).append(v)
         batches = []
         for k, words in by_size.items():
-            families = [tuple(variants[first[i]] for i in family) for family in words.values()]
-            places = np.concatenate(list(words.values()))
-            batches.append((places, [_stack(engine, family, k) for family in families]))
+            places = np.array([number[v] for family in words.values() for v in family])
+            batches.append((places, [_stack(engine, tuple(f), k) for f in words.values()]))
         engine.arranged[variants] = _Arranged(
-            np.array(shape, dtype=np.intp),
+            np.array([number[v] for v in like], dtype=np.intp),
             np.array([log(v.prior) for v in variants]),
-            np.log([len(variants[f].scales) for f in first]),
+            np.log([len(v.scales) for v in number]),
             batches,
         )
     found: _Arranged = engine.arranged[variants]
