@@ -89,7 +89,7 @@ def test_a_speed_that_no_machine_keeps_is_said_to_be_too_high(tmp_path: Path) ->
 
 
 def test_an_amplifier_without_a_line_is_switched_by_the_emulated_hand(tmp_path: Path) -> None:
-    words = write_files(tmp_path, reset_line="null", speed=60)
+    words = write_files(tmp_path, reset_line="null")
     outcome = run_rig(*words, cwd=tmp_path)
     assert outcome.status == 0, outcome.stderr
     dataset = load(tmp_path / "run.h5")
@@ -158,7 +158,9 @@ def test_a_full_disk_ends_with_what_to_do_and_resumes(tmp_path: Path) -> None:
     full = run_rig(*words, cwd=tmp_path, largest_file=100_000)
     assert full.status == 4, full.stderr
     reason = os.strerror(errno.EFBIG)
-    data, end = full.stderr.splitlines()[-2:]
+    # on a busy machine it says, too, that this is too fast for it
+    said = [line for line in full.stderr.splitlines() if "can't keep up" not in line]
+    data, end = said[-2:]
     assert data == (
         f"run.h5: cannot be written: {reason}. Choose another folder, or make room. What was "
         "measured is kept in run.h5.journal. To go on once that is mended: rig measure --resume "
@@ -167,7 +169,7 @@ def test_a_full_disk_ends_with_what_to_do_and_resumes(tmp_path: Path) -> None:
     assert end.startswith("Stopped: run.h5")
     assert f": {reason}." in end
     assert re.search("Unload the arm|Turn the screw back", end)
-    assert len(full.stderr.splitlines()) < 15
+    assert len(said) < 15
     again = run_rig("measure", "--resume", "run.h5", cwd=tmp_path)
     assert again.status == 0, again.stderr
     assert steps_of(load(tmp_path / "run.h5")) == STEPS
