@@ -128,6 +128,7 @@ def test_what_no_word_names_is_unknown_and_told(kind: str) -> None:
 
 
 FINE = Design(repetitions=2, steps=16, hold=1, readings=False)
+LONG_HOLDS = Design(repetitions=2, steps=7, hold=6, readings=False)
 
 
 def test_a_wave_over_the_stroke_is_found_with_its_length() -> None:
@@ -138,6 +139,14 @@ def test_a_wave_over_the_stroke_is_found_with_its_length() -> None:
     assert like.kind == "waves"
     assert like.period == pytest.approx(0.31e-3, rel=0.02)
     assert "mm long" in looks_like(like)
+
+
+def test_a_hum_that_is_read_once_a_second_is_a_fast_swing() -> None:
+    """Hardly slower than the readings of a hold, which scatter by it."""
+    like = explained(measured(swing(5.26), 8e-6, LONG_HOLDS)).looks_like
+    assert like is not None
+    assert like.kind == "swings"
+    assert like.period == pytest.approx(5.26, rel=0.01)
 
 
 def test_below_the_noise_there_is_no_gap() -> None:

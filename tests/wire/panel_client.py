@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+DEADLINE_S = 90.0  # a busy machine takes several times as long as a quiet one
+
 
 class PanelClient:
     """Reads the stream in a thread, as the page does; `client` is the page's own word."""
@@ -56,14 +58,16 @@ class PanelClient:
         """All that have come, in order."""
         return [item["sample"] for item in list(self.items) if "sample" in item]
 
-    def wait(self, what: Callable[[PanelClient], object], deadline_s: float = 30) -> None:
+    def wait(self, what: Callable[[PanelClient], object], deadline_s: float = DEADLINE_S) -> None:
         """Until something holds of what has come."""
         end = time.monotonic() + deadline_s
         while not what(self):
             assert time.monotonic() < end, f"not within {deadline_s} s; last: {self.states[-1:]}"
             time.sleep(0.01)
 
-    def wait_state(self, what: Callable[[dict[str, Any]], object], deadline_s: float = 30) -> None:
+    def wait_state(
+        self, what: Callable[[dict[str, Any]], object], deadline_s: float = DEADLINE_S
+    ) -> None:
         """Until something has held of a state, from the newest one on: phases may be short."""
         first = max(0, len(self.states) - 1)
         self.wait(lambda me: any(what(state) for state in me.states[first:]), deadline_s)

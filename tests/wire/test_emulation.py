@@ -42,7 +42,7 @@ def station(**emulation_changes: object) -> Station:
     return replace(found, emulation=changed)
 
 
-def eventually(condition: Callable[[], bool], deadline_s: float = 20.0) -> bool:
+def eventually(condition: Callable[[], bool], deadline_s: float = 60.0) -> bool:
     end = time.monotonic() + deadline_s
     while time.monotonic() < end:
         if condition():

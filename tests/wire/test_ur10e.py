@@ -25,6 +25,7 @@ from drivers.ur10e.dashboard import Dashboard
 from drivers.ur10e.emulator import Ur10eEmulator
 from drivers.ur10e.settings import Ur10eSettings
 from drivers.ur10e.words import PLAYING, STOPPED
+from tests.wire.processes import children_running
 from tests.wire.scene import StillScene
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -63,12 +64,7 @@ def rig() -> Iterator[Rig]:
             return scene, emulator, robot
 
         yield make
-    assert client_processes() == []
-
-
-def client_processes() -> list[int]:
-    found = psutil.Process().children(recursive=True)
-    return [p.pid for p in found if "drivers.ur10e.child" in p.cmdline()]
+    assert children_running("drivers.ur10e.child") == []
 
 
 def test_every_column_arrives_in_its_place(rig: Rig) -> None:

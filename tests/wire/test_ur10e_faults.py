@@ -25,6 +25,7 @@ from drivers.ur10e.client import Ur10e
 from drivers.ur10e.emulator import FAULTS, Ur10eEmulator
 from drivers.ur10e.process import ReceiveProcess
 from drivers.ur10e.settings import Ur10eSettings
+from tests.wire.processes import children_running
 from tests.wire.scene import StillScene
 
 pytestmark = pytest.mark.timeout(60)
@@ -51,8 +52,7 @@ def rig() -> Iterator[Rig]:
             return emulator, robot
 
         yield make
-    children = psutil.Process().children(recursive=True)
-    assert [p.pid for p in children if "drivers.ur10e.child" in p.cmdline()] == []
+    assert children_running("drivers.ur10e.child") == []
 
 
 def assert_explained(error: DeviceError, words: tuple[str, ...]) -> None:
