@@ -86,7 +86,8 @@ LOOKS_LIKE = {
     "wanders": "the stiffness wanders during the session: see to bolts that loosen, and to damage; "
     "to be sure, measure again now",
     "swings": "the displacement swings with time, {} a period: air conditioning, a pump, a machine "
-    "next door; to be sure, watch the unloaded rig for {}",
+    "next door, or the mains, which beat with the sampling; to be sure, watch the unloaded rig for "
+    "{}",
     "waves": "a wave over the stroke, {} long: the screw's thread, or what the laser's spot "
     "travels over; to be sure, shift the laser's spot a little to the side, and measure again",
     "rough": "every level of the load is off by an amount of its own, the same whenever it is met: "
