@@ -15,6 +15,7 @@ from identification.gap.answer.known import knowing
 from identification.gap.answer.locate import NOWHERE, Where, locate
 from identification.gap.answer.notes import FAULT, REMARK, Note, notes_of, ordered
 from identification.gap.answer.posterior import Known, settled
+from identification.gap.answer.scale import off_scale
 from identification.gap.answer.twins import twin_of
 from identification.gap.data import GapData
 from identification.gap.effects import library
@@ -238,20 +239,23 @@ def _result(
     held = tuple(held_out(engine, chosen, name, number) for name, number in ways.items())
     springs = fit(engine, next(e for e in found.explanations if not e.parts))
     structural = engine.target[:n] - springs.response
+    simulated = stated_prediction(engine)
+    scale = off_scale(bench, simulated)
+    notes = [*scale, *notes_of(bench), *_disbelieved(found, verdict), *_across(bench, chosen)]
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,
         effects=_effects(found, chosen, known),
         where=NOWHERE if verdict == "none" else locate(engine, fitted, chosen.sizes, structural),
         noise=noise_of(bench),
-        before=sample_rms(bench, stated_prediction(engine)),
+        before=sample_rms(bench, simulated),
         after=left_of(engine, fitted),
         held_out=held,
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,
         remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
-        looks_like=_likeness(found, verdict),
-        said=ordered([*notes_of(bench), *_disbelieved(found, verdict), *_across(bench, chosen)]),
+        looks_like=None if scale else _likeness(found, verdict),
+        said=ordered(notes),
         bench=bench,
         engine=engine,
         fit=fitted,

@@ -1,0 +1,57 @@
+"""A response of another order of size than simulated is said to be one, before any verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from identification.gap.answer.scale import off_scale
+from identification.gap.data import GapData
+from identification.gap.model.bench import make_bench
+from tests.conformance.gap_designs import linear
+from tests.explained import explained
+
+
+def said(data: GapData) -> list[str]:
+    bench = make_bench(data)
+    simulated = bench.rows.simulated
+    predicted = bench.stated_slope * bench.load if simulated is None else simulated
+    return [note.text for note in off_scale(bench, predicted)]
+
+
+@pytest.mark.parametrize("name", ["paper", "bench"])
+@pytest.mark.parametrize(
+    ("displacement", "force", "moves"),
+    [
+        (1000.0, 1.0, "times as far as simulated"),  # micrometres for millimetres
+        (1.0, 1e-3, "times as far as simulated"),  # kilonewtons for newtons
+        (1e-3, 1.0, "of the way that was simulated"),
+        (1.0, 1e3, "of the way that was simulated"),
+        (20.0, 1.0, ""),  # of a spring that somebody guessed
+        (0.05, 1.0, ""),
+    ],
+)
+def test_a_wrong_unit_is_asked_for(
+    name: str, displacement: float, force: float, moves: str
+) -> None:
+    data = linear(name)
+    scaled = replace(data, displacement=displacement * data.displacement, force=force * data.force)
+    texts = said(scaled)
+    assert len(texts) == (1 if moves else 0)
+    assert all(moves in text for text in texts)
+
+
+def test_simulated_curves_that_go_the_other_way_are_told() -> None:
+    data = linear("bench")
+    simulated = data.displacement - data.displacement[0]
+    assert said(replace(data, simulated=simulated)) == []
+    (text,) = said(replace(data, simulated=-simulated))
+    assert "go the other way" in text
+
+
+def test_it_is_the_first_thing_said_and_nothing_is_likened() -> None:
+    data = linear("bench")
+    result = explained(replace(data, displacement=1000 * data.displacement))
+    assert "see first whether forces are in N" in result.notes[0]
+    assert result.looks_like is None
