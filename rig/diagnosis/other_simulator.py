@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,16 +27,57 @@ SAME_FORCE = 1e-9
 def with_curves(data: GapData, csv: Path) -> GapData:
     """Displacement that the curves (pose, direction, force_N, displacement_mm) give per sample.
 
-    Straight between the points and beyond the ends; points at one force count as their mean.
-    InputError for a table that holds no such curves.
+    Straight between the points and beyond the ends; points at one force count as their mean, and
+    where that is no small matter a note says so. InputError for a table that holds no such curves.
     """
     table = _read(csv)
-    simulated = np.empty(len(data.force))
+    simulated, notes = np.empty(len(data.force)), list(data.notes)
     for s, setup in enumerate(data.setups):
-        force, displacement = _curve(csv, table, setup)
+        curve = _curve(csv, table, setup)
         rows = data.setup == s
-        simulated[rows] = _along(data.force[rows], force, displacement)
-    return replace(data, simulated=simulated)
+        notes += _doubts(csv, curve, setup, data.force[rows])
+        simulated[rows] = _along(data.force[rows], curve.force, curve.displacement)
+    return replace(data, simulated=simulated, notes=tuple(notes))
+
+
+class _Curve(NamedTuple):
+    """Forces (n,) N, ascending and distinct, displacements (n,) m there, and how far those of one
+    force are apart (n,) m."""
+
+    force: Array
+    displacement: Array
+    apart: Array
+
+
+def _doubts(csv: Path, curve: _Curve, setup: Setup, measured: Array) -> Iterator[str]:
+    """What is odd about a curve, beside the forces (k,) N that were measured."""
+    where = f"direction {setup.direction}" + (f" in pose {setup.pose}" if setup.pose else "")
+    low, high = float(measured.min()), float(measured.max())
+    first, last = float(curve.force[0]), float(curve.force[-1])
+    needed = f"simulated from {first:.4g} to {last:.4g} N, measured from {low:.4g} to {high:.4g} N"
+    covered = min(last, high) - max(first, low)
+    if covered < _HALF * (high - low):
+        raise InputError(
+            f"{csv}: {where}: {needed}; wanted: curves over the range of force. Simulate that, too."
+        )
+    if max(first - low, high - last) > _LITTLE * (high - low):
+        yield f"The curve of {where} was {needed}: it was taken to go straight on beyond its ends."
+    size = float(np.ptp(curve.displacement))
+    if curve.apart.max() > _LITTLE * size:
+        at = float(curve.force[curve.apart.argmax()])
+        yield (
+            f"The curve of {where} has values that are {MM_PER_M * curve.apart.max():.3g} mm apart "
+            f"at {at:.4g} N: their mean was taken."
+        )
+    unloaded = float(_along(np.zeros(1), curve.force, curve.displacement)[0])
+    if first <= 0 <= last and abs(unloaded) > _LITTLE * size:
+        yield (
+            f"The curve of {where} shows {MM_PER_M * unloaded:.3g} mm without load, where the "
+            "laser reads zero: that counts in what the simulation misses, and in no effect."
+        )
+
+
+_HALF, _LITTLE = 0.5, 0.1  # of the measured range of force; of that, and of the simulated range
 
 
 def _read(csv: Path) -> dict[str, Values]:
@@ -76,8 +119,8 @@ def _check_finite(file: CsvFile, block: Block, name: str, values: Values) -> Non
         )
 
 
-def _curve(csv: Path, table: dict[str, Values], setup: Setup) -> tuple[Array, Array]:
-    """Forces (n,) N, ascending and distinct, and displacements (n,) m of a setup."""
+def _curve(csv: Path, table: dict[str, Values], setup: Setup) -> _Curve:
+    """Of a setup."""
     mine = np.ones(len(table["force_N"]), dtype=bool)
     for key, value in (("pose", setup.pose), ("direction", setup.direction)):
         if key in table:
@@ -95,7 +138,11 @@ def _curve(csv: Path, table: dict[str, Values], setup: Setup) -> tuple[Array, Ar
             f"{', all at one force' if len(force) > 1 else ''}; wanted: at least 2 different "
             "forces, over the range of force."
         )
-    return np.bincount(level, force) / count, np.bincount(level, displacement) / count
+    starts = np.flatnonzero(new)
+    apart = np.maximum.reduceat(displacement, starts) - np.minimum.reduceat(displacement, starts)
+    return _Curve(
+        np.bincount(level, force) / count, np.bincount(level, displacement) / count, apart
+    )
 
 
 def _along(force: Array, f: Array, u: Array) -> Array:

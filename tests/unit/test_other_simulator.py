@@ -33,7 +33,7 @@ def simulated_mm(data: GapData, folder: Path, text: str) -> list[float]:
 
 
 def test_straight_between_the_points_and_beyond_them(data: GapData, tmp_path: Path) -> None:
-    rows = "# an FE program's\nx,60,0.5\nx,20,0.1\ny,20,9\nx,40,0.3\n"
+    rows = "# an FE program's\nx,70,0.6\nx,20,0.1\ny,20,9\nx,40,0.3\n"
     assert simulated_mm(data, tmp_path, HEAD + rows) == pytest.approx(
         [-0.1, 0.1, 0.3, 0.5, 0.7, 0.9]
     )
@@ -61,7 +61,7 @@ def test_points_at_one_force_count_as_their_mean(
 def test_beyond_two_points_at_the_largest_force_nothing_explodes(
     data: GapData, tmp_path: Path
 ) -> None:
-    found = simulated_mm(data, tmp_path, HEAD + "x,0,0\nx,40,0.3\nx,40,0.5\n")
+    found = simulated_mm(data, tmp_path, HEAD + "x,0,0\nx,80,0.7\nx,80,0.9\n")
     assert found == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
 
 
@@ -83,6 +83,47 @@ def test_a_table_that_holds_no_curves(data: GapData, tmp_path: Path, rows: str, 
     with pytest.raises(InputError) as caught:
         simulated_mm(data, tmp_path, HEAD + rows)
     assert str(caught.value).startswith(f"{tmp_path}/{says}")
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ("x,0,0\nx,95,0.95\n", None),
+        (
+            "x,0,0\nx,50,0.5\n",
+            "The curve of direction x was simulated from 0 to 50 N, measured from 0 to 100 N: it "
+            "was taken to go straight on beyond its ends.",
+        ),
+        (
+            "x,0,0\nx,60,0.5\nx,60,0.7\nx,100,1\n",
+            "The curve of direction x has values that are 0.2 mm apart at 60 N: their mean was "
+            "taken.",
+        ),
+        ("x,0,0\nx,60,0.595\nx,60,0.605\nx,100,1\n", None),
+        (
+            "x,0,5\nx,100,6\n",
+            "The curve of direction x shows 5 mm without load, where the laser reads zero: that "
+            "counts in what the simulation misses, and in no effect.",
+        ),
+        ("x,10,0.1\nx,100,1\n", None),
+    ],
+)
+def test_what_is_odd_about_curves_is_said(
+    data: GapData, tmp_path: Path, rows: str, says: str | None
+) -> None:
+    (tmp_path / "c.csv").write_text(HEAD + rows)
+    notes = with_curves(data, tmp_path / "c.csv").notes[len(data.notes) :]
+    assert notes == (() if says is None else (says,))
+
+
+@pytest.mark.parametrize(
+    "rows", ["x,0,0\nx,49,0.5\n", "x,0,0\nx,0.000000001,1\n", "x,60,1\nx,200,2\n"]
+)
+def test_curves_over_less_than_half_of_the_range_are_refused(
+    data: GapData, tmp_path: Path, rows: str
+) -> None:
+    with pytest.raises(InputError, match="measured from 0 to 100 N; wanted: curves over the range"):
+        simulated_mm(data, tmp_path, HEAD + rows)
 
 
 @pytest.mark.parametrize(
