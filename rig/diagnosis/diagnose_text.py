@@ -117,7 +117,8 @@ _BY_ANY_SENSOR = {
 _SURE = 3  # periods
 
 
-# Kinds of notes, and under which heading they stand.
+# Kinds of notes, and under which heading they stand: the first kind right after the answer, on which
+# it casts doubt, the others at the end.
 NOTED = {
     "fault": "See to this first",
     "set aside": "Set aside",
@@ -138,11 +139,15 @@ def looks_like(like: Likeness, *, arm: bool = True) -> str:
 
 def render(r: GapResult) -> str:
     """All lines, in the order of importance."""
-    parts = [_answer(r), _where(r), _effects(r), _gap(r), _next(r)]
-    for kind, heading in NOTED.items():
-        told = [f"  {n.text}" for n in r.said if n.kind == kind]
-        parts += ["\n".join([f"{heading}:", *told])] if told else []
+    first, *others = (_noted(r, kind) for kind in NOTED)
+    parts = [_answer(r), first, _where(r), _effects(r), _gap(r), _next(r), *others]
     return "\n\n".join(p for p in parts if p)
+
+
+def _noted(r: GapResult, kind: str) -> str:
+    """The notes of a kind under their heading; empty where there are none."""
+    told = [f"  {n.text}" for n in r.said if n.kind == kind]
+    return "\n".join([f"{NOTED[kind]}:", *told]) if told else ""
 
 
 def _answer(r: GapResult) -> str:

@@ -29,9 +29,12 @@ def gap(session: Session, data: Node) -> Section:
         reason = data["missing"]["diagnose"].text()
         return Section("gap", "Gap to the simulation", (Paragraph((reason,), "warning"),), banners)
     figures = session.diagnosed.figures
-    blocks: list[Block] = [Paragraph(_answer(found), "answer"), *_where(found), *figures[:2]]
+    first, *others = NOTED
+    blocks: list[Block] = [Paragraph(_answer(found), "answer"), *_noted(found, first)]
+    blocks += [*_where(found), *figures[:2]]
     blocks += [*_effects(found), _probabilities(found), _how_far(found), *figures[2:]]
-    blocks += _rest(found)
+    blocks += _next(found)
+    blocks += [block for kind in others for block in _noted(found, kind)]
     return Section("gap", "Gap to the simulation", tuple(blocks), banners)
 
 
@@ -166,17 +169,18 @@ def _sizes(node: Node) -> tuple[Rich, Rich, Rich]:
     return before, after, node["shrink_factor"].number(3)
 
 
-def _rest(found: Node) -> list[Block]:
-    blocks: list[Block] = []
+def _next(found: Node) -> list[Block]:
     following = found["next_measurement"]
-    if following:
-        pair = " from ".join(following.get("separates").value or ())
-        words = (f"To tell {pair}: {following['text'].text()}",)
-        blocks.append(Section("gap-next", "What to measure next", (Paragraph(words),)))
+    if not following:
+        return []
+    pair = " from ".join(following.get("separates").value or ())
+    words = (f"To tell {pair}: {following['text'].text()}",)
+    return [Section("gap-next", "What to measure next", (Paragraph(words),))]
+
+
+def _noted(found: Node, kind: str) -> list[Block]:
+    """The notes of a kind under their heading, if there are any."""
     notes = [(n.text(), k.text()) for n, k in zip(found["notes"], found["note_kinds"], strict=True)]
-    for kind, heading in NOTED.items():
-        told = tuple(text for text, of in notes if of == kind)
-        if told:
-            name = f"gap-{kind.replace(' ', '-')}"
-            blocks.append(Section(name, heading, (Bullets(told),)))
-    return blocks
+    told = tuple(text for text, of in notes if of == kind)
+    name = f"gap-{kind.replace(' ', '-')}"
+    return [Section(name, NOTED[kind], (Bullets(told),))] if told else []

@@ -98,12 +98,13 @@ def test_an_interval_that_nothing_tells_is_not_shown() -> None:
     assert lines[3].endswith("17.2")
 
 
-def test_notes_stand_under_what_they_are_what_is_wrong_first() -> None:
+def test_notes_stand_under_what_they_are_what_is_wrong_right_after_the_answer() -> None:
     assert tuple(diagnose_text.NOTED) == KINDS
     notes = ordered([Note(kind, f"Of {kind}.") for kind in reversed(KINDS)])
     text = diagnose_text.render(replace(shown.without_gap().result, said=notes))
+    assert text.split("\n\n")[1] == "See to this first:\n  Of fault."
     assert text.endswith(
-        "See to this first:\n  Of fault.\n\nSet aside:\n  Of set aside.\n\n"
+        "Set aside:\n  Of set aside.\n\n"
         "Not decidable from these data:\n  Of undecided.\n\n"
         "To be known:\n  Of remark."
     )

@@ -37,6 +37,7 @@ def notes_of(bench: Bench) -> Iterator[Note]:
 
 
 def _faults(bench: Bench) -> Iterator[str]:
+    yield from _nothing_moves(bench)
     yield from (f.text for f in bench.course.faults)
     if bench.noise.raised > NOISY:
         yield (
@@ -45,10 +46,19 @@ def _faults(bench: Bench) -> Iterator[str]:
         )
 
 
-def _undecided(bench: Bench) -> Iterator[str]:
-    data, rows = bench.data, bench.rows
+def _nothing_moves(bench: Bench) -> Iterator[str]:
+    """Of data in which no gap could be seen."""
     if not np.ptp(bench.load) > 0:
         yield "The load does not change: nothing can be said of stiffness or of joints."
+    elif bench.reach < bench.noise.stated:
+        yield (
+            f"Nothing moves by more than {1e3 * bench.reach:.2g} mm, less than a reading is "
+            f"uncertain by ({1e3 * bench.noise.stated:.2g} mm): hardly anything can be said."
+        )
+
+
+def _undecided(bench: Bench) -> Iterator[str]:
+    data, rows = bench.data, bench.rows
     if not bench.course.unloads:
         yield "Nothing was unloaded: lasting and elastic deflection look alike."
     if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
