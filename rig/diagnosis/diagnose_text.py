@@ -117,8 +117,8 @@ _BY_ANY_SENSOR = {
 _SURE = 3  # periods
 
 
-# Kinds of notes, and under which heading they stand: the first kind right after the answer, on which
-# it casts doubt, the others at the end.
+# Kinds of notes, and under which heading they stand: the first kind right after the answer, which
+# it makes doubtful, the others at the end.
 NOTED = {
     "fault": "See to this first",
     "set aside": "Set aside",
