@@ -61,11 +61,13 @@ class Gains:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known of the joints beforehand: stiffness (6,) Nm/rad, relative_sd (6,) of it."""
+    """What is known of the joints beforehand: stiffness (6,) Nm/rad, relative_sd (6,) of it.
+    made_from: what the source says of the data sets behind it."""
 
     stiffness: Array
     relative_sd: Array
     source: str = ""
+    made_from: str = ""
 
     def __post_init__(self) -> None:
         if not (np.asarray(self.stiffness) > 0).all():

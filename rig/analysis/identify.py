@@ -46,6 +46,7 @@ class IdentifyResult:
     tool_xyz: tuple[float, float, float]
     notes: tuple[str, ...]
     banners: tuple[str, ...] = ()
+    made_from: str = ""
 
     @property
     def emulated(self) -> bool:
@@ -123,6 +124,7 @@ def identify(
     prior = prior or Prior(
         arm.joint_stiffness, arm.joint_stiffness_relative_sd, f"data/models/{arm.name}.yaml"
     )
+    _check_new(datasets, names, prior)
     observations: list[Observation] = []
     notes: list[str] = []
     for setup, (dataset, name) in enumerate(zip(datasets, names, strict=True)):
@@ -147,7 +149,23 @@ def identify(
         tool_xyz=first.tcp_xyz_mm,
         notes=tuple(notes),
         banners=tuple(dict.fromkeys(b for d in datasets for b in d.banners())),
+        made_from=_made_from(datasets, prior),
     )
+
+
+def _check_new(datasets: Sequence[Dataset], names: Sequence[str], prior: Prior) -> None:
+    for dataset, name in zip(datasets, names, strict=True):
+        if dataset.uuid in prior.made_from:
+            raise InputError(
+                f"{prior.source}: was made from {name}; every measurement counts once. Leave out "
+                "the data set, or take a model that it is not part of."
+            )
+
+
+def _made_from(datasets: Sequence[Dataset], prior: Prior) -> str:
+    """Which data sets are behind the stiffnesses, those behind the prior included."""
+    mine = f"Identified from {', '.join(d.uuid for d in datasets)}."
+    return f"{mine} Prior: {prior.made_from}" if prior.made_from else mine
 
 
 def _propose(
@@ -163,13 +181,14 @@ def prior_of(model: str | Path) -> Prior:
 
     Raises InputError where the file states none: a prior without spread leaves nothing to learn.
     """
-    arm = load_model(model).arm
+    read = load_model(model)
+    arm = read.arm
     if not (arm.joint_stiffness_relative_sd > 0).all():
         raise InputError(
             f"{model}: as a prior it needs joint_stiffness_relative_sd (or joint_stiffness_sd) "
             "above 0 for all six joints."
         )
-    return Prior(arm.joint_stiffness, arm.joint_stiffness_relative_sd, str(model))
+    return Prior(arm.joint_stiffness, arm.joint_stiffness_relative_sd, str(model), read.note)
 
 
 def _arm(datasets: Sequence[Dataset], names: Sequence[str]) -> Arm:

@@ -57,10 +57,10 @@ def text(result: IdentifyResult) -> str:
 
 def model_text(result: IdentifyResult) -> str:
     """A model file that holds the identified stiffnesses, in the first measured pose."""
-    fit, note = result.fit, " ".join(result.banners)
+    fit, note = result.fit, " ".join([*result.banners, result.made_from])
     lines = [
         f"# Identified from {', '.join(Path(d).name for d in result.datasets)}",
-        *([f"note: {json.dumps(note)}"] if note else []),
+        f"note: {json.dumps(note)}",
         *arm_lines(
             result.arm.name,
             result.observations[0].q.tolist(),

@@ -183,6 +183,19 @@ def test_the_next_protocol_can_be_carried_out(single: IdentifyResult, tmp_path: 
         protocol_text(identify([single.datasets[0]], proposals=0))
 
 
+def test_no_measurement_counts_again_as_its_own_prior(
+    files: Path, single: IdentifyResult, tmp_path: Path
+) -> None:
+    write_model(single, tmp_path / "first.yaml")
+    with pytest.raises(InputError, match=r"first\.yaml: was made from .*single\.h5; every measure"):
+        identify([files / "single.h5"], prior=prior_of(tmp_path / "first.yaml"), proposals=0)
+    second = identify([files / "seen.h5"], prior=prior_of(tmp_path / "first.yaml"), proposals=0)
+    write_model(second, tmp_path / "second.yaml")  # knows of both
+    for name in ("single.h5", "seen.h5"):
+        with pytest.raises(InputError, match="every measurement counts once"):
+            identify([files / name], prior=prior_of(tmp_path / "second.yaml"), proposals=0)
+
+
 def test_a_model_file_as_prior(files: Path, tmp_path: Path) -> None:
     prior = prior_of(MODELS / "F1.yaml")
     found = identify([files / "single.h5"], prior=prior, proposals=0)
