@@ -43,14 +43,15 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
     meta, result = dataset.meta, diagnosis.result
     check_writable(dataset, others=result.bench.rows.simulated is not None)
     pose = meta.poses[result.bench.data.setups[0].pose]
-    note = " ".join(
-        [*diagnosis.banners, f"Springs and effects of the diagnosis of {dataset.uuid}."]
-    )
+    made = f"Springs and effects of the diagnosis of {dataset.uuid}."
+    if result.verdict == "unknown":
+        made = f"Nothing explains the gap of {dataset.uuid}: the springs are those that were given."
+    note = " ".join([*diagnosis.banners, made])
     lines = [
         f"# The simulation with what rig diagnose found missing in it: {result.verdict} "
         f"({likely(result.probabilities[result.verdict])}).",
         f"note: {json.dumps(note)}",
-        *arm_lines(meta.robot, pose.q_rad, pose.tcp_xyz_mm, *springs(result)),
+        *arm_lines(meta.robot, pose.q_rad, pose.tcp_xyz_mm, *_believed(result)),
         *_outside(diagnosis),
         *_effects(diagnosis, dataset),
         *coupling_lines(),
@@ -71,6 +72,15 @@ def check_writable(dataset: Dataset, *, others: bool) -> None:
             f"{where}: diagnosed against another simulator's curves; --write-model corrects the "
             "springs of META or --model. Leave --simulation out."
         )
+
+
+def _believed(result: GapResult) -> tuple[Array, Array]:
+    """Joint stiffnesses and their standard deviations (m,) Nm/rad: as fitted; as stated where the
+    gap is unknown, since what springs take of such a gap says nothing of springs."""
+    if result.verdict != "unknown":
+        return springs(result)
+    stated = 1 / result.bench.data.compliance
+    return stated, stated * result.bench.data.compliance_relative_sd
 
 
 def springs(result: GapResult) -> tuple[Array, Array]:

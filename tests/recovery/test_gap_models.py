@@ -216,6 +216,21 @@ def test_springs_of_the_file_are_the_fitted_ones(
     assert dataset.uuid in read.note
 
 
+def test_of_an_unknown_gap_no_spring_is_made(
+    planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path
+) -> None:
+    _, dataset, diagnosis = planned
+    lost = replace(diagnosis, result=replace(diagnosis.result, verdict="unknown"))
+    path = tmp_path / "m.yaml"
+    write_model(lost, dataset, path)
+    arm, given = load_model(path).arm, lost.result.bench.data
+    np.testing.assert_allclose(arm.joint_stiffness, 1 / given.compliance, rtol=1e-6)
+    np.testing.assert_allclose(
+        arm.joint_stiffness_relative_sd, given.compliance_relative_sd, rtol=1e-3
+    )
+    assert "Nothing explains the gap" in load_model(path).note
+
+
 @pytest.mark.slow
 def test_a_model_with_its_effects_closes_the_gap_that_it_came_from(
     planned: tuple[Path, Dataset, Diagnosis], tmp_path: Path
