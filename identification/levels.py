@@ -223,6 +223,15 @@ class Hysteresis:
     remaining: float
     n: int
 
+    @property
+    def gives_back(self) -> bool:
+        """Whether more work came back than was put in, beyond the scatter of the repetitions."""
+        scatter = self.sd / self.n**0.5 if self.n > 1 else 0.0
+        return self.area < -_BEYOND * scatter and self.relative < -_LITTLE_WORK
+
+
+_BEYOND, _LITTLE_WORK = 3.0, 0.1  # standard deviations of the mean; of the work: drifts do less
+
 
 def hysteresis(curve: Curve, loading: Grid, unloading: Grid) -> Hysteresis | None:
     """Area of the loop in the (u, F) plane (shoelace formula); None without an unloading branch."""

@@ -151,15 +151,23 @@ def analyze_curve(curve: Curve, options: Options | None = None) -> Stiffness:
     if knee is not None and not options.keep_after_knee:
         used = loading.keep(s for s in loading.steps if s not in behind)
         excluded = (*excluded, *(Exclusion(s, _why(knee)) for s in behind))
+    loop = hysteresis(curve, loading, unloading)
     described = replace(
         bare,
         excluded=excluded,
+        notes=(*bare.notes, WRONG_WAY) if loop is not None and loop.gives_back else bare.notes,
         knee=knee,
         pointwise=pointwise(loading, origin=curve.origin),
-        hysteresis=hysteresis(curve, loading, unloading),
+        hysteresis=loop,
         bent=leaves_line(loading, origin=curve.origin),
     )
     return _with_k(described, curve, loading, used)
+
+
+WRONG_WAY = (
+    "The loop runs the wrong way: more work came back than was put in, which no rig does. See to "
+    "the names of the branches, the order of the rows, the signs, and to a channel that lags or drifts."
+)
 
 
 def default_choice(curve: Curve, options: Options) -> tuple[Choice, str]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from identification.curve import Curve, Point
 from identification.estimate import Choice, gain_effect, stated_uncertainty, stiffness
 from identification.levels import LevelTable
-from identification.stiffness import Options, Stiffness, analyze_curve, ratio
+from identification.stiffness import WRONG_WAY, Options, Stiffness, analyze_curve, ratio
 
 LEVELS = (20.0, 40.0, 60.0, 80.0, 100.0)
 FACTORS = (1.0, 1.01, 0.99)  # compliance of the three repetitions
@@ -331,6 +331,13 @@ def test_levels_that_no_run_has_together_stand_in_the_order_of_their_numbers() -
     # no run has both 3 and 4
     assert [p.force for p in result.pointwise] == pytest.approx([10.0, 30.0, 50.0, 90.0])
     assert all(p.n > 0 for p in result.pointwise)
+
+
+@pytest.mark.parametrize(("back", "told"), [(-0.25e-3, True), (0.0, False), (0.25e-3, False)])
+def test_a_loop_that_gives_back_more_than_it_took_is_told(back: float, told: bool) -> None:
+    slope = 1e5 / (1 - back / 1e-3)
+    loop = unloading(curve(factors=(1.0, 1.0, 1.0)), lambda f: f / slope + back, back)
+    assert (WRONG_WAY in analyze_curve(loop).notes) is told
 
 
 def test_the_loop_of_a_cycle_without_zero_has_an_area_and_no_share() -> None:
