@@ -85,7 +85,8 @@ def locate(samples: Samples, near: Kink) -> Kink | None:
 def _sigma(samples: Samples) -> Array:
     """Standard uncertainty in the force direction, (n,): sqrt(u_F^2 + (slope u_u)^2)."""
     f, u = samples.force, samples.displacement
-    slope = np.clip(np.abs(np.gradient(f, u)), 0.0, np.max(np.abs(f / u)))
+    secants = np.abs(np.divide(f, u, out=np.zeros_like(f), where=u != 0))
+    slope = np.clip(np.abs(np.gradient(f, u)), 0.0, np.max(secants))
     tiny = 1e-6 * np.ptp(np.append(f, 0.0))
     sigma: Array = np.maximum(np.hypot(samples.u_force, slope * samples.u_displacement), tiny)
     return sigma

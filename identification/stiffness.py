@@ -166,7 +166,7 @@ def analyze_curve(curve: Curve, options: Options | None = None) -> Stiffness:
 
 WRONG_WAY = (
     "The loop runs the wrong way: more work came back than was put in, which no rig does. See to "
-    "the names of the branches, the order of the rows, the signs, and to a channel that lags or drifts."
+    "the names of the branches, the order of the rows, the signs, and to what lags or drifts."
 )
 
 

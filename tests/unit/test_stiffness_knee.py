@@ -1,5 +1,7 @@
 """Knees: found where an arm gives way, and nowhere else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,14 @@ def test_the_knee_between_levels_is_found_within_half_a_newton() -> None:
         assert knee is not None
         forces.append(knee.force)
     assert np.max(np.abs(np.array(forces) - 75.0)) < 0.5
+
+
+def test_a_level_that_did_not_move_is_one_like_others() -> None:
+    levels = np.append(0.0, LEVELS_Y)
+    with np.errstate(all="raise"):
+        knee = find_knee(replace(samples(levels, giving_way(levels)), origin=False))
+    assert knee is not None
+    assert knee.force == pytest.approx(75.0, abs=0.01)
 
 
 def test_a_force_that_stalls_is_a_knee_too() -> None:
