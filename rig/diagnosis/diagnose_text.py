@@ -125,6 +125,7 @@ NOTED = {
     "undecided": "Not decidable from these data",
     "remark": "To be known",
 }
+DOUBTED = next(iter(NOTED))
 
 
 def looks_like(like: Likeness, *, arm: bool = True) -> str:
@@ -139,8 +140,8 @@ def looks_like(like: Likeness, *, arm: bool = True) -> str:
 
 def render(r: GapResult) -> str:
     """All lines, in the order of importance."""
-    first, *others = (_noted(r, kind) for kind in NOTED)
-    parts = [_answer(r), first, _where(r), _effects(r), _gap(r), _next(r), *others]
+    others = [_noted(r, kind) for kind in NOTED if kind != DOUBTED]
+    parts = [_answer(r), _noted(r, DOUBTED), _where(r), _effects(r), _gap(r), _next(r), *others]
     return "\n\n".join(p for p in parts if p)
 
 

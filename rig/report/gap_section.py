@@ -5,7 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rig.diagnosis.diagnose_text import EACH, LEAST_PROBABILITY, NOTED, OTHERWISE, answer, families
+from rig.diagnosis.diagnose_text import (
+    DOUBTED,
+    EACH,
+    LEAST_PROBABILITY,
+    NOTED,
+    OTHERWISE,
+    answer,
+    families,
+)
 from rig.report.document import (
     Block,
     Bullets,
@@ -29,12 +37,11 @@ def gap(session: Session, data: Node) -> Section:
         reason = data["missing"]["diagnose"].text()
         return Section("gap", "Gap to the simulation", (Paragraph((reason,), "warning"),), banners)
     figures = session.diagnosed.figures
-    first, *others = NOTED
-    blocks: list[Block] = [Paragraph(_answer(found), "answer"), *_noted(found, first)]
+    blocks: list[Block] = [Paragraph(_answer(found), "answer"), *_noted(found, DOUBTED)]
     blocks += [*_where(found), *figures[:2]]
     blocks += [*_effects(found), _probabilities(found), _how_far(found), *figures[2:]]
     blocks += _next(found)
-    blocks += [block for kind in others for block in _noted(found, kind)]
+    blocks += [b for kind in NOTED if kind != DOUBTED for b in _noted(found, kind)]
     return Section("gap", "Gap to the simulation", tuple(blocks), banners)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rig.diagnosis.diagnose_text import DOUBTED, NOTED
 from rig.digits import counted
 from rig.report.document import (
     Block,
@@ -70,12 +71,14 @@ def _gap(data: Node) -> Cell:
     p = found["probabilities"][verdict].probability()
     words: Rich = (Word(verdict, "strong"), " (probability ", *p, ")")
     held = found["gap"]["held_out"]
-    if verdict in ("none", "unknown") or not held:
-        return words
-    low, high = (edge.number(3) for edge in held["ci95"])
-    shrinks = (*held["shrink_factor"].number(3), " [", *low, ", ", *high, "] times")
-    meaning = f", {found['meanings'][verdict].text()}"
-    return (*words, meaning, "; with it the gap shrinks ", *shrinks, " on withheld data")
+    if verdict not in ("none", "unknown") and held:
+        low, high = (edge.number(3) for edge in held["ci95"])
+        shrinks = (*held["shrink_factor"].number(3), " [", *low, ", ", *high, "] times")
+        meaning = f", {found['meanings'][verdict].text()}"
+        words = (*words, meaning, "; with it the gap shrinks ", *shrinks, " on withheld data")
+    doubts = zip(found["notes"], found["note_kinds"], strict=True)
+    first = next((n.text() for n, kind in doubts if kind.text() == DOUBTED), None)
+    return words if first is None else (*words, ". ", Word(NOTED[DOUBTED], "strong"), f": {first}")
 
 
 def _data(session: Session, data: Node) -> Rich:

@@ -233,16 +233,20 @@ def test_an_unknown_gap_is_said_what_it_looks_like(tmp_path: Path) -> None:
     assert f"{left} of {gap} mm rms remain" in page  # as in the table below
 
 
-def test_in_short_the_gap_shrinks_with_its_interval() -> None:
+@pytest.mark.parametrize("kind", ["fault", "remark"])
+def test_in_short_the_gap_shrinks_with_its_interval_and_doubt(kind: str) -> None:
     found = {
         "verdict": "joint_yield",
         "probabilities": {"joint_yield": 0.97},
         "meanings": {"joint_yield": "gives way"},
         "gap": {"held_out": {"shrink_factor": 56.3, "ci95": [12.0, 101.5]}},
+        "notes": ["Mind the units."],
+        "note_kinds": [kind],
     }
     rows = Facts((("Gap", _gap(Node({"diagnose": found}))),))
     text = Page(render(Document("", "", (), (Section("s", "", (rows,)),), ""))).text
     assert "the gap shrinks 56.3 [12.0, 102] times on withheld data" in text
+    assert ("See to this first: Mind the units." in text) is (kind == "fault")
 
 
 @pytest.mark.parametrize("places", [{"joint 1": 0.62, "joint 5": 0.38}, {"joint 3": 1.0}])
