@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.contradictions import contradictions
 from rig.dataset import Dataset, Origin, write
 from rig.digits import counted
 from rig.errors import InputError, close_to, did_you_mean
@@ -55,6 +56,8 @@ def import_table(
         _check_target(out)
     table = _Table(csv, document.value, str(meta_yaml))
     columns = table.read(progress or silent)
+    found = contradictions(document.value, columns)
+    document.refuse([document.problem(path, what) for path, what in found])
     dataset = _dataset(csv, table, columns, document.value, document.text)
     if out is not None:
         (progress or silent)("writing", 0.0)

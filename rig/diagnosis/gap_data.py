@@ -14,6 +14,7 @@ from identification.arrays import Array, Flags, Ints
 from identification.elastic import Beam
 from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
+from rig.contradictions import refuse_contradictions, without_turns
 from rig.dataset import Dataset
 from rig.errors import InputError
 from rig.models.model import ArmModel
@@ -28,13 +29,14 @@ _STEP_RAD = 1e-5  # central differences of levers: error below 1e-9
 
 def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     """SI arrays of the samples in use. model: whose links and mounting are simulated beside the
-    springs of META. InputError where META lacks what a diagnosis needs."""
+    springs of META. InputError where META lacks what a diagnosis needs, or contradicts the data."""
     meta, where = dataset.meta, str(dataset.path or "data set")
     if meta.simulation is None:
         raise InputError(
             f"{where}: META names no simulation, so there is no gap to diagnose. Add `simulation` "
             "with the joint stiffnesses (or, without an arm, stiffness_N_per_mm) to META."
         )
+    refuse_contradictions(dataset)
     used = dataset.used & np.isfinite(dataset.columns["force_N"])
     used &= np.isfinite(dataset.columns["displacement_mm"])
     if not used.any():
@@ -213,7 +215,7 @@ def _readings(
     if q is None:
         return None
     commanded = {name: np.array(p.q_rad) for name, p in dataset.meta.poses.items()}
-    return np.asarray(q - np.stack([commanded[p] for p in poses]))
+    return without_turns(q - np.stack([commanded[p] for p in poses]))
 
 
 def _tangential(
