@@ -16,6 +16,7 @@ from rig.digits import counted
 from rig.errors import InputError, close_to, did_you_mean
 from rig.journal import journal_path
 from rig.meta import Meta
+from rig.oddities import oddities
 from rig.software import software_version
 from rig.storage import csvcells
 from rig.storage.columns import (
@@ -60,6 +61,7 @@ def import_table(
     columns = table.read(progress or silent)
     found = contradictions(document.value, columns)
     document.refuse([document.problem(path, what) for path, what in found])
+    table.notes += oddities(document.value, columns)
     dataset = _dataset(csv, table, columns, document.value, document.text)
     if out is not None:
         (progress or silent)("writing", 0.0)

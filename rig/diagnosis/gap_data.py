@@ -16,9 +16,12 @@ from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
 from rig.contradictions import refuse_contradictions, without_turns
 from rig.dataset import Dataset
+from rig.digits import counted
 from rig.errors import InputError
 from rig.models.model import ArmModel
 from rig.models.robot import load_robot
+from rig.oddities import CHANNELS, incomplete_channels
+from rig.passes import between_levels
 from rig.storage.columns import SAMPLE_NUMBER
 from rig.units import M_PER_MM
 
@@ -41,7 +44,13 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     used &= np.isfinite(dataset.columns["displacement_mm"])
     if not used.any():
         raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
-    used, aside, without = _without_holes(dataset, used)
+    way = used & between_levels(dataset.columns)
+    used, aside, without = _without_holes(dataset, used & ~way)
+    if way.any():
+        aside = (
+            *aside,
+            f"{counted(int(way.sum()), 'sample')} of held runs without a step: set aside.",
+        )
     columns = {k: v[used] for k, v in dataset.columns.items()}
     names = [str(d) for d in columns["direction"]]
     poses = [str(p) for p in columns["pose"]]
@@ -90,11 +99,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     )
 
 
-_JOINTS, _TEMPERATURES = "joint readings", "temperatures"
-_MAY_MISS = {
-    _JOINTS: [f"q{j}_rad" for j in range(1, 7)],
-    "force components": [f"force_{a}_N" for a in "xyz"],
-}
+_JOINTS, _COMPONENTS, _TEMPERATURES = "joint readings", "force components", "temperatures"
 _FEW = 0.05  # of the samples
 
 
@@ -108,8 +113,9 @@ def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...
     """The samples to use (n,), without a few that lack what all others have: a channel counts only
     where it is there throughout. And what to say of those, and of channels that do not count: such
     as are there in no sample of a level, and temperatures, which are worth no sample."""
-    aside, without = [], list(_unread_thermometers(dataset))
-    for what, names in {**_MAY_MISS, _TEMPERATURES: _thermometers(dataset)}.items():
+    aside, without = [], [f"{said}." for said in incomplete_channels(dataset.meta, dataset.columns)]
+    without += _unread_thermometers(dataset)
+    for what, names in {**CHANNELS, _TEMPERATURES: _thermometers(dataset)}.items():
         has = names and all(n in dataset.columns for n in names)
         if not has or (what == _JOINTS and dataset.meta.robot == "none"):
             continue
@@ -211,7 +217,7 @@ def _readings(
 ) -> Array | None:
     if dataset.meta.robot == "none":
         return None
-    q = _optional(columns, _MAY_MISS[_JOINTS], 6)
+    q = _optional(columns, CHANNELS[_JOINTS], 6)
     if q is None:
         return None
     commanded = {name: np.array(p.q_rad) for name, p in dataset.meta.poses.items()}
@@ -221,7 +227,7 @@ def _readings(
 def _tangential(
     columns: dict[str, NDArray[np.generic]], setups: tuple[Setup, ...], setup: Ints
 ) -> Array | None:
-    vector = _optional(columns, [f"force_{a}_N" for a in "xyz"], 3)
+    vector = _optional(columns, CHANNELS[_COMPONENTS], 3)
     if vector is None:
         return None
     return np.asarray(

@@ -136,6 +136,8 @@ def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
         'column "repitition" is kept and ignored; is "repetition" meant?',
         "time_s goes back 1 time, first at sample 3",
         "session_s goes back, first at sample 3",
+        "q2_rad, q3_rad, q4_rad, q5_rad, q6_rad are missing: the joint readings that are there are "
+        "not used",
     ]
 
 
@@ -143,8 +145,8 @@ def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
     ("steps", "kept", "note"),
     [
         (
-            ["0", "1", "2", "1", "0", "-1", "-2", ""],
-            [0, 1, 2, 1, 0, 3, 4, -1],
+            ["0", "1", "2", "1", "0", "-1", "-2", "", ""],
+            [0, 1, 2, 1, 0, 3, 4, -1, -1],
             "steps below 0 are numbered on: -1 is 3 ... -2 is 4",
         ),
         (["0", "-1", "1"], [0, 2, 1], "steps below 0 are numbered on: -1 is 2"),
