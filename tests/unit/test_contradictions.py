@@ -95,13 +95,13 @@ def test_a_jump_in_a_few_readings_is_no_other_pose() -> None:
             "standard_uncertainty_N: 0.05",
             "standard_uncertainty_N: 1e-9",
             "instruments.force.standard_uncertainty_N: 1e-09 N is not allowed",
-            r"wanted: 2\.\d+e-06 N or more",
+            r"wanted: 2\.\d+e-05 N or more",
         ),
         (
             "standard_uncertainty_mm: 0.002",
             "standard_uncertainty_mm: 1e-300",
             "instruments.displacement.standard_uncertainty_mm: 1e-300 mm is not allowed",
-            r"wanted: 2\.\d+e-08 mm or more",
+            r"wanted: 2\.\d+e-11 mm or more",
         ),
         (
             "{x: 95.0}",
@@ -113,7 +113,7 @@ def test_a_jump_in_a_few_readings_is_no_other_pose() -> None:
             "{x: 95.0}",
             "{x: 95e7}",
             "simulation.stiffness_N_per_mm.x: 9.5e+08 N/mm is not allowed",
-            r"the table has 200\.\d N over 2\.\d+ mm, 9\d\.\d+ N/mm",
+            r"the readings cover 200\.\d N over 2\.\d+ mm, 9\d\.\d+ N/mm",
         ),
     ],
 )
@@ -153,7 +153,8 @@ def test_a_drift_without_a_load_has_no_slope() -> None:
 @pytest.mark.parametrize(
     ("stated", "instead"),
     [
-        ("standard_uncertainty_N: 0.05", "standard_uncertainty_N: 4.1e-6"),
+        ("standard_uncertainty_N: 0.05", "standard_uncertainty_N: 4.1e-5"),
+        ("standard_uncertainty_mm: 0.002", "standard_uncertainty_mm: 5e-11"),
         ("{x: 95.0}", "{x: 9e5}"),
         ("{x: 95.0}", "{x: 1e-2}"),
     ],
