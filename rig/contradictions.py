@@ -25,11 +25,12 @@ from rig.yaml.yamlwords import Path, place
 # radian; beyond this its levers are off by half of themselves, and no result speaks of that arm.
 _ELSEWHERE_RAD = 0.5
 _ALIKE = 0.1  # rad, and as a share: near enough to say what the readings probably are
-# Of the range of the readings: 24 bits are 6e-8 of a force's, and no dynamometer is known to 1e-6;
+# Of the largest reading: 24 bits are 6e-8 of a force, and no dynamometer is known to 1e-6;
 # an interferometer tells a nanometre in 100 m.
 _BEST = {"force": 1e-7, "displacement": 1e-11}
 # Units are off by 1e3; simulations of rigs are off by up to 1e2.
 _FAR = 1e4
+_FARTHEST = 1e12  # uncertainties of a displacement, in which a spring is said to go
 _NOISE = 20.0  # standard uncertainties of one sample: the range of a channel that reads but noise
 
 
@@ -62,6 +63,11 @@ def _range(columns: Mapping[str, Values], name: str, rows: Flags) -> float:
     return float(np.ptp(values)) if values.size else 0.0
 
 
+def _largest(columns: Mapping[str, Values], name: str, rows: Flags) -> float:
+    values = np.abs(np.asarray(columns[name][rows], dtype=np.float64))
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
 def _uncertainties(
     meta: Meta, columns: Mapping[str, Values], used: Flags
 ) -> Iterator[tuple[Path, str]]:
@@ -70,13 +76,13 @@ def _uncertainties(
         ("force", "N", stated.force.standard_uncertainty_N),
         ("displacement", "mm", stated.displacement.standard_uncertainty_mm),
     ):
-        span = _range(columns, f"{instrument}_{unit}", used)
-        least = _BEST[instrument] * span
+        largest = _largest(columns, f"{instrument}_{unit}", used)
+        least = _BEST[instrument] * largest
         if u < least:
             yield (
                 ("instruments", instrument, f"standard_uncertainty_{unit}"),
-                f"{brief(u)} {unit} is not allowed: the readings of {instrument}_{unit} cover "
-                f"{brief(span)} {unit}, and no instrument knows one sample that well; wanted: "
+                f"{brief(u)} {unit} is not allowed: {instrument}_{unit} goes up to "
+                f"{brief(largest)} {unit}, and no instrument knows one sample that well; wanted: "
                 f"{brief(least)} {unit} or more. State what one sample is really uncertain by, and "
                 "check the unit of the column.",
             )
@@ -86,24 +92,26 @@ def _uncertainties(
 
 
 def _springs(meta: Meta, columns: Mapping[str, Values], used: Flags) -> Iterator[tuple[Path, str]]:
-    """Of a rig without an arm: against the slope of all that was measured in the direction."""
+    """Of a rig without an arm: against the slope of all that was measured in the direction; where
+    nothing moved, or the force stood, against what an instrument can tell of its own range."""
     springs = None if meta.simulation is None else meta.simulation.stiffness_N_per_mm
     u_force = meta.instruments.force.standard_uncertainty_N
     u_moved = meta.instruments.displacement.standard_uncertainty_mm
     for name, k in (springs or {}).items():
         rows = used & (columns["direction"] == name)
         force, moved = (_range(columns, n, rows) for n in ("force_N", "displacement_mm"))
-        if force == 0 or moved == 0:
-            continue
-        soft = force > _FAR * k * max(moved, _NOISE * u_moved)
-        stiff = force > _NOISE * u_force and k * moved > _FAR * force  # not a drift without load
+        largest = _largest(columns, "force_N", rows)
+        soft = moved > 0 and force > _FAR * k * max(moved, _NOISE * u_moved)
+        soft |= largest > k * u_moved * _FARTHEST
+        # what moves without a load drifts, however stiff the rig
+        stiff = force > _NOISE * u_force and k * moved > _FAR * force
         if soft or stiff:
-            slope = force / moved
             yield (
                 ("simulation", "stiffness_N_per_mm", name),
-                f"{brief(k)} N/mm is not allowed: the readings cover {brief(force)} N over "
-                f"{brief(moved)} mm, {brief(slope)} N/mm; wanted: within a factor of "
-                f"{_FAR:.0f} of that. Check the units of this number and of the columns.",
+                f"{brief(k)} N/mm is not allowed: the readings cover {brief(force)} N (up to "
+                f"{brief(largest)} N) over {brief(moved)} mm, of which one sample is uncertain by "
+                f"{brief(u_moved)} mm; wanted: within a factor of {_FAR:.0f} of the slope that was "
+                "measured. Check the units of these numbers and of the columns.",
             )
 
 
