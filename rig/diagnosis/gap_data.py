@@ -75,7 +75,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         setup=setup,
         repetition=columns["repetition"].astype(np.int64),
         branch=np.array([BRANCH_NAMES.index(str(b)) for b in columns["branch"]], dtype=np.int64),
-        step=columns["step"].astype(np.int64),
+        step=_steps(columns),
         force=columns["force_N"].astype(float),
         displacement=columns["displacement_mm"].astype(float) * M_PER_MM,
         compliance=compliance,
@@ -178,6 +178,14 @@ def _clock(time: Array, session: Array | None, run: Ints) -> tuple[Array, tuple[
     return out, (
         f"time_s stands still in {stood} of {int(run[-1]) + 1} runs: taken from session_s there.",
     )
+
+
+def _steps(columns: dict[str, NDArray[np.generic]]) -> Ints:
+    """Steps (n,): 0 of unloaded samples that bear none, where all loaded ones bear one."""
+    step, unloaded = columns["step"].astype(np.int64), columns["branch"] == "zero"
+    if unloaded.all() or np.any(step[~unloaded] < 0):
+        return step
+    return np.where(unloaded & (step < 0), 0, step)
 
 
 def _runs(setup: Ints, repetition: Ints) -> Ints:

@@ -87,6 +87,17 @@ def test_an_empty_step_costs_its_sample_and_no_level() -> None:
     assert k.value == pytest.approx(whole.value, rel=1e-3)
 
 
+@pytest.mark.parametrize("every", [1, 3])
+def test_no_load_needs_no_step(every: int) -> None:
+    rows = noisy(BENCH).astype({"step": "Int64"})
+    whole = gap_data(imported(rows, meta(BENCH)))
+    rows.loc[rows.index[rows.branch == "zero"][::every], "step"] = pd.NA
+    dataset = imported(rows, meta(BENCH))
+    assert notes(dataset) == []
+    assert held(dataset)
+    np.testing.assert_array_equal(gap_data(dataset).step, whole.step)
+
+
 @pytest.mark.parametrize("share", [0.3, 1.0])
 def test_a_run_that_lacks_many_steps_is_a_running_recording(share: float) -> None:
     rows = noisy(BENCH).astype({"step": "Int64"})
