@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,26 @@ def is_held(runs: Iterable[Levels]) -> bool:
         if runs_through(load, displacement[loaded], first, float(np.ptp(np.append(load, 0.0)))):
             return False
     return True
+
+
+_FEW = 0.1  # of the loaded samples of a run
+
+
+def between_levels(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """(n,) samples in use that lack the step which others of their run have, a few of them (one in
+    ten, or a single one): on the way from level to level, or a cell that was lost. A run that lacks
+    more of them was not held."""
+    branch, step = columns["branch"], columns["step"]
+    loaded = branch != "zero"
+    if "discarded" in columns:
+        loaded = loaded & ~columns["discarded"]
+    out = loaded & (step < 0)
+    if not out.any() or not np.any(loaded & (step >= 0)):
+        return np.zeros(len(step), dtype=bool)
+    first = first_rows(*(columns[n] for n in ("pose", "direction", "repetition")))
+    run = np.repeat(np.arange(first.size), np.diff(np.append(first, len(step))))
+    without, count = (np.bincount(run, weights=w)[run] for w in (out, loaded))
+    return np.asarray(out & (without <= np.maximum(_FEW * count, 1)) & (2 * without < count))
 
 
 def binned(

@@ -26,7 +26,7 @@ No threshold here is absolute; all refer to ranges of the data or to stated unce
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.arrays import Flags
 from identification.curve import Curve, Point
 from identification.running import first_rows
 from identification.stairs import steps_of_stairs
@@ -42,7 +43,7 @@ from identification.ways import leading_on
 from rig.arrays import Array
 from rig.digits import counted
 from rig.measurements import Measurements
-from rig.passes import TURN, binned, is_held
+from rig.passes import TURN, between_levels, binned, is_held
 from rig.units import M_PER_MM
 
 MOST_REPETITIONS = 50  # into which the cycles of a recording are gathered
@@ -87,12 +88,17 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
         dataset.meta.instruments.displacement.standard_uncertainty_mm * M_PER_MM,
     )
     result: dict[tuple[str, str], Curve] = {}
-    for (pose, direction), taken in _setups(dataset.columns):
+    way = between_levels(dataset.columns)
+    columns = _without(dataset.columns, way)
+    for (pose, direction), taken in _setups(columns):
         runs = [_leading_on(run, stated) for run in _numbered(taken, stated)]
         points: list[Point] = []
         notes: list[str] = []
         if _bare(taken) and not _bare(runs):
             notes.append("No steps are numbered; the levels at which the load stands were found.")
+        lost = int(way[_of_setup(columns, pose, direction)].sum())
+        if lost:
+            notes.append(f"{counted(lost, 'sample')} of held runs without a step: left out.")
         held = is_held([(r.branch, r.step, r.force, r.displacement) for r in runs])
         zeros = [_plateaus(run, stated) for run in runs]
         if held:
@@ -138,6 +144,17 @@ def _setups(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[tuple[str, str],
                 runs.append(_run(columns, number, rows))
         if runs:
             yield setup, runs
+
+
+def _of_setup(columns: Mapping[str, NDArray[Any]], pose: str, direction: str) -> Flags:
+    return np.asarray((columns["pose"] == pose) & (columns["direction"] == direction))
+
+
+def _without(columns: dict[str, NDArray[Any]], rows: Flags) -> dict[str, NDArray[Any]]:
+    """The columns with rows (n,) not to be used."""
+    if not rows.any():
+        return columns
+    return columns | {"discarded": columns["discarded"] | rows if "discarded" in columns else rows}
 
 
 def _rows(columns: dict[str, NDArray[Any]]) -> int:

@@ -10,18 +10,22 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.contradictions import contradictions
 from rig.dataset import Dataset, Origin, write
 from rig.digits import counted
 from rig.errors import InputError, close_to, did_you_mean
 from rig.journal import journal_path
 from rig.meta import Meta
+from rig.oddities import oddities
 from rig.software import software_version
 from rig.storage import csvcells
 from rig.storage.columns import (
     BRANCHES,
+    JOINT_C,
     KNOWN,
     NO_STEP,
     SAMPLE_NUMBER,
+    SPECIMEN_C,
     TABLE_COLUMNS,
     Column,
     Values,
@@ -55,6 +59,9 @@ def import_table(
         _check_target(out)
     table = _Table(csv, document.value, str(meta_yaml))
     columns = table.read(progress or silent)
+    found = contradictions(document.value, columns)
+    document.refuse([document.problem(path, what) for path, what in found])
+    table.notes += oddities(document.value, columns)
     dataset = _dataset(csv, table, columns, document.value, document.text)
     if out is not None:
         (progress or silent)("writing", 0.0)
@@ -186,10 +193,10 @@ class _Table:
                     "every row needs a finite value",
                     " Leave rows without one out of the table.",
                 )
-        bad = np.flatnonzero(np.abs(values) > column.largest)
+        low, high = self._limits(column)
+        bad = np.flatnonzero((values < low) | (values > high))
         if len(bad):
-            limit = f"{column.largest:.0f} {column.unit}"
-            what = f"allowed: -{limit} to {limit}"
+            what = f"allowed: {low:.8g} {column.unit} to {high:.8g} {column.unit}"
             raise self._cell(file, block, column.name, bad[0], what, " Is the unit right?")
         if column.kind == "flag":
             bad = np.flatnonzero(~np.isin(values, (0.0, 1.0)))
@@ -197,6 +204,11 @@ class _Table:
                 raise self._cell(file, block, column.name, bad[0], "wanted: 0 or 1")
             return np.equal(values, 1.0)
         return self._counts(file, block, column, values) if column.kind == "count" else values
+
+    def _limits(self, column: Column) -> tuple[float, float]:
+        if column.unit == "degC":
+            return SPECIMEN_C if self._meta.robot == "none" else JOINT_C
+        return -column.largest, column.largest
 
     def _counts(self, file: CsvFile, block: Block, column: Column, values: Values) -> Values:
         lowest, wanted = 1, "wanted: a whole number, 1, 2, 3 ..."

@@ -20,6 +20,7 @@ from identification.next_poses import Criterion, Plan, Proposal, propose
 from identification.stiffness import Stiffness, analyze_curve
 from rig import schemas
 from rig.arrays import Array
+from rig.contradictions import refuse_contradictions
 from rig.dataset import Dataset, load_each
 from rig.digits import counted
 from rig.errors import InputError
@@ -121,6 +122,8 @@ def identify(
     datasets = load_each([Path(p) for p in paths])
     names = [str(p) for p in paths]
     arm = _arm(datasets, names)
+    for dataset in datasets:
+        refuse_contradictions(dataset)
     prior = prior or Prior(
         arm.joint_stiffness, arm.joint_stiffness_relative_sd, f"data/models/{arm.name}.yaml"
     )

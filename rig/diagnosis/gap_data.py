@@ -14,10 +14,14 @@ from identification.arrays import Array, Flags, Ints
 from identification.elastic import Beam
 from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
+from rig.contradictions import refuse_contradictions, without_turns
 from rig.dataset import Dataset
+from rig.digits import counted
 from rig.errors import InputError
 from rig.models.model import ArmModel
 from rig.models.robot import load_robot
+from rig.oddities import CHANNELS, incomplete_channels
+from rig.passes import between_levels
 from rig.storage.columns import SAMPLE_NUMBER
 from rig.units import M_PER_MM
 
@@ -28,18 +32,25 @@ _STEP_RAD = 1e-5  # central differences of levers: error below 1e-9
 
 def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     """SI arrays of the samples in use. model: whose links and mounting are simulated beside the
-    springs of META. InputError where META lacks what a diagnosis needs."""
+    springs of META. InputError where META lacks what a diagnosis needs, or contradicts the data."""
     meta, where = dataset.meta, str(dataset.path or "data set")
     if meta.simulation is None:
         raise InputError(
             f"{where}: META names no simulation, so there is no gap to diagnose. Add `simulation` "
             "with the joint stiffnesses (or, without an arm, stiffness_N_per_mm) to META."
         )
+    refuse_contradictions(dataset)
     used = dataset.used & np.isfinite(dataset.columns["force_N"])
     used &= np.isfinite(dataset.columns["displacement_mm"])
     if not used.any():
         raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
-    used, aside, without = _without_holes(dataset, used)
+    way = used & between_levels(dataset.columns)
+    used, aside, without = _without_holes(dataset, used & ~way)
+    if way.any():
+        aside = (
+            *aside,
+            f"{counted(int(way.sum()), 'sample')} of held runs without a step: set aside.",
+        )
     columns = {k: v[used] for k, v in dataset.columns.items()}
     names = [str(d) for d in columns["direction"]]
     poses = [str(p) for p in columns["pose"]]
@@ -64,7 +75,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         setup=setup,
         repetition=columns["repetition"].astype(np.int64),
         branch=np.array([BRANCH_NAMES.index(str(b)) for b in columns["branch"]], dtype=np.int64),
-        step=columns["step"].astype(np.int64),
+        step=_steps(columns),
         force=columns["force_N"].astype(float),
         displacement=columns["displacement_mm"].astype(float) * M_PER_MM,
         compliance=compliance,
@@ -88,11 +99,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     )
 
 
-_JOINTS, _TEMPERATURES = "joint readings", "temperatures"
-_MAY_MISS = {
-    _JOINTS: [f"q{j}_rad" for j in range(1, 7)],
-    "force components": [f"force_{a}_N" for a in "xyz"],
-}
+_JOINTS, _COMPONENTS, _TEMPERATURES = "joint readings", "force components", "temperatures"
 _FEW = 0.05  # of the samples
 
 
@@ -106,8 +113,9 @@ def _without_holes(dataset: Dataset, used: Flags) -> tuple[Flags, tuple[str, ...
     """The samples to use (n,), without a few that lack what all others have: a channel counts only
     where it is there throughout. And what to say of those, and of channels that do not count: such
     as are there in no sample of a level, and temperatures, which are worth no sample."""
-    aside, without = [], list(_unread_thermometers(dataset))
-    for what, names in {**_MAY_MISS, _TEMPERATURES: _thermometers(dataset)}.items():
+    aside, without = [], [f"{said}." for said in incomplete_channels(dataset.meta, dataset.columns)]
+    without += _unread_thermometers(dataset)
+    for what, names in {**CHANNELS, _TEMPERATURES: _thermometers(dataset)}.items():
         has = names and all(n in dataset.columns for n in names)
         if not has or (what == _JOINTS and dataset.meta.robot == "none"):
             continue
@@ -172,6 +180,14 @@ def _clock(time: Array, session: Array | None, run: Ints) -> tuple[Array, tuple[
     )
 
 
+def _steps(columns: dict[str, NDArray[np.generic]]) -> Ints:
+    """Steps (n,): 0 of unloaded samples that bear none, where all loaded ones bear one."""
+    step, unloaded = columns["step"].astype(np.int64), columns["branch"] == "zero"
+    if unloaded.all() or np.any(step[~unloaded] < 0):
+        return step
+    return np.where(unloaded & (step < 0), 0, step)
+
+
 def _runs(setup: Ints, repetition: Ints) -> Ints:
     """Consecutive numbers: a run is an unbroken stretch of one setup and repetition."""
     new = (np.diff(setup, prepend=setup[0]) != 0) | (
@@ -209,17 +225,17 @@ def _readings(
 ) -> Array | None:
     if dataset.meta.robot == "none":
         return None
-    q = _optional(columns, _MAY_MISS[_JOINTS], 6)
+    q = _optional(columns, CHANNELS[_JOINTS], 6)
     if q is None:
         return None
     commanded = {name: np.array(p.q_rad) for name, p in dataset.meta.poses.items()}
-    return np.asarray(q - np.stack([commanded[p] for p in poses]))
+    return without_turns(q - np.stack([commanded[p] for p in poses]))
 
 
 def _tangential(
     columns: dict[str, NDArray[np.generic]], setups: tuple[Setup, ...], setup: Ints
 ) -> Array | None:
-    vector = _optional(columns, [f"force_{a}_N" for a in "xyz"], 3)
+    vector = _optional(columns, CHANNELS[_COMPONENTS], 3)
     if vector is None:
         return None
     return np.asarray(

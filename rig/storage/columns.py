@@ -22,6 +22,8 @@ SAMPLE_NUMBER = "number of the sample; no time was recorded"  # in place of what
 # Far beyond any rig (the largest machines reach some 1e7 N): what lies there is in another unit.
 LARGEST_N = 1e7
 LARGEST_MM = 1e5
+# Joints of an arm work from some -10 to 80; a specimen of a rig without an arm may glow.
+JOINT_C, SPECIMEN_C = (-60.0, 200.0), (-273.15, 3000.0)
 NO_STEP = -1  # in the column `step`: a continuous measurement, not held at any level
 AXES = ("x", "y", "z")
 JOINTS = range(1, 7)

@@ -254,7 +254,7 @@ def once_a_step(rows: pd.DataFrame) -> pd.DataFrame:
 THIN: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
     "no unloading": (unloaded, "Nothing was unloaded"),
     "one repetition": (one_repetition, "One repetition"),
-    "no readings": (without_readings, "Joint readings are not recorded"),
+    "no readings": (without_readings, "No joint readings to go by"),
     "no clock": (without_clock, "No session clock"),
     "all zero": (all_zero, "The load does not change"),
     "constant": (constant, "The load does not change"),
@@ -278,7 +278,7 @@ def test_only_force_and_displacement(told: Rig) -> None:
     status, said, found = told(two_columns(table()), text)
     assert status == 0, said
     notes = " ".join(found["notes"])  # type: ignore[arg-type]
-    for note in ("Joint readings are not recorded", "No session clock"):
+    for note in ("No joint readings to go by", "No session clock"):
         assert note in notes
     assert found["verdict"] not in ("joint_yield", "base_slip", "joint_creep"), found["verdict"]
 

@@ -136,6 +136,8 @@ def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
         'column "repitition" is kept and ignored; is "repetition" meant?',
         "time_s goes back 1 time, first at sample 3",
         "session_s goes back, first at sample 3",
+        "q2_rad, q3_rad, q4_rad, q5_rad, q6_rad are missing: the joint readings that are there are "
+        "not used",
     ]
 
 
@@ -143,8 +145,8 @@ def test_notes_on_what_looks_odd_but_is_allowed(tmp_path: Path) -> None:
     ("steps", "kept", "note"),
     [
         (
-            ["0", "1", "2", "1", "0", "-1", "-2", ""],
-            [0, 1, 2, 1, 0, 3, 4, -1],
+            ["0", "1", "2", "1", "0", "-1", "-2", "", ""],
+            [0, 1, 2, 1, 0, 3, 4, -1, -1],
             "steps below 0 are numbered on: -1 is 3 ... -2 is 4",
         ),
         (["0", "-1", "1"], [0, 2, 1], "steps below 0 are numbered on: -1 is 2"),
@@ -326,6 +328,11 @@ REFUSED: list[tuple[str | bytes, str]] = [
         "not allowed; allowed: -10000000 N to 10000000 N. Is the unit right?",
     ),
     (
+        "direction,force_N,displacement_mm,temperature2_C\nx,1,5,\nx,1,5,-60\nx,1,5,25000\n",
+        ':4: column temperature2_C: "25000" (degC) is not allowed; allowed: -60 degC to 200 degC. '
+        "Is the unit right?",
+    ),
+    (
         HEAD + GOOD + "1,x,1,loading,1,1e999,0\n",
         ':3: column force_N: "1e999" (N) is not allowed; every row needs a finite value.'
         " Leave rows without one out of the table.",
@@ -407,6 +414,13 @@ def test_refused_tables(tmp_path: Path, table: str | bytes, message: str) -> Non
         bring(tmp_path, table)
     text = str(told.value).replace(str(tmp_path / "META.yaml"), "META.yaml")
     assert text == f"{tmp_path / 't.csv'}{message}"
+
+
+def test_what_no_arm_is_may_be_hot(tmp_path: Path) -> None:
+    rows = "force_N,displacement_mm,temperature1_C\n1,5,650\n"
+    assert bring(tmp_path, rows, example.META_SPECIMEN).columns["temperature1_C"] == [650]
+    with pytest.raises(InputError, match=r"allowed: -273\.15 degC to 3000 degC"):
+        bring(tmp_path, rows.replace("650", "-300"), example.META_SPECIMEN)
 
 
 def test_lines_are_counted_through_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

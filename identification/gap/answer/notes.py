@@ -57,6 +57,9 @@ def _nothing_moves(bench: Bench) -> Iterator[str]:
         )
 
 
+_BEFORE = "Joint readings are taken before the gear"
+
+
 def _undecided(bench: Bench) -> Iterator[str]:
     data, rows = bench.data, bench.rows
     if not bench.course.unloads:
@@ -64,8 +67,8 @@ def _undecided(bench: Bench) -> Iterator[str]:
     if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
         yield "One repetition: what repeats and what does not can't be told apart."
     if data.arm and not bench.has_q:
-        reason = "not recorded" if data.q is None else "taken before the gear"
-        yield f"Joint readings are {reason}: joints, links and base look alike."
+        reason = "No joint readings to go by" if data.q is None else _BEFORE
+        yield f"{reason}: joints, links and base look alike."
     if data.session is None and data.arm:
         yield "No session clock: drifts are seen only within runs and from run to run."
     if bench.course.timeless:
