@@ -1,10 +1,11 @@
-"""Before the work: no result takes the place of what it is computed from, nor of any measurement,
-nor of another kind of file, and every place can be written to. After it: what was replaced."""
+"""Before the work: no result takes the place of what it is computed from, of any measurement, of
+another result or of another kind of file, and every place can be written to. After it: what
+was replaced."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +50,12 @@ class Guarded(TyperCommand):
             raise wrong_value(error, given) or error from None
 
     def invoke(self, ctx: Any) -> Any:
-        """InputError where a result would overwrite an input, a data set or another kind of file,
-        or could not be written once the work is done."""
+        """InputError where a result would overwrite an input, a data set, another result or another
+        kind of file, or could not be written once the work is done."""
+        _name_page(ctx)
         inputs = [path for _, _, path in _paths(ctx, written=False)]
         places = list(_paths(ctx, written=True))
+        _check_apart([*((option, path) for option, _, path in places), *_folders(ctx)])
         for option, _, path in places:
             if any(_same(path, other) for other in inputs):
                 raise InputError(
@@ -69,6 +72,27 @@ class Guarded(TyperCommand):
             _check_may_be_made(option, path)
         with replacing([] if self.name in _MAKES_DATA else places):
             return super().invoke(ctx)
+
+
+def _name_page(ctx: Any) -> None:
+    """A report whose name was left to the command is an output as any other."""
+    if ctx.command.name == "report" and ctx.params["output"] is None:
+        from rig.report.report import default_output
+
+        ctx.params["output"] = default_output(ctx.params["datasets"])
+
+
+def _check_apart(places: Sequence[tuple[str, Path]]) -> None:
+    """InputError where two results would go to one place; a device takes any number."""
+    for i, (option, path) in enumerate(places):
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            continue
+        for other, place in places[:i]:
+            if os.path.realpath(path) == os.path.realpath(place) or _same(path, place):
+                raise InputError(
+                    f"{other} {place}, {option} {path}: are one place, and only one result can "
+                    "stand there. Give another name to one of them."
+                )
 
 
 def _check_file(option: str, path: Path) -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import io
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from rig.errors import InputError
 
 JsonOption = Annotated[
     str | None,
@@ -66,34 +69,62 @@ def show(text: str) -> None:
 
 
 def _put_out(text: str) -> None:
-    """To standard output; InputError where a disk behind it refuses. A reader that has left is
-    typer's business."""
-    from rig.errors import InputError
-
+    """To standard output; InputError where a disk behind it refuses, BrokenPipeError where the
+    reader has left."""
     try:
         typer.echo(text)
-    except BrokenPipeError:
-        raise
     except OSError as error:
         sys.stdout = io.StringIO()  # or Python would try again at its end
+        if isinstance(error, BrokenPipeError):
+            raise
         reason = error.strerror or error
         raise InputError(f"standard output: cannot be written: {reason}.") from error
 
 
-def give(result: Any, json_file: str | None) -> None:
-    """Prints the text of a result, and writes its JSON where asked; on stdout that is all."""
+def give(result: Any, json_file: str | None, files: Iterable[str] = ()) -> None:
+    """Prints the text of a result, and writes its JSON where asked; on stdout that is all. files:
+    writes the other files while it is gone through, and yields what to say of each.
+
+    Files come first: whoever reads what is printed may leave. A file that fails costs neither the
+    JSON nor what is printed.
+    """
     text = "" if json_file is None else json.dumps(result.to_json(), indent=2, allow_nan=False)
-    if json_file == "-":
-        _put_out(text)
-        return
-    show(result.to_text())
-    if json_file is not None:
-        _write_json(Path(json_file), text + "\n")
+    said: list[str] = []
+    refused: list[str] = []
+    try:
+        with _keeping(refused):
+            for line in files:
+                said.append(line)
+        if json_file not in (None, "-"):
+            with _keeping(refused):
+                _write_json(Path(str(json_file)), text + "\n")
+    finally:
+        try:
+            if json_file == "-":
+                _put_out(text)
+            else:
+                show(result.to_text())
+        except BrokenPipeError:
+            if not refused:
+                raise
+        finally:
+            for line in said:
+                say(line)
+    if refused:
+        raise InputError("\n".join(refused))
+
+
+@contextmanager
+def _keeping(refused: list[str]) -> Iterator[None]:
+    """An InputError waits until all the rest is done."""
+    try:
+        yield
+    except InputError as error:
+        refused.append(str(error))
 
 
 def _write_json(path: Path, text: str) -> None:
     """InputError where that fails. Pipes and devices are written to; a file is replaced."""
-    from rig.errors import InputError
     from rig.storage.files import in_place_of
 
     if not path.exists() or (path.is_file() and not path.is_symlink()):
@@ -106,7 +137,7 @@ def _write_json(path: Path, text: str) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}.") from error
 
 
-def list_written(paths: Iterable[Path]) -> None:
+def list_written(paths: Iterable[Path]) -> Iterator[str]:
     """A line for every file that was written."""
     for path in paths:
-        say(f"{path}: written")
+        yield f"{path}: written"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.slow import slow_ones
-from tests.unit.cli_bench import HOME, TABLE, Rig
+from tests.unit.cli_bench import Rig
 
 
 @pytest.mark.parametrize(
@@ -73,6 +73,32 @@ def test_no_result_takes_the_place_of_an_input_or_a_measurement(
     assert {p.name: p.read_bytes() for p in files.iterdir()} == before
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("diagnose no.h5 --json x --write-model ./x", "--write-model x, --json x: are one place"),
+        ("identify no.h5 --write-protocol s --write-model s", "--write-model s, --write-protocol"),
+        ("simulate no.yaml p.yaml --csv sub/../t --json t", "--csv sub/../t, --json t: are one"),
+        ("report no.h5 -o r.html --json r.html", "--output r.html, --json r.html: are one place"),
+        ("report no.h5 --json no_report.html", "--output no_report.html, --json no_report.html:"),
+        ("report no.h5 --figures x --json x", "--json x, --figures x: are one place"),
+        ("diagnose no.h5 --next m.yaml --json link", "--next m.yaml, --json link: are one place"),
+    ],
+)
+def test_two_results_do_not_go_to_one_place(rig: Rig, files: Path, words: str, says: str) -> None:
+    (files / "sub").mkdir()
+    (files / "link").symlink_to("m.yaml")
+    status, out, err = rig(*words.split())
+    assert (status, out) == (2, "")
+    assert err.startswith(says)
+    assert err.endswith("only one result can stand there. Give another name to one of them.\n")
+
+
+def test_one_device_takes_several_results(rig: Rig, files: Path) -> None:
+    err = rig("diagnose", "no.h5", "--json", os.devnull, "--write-model", os.devnull)[2]
+    assert err.startswith("no.h5: cannot be read: no such file.")
+
+
 def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
     assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
     (files / "r.json").write_text("{}")
@@ -85,13 +111,6 @@ def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
     assert "replaced" not in rig("import", "t.csv", "m.yaml", "-o", "new.h5")[2]
 
 
-ARM_META = """\
-robot: ur10e
-poses: {P1: {q_rad: [0.234398, -1.742537, -1.886701, -1.083151, 1.570796, -1.336399]}}
-directions: {x: [1, 0, 0]}
-instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
-simulation: {joint_stiffness_Nm_per_rad: [37000, 57000, 18000, 7100, 7500, 8000]}
-"""
 WRITTEN = [
     ("diagnose a.h5 --write-model", "f.yaml", "model written by rig"),
     ("diagnose a.h5 --next", "f.yaml", "protocol written by rig"),
@@ -105,18 +124,6 @@ WRITTEN = [
     ("export a.h5 -o", "f.csv", "table exported by rig"),
     ("export a.h5 -o", "f.parquet", "Parquet table"),
 ]
-
-
-@pytest.fixture
-def arm(rig: Rig, files: Path) -> Path:
-    (files / "arm.yaml").write_text(ARM_META)
-    shutil.copy(HOME / "data" / "models" / "F1.yaml", files)
-    # It gives way at the last level, or something drifts: there is something to tell apart.
-    (files / "k.csv").write_text(TABLE.replace(",100,1.", ",100,1.5"))
-    assert rig("import", "k.csv", "arm.yaml", "-o", "a.h5")[0] == 0
-    return files
-
-
 LONG = ("diagnose a.h5 --write-model", "diagnose a.h5 --next", "report a.h5 --no-gap --pdf")
 
 
