@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from rig.cli.kinds import replacing
+from rig.cli.options import put_out
 from rig.cli.usage import check_given_once, check_words, wrong_value
 from rig.errors import InputError, did_you_mean
 
@@ -22,7 +23,24 @@ _MAKES_DATA = {"measure", "import"}  # their own rules say which data set may be
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-class Commands(TyperGroup):
+class _Helped:
+    """A command whose help is printed as results are: a disk that refuses it is no bug."""
+
+    def get_help_option(self, ctx: Any) -> Any:
+        """The library's, but for how it prints."""
+        option = super().get_help_option(ctx)  # type: ignore[misc]
+        if option is not None:
+            option.callback = _show_help
+        return option
+
+
+def _show_help(ctx: Any, _param: Any, wanted: bool) -> None:
+    if wanted and not ctx.resilient_parsing:
+        put_out(ctx.get_help())
+        ctx.exit()
+
+
+class Commands(_Helped, TyperGroup):
     """All commands; one that is not there is told with those that are."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -34,7 +52,7 @@ class Commands(TyperGroup):
         return super().resolve_command(ctx, args)
 
 
-class Guarded(TyperCommand):
+class Guarded(_Helped, TyperCommand):
     """A command that looks at its words and at its output paths before it begins."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

@@ -41,7 +41,7 @@ def _tell_version(wanted: bool) -> None:
     if wanted:
         from rig.software import software_version
 
-        typer.echo(software_version())
+        put_out(software_version())
         raise typer.Exit
 
 
@@ -55,20 +55,26 @@ def version(
 
 
 def say(text: str) -> None:
-    """Progress and notes go to standard error: standard output belongs to results."""
+    """Progress and notes go to standard error: standard output belongs to results. Where a disk or
+    a terminal refuses them, nobody is left who could be told."""
     from rig.terminal import folded_for
 
-    typer.echo(folded_for(sys.stderr, text), err=True)
+    try:
+        typer.echo(folded_for(sys.stderr, text), err=True)
+    except BrokenPipeError:
+        raise
+    except OSError:
+        sys.stderr = io.StringIO()  # or Python would try again at its end
 
 
 def show(text: str) -> None:
     """A result in words."""
     from rig.terminal import folded_for
 
-    _put_out(folded_for(sys.stdout, text))
+    put_out(folded_for(sys.stdout, text))
 
 
-def _put_out(text: str) -> None:
+def put_out(text: str) -> None:
     """To standard output; InputError where a disk behind it refuses, BrokenPipeError where the
     reader has left."""
     try:
@@ -101,7 +107,7 @@ def give(result: Any, json_file: str | None, files: Iterable[str] = ()) -> None:
     finally:
         try:
             if json_file == "-":
-                _put_out(text)
+                put_out(text)
             else:
                 show(result.to_text())
         except BrokenPipeError:

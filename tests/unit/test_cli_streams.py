@@ -96,3 +96,46 @@ def test_a_full_disk_behind_standard_output_costs_no_file(arm: Path) -> None:
         f"c.csv: written\nstandard output: cannot be written: {os.strerror(errno.ENOSPC)}.\n"
     )
     assert (arm / "c.csv").exists()
+
+
+_REFUSED = f"standard output: cannot be written: {os.strerror(errno.ENOSPC)}.\n"
+
+
+@_NEEDS_FULL
+@pytest.mark.parametrize(
+    ("words", "ends", "says"),
+    [
+        ("--version >/dev/full", 2, _REFUSED),
+        ("--help >/dev/full", 2, _REFUSED),
+        ("analyze --help >/dev/full", 2, _REFUSED),
+        ("analyze nofile.h5 2>/dev/full", 2, ""),
+        ("analyze 2>/dev/full", 2, ""),  # what the library says of wrong words
+        ("2>/dev/full", 2, ""),
+    ],
+)
+def test_a_stream_that_refuses_is_no_bug(tmp_path: Path, words: str, ends: int, says: str) -> None:
+    assert _sh(tmp_path, words) == (ends, "", says)
+
+
+@pytest.mark.parametrize(
+    ("words", "ends", "out", "err"),
+    [
+        ("analyze a.h5 --json j >&-", 0, "", ""),
+        ("analyze a.h5 --json - >&- 2>&- <&-", 0, "", ""),
+        ("list . --json - 2>&-", 0, '"schema": "rig.list/1"', ""),
+        ("export a.h5 -o e.csv 2>&-", 0, "", ""),
+        ("--version >&-", 0, "", ""),
+        ("analyze nofile.h5 >&-", 2, "", "nofile.h5: cannot be read: no such file."),
+        ("analyze nofile.h5 2>&-", 2, "", ""),
+        ("analyze 2>&-", 2, "", ""),
+    ],
+)
+def test_a_stream_that_is_closed_leads_nowhere(
+    arm: Path, words: str, ends: int, out: str, err: str
+) -> None:
+    status, printed, said = _sh(arm, words)
+    assert status == ends
+    assert out in printed
+    assert err in said
+    assert bool(out) == bool(printed)
+    assert bool(err) == bool(said)
