@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.banners import marks
 from rig.errors import InputError
+from rig.storage.files import legible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +28,7 @@ STYLE: Any = {
 
 def named(figure: Figure, name: str) -> Figure:
     """The file that a figure shows, small in a corner: it may leave its folder or page."""
-    figure.text(0.995, 0.003, name, fontsize=6, color="0.4", ha="right", va="bottom")
+    figure.text(0.995, 0.003, legible(name), fontsize=6, color="0.4", ha="right", va="bottom")
     return figure
 
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from rig.errors import InputError
+from rig.storage.files import in_place_of, legible
 
 JsonOption = Annotated[
     str | None,
@@ -60,7 +61,7 @@ def say(text: str) -> None:
     from rig.terminal import folded_for
 
     try:
-        typer.echo(folded_for(sys.stderr, text), err=True)
+        typer.echo(folded_for(sys.stderr, legible(text)), err=True)
     except BrokenPipeError:
         raise
     except OSError:
@@ -71,7 +72,7 @@ def show(text: str) -> None:
     """A result in words."""
     from rig.terminal import folded_for
 
-    put_out(folded_for(sys.stdout, text))
+    put_out(folded_for(sys.stdout, legible(text)))
 
 
 def put_out(text: str) -> None:
@@ -131,8 +132,6 @@ def _keeping(refused: list[str]) -> Iterator[None]:
 
 def _write_json(path: Path, text: str) -> None:
     """InputError where that fails. Pipes and devices are written to; a file is replaced."""
-    from rig.storage.files import in_place_of
-
     if not path.exists() or (path.is_file() and not path.is_symlink()):
         with in_place_of(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
