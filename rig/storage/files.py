@@ -26,6 +26,16 @@ def check_ending(path: Path) -> None:
         )
 
 
+def check_regular(path: Path, wanted: str) -> None:
+    """InputError for a pipe or a device, whose opening alone may wait for ever. wanted: what is
+    to be read there."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(
+            f"{path}: is a pipe or a device, which can be read once only; {wanted} is read more "
+            "often. Write it to a file, and give that."
+        )
+
+
 def legible(name: str | Path) -> str:
     """A file's name, or text that holds one, as it can be shown and stored: bytes that are no UTF-8
     become replacement characters."""

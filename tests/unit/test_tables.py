@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -423,16 +422,6 @@ def test_lines_are_counted_through_blocks(tmp_path: Path, monkeypatch: pytest.Mo
 def test_a_pose_column_without_an_arm(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r'pose: "P1" is not allowed; robot: none in .* no poses'):
         bring(tmp_path, "pose,force_N,displacement_mm\nP1,1,2\n", example.META_SPECIMEN)
-
-
-def test_a_pipe_is_refused(tmp_path: Path) -> None:
-    pipe = tmp_path / "pipe.csv"
-    os.mkfifo(pipe)
-    end = os.open(pipe, os.O_RDWR)  # nobody has to wait for the other end
-    os.write(end, b"force_N,displacement_mm\n0,0\n")
-    with pytest.raises(InputError, match=r"pipe.csv: is a pipe, which can be read once only"):
-        csvblocks.CsvFile(pipe)
-    os.close(end)
 
 
 def test_missing_files(tmp_path: Path) -> None:
