@@ -208,6 +208,9 @@ class _Table:
             good = (values >= lowest) & (values < _BIGGEST_COUNT) & (values == np.floor(values))
         bad = np.flatnonzero(~good)
         if len(bad):
+            if abs(values[bad[0]]) >= _BIGGEST_COUNT:
+                end, sign = ("largest", "") if values[bad[0]] > 0 else ("smallest", "-")
+                wanted += f"; the {end} one is {sign}{_BIGGEST_COUNT - 1}"
             raise self._cell(file, block, column.name, bad[0], wanted)
         return values.astype(np.int64)
 

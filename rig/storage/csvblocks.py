@@ -130,7 +130,11 @@ class CsvFile:
                 f"the names of the columns, {_COLUMNS_WANTED}.",
             )
         if len(names) > MOST_COLUMNS:
-            raise self.error(self._line, f"{len(names)} columns; at most {MOST_COLUMNS} are read.")
+            raise self.error(
+                self._line,
+                f"{len(names)} columns; at most {MOST_COLUMNS} are read. Remove those that rig "
+                "does not know: they would be kept, and not be used.",
+            )
         for index, name in enumerate(names):
             if not name:
                 raise self.error(

@@ -366,11 +366,23 @@ REFUSED: list[tuple[str | bytes, str]] = [
     ),
     (
         HEAD + GOOD + "1,x,1,loading,1e40,5,0\n",
-        ':3: column step: "1e40" is not allowed; wanted: a whole number, or nothing (continuous).',
+        ':3: column step: "1e40" is not allowed; wanted: a whole number, or nothing (continuous); '
+        "the largest one is 9007199254740991.",
     ),
     (
         HEAD + GOOD + "1,x,1,loading,-1e40,5,0\n",
-        ':3: column step: "-1e40" is not allowed; wanted: a whole number, or nothing (continuous).',
+        ':3: column step: "-1e40" is not allowed; wanted: a whole number, or nothing (continuous); '
+        "the smallest one is -9007199254740991.",
+    ),
+    (
+        HEAD + GOOD + "1,x,99999999999999999999,loading,1,5,0\n",
+        ':3: column repetition: "99999999999999999999" is not allowed; wanted: a whole number, '
+        "1, 2, 3 ...; the largest one is 9007199254740991.",
+    ),
+    (
+        ",".join(f"c{i}" for i in range(2001)) + "\n",
+        ":1: 2001 columns; at most 2000 are read. Remove those that rig does not know: they would "
+        "be kept, and not be used.",
     ),
     (
         HEAD + GOOD + '1,x,"1,loading,1,5,0\n',
