@@ -12,6 +12,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from rig.cli.drawn import is_drawn, standing
 from rig.cli.kinds import replacing
 from rig.cli.options import put_out
 from rig.cli.usage import check_given_once, check_words, wrong_value
@@ -86,9 +87,13 @@ class Guarded(_Helped, TyperCommand):
                     "Give another name."
                 )
             _check_file(option, path)
+            if is_drawn(ctx, path):
+                raise InputError(
+                    f"{option} {path}: a figure of --figures goes there. Give another name."
+                )
         for option, path in _folders(ctx):
             _check_may_be_made(option, path)
-        with replacing([] if self.name in _MAKES_DATA else places):
+        with replacing([] if self.name in _MAKES_DATA else places, standing(ctx)):
             return super().invoke(ctx)
 
 
