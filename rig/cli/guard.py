@@ -106,10 +106,8 @@ def _name_page(ctx: Any) -> None:
 
 
 def _check_apart(places: Sequence[tuple[str, Path]]) -> None:
-    """InputError where two results would go to one place; a device takes any number."""
+    """InputError where two results would go to one place."""
     for i, (option, path) in enumerate(places):
-        if path.exists() and not (path.is_file() or path.is_dir()):
-            continue
         for other, place in places[:i]:
             if os.path.realpath(path) == os.path.realpath(place) or _same(path, place):
                 raise InputError(
@@ -126,6 +124,11 @@ def _check_file(option: str, path: Path) -> None:
         raise InputError(f"{option} {path}: is a folder. Give the name of a file{or_out}.")
     if str(path) == "-":
         raise InputError(f"{option} -: this one goes to a file only. Give its name.")
+    if option != "--json" and path.exists() and not path.is_file():
+        raise InputError(
+            f"{option} {path}: is a pipe or a device, where only JSON may go. Give the name of a "
+            "file."
+        )
     check_folder(path, f"{option} ")
     if not path.exists():
         _check_open(option, path, path.parent)

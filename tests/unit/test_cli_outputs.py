@@ -110,9 +110,19 @@ def test_two_results_do_not_go_to_one_place(rig: Rig, files: Path, words: str, s
     assert err.endswith("only one result can stand there. Give another name to one of them.\n")
 
 
-def test_one_device_takes_several_results(rig: Rig, files: Path) -> None:
-    err = rig("diagnose", "no.h5", "--json", os.devnull, "--write-model", os.devnull)[2]
-    assert err.startswith("no.h5: cannot be read: no such file.")
+@pytest.mark.parametrize(
+    "words", ["diagnose no.h5 --write-model", "import t.csv m.yaml -o", "simulate m p --csv"]
+)
+def test_no_file_takes_the_place_of_a_device(rig: Rig, files: Path, words: str) -> None:
+    os.mkfifo("pipe.h5")
+    for place in (os.devnull, "pipe.h5"):
+        status, out, err = rig(*words.split(), place)
+        assert (status, out) == (2, "")
+        option = "--output" if words.endswith("-o") else words.rsplit(maxsplit=1)[-1]
+        assert err == (
+            f"{option} {place}: is a pipe or a device, where only JSON may go. Give the name of a "
+            "file.\n"
+        )
 
 
 def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
