@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rig.showing import Table
+from rig.storage.files import legible
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,7 +114,7 @@ class Run:
     def __init__(self, dataset: Dataset) -> None:
         """dataset: as `rig.dataset.load` gives it."""
         self.dataset = dataset
-        self.name = dataset.path.name if dataset.path else dataset.uuid
+        self.name = legible(dataset.path.name) if dataset.path else dataset.uuid
         self.banners = dataset.banners()
 
     def __repr__(self) -> str:

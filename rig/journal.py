@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import InputError, MeasurementStopped
-from rig.storage.files import sync_folder
+from rig.storage.files import check_regular, sync_folder
 
 KINDS = ("start", "descriptor", "sample", "event", "stop")
 SCHEMA = "rig.journal/1"
@@ -198,6 +198,7 @@ class Journal:
 def replay(path: Path) -> list[Record]:
     """All records; a torn last line is passed over, damage before it is an InputError."""
     try:
+        check_regular(path, "a journal")
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}.") from error

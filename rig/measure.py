@@ -36,6 +36,7 @@ from rig.runner import Runner
 from rig.software import software_version
 from rig.station import Station, parse_station, station_for
 from rig.storage.files import check_ending, check_folder
+from rig.terminal import leave_lost_terminal
 
 if TYPE_CHECKING:
     from rig.panel.link import PanelOptions
@@ -346,10 +347,17 @@ def _build(job: Job) -> None:
 
 @contextmanager
 def _signals(on_ctrl_c: Callable[[], object], on_end: Callable[[], object]) -> Iterator[None]:
-    """Ctrl-C and the wish to end (SIGTERM) for the time of the measurement."""
+    """Ctrl-C and the wish to end (SIGTERM, a terminal that is closed) for the time of the
+    measurement."""
     wishes = {signal.SIGINT: on_ctrl_c, signal.SIGTERM: on_end}
+    hangup = getattr(signal, "SIGHUP", None)  # Windows has none
+    if hangup is not None and signal.getsignal(hangup) is not signal.SIG_IGN:  # as nohup asks
+        wishes[hangup] = on_end
 
     def handler(number: int, _frame: FrameType | None) -> None:
+        if number == hangup:
+            signal.signal(number, signal.SIG_IGN)  # shell and kernel say it once more each
+            leave_lost_terminal()
         wishes[signal.Signals(number)]()
 
     earlier = {number: signal.signal(number, handler) for number in wishes}
@@ -357,7 +365,8 @@ def _signals(on_ctrl_c: Callable[[], object], on_end: Callable[[], object]) -> I
         yield
     finally:
         for number, was in earlier.items():
-            signal.signal(number, was)
+            if signal.getsignal(number) is handler:
+                signal.signal(number, was)
 
 
 def _patience(say: Say) -> Callable[[], None]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.banners import marks
 from rig.errors import InputError
+from rig.storage.files import legible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 # Okabe and Ito's palette without its yellow: told apart by colour-blind readers and in print
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P")
+MADE_BY = "rig, with Matplotlib"  # in every file of a figure: only such a file is replaced
+METADATA: Any = {"png": {"Software": MADE_BY}, "svg": {"Creator": MADE_BY, "Date": None}}
 STYLE: Any = {
     "font.size": 10,
     "axes.grid": True,
@@ -27,7 +30,7 @@ STYLE: Any = {
 
 def named(figure: Figure, name: str) -> Figure:
     """The file that a figure shows, small in a corner: it may leave its folder or page."""
-    figure.text(0.995, 0.003, name, fontsize=6, color="0.4", ha="right", va="bottom")
+    figure.text(0.995, 0.003, legible(name), fontsize=6, color="0.4", ha="right", va="bottom")
     return figure
 
 
@@ -65,8 +68,7 @@ def write_figures(folder: Path, figures: Callable[[], Iterable[tuple[str, Figure
             for name, figure in figures():
                 for kind in ("png", "svg"):
                     path = folder / f"{name}.{kind}"
-                    metadata = {"Date": None} if kind == "svg" else None
-                    figure.savefig(path, dpi=150, metadata=metadata)
+                    figure.savefig(path, dpi=150, metadata=METADATA[kind])
                     written.append(path)
     except OSError as error:
         raise InputError(

@@ -33,7 +33,7 @@ from rig.storage.columns import (
     unit_of,
 )
 from rig.storage.csvblocks import Block, CsvFile, close_match
-from rig.storage.files import check_ending
+from rig.storage.files import check_ending, legible
 from rig.terminal import Progress, silent
 from rig.yaml.yamlfile import read_document
 
@@ -93,7 +93,7 @@ def _dataset(
         origin = "emulated"
     incomplete = [c for c in comments if c.startswith(_INCOMPLETE_MARK)]
     texts = {"protocol": "", "station": "", "meta": meta_text, "comments": "\n".join(comments)}
-    events = [{"sample": 0, "kind": "import", "text": f"imported from {csv.name}"}]
+    events = [{"sample": 0, "kind": "import", "text": f"imported from {legible(csv.name)}"}]
     events += [{"sample": 0, "kind": "note", "text": note} for note in table.notes]
     return Dataset(
         path=None,
@@ -109,7 +109,7 @@ def _dataset(
         texts=texts,
         software=software_version(),
         stop_reason="said by the imported table" if incomplete else "imported",
-        title=csv.name,
+        title=legible(csv.name),
     )
 
 
@@ -220,6 +220,9 @@ class _Table:
             good = (values >= lowest) & (values < _BIGGEST_COUNT) & (values == np.floor(values))
         bad = np.flatnonzero(~good)
         if len(bad):
+            if abs(values[bad[0]]) >= _BIGGEST_COUNT:
+                end, sign = ("largest", "") if values[bad[0]] > 0 else ("smallest", "-")
+                wanted += f"; the {end} one is {sign}{_BIGGEST_COUNT - 1}"
             raise self._cell(file, block, column.name, bad[0], wanted)
         return values.astype(np.int64)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import stat
 import sys
 import textwrap
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TextIO
 
 Progress = Callable[[str, float], None]  # what is being done, and how much of it is: 0 to 1
@@ -48,6 +50,17 @@ def folded_for(stream: TextIO, text: str) -> str:
     """Folded where the stream is a terminal."""
     width = width_of(stream)
     return text if width is None else folded(text, width)
+
+
+def leave_lost_terminal() -> None:
+    """Standard streams on a terminal that was closed lead nowhere from here on: whatever is still
+    written or read there would fail, in whichever thread does it."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for number in (0, 1, 2):
+        with suppress(OSError):
+            if stat.S_ISCHR(os.fstat(number).st_mode) and not os.isatty(number):
+                os.dup2(nowhere, number)
+    os.close(nowhere)
 
 
 def _fold(line: str, width: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sys
 import threading
@@ -119,7 +120,8 @@ class ConsoleOperator:
         """Gives the terminal back as it was; never raises, may be called twice."""
         self._closed.set()
         if self._live is not None:
-            self._live.stop()
+            with contextlib.suppress(OSError):  # the terminal itself may be gone
+                self._live.stop()
             self._live = None
         self._keys.stop()
 

@@ -29,7 +29,9 @@ _STATUS_EVERY_S = 0.1
 def main() -> None:
     """Receives until the parent goes, the library fails, or the watchdog bites."""
     options = json.loads(sys.argv[1])
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer,
+    if sys.platform != "win32":
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # and so is a terminal that is closed
     out = _private_output()
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     faulthandler.dump_traceback_later(options["connect_s"] + 1.0, exit=True)

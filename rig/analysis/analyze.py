@@ -15,6 +15,7 @@ from rig import schemas
 from rig.errors import InputError, close_to
 from rig.measurements import Measurements
 from rig.reduce import curves
+from rig.storage.files import legible
 from rig.units import MM_PER_M, N_PER_MM
 
 AUTO: Literal["auto"] = "auto"
@@ -136,7 +137,7 @@ def analyze(dataset: Source, options: Options | None = None) -> Analysis:
             ratio = st.ratio(a.result, b.result)
             if ratio is not None:
                 anisotropy[key_a, key_b] = ratio
-    name = dataset.path.name if dataset.path is not None else dataset.uuid
+    name = legible(dataset.path.name) if dataset.path is not None else dataset.uuid
     return Analysis(
         dataset.uuid,
         name,

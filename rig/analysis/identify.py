@@ -27,6 +27,7 @@ from rig.errors import InputError
 from rig.models.model import load_model
 from rig.models.robot import load_robot
 from rig.reduce import curves
+from rig.storage.files import legible
 from rig.units import MM_PER_M
 
 # What a joint reading may be off by from one load to another. The readings' resolution is far
@@ -120,7 +121,7 @@ def identify(
     if not paths:
         raise InputError("rig identify: give at least one data set.")
     datasets = load_each([Path(p) for p in paths])
-    names = [str(p) for p in paths]
+    names = [legible(p) for p in paths]
     arm = _arm(datasets, names)
     for dataset in datasets:
         refuse_contradictions(dataset)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 import tempfile
 import traceback
+from pathlib import Path
 from types import TracebackType
 
 import typer
@@ -22,6 +24,7 @@ def main() -> None:
     from rig.intruders import refuse_intruders
     from rig.threads import one_each
 
+    _open_streams()
     one_each()
     sys.excepthook = _report_bug
     try:
@@ -31,6 +34,15 @@ def main() -> None:
         _end(2, str(error))
     except MeasurementStopped as error:
         _end(4, f"Stopped: {error}")
+
+
+def _open_streams() -> None:
+    """A standard stream that is closed leads nowhere instead; or else the next file that is opened
+    would have its number, and be written into by whoever believes it to be the stream."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            nowhere = Path(os.devnull).open(mode, encoding="utf-8", errors="replace")  # noqa: SIM115
+            setattr(sys, name, nowhere)
 
 
 def _run() -> None:
@@ -47,6 +59,11 @@ def _run() -> None:
         raise
     except BrokenPipeError:
         _end_unread(_UNREAD)
+    except OSError as error:
+        # Standard error refuses what the library has to say of wrong words.
+        if not hasattr(error.__context__, "exit_code"):
+            raise
+        _end_unread(2)
     except SafetyStop as error:
         _end(4, f"Stopped for safety. {error}")
     except DeviceError as error:

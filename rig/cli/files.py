@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,6 +19,9 @@ from rig.cli.options import (
     list_written,
     say,
 )
+
+if TYPE_CHECKING:
+    from rig.report.report import Report
 
 _Page = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="The page.")
@@ -48,8 +52,8 @@ def report(
     from rig.report import report as reports
     from rig.terminal import terminal_progress
 
-    page = reports.checked(output or reports.default_output(datasets), pdf)
-    replaced = output is None and page.exists()  # the guard tells it of a page that was given
+    assert output is not None  # the guard has seen to that
+    page = reports.checked(output, pdf)
     with terminal_progress() as progress:
         wishes = reports.Wishes(
             couple=couple,
@@ -59,20 +63,24 @@ def report(
             processes=reports.usable_cores() - 1,
         )
         result = reports.make(datasets, wishes, progress)
-    give(result, json_file)
     for session in result.gathered.sessions:
         for found in (session.analysis.to_json(), session.diagnosed.json):
             if found is not None:
                 remember_result(session.path, found)
+    give(result, json_file, _pages(result, page, pdf, figures))
+
+
+def _pages(result: Report, page: Path, pdf: Path | None, figures: Path | None) -> Iterator[str]:
+    """The page, and the same as PDF and the figures where asked for."""
+    from rig.report import report as reports
+
     reports.write_html(result, page)
-    list_written([page])
-    if replaced:
-        say(f"{page}: replaced; an earlier page stood there")
+    yield from list_written([page])
     if pdf is not None:
         reports.write_pdf(result, pdf)
-        list_written([pdf])
+        yield from list_written([pdf])
     if figures is not None:
-        list_written(reports.write_figures(result, figures))
+        yield from list_written(reports.write_figures(result, figures))
 
 
 def list_(

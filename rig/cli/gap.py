@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import DatasetArgument, FiguresOption, JsonOption, give, list_written, say
+from rig.cli.options import DatasetArgument, FiguresOption, JsonOption, give, list_written
 
 if TYPE_CHECKING:
     from rig.dataset import Dataset
@@ -102,32 +103,38 @@ def diagnose(
             withhold=withhold or (),
             progress=progress,
         )
-    give(result, json_file)
     if not (model or simulation or add or withhold):
         from rig.catalogue import remember_result
 
         remember_result(dataset, result.to_json())
-    _write(result, measured, write_model, next_file)
-    if figures is not None:
-        from rig.diagnosis.gap_figures import draw
-
-        list_written(draw(result, figures, dataset.name))
+    give(result, json_file, _files(result, dataset, measured, write_model, next_file, figures))
 
 
-def _write(result: Diagnosis, measured: Dataset, model: Path | None, protocol: Path | None) -> None:
-    """The model with its effects and the next protocol, where asked for."""
+def _files(
+    result: Diagnosis,
+    dataset: Path,
+    measured: Dataset,
+    model: Path | None,
+    protocol: Path | None,
+    figures: Path | None,
+) -> Iterator[str]:
+    """The model with its effects, the next protocol and the figures, where asked for."""
     if model is not None:
         from rig.diagnosis.gap_forms import left_behind
         from rig.diagnosis.gap_model import OF_THIS_SESSION, forms, write_model
 
         write_model(result, measured, model)
         for word in left_behind(forms(result.result)):
-            say(f"{model}: {word} is {OF_THIS_SESSION}")
-        say(f"{model}: written. Next: rig simulate {model} PROTOCOL.yaml")
+            yield f"{model}: {word} is {OF_THIS_SESSION}"
+        yield f"{model}: written. Next: rig simulate {model} PROTOCOL.yaml"
     if protocol is not None:
         from rig.diagnosis.next_protocol import write_next
 
-        say(write_next(result, measured, protocol))
+        yield write_next(result, measured, protocol)
+    if figures is not None:
+        from rig.diagnosis.gap_figures import draw
+
+        yield from list_written(draw(result, figures, dataset.name))
 
 
 def blind(

@@ -1,17 +1,20 @@
-"""Before the work: no result takes the place of what it is computed from, nor of any measurement,
-nor of another kind of file, and every place can be written to. After it: what was replaced."""
+"""Before the work: no result takes the place of what it is computed from, of any measurement, of
+another result or of another kind of file, and every place can be written to. After it: what
+was replaced."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from rig.cli.drawn import is_drawn, standing
 from rig.cli.kinds import replacing
+from rig.cli.options import put_out
 from rig.cli.usage import check_given_once, check_words, wrong_value
 from rig.errors import InputError, did_you_mean
 
@@ -21,7 +24,24 @@ _MAKES_DATA = {"measure", "import"}  # their own rules say which data set may be
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-class Commands(TyperGroup):
+class _Helped:
+    """A command whose help is printed as results are: a disk that refuses it is no bug."""
+
+    def get_help_option(self, ctx: Any) -> Any:
+        """The library's, but for how it prints."""
+        option = super().get_help_option(ctx)  # type: ignore[misc]
+        if option is not None:
+            option.callback = _show_help
+        return option
+
+
+def _show_help(ctx: Any, _param: Any, wanted: bool) -> None:
+    if wanted and not ctx.resilient_parsing:
+        put_out(ctx.get_help())
+        ctx.exit()
+
+
+class Commands(_Helped, TyperGroup):
     """All commands; one that is not there is told with those that are."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -33,7 +53,7 @@ class Commands(TyperGroup):
         return super().resolve_command(ctx, args)
 
 
-class Guarded(TyperCommand):
+class Guarded(_Helped, TyperCommand):
     """A command that looks at its words and at its output paths before it begins."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -49,10 +69,12 @@ class Guarded(TyperCommand):
             raise wrong_value(error, given) or error from None
 
     def invoke(self, ctx: Any) -> Any:
-        """InputError where a result would overwrite an input, a data set or another kind of file,
-        or could not be written once the work is done."""
+        """InputError where a result would overwrite an input, a data set, another result or another
+        kind of file, or could not be written once the work is done."""
+        _name_page(ctx)
         inputs = [path for _, _, path in _paths(ctx, written=False)]
         places = list(_paths(ctx, written=True))
+        _check_apart([*((option, path) for option, _, path in places), *_folders(ctx)])
         for option, _, path in places:
             if any(_same(path, other) for other in inputs):
                 raise InputError(
@@ -65,10 +87,33 @@ class Guarded(TyperCommand):
                     "Give another name."
                 )
             _check_file(option, path)
+            if is_drawn(ctx, path):
+                raise InputError(
+                    f"{option} {path}: a figure of --figures goes there. Give another name."
+                )
         for option, path in _folders(ctx):
             _check_may_be_made(option, path)
-        with replacing([] if self.name in _MAKES_DATA else places):
+        with replacing([] if self.name in _MAKES_DATA else places, standing(ctx)):
             return super().invoke(ctx)
+
+
+def _name_page(ctx: Any) -> None:
+    """A report whose name was left to the command is an output as any other."""
+    if ctx.command.name == "report" and ctx.params["output"] is None:
+        from rig.report.report import default_output
+
+        ctx.params["output"] = default_output(ctx.params["datasets"])
+
+
+def _check_apart(places: Sequence[tuple[str, Path]]) -> None:
+    """InputError where two results would go to one place."""
+    for i, (option, path) in enumerate(places):
+        for other, place in places[:i]:
+            if os.path.realpath(path) == os.path.realpath(place) or _same(path, place):
+                raise InputError(
+                    f"{other} {place}, {option} {path}: are one place, and only one result can "
+                    "stand there. Give another name to one of them."
+                )
 
 
 def _check_file(option: str, path: Path) -> None:
@@ -79,6 +124,11 @@ def _check_file(option: str, path: Path) -> None:
         raise InputError(f"{option} {path}: is a folder. Give the name of a file{or_out}.")
     if str(path) == "-":
         raise InputError(f"{option} -: this one goes to a file only. Give its name.")
+    if option != "--json" and path.exists() and not path.is_file():
+        raise InputError(
+            f"{option} {path}: is a pipe or a device, where only JSON may go. Give the name of a "
+            "file."
+        )
     check_folder(path, f"{option} ")
     if not path.exists():
         _check_open(option, path, path.parent)

@@ -9,23 +9,36 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rig.cli.options import say
+from rig.digits import counted
 from rig.errors import InputError
+from rig.plotting import MADE_BY
 
 _HEAD_BYTES = 4096
 
 
 @contextmanager
-def replacing(places: Iterable[tuple[str, str, Path]]) -> Iterator[None]:
-    """Around the work; option, parameter and path of what it writes. Says afterwards which files it
-    replaced. InputError before it where another kind of file stands; pipes and devices are let be.
+def replacing(
+    places: Iterable[tuple[str, str, Path]], drawn: Iterable[Path] = ()
+) -> Iterator[None]:
+    """Around the work; option, parameter and path of what it writes, and what stands where it draws
+    figures. Says afterwards which files it replaced. InputError before it where another kind of
+    file stands; pipes and devices are let be.
     """
-    stood = [_Standing(option, name, path) for option, name, path in places if path.is_file()]
+    stood = [
+        _Standing(option, _kind(name, path), path)
+        for option, name, path in places
+        if path.is_file()
+    ]
+    figures = [_Standing("--figures", _OF_DRAWN.get(path.suffix), path) for path in drawn]
     try:
         yield
     finally:
-        for told in (one.told() for one in stood):
-            if told is not None:
-                say(told)
+        for one in stood:
+            if one.is_replaced():
+                say(f"{one.path}: replaced; an earlier {one.what} stood there")
+        if count := sum(one.is_replaced() for one in figures):
+            folder = figures[0].path.parent
+            say(f"{folder}: {counted(count, 'file')} replaced; earlier figures stood there")
 
 
 class _Kind(NamedTuple):
@@ -40,7 +53,7 @@ _PROTOCOL = _Kind(
 )
 _ARM = _Kind("arm exported by rig", r"<(mujoco|robot) [^>]*>\s*<!-- Joint springs in Nm/rad")
 _OF_OPTION = {
-    "json_file": _Kind("JSON", r"\s*\{"),
+    "json_file": _Kind("JSON written by rig", r'\s*\{\s*"schema":\s*"rig\.'),
     "csv": _Kind("table of curves", r"(#.*\n)*pose,direction,force_N,displacement_mm"),
     "write_model": _Kind(
         "model written by rig", r"# (The simulation with what rig diagnose|Identified from )"
@@ -59,27 +72,35 @@ _OF_ENDING = {
 }
 
 
-class _Standing:
-    """A file that stands where the result of an option is to go. InputError where it is of another
-    kind; an empty one is of any."""
+_OF_DRAWN = {
+    ".png": _Kind("figure drawn by rig", f"(?s).*?{MADE_BY}"),
+    ".svg": _Kind("figure drawn by rig", f"(?s).*?{MADE_BY}"),
+    ".csv": _Kind("table written by rig", r"(#.*\n)*# rig (diagnose|report)\b"),
+}
 
-    def __init__(self, option: str, parameter: str, path: Path) -> None:
-        self._path = path
-        self._kind = _OF_OPTION.get(parameter) or _OF_ENDING.get(path.suffix.lower())
+
+def _kind(parameter: str, path: Path) -> _Kind | None:
+    return _OF_OPTION.get(parameter) or _OF_ENDING.get(path.suffix.lower())
+
+
+class _Standing:
+    """A file that stands where a result is to go. InputError where it is of another kind; an empty
+    one is of any."""
+
+    def __init__(self, option: str, kind: _Kind | None, path: Path) -> None:
+        self.path = path
+        self.what = "one" if kind is None else kind.name
         self._before = _made(path)
-        head = _head(path) if self._kind else ""
-        if self._kind and head and not re.match(self._kind.begins, head):
+        head = _head(path) if kind else ""
+        if kind and head and not re.match(kind.begins, head):
             raise InputError(
-                f"{option} {path}: exists and is no {self._kind.name}, so it is not replaced. "
-                "Give another name, or move it away."
+                f"{option} {path}: exists and is no {kind.name}, so it is not replaced. "
+                f"Give another {'folder' if option == '--figures' else 'name'}, or move it away."
             )
 
-    def told(self) -> str | None:
-        """What to say once the work is done; None where the file still stands."""
-        if _made(self._path) == self._before:
-            return None
-        what = "one" if self._kind is None else self._kind.name
-        return f"{self._path}: replaced; an earlier {what} stood there"
+    def is_replaced(self) -> bool:
+        """Asked once the work is done."""
+        return _made(self.path) not in (None, self._before)
 
 
 def _made(path: Path) -> tuple[int, int] | None:

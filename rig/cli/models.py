@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,8 +17,11 @@ from rig.cli.options import (
     UrdfOption,
     give,
     list_written,
-    say,
 )
+
+if TYPE_CHECKING:
+    from rig.coupling.couple import CouplingResult
+    from rig.models.simulate import Simulation
 
 _Path = Annotated[
     Path | None,
@@ -48,7 +52,6 @@ def couple(
 ) -> None:
     """Coupled state of two arms: workspace, compound stiffness, when to couple."""
     from rig.coupling.couple import couple as run_couple
-    from rig.models import model_export
     from rig.terminal import terminal_progress
 
     with terminal_progress() as progress:
@@ -61,13 +64,20 @@ def couple(
             best_placement=best_placement,
             progress=told,
         )
-    give(result, json_file)
+    give(result, json_file, _files(result, figures, export_mujoco, export_urdf))
+
+
+def _files(
+    result: CouplingResult, figures: Path | None, mujoco: Path | None, urdf: Path | None
+) -> Iterator[str]:
+    """The figures, and the arm for other simulators, where asked for."""
+    from rig.models import model_export
+
     if figures is not None:
         from rig.coupling.coupling_figures import draw
 
-        list_written(draw(result, figures))
-    written = model_export.write(result.model, mujoco=export_mujoco, urdf_file=export_urdf)
-    list_written(written)
+        yield from list_written(draw(result, figures))
+    yield from list_written(model_export.write(result.model, mujoco=mujoco, urdf_file=urdf))
 
 
 def simulate(
@@ -78,10 +88,14 @@ def simulate(
 ) -> None:
     """The curves that a model predicts for a procedure."""
     from rig.models.simulate import simulate as run_simulate
-    from rig.models.simulate import write_csv
 
     result = run_simulate(model, protocol)
-    give(result, json_file)
+    give(result, json_file, _table(result, csv))
+
+
+def _table(result: Simulation, csv: Path | None) -> Iterator[str]:
     if csv is not None:
+        from rig.models.simulate import write_csv
+
         write_csv(result, csv)
-        say(f"{csv}: written")
+        yield f"{csv}: written"

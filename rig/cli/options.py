@@ -5,11 +5,15 @@ from __future__ import annotations
 import io
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from rig.errors import InputError
+from rig.storage.files import in_place_of, legible
 
 JsonOption = Annotated[
     str | None,
@@ -38,7 +42,7 @@ def _tell_version(wanted: bool) -> None:
     if wanted:
         from rig.software import software_version
 
-        typer.echo(software_version())
+        put_out(software_version())
         raise typer.Exit
 
 
@@ -52,50 +56,82 @@ def version(
 
 
 def say(text: str) -> None:
-    """Progress and notes go to standard error: standard output belongs to results."""
+    """Progress and notes go to standard error: standard output belongs to results. Where a disk or
+    a terminal refuses them, nobody is left who could be told."""
     from rig.terminal import folded_for
 
-    typer.echo(folded_for(sys.stderr, text), err=True)
+    try:
+        typer.echo(folded_for(sys.stderr, legible(text)), err=True)
+    except BrokenPipeError:
+        raise
+    except OSError:
+        sys.stderr = io.StringIO()  # or Python would try again at its end
 
 
 def show(text: str) -> None:
     """A result in words."""
     from rig.terminal import folded_for
 
-    _put_out(folded_for(sys.stdout, text))
+    put_out(folded_for(sys.stdout, legible(text)))
 
 
-def _put_out(text: str) -> None:
-    """To standard output; InputError where a disk behind it refuses. A reader that has left is
-    typer's business."""
-    from rig.errors import InputError
-
+def put_out(text: str) -> None:
+    """To standard output; InputError where a disk behind it refuses, BrokenPipeError where the
+    reader has left."""
     try:
         typer.echo(text)
-    except BrokenPipeError:
-        raise
     except OSError as error:
         sys.stdout = io.StringIO()  # or Python would try again at its end
+        if isinstance(error, BrokenPipeError):
+            raise
         reason = error.strerror or error
         raise InputError(f"standard output: cannot be written: {reason}.") from error
 
 
-def give(result: Any, json_file: str | None) -> None:
-    """Prints the text of a result, and writes its JSON where asked; on stdout that is all."""
+def give(result: Any, json_file: str | None, files: Iterable[str] = ()) -> None:
+    """Prints the text of a result, and writes its JSON where asked; on stdout that is all. files:
+    writes the other files while it is gone through, and yields what to say of each.
+
+    Files come first: whoever reads what is printed may leave. A file that fails costs neither the
+    JSON nor what is printed.
+    """
     text = "" if json_file is None else json.dumps(result.to_json(), indent=2, allow_nan=False)
-    if json_file == "-":
-        _put_out(text)
-        return
-    show(result.to_text())
-    if json_file is not None:
-        _write_json(Path(json_file), text + "\n")
+    said: list[str] = []
+    refused: list[str] = []
+    try:
+        with _keeping(refused):
+            for line in files:
+                said.append(line)
+        if json_file not in (None, "-"):
+            with _keeping(refused):
+                _write_json(Path(str(json_file)), text + "\n")
+    finally:
+        try:
+            if json_file == "-":
+                put_out(text)
+            else:
+                show(result.to_text())
+        except BrokenPipeError:
+            if not refused:
+                raise
+        finally:
+            for line in said:
+                say(line)
+    if refused:
+        raise InputError("\n".join(refused))
+
+
+@contextmanager
+def _keeping(refused: list[str]) -> Iterator[None]:
+    """An InputError waits until all the rest is done."""
+    try:
+        yield
+    except InputError as error:
+        refused.append(str(error))
 
 
 def _write_json(path: Path, text: str) -> None:
     """InputError where that fails. Pipes and devices are written to; a file is replaced."""
-    from rig.errors import InputError
-    from rig.storage.files import in_place_of
-
     if not path.exists() or (path.is_file() and not path.is_symlink()):
         with in_place_of(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -106,7 +142,7 @@ def _write_json(path: Path, text: str) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}.") from error
 
 
-def list_written(paths: Iterable[Path]) -> None:
+def list_written(paths: Iterable[Path]) -> Iterator[str]:
     """A line for every file that was written."""
     for path in paths:
-        say(f"{path}: written")
+        yield f"{path}: written"

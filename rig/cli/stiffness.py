@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -16,9 +17,12 @@ from rig.cli.options import (
     UrdfOption,
     give,
     list_written,
-    say,
 )
 from rig.errors import InputError
+
+if TYPE_CHECKING:
+    from rig.analysis.analyze import Analysis
+    from rig.analysis.identify import IdentifyResult
 
 _Weighting = Annotated[
     str,
@@ -77,15 +81,18 @@ def analyze(
         keep_after_knee=keep_after_knee,
     )
     result = analysis.analyze(load(dataset), options)
-    give(result, json_file)
     if options == analysis.Options():
         from rig.catalogue import remember_result
 
         remember_result(dataset, result.to_json())
+    give(result, json_file, _drawn(result, figures))
+
+
+def _drawn(result: Analysis, figures: Path | None) -> Iterator[str]:
     if figures is not None:
         from rig.analysis.figures import draw
 
-        list_written(draw(result, figures))
+        yield from list_written(draw(result, figures))
 
 
 def identify(
@@ -101,10 +108,8 @@ def identify(
     json_file: JsonOption = None,
 ) -> None:
     """Joint torsional stiffnesses, and what the data can and cannot tell about them."""
-    from rig.analysis import identify_text
     from rig.analysis.identify import identify as run_identify
     from rig.analysis.identify import prior_of
-    from rig.models import model_export
 
     if write_protocol is not None and not proposals:
         raise InputError(
@@ -118,11 +123,25 @@ def identify(
         proposals=proposals,
         criterion=criterion,
     )
-    give(result, json_file)
-    if write_model is not None:
-        identify_text.write_model(result, write_model)
-        say(f"{write_model}: written")
-    if write_protocol is not None:
-        identify_text.write_protocol(result, write_protocol)
-        say(f"{write_protocol}: written")
-    list_written(model_export.write(result, mujoco=export_mujoco, urdf_file=export_urdf))
+    files = _files(result, write_model, write_protocol, export_mujoco, export_urdf)
+    give(result, json_file, files)
+
+
+def _files(
+    result: IdentifyResult,
+    model: Path | None,
+    protocol: Path | None,
+    mujoco: Path | None,
+    urdf: Path | None,
+) -> Iterator[str]:
+    """The arm as a model and for other simulators, and the next protocol, where asked for."""
+    from rig.analysis import identify_text
+    from rig.models import model_export
+
+    if model is not None:
+        identify_text.write_model(result, model)
+        yield f"{model}: written"
+    if protocol is not None:
+        identify_text.write_protocol(result, protocol)
+        yield f"{protocol}: written"
+    yield from list_written(model_export.write(result, mujoco=mujoco, urdf_file=urdf))

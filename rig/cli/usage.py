@@ -3,6 +3,7 @@ library's own messages leave out one or the other."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -38,6 +39,13 @@ def wrong_value(error: typer.BadParameter, given: Mapping[str, Any]) -> InputErr
     param: Any = error.param
     option = param.opts[-1]
     if (value := given.get(param.name)) is not None:
+        for path in value if isinstance(value, list | tuple) else [value]:
+            if error.message.endswith("is not readable.") and not os.access(path, os.R_OK):
+                place = f"{option} {path}" if option.startswith("-") else path
+                return InputError(
+                    f"{place}: you may not read this file. Change its permissions, or ask whoever "
+                    "owns it."
+                )
         return InputError(f"{option} {value}: {_allowed(param, error.message)}.")
     if param.param_type_name == "argument":
         return None

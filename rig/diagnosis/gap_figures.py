@@ -25,6 +25,7 @@ from rig.diagnosis.gap_points import (
 from rig.diagnosis.gap_ranking import probabilities, ranked, withheld
 from rig.errors import InputError
 from rig.plotting import watermark, write_figures
+from rig.storage.files import legible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +80,7 @@ class _Drawing:
 
     def comments(self) -> tuple[str, ...]:
         """First lines of every table."""
-        return (*self.banners, f"rig diagnose {self.name}: {self.shown.verdict}")
+        return (*self.banners, f"rig diagnose {legible(self.name)}: {self.shown.verdict}")
 
     def _finish(self, figure: Figure) -> Figure:
         """The data set's name; and across the figure what must not be overlooked."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Literal
 
 from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
@@ -62,7 +63,8 @@ class LoaderWithBar:
 
     def close(self) -> None:
         """Ends both; what the bar shows last stays."""
-        self._bar.stop()
+        with suppress(OSError):  # the terminal itself may be gone
+            self._bar.stop()
         self._loader.close()
 
     def identity(self) -> Mapping[str, str]:

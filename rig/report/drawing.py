@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from rig.plotting import STYLE
+from rig.plotting import METADATA, STYLE
 from rig.report.document import Figure
 
 if TYPE_CHECKING:
@@ -86,5 +86,5 @@ def _renamed(match: re.Match[str], prefix: str) -> str:
 
 def _png(figure: Plot) -> bytes:
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=PNG_DPI)
+    figure.savefig(buffer, format="png", dpi=PNG_DPI, metadata=METADATA["png"])
     return buffer.getvalue()

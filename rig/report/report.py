@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.banners import marks
 from rig.errors import InputError
+from rig.plotting import MADE_BY
 from rig.report.diagnosing import Job, diagnosing, usable_cores
 from rig.report.document import Document, Figure, figures
 from rig.report.wishes import Wishes, named
@@ -152,7 +153,8 @@ def write_figures(report: Report, folder: Path) -> list[Path]:
 
 
 def _files(figure: Figure, words: Sequence[str]) -> dict[str, bytes]:
-    files = {"svg": f'<?xml version="1.0" encoding="utf-8"?>\n{figure.svg}\n'.encode()}
+    prologue = f'<?xml version="1.0" encoding="utf-8"?>\n<!-- {MADE_BY} -->\n'
+    files = {"svg": f"{prologue}{figure.svg}\n".encode()}
     if figure.png is not None:
         files["png"] = figure.png
     if figure.header:
@@ -164,6 +166,7 @@ def _csv(figure: Figure, words: Sequence[str]) -> str:
     buffer = io.StringIO()
     for mark in words:
         buffer.write(f"# {mark}\n")
+    buffer.write(f"# rig report: {figure.name}\n")
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(figure.header)
     writer.writerows(figure.rows)

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from rig.storage.files import legible
+
 
 @dataclass(frozen=True)
 class Wishes:
@@ -38,7 +40,7 @@ def named(paths: Sequence[Path]) -> list[Named]:
         stem = file_stem(path.stem)
         stem = stem if stem.lower() not in taken else f"{stem}_{n}"
         taken.add(stem.lower())
-        label = path.name if names.count(path.name) == 1 else str(path)
+        label = legible(path.name if names.count(path.name) == 1 else path)
         found.append(Named(path, label, stem))
     return found
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import InputError
-from rig.storage.files import neighbours
+from rig.storage.files import check_regular, neighbours
 
 BLOCK_BYTES = 8_000_000
 MOST_COLUMNS = 2_000
@@ -57,6 +57,7 @@ class CsvFile:
         self.comments: list[str] = []
         self._line = 0
         try:
+            check_regular(path, "a table")
             self.size = path.stat().st_size
             self._file: BinaryIO = path.open("rb")
         except FileNotFoundError as error:
@@ -64,12 +65,6 @@ class CsvFile:
             raise InputError(f"{path}: cannot be read: no such file.{hint}") from error
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}.") from error
-        if not self._file.seekable():
-            self._file.close()
-            raise InputError(
-                f"{path}: is a pipe, which can be read once only; a table is read more often. "
-                "Write it to a file, and import that."
-            )
         try:
             self.names = self._header()
         except InputError:
@@ -135,7 +130,11 @@ class CsvFile:
                 f"the names of the columns, {_COLUMNS_WANTED}.",
             )
         if len(names) > MOST_COLUMNS:
-            raise self.error(self._line, f"{len(names)} columns; at most {MOST_COLUMNS} are read.")
+            raise self.error(
+                self._line,
+                f"{len(names)} columns; at most {MOST_COLUMNS} are read. Remove those that rig "
+                "does not know: they would be kept, and not be used.",
+            )
         for index, name in enumerate(names):
             if not name:
                 raise self.error(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from pathlib import Path
 from rig.errors import InputError, did_you_mean
 
 _MOST_NAMED = 40
+_NO_UTF8 = re.compile("[\ud800-\udfff]")  # what Python puts in the place of such bytes
 ENDINGS = (".h5", ".hdf5")  # of data sets, in any case of letters
 
 
@@ -22,6 +24,22 @@ def check_ending(path: Path) -> None:
             f"{path}: a data set is an HDF5 file; allowed endings: {', '.join(ENDINGS)}. "
             f"Choose another name with -o, such as {path.with_suffix('.h5').name}."
         )
+
+
+def check_regular(path: Path, wanted: str) -> None:
+    """InputError for a pipe or a device, whose opening alone may wait for ever. wanted: what is
+    to be read there."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(
+            f"{path}: is a pipe or a device, which can be read once only; {wanted} is read more "
+            "often. Write it to a file, and give that."
+        )
+
+
+def legible(name: str | Path) -> str:
+    """A file's name, or text that holds one, as it can be shown and stored: bytes that are no UTF-8
+    become replacement characters."""
+    return _NO_UTF8.sub("\N{REPLACEMENT CHARACTER}", str(name))
 
 
 @contextmanager

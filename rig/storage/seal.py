@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rig.errors import InputError
-from rig.storage.files import ENDINGS, neighbours
+from rig.storage.files import ENDINGS, check_regular, neighbours
 
 SCHEMA = "rig.dataset"
 SEAL = b"\n# rig.dataset sha256 "
@@ -42,12 +42,14 @@ def damaged(path: Path, what: str) -> InputError:
 def check_bytes(path: Path) -> str:
     """Magic number and seal, before the HDF5 library sees the file; InputError where they fail.
     The SHA-256 that the seal states, "" where another program has left none."""
-    if path.is_dir():
-        raise InputError(
-            f"{path}: a folder; a data set (.h5) is wanted. `rig list {path}` shows those in it."
-        )
     sha256, wrong = "", ""
     try:
+        if path.is_dir():
+            raise InputError(
+                f"{path}: a folder; a data set (.h5) is wanted. `rig list {path}` shows those in "
+                "it."
+            )
+        check_regular(path, "a data set")
         with path.open("rb") as file:
             head = file.read(len(_MAGIC))
             if head == _MAGIC:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import InputError
+from rig.storage.files import check_regular
 from rig.storage.seal import BROKEN, SCHEMA
 
 _ROBOT = re.compile(r"^robot:\s*([A-Za-z0-9_.-]+)\s*(?:#.*)?$", re.MULTILINE)
@@ -105,6 +106,7 @@ def by_any_program(path: Path) -> tuple[dict[str, Any], str]:
 def journal_summary(journal: Path) -> Summary:
     """Of a journal, from its first line; rows: its samples so far. InputError if it has none."""
     try:
+        check_regular(journal, "a journal")
         content = journal.read_bytes()
         start: dict[str, Any] = json.loads(content.split(b"\n", 1)[0])["data"]
         robot, directions = _of_meta(str(start["meta"]), str(journal))

@@ -17,5 +17,12 @@ TABLE = "time_s,repetition,branch,step,force_N,displacement_mm\n" + "".join(
     for r in (1, 2, 3)
     for s in range(6)
 )
+ARM_META = """\
+robot: ur10e
+poses: {P1: {q_rad: [0.234398, -1.742537, -1.886701, -1.083151, 1.570796, -1.336399]}}
+directions: {x: [1, 0, 0]}
+instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
+simulation: {joint_stiffness_Nm_per_rad: [37000, 57000, 18000, 7100, 7500, 8000]}
+"""
 
 Rig = Callable[..., tuple[int, str, str]]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 
 import pytest
 
 from rig import cli
-from tests.unit.cli_bench import META, TABLE, Rig
+from tests.unit.cli_bench import ARM_META, HOME, META, TABLE, Rig
 from tests.unit.runner_bench import PROTOCOL
 
 
@@ -35,3 +36,14 @@ def files(tmp_path: Path) -> Path:
     (tmp_path / "t.csv").write_text(TABLE)
     (tmp_path / "p.yaml").write_text(PROTOCOL)
     return tmp_path
+
+
+@pytest.fixture
+def arm(rig: Rig, files: Path) -> Path:
+    """With `a.h5`, an arm's session, and a model."""
+    (files / "arm.yaml").write_text(ARM_META)
+    shutil.copy(HOME / "data" / "models" / "F1.yaml", files)
+    # It gives way at the last level, or something drifts: there is something to tell apart.
+    (files / "k.csv").write_text(TABLE.replace(",100,1.", ",100,1.5"))
+    assert rig("import", "k.csv", "arm.yaml", "-o", "a.h5")[0] == 0
+    return files

@@ -271,3 +271,39 @@ def test_a_reader_that_has_left_is_no_bug(
     os.close(pipe)
     assert (ended.returncode, ended.stderr) == (ends, None if both else "")
     assert not list(files.glob("rig-bug-*"))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes have no names here")
+@pytest.mark.parametrize(
+    ("words", "name", "wanted"),
+    [
+        ("diagnose pipe.h5", "pipe.h5", "a data set"),
+        ("list .", "pipe.h5", "a data set"),
+        ("list .", "b.h5.journal", "a journal"),
+        ("measure --resume b.h5", "b.h5.journal", "a journal"),
+        ("import pipe.csv m.yaml -o d.h5", "pipe.csv", "a table"),
+        (f"import {os.devnull} m.yaml -o d.h5", os.devnull, "a table"),
+    ],
+)
+def test_nobody_waits_for_a_pipe(files: Path, words: str, name: str, wanted: str) -> None:
+    if name != os.devnull:
+        os.mkfifo(files / name)
+    ended = subprocess.run(
+        [sys.executable, "-m", "rig", *words.split()],
+        cwd=files,
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(HOME)},
+    )
+    said = (
+        f"is a pipe or a device, which can be read once only; {wanted} is read more often. "
+        "Write it to a file, and give that.\n"
+    )
+    if words == "list .":
+        assert ended.returncode == 0
+        assert "Left out: " in ended.stdout
+        assert ended.stdout.endswith(said)
+    else:
+        assert (ended.returncode, ended.stderr) == (2, f"{name}: {said}")

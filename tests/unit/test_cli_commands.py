@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -231,3 +233,34 @@ def test_check_names_every_device_that_is_not_ready(
     assert err == "robot: no answer. Switch it on.\nlaser: it is silent. Check its cable.\n"
     assert "laser        NOT READY" in out
     assert isinstance(found.failure, CannotConnect)  # the first decides over the status
+
+
+BAD, SHOWN = os.fsdecode(b"bad\xff"), "bad\N{REPLACEMENT CHARACTER}"
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="its file systems refuse such names")
+@pytest.mark.parametrize(
+    ("words", "shows"),
+    [
+        ("report {}.h5 --no-gap -o r.html", "r.html"),
+        ("analyze {}.h5 --figures f --json r.json", ""),
+        ("identify {}.h5 --proposals 0 --write-model m.out", "m.out"),
+        ("import {}.csv arm.yaml -o new.h5", "new.h5"),
+        ("list .", ""),
+        pytest.param("diagnose {}.h5 --figures .", "gap_points.csv", marks=pytest.mark.slow),
+    ],
+)
+def test_a_name_that_is_no_utf_8_is_shown_with_a_replacement_character(
+    rig: Rig, arm: Path, monkeypatch: pytest.MonkeyPatch, words: str, shows: str
+) -> None:
+    (arm / "a.h5").rename(arm / f"{BAD}.h5")
+    (arm / "k.csv").rename(arm / f"{BAD}.csv")
+    status, out, err = rig(*(w.format(BAD) for w in words.split()))
+    assert status == 0, err
+    assert words.startswith(("import", "diagnose")) or SHOWN in out
+    if shows:
+        assert SHOWN.encode() in (arm / shows).read_bytes()
+
+
+def test_an_unknown_name_that_is_no_utf_8_is_told_as_any(rig: Rig, files: Path) -> None:
+    assert rig("analyze", f"{BAD}.h5")[2] == f"{SHOWN}.h5: cannot be read: no such file.\n"

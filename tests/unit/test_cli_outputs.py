@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.slow import slow_ones
-from tests.unit.cli_bench import HOME, TABLE, Rig
+from tests.unit.cli_bench import Rig
 
 
 @pytest.mark.parametrize(
@@ -48,6 +48,22 @@ def test_places_that_could_not_be_written_to_are_said_before_the_work(
 
 
 @pytest.mark.parametrize(
+    "words",
+    [
+        "analyze no.h5 --figures f --json f/curve.svg",
+        "report no.h5 --figures . --json no_curve.csv",
+        "diagnose no.h5 --figures . --json gap_points.csv",
+    ],
+)
+def test_no_result_goes_where_a_figure_goes(rig: Rig, files: Path, words: str) -> None:
+    (files / "f").mkdir()
+    place = words.rsplit(maxsplit=1)[-1]
+    status, out, err = rig(*words.split())
+    assert (status, out) == (2, "")
+    assert err == f"--json {place}: a figure of --figures goes there. Give another name.\n"
+
+
+@pytest.mark.parametrize(
     ("words", "says"),
     [
         ("analyze d.h5 --json d.h5", "--json d.h5: is read by this command"),
@@ -73,11 +89,47 @@ def test_no_result_takes_the_place_of_an_input_or_a_measurement(
     assert {p.name: p.read_bytes() for p in files.iterdir()} == before
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("diagnose no.h5 --json x --write-model ./x", "--write-model x, --json x: are one place"),
+        ("identify no.h5 --write-protocol s --write-model s", "--write-model s, --write-protocol"),
+        ("simulate no.yaml p.yaml --csv sub/../t --json t", "--csv sub/../t, --json t: are one"),
+        ("report no.h5 -o r.html --json r.html", "--output r.html, --json r.html: are one place"),
+        ("report no.h5 --json no_report.html", "--output no_report.html, --json no_report.html:"),
+        ("report no.h5 --figures x --json x", "--json x, --figures x: are one place"),
+        ("diagnose no.h5 --next m.yaml --json link", "--next m.yaml, --json link: are one place"),
+    ],
+)
+def test_two_results_do_not_go_to_one_place(rig: Rig, files: Path, words: str, says: str) -> None:
+    (files / "sub").mkdir()
+    (files / "link").symlink_to("m.yaml")
+    status, out, err = rig(*words.split())
+    assert (status, out) == (2, "")
+    assert err.startswith(says)
+    assert err.endswith("only one result can stand there. Give another name to one of them.\n")
+
+
+@pytest.mark.parametrize(
+    "words", ["diagnose no.h5 --write-model", "import t.csv m.yaml -o", "simulate m p --csv"]
+)
+def test_no_file_takes_the_place_of_a_device(rig: Rig, files: Path, words: str) -> None:
+    os.mkfifo("pipe.h5")
+    for place in (os.devnull, "pipe.h5"):
+        status, out, err = rig(*words.split(), place)
+        assert (status, out) == (2, "")
+        option = "--output" if words.endswith("-o") else words.rsplit(maxsplit=1)[-1]
+        assert err == (
+            f"{option} {place}: is a pipe or a device, where only JSON may go. Give the name of a "
+            "file.\n"
+        )
+
+
 def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
     assert rig("import", "t.csv", "m.yaml", "-o", "d.h5")[0] == 0
-    (files / "r.json").write_text("{}")
+    assert rig("list", ".", "--json", "r.json")[0] == 0
     status, _, err = rig("analyze", "d.h5", "--json", "r.json")
-    assert (status, err) == (0, "r.json: replaced; an earlier JSON stood there\n")
+    assert (status, err) == (0, "r.json: replaced; an earlier JSON written by rig stood there\n")
     assert json.loads((files / "r.json").read_text())["schema"] == "rig.analysis/1"
     status, _, err = rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     assert status == 0
@@ -85,13 +137,6 @@ def test_a_result_may_replace_an_older_result(rig: Rig, files: Path) -> None:
     assert "replaced" not in rig("import", "t.csv", "m.yaml", "-o", "new.h5")[2]
 
 
-ARM_META = """\
-robot: ur10e
-poses: {P1: {q_rad: [0.234398, -1.742537, -1.886701, -1.083151, 1.570796, -1.336399]}}
-directions: {x: [1, 0, 0]}
-instruments: {force: {standard_uncertainty_N: 0.1}, displacement: {standard_uncertainty_mm: 0.002}}
-simulation: {joint_stiffness_Nm_per_rad: [37000, 57000, 18000, 7100, 7500, 8000]}
-"""
 WRITTEN = [
     ("diagnose a.h5 --write-model", "f.yaml", "model written by rig"),
     ("diagnose a.h5 --next", "f.yaml", "protocol written by rig"),
@@ -104,20 +149,25 @@ WRITTEN = [
     ("report a.h5 --no-gap --pdf", "f.pdf", "PDF"),
     ("export a.h5 -o", "f.csv", "table exported by rig"),
     ("export a.h5 -o", "f.parquet", "Parquet table"),
+    ("check p.yaml --station emulated --json", "f.json", "JSON written by rig"),
+    ("analyze a.h5 --json", "f.json", "JSON written by rig"),
+    ("identify a.h5 --proposals 0 --json", "f.json", "JSON written by rig"),
+    ("couple F1.yaml --samples 1000 --json", "f.json", "JSON written by rig"),
+    ("diagnose a.h5 --json", "f.json", "JSON written by rig"),
+    ("simulate F1.yaml p.yaml --json", "f.json", "JSON written by rig"),
+    ("blind --cases 1 --json", "f.json", "JSON written by rig"),
+    ("report a.h5 --no-gap --json", "f.json", "JSON written by rig"),
+    ("list . --json", "f.json", "JSON written by rig"),
 ]
-
-
-@pytest.fixture
-def arm(rig: Rig, files: Path) -> Path:
-    (files / "arm.yaml").write_text(ARM_META)
-    shutil.copy(HOME / "data" / "models" / "F1.yaml", files)
-    # It gives way at the last level, or something drifts: there is something to tell apart.
-    (files / "k.csv").write_text(TABLE.replace(",100,1.", ",100,1.5"))
-    assert rig("import", "k.csv", "arm.yaml", "-o", "a.h5")[0] == 0
-    return files
-
-
-LONG = ("diagnose a.h5 --write-model", "diagnose a.h5 --next", "report a.h5 --no-gap --pdf")
+LONG = (
+    "diagnose a.h5 --write-model",
+    "diagnose a.h5 --next",
+    "diagnose a.h5 --json",
+    "blind --cases 1 --json",
+    "check p.yaml --station emulated --json",
+    "report a.h5 --no-gap --pdf",
+    "report a.h5 --no-gap --json",
+)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +182,8 @@ def test_a_result_replaces_its_own_kind_only_and_says_so(
         status, _, err = rig(*words.split(), name)
         assert status == 0, err
         assert (told in err.splitlines()) == earlier
-    for other in ("F1.yaml", "p.yaml", "t.csv"):  # written by hand, or measured
+    (arm / "mine").write_text('{"my": {"schema": "rig.analysis/1"}}')
+    for other in ("F1.yaml", "p.yaml", "t.csv", "mine"):  # written by hand, or measured
         shutil.copy(arm / other, arm / name)
         status, out, err = rig(*words.split(), name)
         assert (status, out) == (2, "")
@@ -144,6 +195,38 @@ def test_a_result_replaces_its_own_kind_only_and_says_so(
         assert (arm / name).read_bytes() == (arm / other).read_bytes()
 
 
+DRAWN = [
+    ("analyze a.h5", "pointwise"),
+    ("couple F1.yaml --samples 1000", "map"),
+    ("diagnose a.h5", "gap_points"),
+    ("report a.h5 --no-gap --couple F1.yaml", "a_setup_P1"),
+]
+
+
+@pytest.mark.parametrize(
+    ("words", "name"), slow_ones(DRAWN, ("diagnose a.h5", "report a.h5 --no-gap --couple F1.yaml"))
+)
+def test_figures_replace_figures_of_rig_only(rig: Rig, arm: Path, words: str, name: str) -> None:
+    command = [*words.split(), "--figures", "f"]
+    assert "replaced" not in rig(*command)[2]
+    (arm / "f" / "mine.csv").write_text("1,2\n")
+    written = [p for p in (arm / "f").iterdir() if p.stem != "mine"]
+    status, _, err = rig(*command)
+    assert (status, f"f: {len(written)} files replaced;" in err) == (0, True)
+    assert any(p.stem == name for p in written)
+    for path in written:
+        what = "table written" if path.suffix == ".csv" else "figure drawn"
+        kept = path.read_bytes()
+        path.write_bytes(b"<svg/> 1,2,drawn by hand")
+        status, out, err = rig(*command)
+        assert (status, out) == (2, "")
+        assert err == (
+            f"--figures f/{path.name}: exists and is no {what} by rig, so it is not replaced. "
+            "Give another folder, or move it away.\n"
+        )
+        path.write_bytes(kept)
+
+
 @pytest.mark.slow
 def test_a_report_under_its_own_name_says_what_it_replaced(rig: Rig, arm: Path) -> None:
     told = "a_report.html: replaced; an earlier page stood there"
@@ -152,7 +235,7 @@ def test_a_report_under_its_own_name_says_what_it_replaced(rig: Rig, arm: Path) 
 
 
 def test_nothing_is_said_of_a_file_that_still_stands(rig: Rig, arm: Path) -> None:
-    (arm / "m.json").write_text("{}")
+    (arm / "m.json").touch()
     status, _, err = rig("simulate", "F1.yaml", "none.yaml", "--json", "m.json")
     assert status == 2
     assert "replaced" not in err
@@ -162,7 +245,8 @@ def test_json_that_cannot_be_written_costs_no_result(
     rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
-    (files / "r.json").write_text("{}")
+    assert rig("list", ".", "--json", "r.json")[0] == 0
+    before = (files / "r.json").read_text()
 
     def full(*_: object, **__: object) -> int:
         raise OSError(28, "No space left on device")
@@ -172,7 +256,7 @@ def test_json_that_cannot_be_written_costs_no_result(
     assert status == 2
     assert "N/mm" in out
     assert err.startswith("r.json: cannot be written: No space left on device.")
-    assert (files / "r.json").read_text() == "{}"
+    assert (files / "r.json").read_text() == before
     assert "replaced" not in err
     (files / "link.json").symlink_to("r.json")
     status, _, err = rig("analyze", "d.h5", "--json", "link.json")
@@ -182,7 +266,7 @@ def test_json_that_cannot_be_written_costs_no_result(
 def test_json_goes_into_a_pipe_and_through_a_link(rig: Rig, files: Path) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     (files / "link.json").symlink_to("real.json")
-    (files / "real.json").write_text("{}")
+    (files / "real.json").touch()
     os.mkfifo("pipe.json")
     pipe = os.open("pipe.json", os.O_RDONLY | os.O_NONBLOCK)
     for place in ("pipe.json", "link.json"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -87,3 +88,22 @@ def test_of_a_missing_file_its_neighbours_are_told(
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
     status, _, err = rig(*words)
     assert (status, err) == (2, f"{said}\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "place"),
+    [
+        ("analyze t.csv", "t.csv"),
+        ("report p.yaml t.csv", "t.csv"),
+        ("diagnose none.h5 --model t.csv", "--model t.csv"),
+    ],
+)
+def test_an_unreadable_file_is_told_with_what_to_do(
+    rig: Rig, files: Path, monkeypatch: pytest.MonkeyPatch, words: str, place: str
+) -> None:
+    monkeypatch.setattr(os, "access", lambda path, _mode: str(path) != "t.csv")
+    status, out, err = rig(*words.split())
+    assert (status, out) == (2, "")
+    assert err == (
+        f"{place}: you may not read this file. Change its permissions, or ask whoever owns it.\n"
+    )

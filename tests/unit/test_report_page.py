@@ -349,9 +349,10 @@ def test_figures_with_their_numbers(tmp_path: Path) -> None:
     for name in ("a_setup", "a_curve", "a_pointwise", "a_quality"):
         assert {f"{name}.svg", f"{name}.png", f"{name}.csv"} <= written
     table = (tmp_path / "figures" / "a_curve.csv").read_text("utf-8").splitlines()
-    assert table[:2] == ["# EMULATED", "direction,branch,step,force_N,displacement_mm,sd_mm,n"]
+    header = "direction,branch,step,force_N,displacement_mm,sd_mm,n"
+    assert table[:3] == ["# EMULATED", "# rig report: a_curve", header]
     levels = report.to_json()["datasets"][0]["analyze"]["directions"]["x"]["curve"]
-    cells = [float(line.split(",")[4]) for line in table[2:]]
+    cells = [float(line.split(",")[4]) for line in table[3:]]
     assert cells == [p["displacement_mm"] for p in levels]
     assert (tmp_path / "figures" / "a_curve.png").read_bytes().startswith(b"\x89PNG")
     assert "xmlns" in (tmp_path / "figures" / "a_curve.svg").read_text("utf-8")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pty
 import re
 import signal
 import subprocess
@@ -110,14 +111,19 @@ def test_measurements_are_never_overwritten(tmp_path: Path) -> None:
     assert (tmp_path / "run.h5").read_bytes() == b"precious"
 
 
-def started(folder: Path, words: list[str]) -> subprocess.Popen[str]:
-    """A measurement in the background, returned once it has recorded some rows."""
+def started(folder: Path, words: list[str], terminal: int | None = None) -> subprocess.Popen[str]:
+    """A measurement in the background, returned once it has recorded some rows. terminal: on which
+    it runs, as if it had been opened for it."""
+    own = "os.open(os.ttyname(0), os.O_RDWR); " if terminal is not None else ""
+    code = f"import os; {own}from rig.cli import main; main()"
     process = subprocess.Popen(
-        [sys.executable, "-m", "rig", *words],
+        [sys.executable, "-c", code, *words],
         cwd=folder,
-        stderr=subprocess.PIPE,
+        stderr=subprocess.PIPE if terminal is None else terminal,
+        stdout=terminal,
         text=True,
-        stdin=subprocess.DEVNULL,
+        stdin=subprocess.DEVNULL if terminal is None else terminal,
+        start_new_session=terminal is not None,
         env={**os.environ, "PYTHONPATH": str(HOME)},
     )
     journal = folder / "run.h5.journal"
@@ -142,15 +148,36 @@ def test_ctrl_c_asks_and_the_answer_stops_with_status_4(tmp_path: Path) -> None:
     assert dataset.rows >= 8
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_being_ended_writes_the_file(tmp_path: Path, number: int) -> None:
     process = started(tmp_path, write_files(tmp_path))
     process.send_signal(number)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130, errors
     assert "Traceback" not in errors
+    assert "Interrupted. " in errors
     assert not load(tmp_path / "run.h5").complete
     assert no_process_left(tmp_path)
+
+
+def test_a_terminal_that_is_closed_costs_no_data(tmp_path: Path) -> None:
+    window, terminal = pty.openpty()
+    process = started(tmp_path, write_files(tmp_path), terminal)
+    os.close(terminal)
+    os.close(window)
+    assert process.wait(timeout=60) == 130
+    assert load(tmp_path / "run.h5").rows >= 8
+    assert no_process_left(tmp_path)
+
+
+def test_a_hangup_that_was_to_be_ignored_ends_nothing(tmp_path: Path) -> None:
+    earlier = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    process = started(tmp_path, write_files(tmp_path))
+    signal.signal(signal.SIGHUP, earlier)
+    process.send_signal(signal.SIGHUP)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    assert load(tmp_path / "run.h5").complete
 
 
 def test_a_full_disk_ends_with_what_to_do_and_resumes(tmp_path: Path) -> None:
