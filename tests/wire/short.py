@@ -44,7 +44,9 @@ prompts: {}
 
 def station(speed: float = 30, faults: str = "[]", seed: int = 1, **others: str) -> str:
     """The emulated station of the project with another speed, other faults, another seed, and
-    `others` by their key."""
+    `others` by their key. Where no device is to fail, none does because the machine is busy."""
+    if faults == "[]":
+        others.setdefault("stale_after_s", "10")
     text = (HOME / "protocols" / "stations" / "emulated.yaml").read_text(encoding="utf-8")
     lines = []
     for line in text.splitlines():

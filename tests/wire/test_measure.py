@@ -111,11 +111,18 @@ def test_measurements_are_never_overwritten(tmp_path: Path) -> None:
     assert (tmp_path / "run.h5").read_bytes() == b"precious"
 
 
-def started(folder: Path, words: list[str], terminal: int | None = None) -> subprocess.Popen[str]:
+def started(
+    folder: Path,
+    words: list[str],
+    terminal: int | None = None,
+    hangup: signal.Handlers = signal.SIG_DFL,
+) -> subprocess.Popen[str]:
     """A measurement in the background, returned once it has recorded some rows. terminal: on which
-    it runs, as if it had been opened for it."""
+    it runs, as if it had been opened for it. hangup: what it was told to do when that is closed,
+    whatever the tests were (nohup)."""
+    heard = f"signal.signal(signal.SIGHUP, {hangup:d}); " if hasattr(signal, "SIGHUP") else ""
     own = "os.open(os.ttyname(0), os.O_RDWR); " if terminal is not None else ""
-    code = f"import os; {own}from rig.cli import main; main()"
+    code = f"import os, signal; {heard}{own}from rig.cli import main; main()"
     process = subprocess.Popen(
         [sys.executable, "-c", code, *words],
         cwd=folder,
@@ -171,9 +178,7 @@ def test_a_terminal_that_is_closed_costs_no_data(tmp_path: Path) -> None:
 
 
 def test_a_hangup_that_was_to_be_ignored_ends_nothing(tmp_path: Path) -> None:
-    earlier = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
-    process = started(tmp_path, write_files(tmp_path))
-    signal.signal(signal.SIGHUP, earlier)
+    process = started(tmp_path, write_files(tmp_path), hangup=signal.SIG_IGN)  # as nohup does
     process.send_signal(signal.SIGHUP)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 0, errors
