@@ -73,8 +73,15 @@ def _components(meta: Meta, columns: Mapping[str, Values]) -> Iterator[str]:
         force = columns["force_N"][rows]
         if max(np.ptp(along), np.ptp(force)) < _SEEN * stated.standard_uncertainty_N:
             continue
+        if np.ptp(along) < _SEEN * stated.standard_uncertainty_N:
+            yield (
+                f"direction {name}: force_x_N, force_y_N and force_z_N have no force along it, "
+                f"while force_N covers {brief(float(np.ptp(force)), 3)} N; force_N counts. Check "
+                "the direction in META, and the columns"
+            )
+            continue
         off = along - along.mean()
-        ratio = float(off @ (force - force.mean()) / (off @ off)) if off.any() else np.inf
+        ratio = float(off @ (force - force.mean()) / (off @ off))
         if abs(ratio - 1) > allowed:
             yield (
                 f"direction {name}: force_N is {brief(ratio, 3)} times what force_x_N, force_y_N "

@@ -197,7 +197,8 @@ class _Table:
         bad = np.flatnonzero((values < low) | (values > high))
         if len(bad):
             what = f"allowed: {low:.8g} {column.unit} to {high:.8g} {column.unit}"
-            raise self._cell(file, block, column.name, bad[0], what, " Is the unit right?")
+            lost = " Where the sensor failed, leave the cell empty." * (column.unit == "degC")
+            raise self._cell(file, block, column.name, bad[0], what, f" Is the unit right?{lost}")
         if column.kind == "flag":
             bad = np.flatnonzero(~np.isin(values, (0.0, 1.0)))
             if len(bad):

@@ -241,7 +241,8 @@ def _result(
     structural = engine.target[:n] - springs.response
     simulated = stated_prediction(engine)
     scale = off_scale(bench, simulated)
-    notes = [*scale, *notes_of(bench), *_disbelieved(found, verdict), *_across(bench, chosen)]
+    notes = [*scale, *notes_of(bench, verdict)]
+    notes += [*_disbelieved(found, verdict), *_across(bench, chosen)]
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,

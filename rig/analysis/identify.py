@@ -123,8 +123,6 @@ def identify(
     datasets = load_each([Path(p) for p in paths])
     names = [legible(p) for p in paths]
     arm = _arm(datasets, names)
-    for dataset in datasets:
-        refuse_contradictions(dataset)
     prior = prior or Prior(
         arm.joint_stiffness, arm.joint_stiffness_relative_sd, f"data/models/{arm.name}.yaml"
     )
@@ -197,6 +195,8 @@ def prior_of(model: str | Path) -> Prior:
 
 def _arm(datasets: Sequence[Dataset], names: Sequence[str]) -> Arm:
     robots = [d.meta.robot for d in datasets]
+    for dataset in datasets:
+        refuse_contradictions(dataset)
     for name, robot in zip(names, robots, strict=True):
         if robot == "none":
             raise InputError(f"{name}: robot: none; joint stiffnesses need an arm.")

@@ -16,13 +16,18 @@ _STEMS = {
     "report": "joints|coupling|compared_.+",
 }
 _OF_EACH = "(setup|curve|pointwise|joints|gap|quality)(_.+)?"  # of every data set of a report
-_ENDINGS = r"\.(png|svg|csv)"
+_NUMBERS = ("diagnose", "report")  # which write the numbers behind their figures, too
+
+
+def where(path: Path) -> str:
+    """The same for all names of one place, whatever stands there."""
+    return os.path.normcase(os.path.realpath(path))
 
 
 def is_drawn(ctx: Any, path: Path) -> bool:
     """Whether the command may put a figure, or the numbers behind it, into this place."""
     folder = ctx.params.get("figures")
-    if folder is None or os.path.realpath(path.parent) != os.path.realpath(folder):
+    if folder is None or where(path.parent) != where(folder):
         return False
     stems = _STEMS[ctx.command.name]
     if ctx.command.name == "report":
@@ -30,7 +35,8 @@ def is_drawn(ctx: Any, path: Path) -> bool:
 
         for one in named(ctx.params["datasets"]):
             stems += f"|{re.escape(one.stem)}_{_OF_EACH}"
-    return re.fullmatch(f"({stems}){_ENDINGS}", path.name) is not None
+    endings = "png|svg|csv" if ctx.command.name in _NUMBERS else "png|svg"
+    return re.fullmatch(rf"({stems})\.({endings})", path.name) is not None
 
 
 def standing(ctx: Any) -> Iterator[Path]:

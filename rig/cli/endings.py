@@ -38,11 +38,14 @@ def main() -> None:
 
 def _open_streams() -> None:
     """A standard stream that is closed leads nowhere instead; or else the next file that is opened
-    would have its number, and be written into by whoever believes it to be the stream."""
+    would have its number, and be written into by whoever believes it to be the stream. What its
+    encoding lacks (a name in another script) is replaced."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             nowhere = Path(os.devnull).open(mode, encoding="utf-8", errors="replace")  # noqa: SIM115
             setattr(sys, name, nowhere)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
 
 
 def _run() -> None:

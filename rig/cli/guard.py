@@ -12,7 +12,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from rig.cli.drawn import is_drawn, standing
+from rig.cli.drawn import is_drawn, standing, where
 from rig.cli.kinds import replacing
 from rig.cli.options import put_out
 from rig.cli.usage import check_given_once, check_words, wrong_value
@@ -109,7 +109,7 @@ def _check_apart(places: Sequence[tuple[str, Path]]) -> None:
     """InputError where two results would go to one place."""
     for i, (option, path) in enumerate(places):
         for other, place in places[:i]:
-            if os.path.realpath(path) == os.path.realpath(place) or _same(path, place):
+            if where(path) == where(place) or _same(path, place):
                 raise InputError(
                     f"{other} {place}, {option} {path}: are one place, and only one result can "
                     "stand there. Give another name to one of them."

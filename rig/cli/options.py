@@ -107,10 +107,11 @@ def give(result: Any, json_file: str | None, files: Iterable[str] = ()) -> None:
                 _write_json(Path(str(json_file)), text + "\n")
     finally:
         try:
-            if json_file == "-":
-                put_out(text)
-            else:
-                show(result.to_text())
+            with _keeping(refused):
+                if json_file == "-":
+                    put_out(text)
+                else:
+                    show(result.to_text())
         except BrokenPipeError:
             if not refused:
                 raise

@@ -40,17 +40,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
             "with the joint stiffnesses (or, without an arm, stiffness_N_per_mm) to META."
         )
     refuse_contradictions(dataset)
-    used = dataset.used & np.isfinite(dataset.columns["force_N"])
-    used &= np.isfinite(dataset.columns["displacement_mm"])
-    if not used.any():
-        raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
-    way = used & between_levels(dataset.columns)
-    used, aside, without = _without_holes(dataset, used & ~way)
-    if way.any():
-        aside = (
-            *aside,
-            f"{counted(int(way.sum()), 'sample')} of held runs without a step: set aside.",
-        )
+    used, aside, without = _in_use(dataset, where)
     columns = {k: v[used] for k, v in dataset.columns.items()}
     names = [str(d) for d in columns["direction"]]
     poses = [str(p) for p in columns["pose"]]
@@ -97,6 +87,21 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         aside=aside,
         notes=(*notes, *without, *_unsettled(dataset)),
     )
+
+
+def _in_use(dataset: Dataset, where: str) -> tuple[Flags, tuple[str, ...], tuple[str, ...]]:
+    """The samples to use (n,), what to say of those that were set aside, and of channels that do
+    not count. InputError where there is none."""
+    used = dataset.used & np.isfinite(dataset.columns["force_N"])
+    used &= np.isfinite(dataset.columns["displacement_mm"])
+    if not used.any():
+        raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
+    way = used & between_levels(dataset.columns)
+    used, aside, without = _without_holes(dataset, used & ~way)
+    if way.any():
+        lost = f"{counted(int(way.sum()), 'sample')} of held runs without a step: set aside."
+        aside = (*aside, lost)
+    return used, aside, without
 
 
 _JOINTS, _COMPONENTS, _TEMPERATURES = "joint readings", "force components", "temperatures"

@@ -44,12 +44,14 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
     check_writable(dataset, others=result.bench.rows.simulated is not None)
     pose = meta.poses[result.bench.data.setups[0].pose]
     made = f"Springs and effects of the diagnosis of {dataset.uuid}."
-    if result.verdict == "unknown":
-        made = f"Nothing explains the gap of {dataset.uuid}: the springs are those that were given."
-    note = " ".join([*diagnosis.banners, made])
+    if result.verdict == "unknown":  # nothing of the data set is in it, so it is not named here
+        made = "Nothing explains the measured gap: the springs are those that were given."
+    given = diagnosis.model.note if diagnosis.model is not None else ""
+    note = " ".join([*diagnosis.banners, made, *([f"Given: {given}"] if given else [])])
     lines = [
         f"# The simulation with what rig diagnose found missing in it: {result.verdict} "
         f"({likely(result.probabilities[result.verdict])}).",
+        f"# Data set: {dataset.uuid}",
         f"note: {json.dumps(note)}",
         *arm_lines(meta.robot, pose.q_rad, pose.tcp_xyz_mm, *_believed(result)),
         *_outside(diagnosis),

@@ -35,7 +35,7 @@ def with_curves(data: GapData, csv: Path) -> GapData:
     for s, setup in enumerate(data.setups):
         curve = _curve(csv, table, setup)
         rows = data.setup == s
-        notes += _doubts(csv, curve, setup, data.force[rows])
+        notes += _doubts(csv, curve, setup, data.force[rows], data.instruments.force)
         simulated[rows] = _along(data.force[rows], curve.force, curve.displacement)
     return replace(data, simulated=simulated, notes=tuple(notes))
 
@@ -49,18 +49,20 @@ class _Curve(NamedTuple):
     apart: Array
 
 
-def _doubts(csv: Path, curve: _Curve, setup: Setup, measured: Array) -> Iterator[str]:
-    """What is odd about a curve, beside the forces (k,) N that were measured."""
+def _doubts(csv: Path, curve: _Curve, setup: Setup, measured: Array, noise: float) -> Iterator[str]:
+    """What is odd about a curve, beside the forces (k,) N that were measured with that noise, N.
+    InputError where it covers too little of them."""
     where = f"direction {setup.direction}" + (f" in pose {setup.pose}" if setup.pose else "")
     low, high = float(measured.min()), float(measured.max())
     first, last = float(curve.force[0]), float(curve.force[-1])
     needed = f"simulated from {first:.4g} to {last:.4g} N, measured from {low:.4g} to {high:.4g} N"
     covered = min(last, high) - max(first, low)
-    if covered < _HALF * (high - low):
+    moves = high - low > _MOVES * noise
+    if moves and covered < _THIRD * (high - low):
         raise InputError(
             f"{csv}: {where}: {needed}; wanted: curves over the range of force. Simulate that, too."
         )
-    if max(first - low, high - last) > _LITTLE * (high - low):
+    if moves and max(first - low, high - last) > _LITTLE * (high - low):
         yield f"The curve of {where} was {needed}: it was taken to go straight on beyond its ends."
     size = float(np.ptp(curve.displacement))
     if curve.apart.max() > _LITTLE * size:
@@ -77,7 +79,8 @@ def _doubts(csv: Path, curve: _Curve, setup: Setup, measured: Array) -> Iterator
         )
 
 
-_HALF, _LITTLE = 0.5, 0.1  # of the measured range of force; of that, and of the simulated range
+_THIRD, _LITTLE = 1 / 3, 0.1  # of the measured range of force; of that, and of the simulated one
+_MOVES = 20.0  # standard uncertainties: a force that goes no further stands still
 
 
 def _read(csv: Path) -> dict[str, Values]:

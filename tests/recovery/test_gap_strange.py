@@ -149,6 +149,19 @@ def test_a_hum_that_is_read_once_a_second_is_a_fast_swing() -> None:
     assert like.period == pytest.approx(5.26, rel=0.01)
 
 
+def test_fast_samples_in_a_long_session_have_no_end_of_swings() -> None:
+    """A thousand readings a second, and pauses of an hour."""
+    data = measured(swing(5.26), 16e-6, LONG_HOLDS)
+    assert data.session is not None
+    hour = 3600.0 * data.run
+    bench = make_bench(replace(data, time=1e-3 * data.time, session=1e-3 * data.session + hour))
+    assert bench.noise.raised > 1.0
+    base, target = base_columns(bench), bench.observed - prediction(bench)
+    swings = [v for v in strangers(bench, base, target) if v.word == "swings"]
+    looked_at = 1 / swings[0].prior
+    assert looked_at < 10 * bench.rows.n
+
+
 def test_below_the_noise_there_is_no_gap() -> None:
     """However plainly many samples show it."""
     assert explained(measured(swing(61.0), 1.2e-6, DESIGNS["medium"])).verdict == "none"

@@ -208,9 +208,13 @@ DRAWN = [
 )
 def test_figures_replace_figures_of_rig_only(rig: Rig, arm: Path, words: str, name: str) -> None:
     command = [*words.split(), "--figures", "f"]
+    own = arm / "f" / "curve.csv"  # which no command draws
+    own.parent.mkdir()
+    own.write_text("1,2\n")
     assert "replaced" not in rig(*command)[2]
+    assert own.read_text() == "1,2\n"
     (arm / "f" / "mine.csv").write_text("1,2\n")
-    written = [p for p in (arm / "f").iterdir() if p.stem != "mine"]
+    written = [p for p in (arm / "f").iterdir() if p.stem != "mine" and p != own]
     status, _, err = rig(*command)
     assert (status, f"f: {len(written)} files replaced;" in err) == (0, True)
     assert any(p.stem == name for p in written)

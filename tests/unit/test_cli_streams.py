@@ -16,7 +16,7 @@ FULL = Path("/dev/full")
 _NEEDS_FULL = pytest.mark.skipif(not FULL.exists(), reason="a device of Linux")
 
 
-def _sh(folder: Path, words: str) -> tuple[int, str, str]:
+def _sh(folder: Path, words: str, **environment: str) -> tuple[int, str, str]:
     """Status, stdout and stderr of `rig WORDS` as a shell runs it, redirections and all."""
     ended = subprocess.run(
         ["sh", "-c", f"{sys.executable} -m rig {words}"],
@@ -24,7 +24,7 @@ def _sh(folder: Path, words: str) -> tuple[int, str, str]:
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, "PYTHONPATH": str(HOME), "TMPDIR": str(folder)},
+        env={**os.environ, "PYTHONPATH": str(HOME), "TMPDIR": str(folder), **environment},
     )
     assert not list(folder.glob("rig-bug-*"))
     return ended.returncode, ended.stdout, ended.stderr
@@ -98,6 +98,20 @@ def test_a_full_disk_behind_standard_output_costs_no_file(arm: Path) -> None:
     assert (arm / "c.csv").exists()
 
 
+@_NEEDS_FULL
+def test_of_two_that_refuse_both_are_told(arm: Path) -> None:
+    status, _, err = _sh(arm, "simulate F1.yaml p.yaml --csv c.csv --json /dev/full >/dev/full")
+    assert status == 2
+    assert err == f"c.csv: written\n{FULL}: cannot be written: {_NO_ROOM}.\n{_REFUSED}"
+
+
+def test_what_the_encoding_of_standard_output_lacks_is_replaced(arm: Path) -> None:
+    (arm / "\u65e5.h5").write_bytes((arm / "a.h5").read_bytes())
+    status, out, _ = _sh(arm, "analyze \u65e5.h5", PYTHONIOENCODING="cp1252")
+    assert (status, "?.h5" in out) == (0, True)
+
+
+_NO_ROOM = os.strerror(errno.ENOSPC)
 _REFUSED = f"standard output: cannot be written: {os.strerror(errno.ENOSPC)}.\n"
 
 

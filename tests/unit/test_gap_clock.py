@@ -29,7 +29,9 @@ def test_times_that_are_numbers_of_readings_are_said_to_be_so() -> None:
     force = 100.0 * triangle(300, 3.0)
     for timed in (True, False):
         bench = make_bench(running(force, force / SPRING, timed=timed))
-        said = [n.text for n in notes_of(bench) if n.text.startswith("No time was recorded")]
+        said = [
+            n.text for n in notes_of(bench, "none") if n.text.startswith("No time was recorded")
+        ]
         assert len(said) == (not timed)
 
 
@@ -37,6 +39,8 @@ def test_what_lets_go_does_so_at_a_time_or_at_a_reading() -> None:
     force, u = saw(0.4)
     for timed, unit in ((True, " s)"), (False, ")")):
         bench = make_bench(stroke(force, u, timed=timed))
-        (said,) = (n.text for n in notes_of(bench) if "lets go" in n.text or "sticks" in n.text)
+        (said,) = (
+            n.text for n in notes_of(bench, "none") if "lets go" in n.text or "sticks" in n.text
+        )
         assert f"first at {'reading ' if not timed else ''}" in said
         assert unit in said

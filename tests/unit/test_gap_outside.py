@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -104,6 +105,13 @@ def test_a_corrected_model_keeps_them(folder: Path, found: Diagnosis) -> None:
     assert after.mounting is not None
     np.testing.assert_allclose(after.mounting, before.mounting)
     assert after.links == before.links
+
+
+def test_a_corrected_model_says_what_it_was_made_from(folder: Path, found: Diagnosis) -> None:
+    assert found.model is not None
+    given = replace(found, model=replace(found.model, note="Identified from data set a."))
+    write_model(given, measured(folder), folder / "better.yaml")
+    assert "Given: Identified from data set a." in load_model(folder / "better.yaml").note
 
 
 def test_what_is_planned_next_has_them_too(folder: Path) -> None:

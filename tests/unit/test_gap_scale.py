@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from identification.gap.answer.notes import FAULT, UNDECIDED, notes_of
 from identification.gap.answer.scale import off_scale
 from identification.gap.data import GapData
 from identification.gap.model.bench import make_bench
@@ -55,3 +57,16 @@ def test_it_is_the_first_thing_said_and_nothing_is_likened() -> None:
     result = explained(replace(data, displacement=1000 * data.displacement))
     assert "see first whether forces are in N" in result.notes[0]
     assert result.looks_like is None
+
+
+@pytest.mark.parametrize(("verdict", "kind"), [("none", FAULT), ("thermal_drift", UNDECIDED)])
+@pytest.mark.parametrize("still", ["load", "signals"])
+def test_where_nothing_moves_no_gap_is_no_finding(still: str, verdict: str, kind: str) -> None:
+    data = linear("bench")
+    if still == "load":
+        data = replace(data, force=np.zeros(len(data.force)))
+    else:
+        data = replace(data, force=1e-9 * data.force, displacement=1e-9 * data.displacement)
+    said = {n.text: n.kind for n in notes_of(make_bench(data), verdict)}
+    (text,) = (t for t in said if "The load does not change" in t or "Nothing moves by more" in t)
+    assert said[text] == kind

@@ -122,6 +122,14 @@ def test_a_force_that_is_not_its_components(factor: float) -> None:
     )
 
 
+def test_components_without_any_force_along_the_direction_have_no_ratio() -> None:
+    rows = noisy(RICH)
+    y = rows.direction == "y"
+    rows.loc[y, ["force_x_N", "force_y_N"]] = rows.loc[y, ["force_y_N", "force_x_N"]].to_numpy()
+    (said,) = notes(imported(rows, meta(RICH)))
+    assert said.startswith("direction y: force_x_N, force_y_N and force_z_N have no force along it")
+
+
 def test_a_push_that_is_a_little_askew_is_none() -> None:
     rows = noisy(RICH)
     along = rows.direction == "x"

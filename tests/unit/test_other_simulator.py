@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -116,10 +117,16 @@ def test_what_is_odd_about_curves_is_said(
     assert notes == (() if says is None else (says,))
 
 
+def test_a_force_that_stands_still_has_no_range_to_cover(data: GapData, tmp_path: Path) -> None:
+    drifts = replace(data, force=1e-3 * data.force)  # N: its noise
+    (tmp_path / "c.csv").write_text(HEAD + "x,0,0\nx,100,1\n")
+    assert with_curves(drifts, tmp_path / "c.csv").notes == drifts.notes
+
+
 @pytest.mark.parametrize(
-    "rows", ["x,0,0\nx,49,0.5\n", "x,0,0\nx,0.000000001,1\n", "x,60,1\nx,200,2\n"]
+    "rows", ["x,0,0\nx,32,0.5\n", "x,0,0\nx,0.000000001,1\n", "x,70,1\nx,200,2\n"]
 )
-def test_curves_over_less_than_half_of_the_range_are_refused(
+def test_curves_over_less_than_a_third_of_the_range_are_refused(
     data: GapData, tmp_path: Path, rows: str
 ) -> None:
     with pytest.raises(InputError, match="measured from 0 to 100 N; wanted: curves over the range"):

@@ -329,7 +329,7 @@ REFUSED: list[tuple[str | bytes, str]] = [
     (
         "direction,force_N,displacement_mm,temperature2_C\nx,1,5,\nx,1,5,-60\nx,1,5,25000\n",
         ':4: column temperature2_C: "25000" (degC) is not allowed; allowed: -60 degC to 200 degC. '
-        "Is the unit right?",
+        "Is the unit right? Where the sensor failed, leave the cell empty.",
     ),
     (
         HEAD + GOOD + "1,x,1,loading,1,1e999,0\n",

@@ -28,8 +28,10 @@ def ordered(notes: Iterable[Note]) -> tuple[Note, ...]:
     return tuple(sorted(notes, key=lambda n: KINDS.index(n.kind)))
 
 
-def notes_of(bench: Bench) -> Iterator[Note]:
-    """What is said whatever the verdict."""
+def notes_of(bench: Bench, verdict: str) -> Iterator[Note]:
+    """What is said of the data. Where nothing moves, "no gap" is no finding; a drift may be one."""
+    still = FAULT if verdict == "none" else UNDECIDED
+    yield from (Note(still, text) for text in _nothing_moves(bench))
     yield from (Note(FAULT, text) for text in _faults(bench))
     yield from (Note(ASIDE, text) for text in bench.data.aside)
     yield from (Note(UNDECIDED, text) for text in _undecided(bench))
@@ -37,7 +39,6 @@ def notes_of(bench: Bench) -> Iterator[Note]:
 
 
 def _faults(bench: Bench) -> Iterator[str]:
-    yield from _nothing_moves(bench)
     yield from (f.text for f in bench.course.faults)
     if bench.noise.raised > NOISY:
         yield (
@@ -57,9 +58,6 @@ def _nothing_moves(bench: Bench) -> Iterator[str]:
         )
 
 
-_BEFORE = "Joint readings are taken before the gear"
-
-
 def _undecided(bench: Bench) -> Iterator[str]:
     data, rows = bench.data, bench.rows
     if not bench.course.unloads:
@@ -67,8 +65,11 @@ def _undecided(bench: Bench) -> Iterator[str]:
     if len(np.unique(rows.repetition)) < 2 and not rows.continuous:
         yield "One repetition: what repeats and what does not can't be told apart."
     if data.arm and not bench.has_q:
-        reason = "No joint readings to go by" if data.q is None else _BEFORE
-        yield f"{reason}: joints, links and base look alike."
+        alike = "joints, links and base look alike"
+        if data.q is None:
+            yield f"No joint readings to go by: {alike}."
+        else:
+            yield f"Joint readings are taken before the gear: {alike}."
     if data.session is None and data.arm:
         yield "No session clock: drifts are seen only within runs and from run to run."
     if bench.course.timeless:

@@ -41,6 +41,7 @@ RESTING_SWINGS = 6.0
 _PER_PERIOD = 4  # steps of the number of periods: more tell nothing new of a whole record
 _SHORTEST_ROWS = 4.0  # rows that a period lasts at least
 _FASTEST = 3.0  # rows of a hold that the fastest swing lasts
+_PERIODS_PER_ROW = 2.0  # at the most, pauses included: holds of milliseconds have no end of them
 _PEAKS, _CLOSER = 3, 17
 _PIECES = 32
 _ALIKE, _MOST_LEVELS = 0.02, 200  # of the range of the load: loads that count as the same
@@ -159,7 +160,8 @@ def _swings(bench: Bench, base: Base, target: Array) -> list[Variant]:
     most = bench.rows.n / _SHORTEST_ROWS / 2
     if bench.data.arm and bench.noise.raised > 1.0 and row_time(bench.rows) > 0:
         # readings of holds scatter more than stated, as with a hum that is sampled once a second
-        most = max(most, span / (_FASTEST * row_time(bench.rows)))
+        fastest = span / (_FASTEST * row_time(bench.rows))
+        most = max(most, min(fastest, _PERIODS_PER_ROW * bench.rows.n))
     if bench.course.rests or waited(bench).any():
         least = max(least, RESTING_SWINGS)
     count = np.arange(least, max(most, least), 1 / _PER_PERIOD)
