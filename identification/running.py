@@ -20,6 +20,12 @@ def first_rows(*keys: NDArray[Any]) -> Ints:
     return np.concatenate([[0], np.flatnonzero(new) + 1]).astype(np.int64)
 
 
+def stretches(*keys: NDArray[Any]) -> Ints:
+    """(n,) numbers, from 0, of the stretches in which no key (n,) changes; of one row at least."""
+    first = first_rows(*keys)
+    return np.repeat(np.arange(first.size), np.diff(np.append(first, len(keys[0]))))
+
+
 def runs_through(force: Array, displacement: Array, first: Ints, span: Array | float) -> bool:
     """Whether the force (n,) runs through more than half of its range span (h,) within one of the
     levels that begin at rows first (h,), and does not come to rest in it: displacement (n,). Two

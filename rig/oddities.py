@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from identification.arrays import Array, Flags, Ints
-from identification.running import first_rows
+from identification.running import first_rows, stretches
 from rig.digits import brief, counted
 from rig.meta import Meta
 from rig.passes import between_levels
@@ -117,8 +117,8 @@ def _senses(columns: Mapping[str, Values], least: float) -> tuple[Ints, Ints]:
     if not rows.size:
         return rows, rows
     branch, step = columns["branch"][rows], columns["step"][rows]
-    run = _numbers(rows.size, *(columns[n][rows] for n in ("pose", "direction", "repetition")))
-    part = _parts(_numbers(rows.size, run, branch), step)
+    run = stretches(*(columns[n][rows] for n in ("pose", "direction", "repetition")))
+    part = _parts(stretches(run, branch), step)
     first = first_rows(run, branch, step, part)
     count = np.diff(np.append(first, rows.size))
     force, moved = (
@@ -131,13 +131,6 @@ def _senses(columns: Mapping[str, Values], least: float) -> tuple[Ints, Ints]:
     onward = np.diff(moved) * np.sign(force[1:] + force[:-1])
     sense = np.sign(goes) * (np.abs(goes) > least) * (np.sign(goes) == np.sign(onward)) * label
     return run[1:], np.where(run[1:] == run[:-1], sense, 0).astype(np.int64)
-
-
-def _numbers(rows: int, *keys: Values) -> Ints:
-    """(rows,) numbers of the stretches in which no key changes."""
-    begins = np.zeros(rows, dtype=np.int64)
-    begins[first_rows(*keys)] = 1
-    return np.asarray(np.cumsum(begins) - 1)
 
 
 def _parts(pass_: Ints, step: Ints) -> Ints:

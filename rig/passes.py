@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.running import first_rows, runs_through
+from identification.running import first_rows, runs_through, stretches
 from rig.arrays import Array
 
 BINS = 20  # over the range of force
@@ -47,8 +47,7 @@ def between_levels(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
     out = loaded & (step < 0)
     if not out.any() or not np.any(loaded & (step >= 0)):
         return np.zeros(len(step), dtype=bool)
-    first = first_rows(*(columns[n] for n in ("pose", "direction", "repetition")))
-    run = np.repeat(np.arange(first.size), np.diff(np.append(first, len(step))))
+    run = stretches(*(columns[n] for n in ("pose", "direction", "repetition")))
     without, count = (np.bincount(run, weights=w)[run] for w in (out, loaded))
     return np.asarray(out & (without <= np.maximum(_FEW * count, 1)) & (2 * without < count))
 

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from identification.arrays import Flags
 from identification.curve import Curve, Point
-from identification.running import first_rows
+from identification.running import first_rows, stretches
 from identification.stairs import steps_of_stairs
 from identification.turns import turning_points
 from identification.ways import leading_on
@@ -205,8 +205,7 @@ def _leading_on(run: _Run, stated: _Stated) -> _Run:
     read = np.flatnonzero(np.isfinite(run.force) & np.isfinite(run.displacement))
     if run.settled is not None or not read.size:
         return run
-    first = first_rows(branch, step)
-    hold = np.repeat(np.arange(first.size), np.diff(np.append(first, branch.size)))
+    hold = stretches(branch, step)
     _, named = np.unique(hold[read], return_inverse=True)
     sd = stated.force, stated.displacement
     for leaves, b in leading_on(run.force[read], run.displacement[read], sd, named):

@@ -14,6 +14,7 @@ from identification.arrays import Array, Flags, Ints
 from identification.elastic import Beam
 from identification.gap.data import BRANCH_NAMES, GapData, Instruments, Setup
 from identification.gap.effects.link_flexibility import BENDING, STRAINS
+from identification.running import stretches
 from rig.contradictions import refuse_contradictions, without_turns
 from rig.dataset import Dataset
 from rig.digits import counted
@@ -52,7 +53,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
     compliance, relative = _springs(dataset)
     meter = meta.instruments
     run, session = (
-        _runs(setup, columns["repetition"].astype(np.int64)),
+        stretches(setup, columns["repetition"].astype(np.int64)),
         _optional(columns, ["session_s"], 1),
     )
     time, notes = _clock(np.nan_to_num(columns["time_s"].astype(float)), session, run)
@@ -191,14 +192,6 @@ def _steps(columns: dict[str, NDArray[np.generic]]) -> Ints:
     if unloaded.all() or np.any(step[~unloaded] < 0):
         return step
     return np.where(unloaded & (step < 0), 0, step)
-
-
-def _runs(setup: Ints, repetition: Ints) -> Ints:
-    """Consecutive numbers: a run is an unbroken stretch of one setup and repetition."""
-    new = (np.diff(setup, prepend=setup[0]) != 0) | (
-        np.diff(repetition, prepend=repetition[0]) != 0
-    )
-    return np.cumsum(new).astype(np.int64)
 
 
 def _springs(dataset: Dataset) -> tuple[Array, Array]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -26,3 +29,20 @@ simulation: {joint_stiffness_Nm_per_rad: [37000, 57000, 18000, 7100, 7500, 8000]
 """
 
 Rig = Callable[..., tuple[int, str, str]]
+
+
+def unread(folder: Path, words: str, *, both: bool = False) -> tuple[int, str]:
+    """Status and stderr of `rig WORDS` whose reader has left; both: that of stderr, too."""
+    reader, pipe = os.pipe()
+    os.close(reader)
+    ended = subprocess.run(
+        [sys.executable, "-m", "rig", *words.split()],
+        cwd=folder,
+        stdout=pipe,
+        stderr=pipe if both else subprocess.PIPE,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(HOME), "TMPDIR": str(folder)},
+    )
+    os.close(pipe)
+    return ended.returncode, ended.stderr or ""

@@ -14,7 +14,7 @@ import pytest
 
 from identification.estimate import WEIGHTINGS
 from rig.software import software_version
-from tests.unit.cli_bench import HOME, Rig
+from tests.unit.cli_bench import HOME, Rig, unread
 
 
 @pytest.mark.parametrize(
@@ -257,19 +257,7 @@ def test_a_reader_that_has_left_is_no_bug(
     rig: Rig, files: Path, words: str, both: bool, ends: int
 ) -> None:
     rig("import", "t.csv", "m.yaml", "-o", "d.h5")
-    reader, pipe = os.pipe()
-    os.close(reader)
-    ended = subprocess.run(
-        [sys.executable, "-m", "rig", *words.split()],
-        cwd=files,
-        stdout=pipe,
-        text=True,
-        stderr=pipe if both else subprocess.PIPE,
-        check=False,
-        env={**os.environ, "PYTHONPATH": str(HOME), "TMPDIR": str(files)},
-    )
-    os.close(pipe)
-    assert (ended.returncode, ended.stderr) == (ends, None if both else "")
+    assert unread(files, words, both=both) == (ends, "")
     assert not list(files.glob("rig-bug-*"))
 
 

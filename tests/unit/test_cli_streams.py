@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.cli_bench import HOME
+from tests.unit.cli_bench import HOME, unread
 
 FULL = Path("/dev/full")
 _NEEDS_FULL = pytest.mark.skipif(not FULL.exists(), reason="a device of Linux")
@@ -28,23 +28,6 @@ def _sh(folder: Path, words: str, **environment: str) -> tuple[int, str, str]:
     )
     assert not list(folder.glob("rig-bug-*"))
     return ended.returncode, ended.stdout, ended.stderr
-
-
-def _unread(folder: Path, words: str) -> tuple[int, str]:
-    """Status and stderr of `rig WORDS` whose reader has left."""
-    reader, pipe = os.pipe()
-    os.close(reader)
-    ended = subprocess.run(
-        [sys.executable, "-m", "rig", *words.split()],
-        cwd=folder,
-        stdout=pipe,
-        stderr=subprocess.PIPE,
-        text=True,
-        check=False,
-        env={**os.environ, "PYTHONPATH": str(HOME), "TMPDIR": str(folder)},
-    )
-    os.close(pipe)
-    return ended.returncode, ended.stderr
 
 
 @pytest.mark.parametrize(
@@ -74,7 +57,7 @@ def test_a_reader_that_leaves_costs_no_file(
     wanted: set[str],
 ) -> None:
     (arm / "n").mkdir()
-    status, err = _unread(arm, words)
+    status, err = unread(arm, words)
     assert status == 141
     assert {p.name for p in (arm / "n").iterdir()} == wanted
     for name in wanted - {"j"}:
@@ -83,7 +66,7 @@ def test_a_reader_that_leaves_costs_no_file(
 
 @_NEEDS_FULL
 def test_what_could_not_be_written_is_said_though_the_reader_has_left(arm: Path) -> None:
-    status, err = _unread(arm, f"simulate F1.yaml p.yaml --csv c.csv --json {FULL}")
+    status, err = unread(arm, f"simulate F1.yaml p.yaml --csv c.csv --json {FULL}")
     assert status == 2
     assert err == (f"c.csv: written\n{FULL}: cannot be written: {os.strerror(errno.ENOSPC)}.\n")
 

@@ -82,7 +82,7 @@ def test_an_arm_may_stand_elsewhere_by_a_little_and_be_turned_right_round() -> N
 def test_a_jump_in_a_few_readings_is_no_other_pose() -> None:
     rows = arm()
     rows.loc[rows.index[:20], "q3_rad"] = 57.0
-    imported(rows, meta(ARM))
+    assert imported(rows, meta(ARM)).rows == len(rows)
 
 
 # ------------------------------------------------------------------ numbers of META
@@ -147,7 +147,7 @@ def test_a_drift_without_a_load_has_no_slope() -> None:
     rows, rng = noisy(BENCH), np.random.default_rng(1)
     rows["force_N"] = rng.normal(0, 0.05, len(rows))
     rows["displacement_mm"] = np.linspace(0, 1, len(rows))
-    imported(rows, meta(BENCH).replace("{x: 95.0}", "{x: 1e7}"))
+    assert imported(rows, meta(BENCH).replace("{x: 95.0}", "{x: 1e7}")).rows == len(rows)
 
 
 @pytest.mark.parametrize(("column", "value"), [("displacement_mm", 0.0), ("force_N", 7.0)])
@@ -177,7 +177,8 @@ def test_a_channel_that_stands_still_leaves_no_room_for_any_number(
 @pytest.mark.parametrize("name", ["bench", "bench imposed"])
 def test_what_is_just_allowed_is_diagnosed(name: str, stated: str, instead: str) -> None:
     design = DESIGNS[name]
-    diagnose(imported(noisy(design), meta(design).replace(stated, instead)))
+    found = diagnose(imported(noisy(design), meta(design).replace(stated, instead)))
+    assert sum(found.result.probabilities.values()) == pytest.approx(1.0)  # no NaN
 
 
 # ------------------------------------------------------------------ data sets that were written
