@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult, explain_gap
+from identification.gap.diagnose import explain_gap
 
 
 def explained(data: GapData, *, withhold: Iterable[str] = (), add: Iterable[str] = ()) -> GapResult:

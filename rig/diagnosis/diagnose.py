@@ -11,14 +11,9 @@ from typing import Any, NamedTuple
 
 from identification.gap.answer.forms import Form
 from identification.gap.answer.known import NotKnown
+from identification.gap.answer.result import EffectFound, GapResult
 from identification.gap.data import BRANCH_NAMES, GapData
-from identification.gap.diagnose import (
-    EffectFound,
-    GapResult,
-    NotShown,
-    diagnose_gap,
-    explain_gap,
-)
+from identification.gap.diagnose import NotShown, diagnose_gap, explain_gap
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter
 from identification.gap.words import WORDS

@@ -10,7 +10,7 @@ from rig.digits import brief, likely
 from rig.units import MM_PER_M
 
 if TYPE_CHECKING:
-    from identification.gap.diagnose import EffectFound, GapResult
+    from identification.gap.answer.result import EffectFound, GapResult
     from identification.gap.explanations.explanation import Likeness
     from identification.gap.laws.interval import Parameter
 

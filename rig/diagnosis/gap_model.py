@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.answer.forms import Form, describe, lasting
-from identification.gap.diagnose import EffectFound, GapResult
+from identification.gap.answer.result import EffectFound, GapResult
 from rig.dataset import Dataset
 from rig.diagnosis.diagnose import Diagnosis
 from rig.diagnosis.diagnose_text import meanings

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from identification.arrays import Array, Ints
 from identification.gap.answer.remainder import Remainder, branches
+from identification.gap.answer.result import EffectFound, GapResult
 from identification.gap.data import BRANCH_NAMES, ZERO
-from identification.gap.diagnose import EffectFound, GapResult
 from identification.gap.judging.heldout import HeldOut, stated_prediction
 from identification.gap.model.bench import Bench
 from rig.units import MM_PER_M

@@ -12,8 +12,8 @@ import pytest
 
 from identification.arm import tool_offset
 from identification.gap.answer.forms import law_of, rows_of
+from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult
 from identification.gap.effects import load_misalignment
 from identification.gap.effects.load_misalignment import Shape
 from identification.gap.effects.pose_error import turned

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.gap.diagnose import GapResult
+from identification.gap.answer.result import GapResult
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import TOP_N, Array, Design, imported, meta, noisy
 from tests.explained import explained

@@ -13,8 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.gap.answer.parameters import parameters
+from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.evidence.signs import Limits

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from identification.gap.answer.parameters import parameters
-from identification.gap.diagnose import GapResult
+from identification.gap.answer.result import GapResult
 from identification.gap.effects import joint_backlash, library
 from identification.gap.evidence.parts import Part
 from identification.gap.laws.interval import Parameter

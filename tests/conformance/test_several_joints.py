@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult
 from identification.gap.evidence.parts import Part, Sizes
 from identification.gap.explanations.explanation import Explanation, explain
 from identification.gap.explanations.penalties import minor_parts

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from identification.arrays import Flags
-from identification.gap.diagnose import GapResult
+from identification.gap.answer.result import GapResult
 from identification.gap.judging.heldout import ALWAYS_IN, folds, held_out, stated_prediction
 from identification.gap.search.unseen import Unseen
 from rig.diagnosis.gap_data import gap_data

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 from identification.arm import tool_offset
-from identification.gap.diagnose import GapResult, diagnose_gap
+from identification.gap.answer.result import GapResult
+from identification.gap.diagnose import diagnose_gap
 from identification.gap.effects import EFFECTS, library
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench

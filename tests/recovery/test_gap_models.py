@@ -11,7 +11,7 @@ import pytest
 
 from identification.gap.answer.discriminate import NextMeasurement
 from identification.gap.answer.forms import law_of
-from identification.gap.diagnose import EffectFound, GapResult
+from identification.gap.answer.result import EffectFound, GapResult
 from identification.gap.effects import EFFECTS, library
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.fit import Fit

@@ -17,8 +17,8 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult
 from identification.gap.explanations.verdict import BENCH_DOUBT
 from rig import cli
 from rig.diagnosis.gap_data import gap_data

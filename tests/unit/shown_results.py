@@ -13,7 +13,7 @@ from drivers.errors import CannotConnect
 from identification.gap.answer.discriminate import NextMeasurement, Option
 from identification.gap.answer.locate import Where
 from identification.gap.answer.notes import ASIDE, UNDECIDED, Note
-from identification.gap.diagnose import EffectFound, GapResult
+from identification.gap.answer.result import EffectFound, GapResult
 from identification.gap.explanations.explanation import Likeness
 from identification.gap.judging.heldout import HeldOut
 from identification.gap.laws.interval import Parameter

@@ -9,8 +9,8 @@ import pytest
 from scipy.special import erf
 
 from identification.arrays import Array
+from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
-from identification.gap.diagnose import GapResult
 from identification.gap.explanations.priors import LOG_UNKNOWN, prior_of
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData, Instruments
-from identification.gap.diagnose import GapResult
 from identification.gap.effects import contact_seating, library
 from identification.gap.effects.contact_seating import refined
 from identification.gap.evidence.engine import Engine

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from identification.gap.diagnose import _shared
+from identification.gap.answer.result import _shared
 
 
 def test_twins_share_their_probability() -> None:

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import GapData
+from identification.gap.explanations.explanation import Explanation, SearchResult
+from identification.gap.explanations.fit import fit
+from identification.gap.judging.strain import what_is_strained
 from identification.gap.model.bench import Bench
-from identification.gap.model.noise import NOISY
+from identification.gap.model.noise import NOISY, SWINGS
 from identification.gap.recording.snaps import Snaps
 
 FAULT, ASIDE, UNDECIDED, REMARK = KINDS = ("fault", "set aside", "undecided", "remark")
@@ -111,3 +114,45 @@ def _let_go(snaps: Snaps, data: GapData) -> str:
         f"{snaps.largest * span:.3g} N (first {data.moment(snaps.first)}): it sticks and slips, "
         "snaps, cracks or is torn off, as no effect of the library does."
     )
+
+
+def across(bench: Bench, chosen: Explanation) -> tuple[Note, ...]:
+    """Of an effect that other readings show, and nothing moves by."""
+    each = zip(chosen.parts, chosen.sizes, strict=True)
+    shown = [p for p, s in each if p.variant.shown > 1 and s < _MOVES * bench.noise.stated]
+    if not shown:
+        return ()
+    text = (
+        "The force across the direction shows that the load acts askew; the displacement does not "
+        "move by it."
+    )
+    if len(shown) == len(chosen.parts):
+        text += " What makes the gap smaller is springs and gains within what META states."
+    return (Note(REMARK, text),)
+
+
+_MOVES = 0.2  # of the noise of a sample
+
+
+def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:
+    """Why an arm's best explanation was not believed, where that is what it asks for: META may
+    state too little, and only its author can tell."""
+    best, swings = found.explanations[0], found.engine.bench.noise.swings
+    if verdict != "unknown" or not found.engine.bench.data.arm:
+        return ()
+    if not best.parts and swings > SWINGS:
+        text = (
+            f"While nothing changes the displacement swings by {swings:.1f} times what is stated "
+            "of one sample: a vibration, or a pick-up of the mains. Find it before you go on."
+        )
+        return (Note(FAULT, text),)
+    asks = what_is_strained(found.engine, fit(found.engine, best), best.eta)
+    if not asks:
+        return ()
+    words = " and ".join(best.troubles)
+    what = f"What explains the gap best ({words})" if words else "Without any effect, the best fit"
+    text = (
+        f"{what} asks for {asks}: it was not believed. "
+        "See whether META states too small an uncertainty."
+    )
+    return (Note(REMARK, text),)
