@@ -66,13 +66,24 @@ def write_figures(folder: Path, figures: Callable[[], Iterable[tuple[str, Figure
         folder.mkdir(parents=True, exist_ok=True)
         with mpl.rc_context(STYLE):
             for name, figure in figures():
-                for kind in ("png", "svg"):
-                    path = folder / f"{name}.{kind}"
-                    figure.savefig(path, dpi=150, metadata=METADATA[kind])
-                    written.append(path)
+                written += _written(folder / name, figure)
     except OSError as error:
         raise InputError(
             f"{folder}: the figures can't be written there ({error.strerror}). "
             "Give another folder with --figures."
         ) from error
     return written
+
+
+def _written(stem: Path, figure: Figure) -> list[Path]:
+    """The files of one figure. `savefig` draws each twice, first for the layout alone, which is the
+    same in both."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in METADATA)
+    figure.set_dpi(150)
+    FigureCanvasAgg(figure).print_png(png, metadata=METADATA["png"])  # type: ignore[no-untyped-call]
+    figure.set_layout_engine("none")
+    FigureCanvasSVG(figure).print_svg(svg, metadata=METADATA["svg"])  # type: ignore[no-untyped-call]
+    return [png, svg]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from copy import deepcopy
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -218,16 +219,12 @@ JUNK = st.one_of(
 @given(word=st.sampled_from(WORDS), pick=st.integers(0, 10**6), junk=JUNK, deep=st.booleans())
 def test_damaged_entries_are_refused_or_work(word: str, pick: int, junk: Any, deep: bool) -> None:
     """One value of a good entry replaced by anything: a message, or an effect that can be used."""
-    there = small_bench()
-    fresh = replace(there, columns=Pool())
-    v = library(fresh, (word,))[0]
-    form = describe(fresh, Part(v, 1.0), np.full(len(v.columns), 0.01), np.eye(len(v.columns)))
-    entry = to_entry(form, {"name": word})
+    entry = deepcopy(entry_of(word))
     target: Any = entry["terms"][pick % len(entry["terms"])] if deep else entry
     target[sorted(target)[pick % len(target)]] = junk
     try:
         read = from_entry(entry)
-        made = realise(there, read)
+        made = realise(small_bench(), read)
     except FormError as error:
         assert len(str(error)) > 10  # noqa: PT017
     except ValueError as error:
@@ -239,6 +236,15 @@ def test_damaged_entries_are_refused_or_work(word: str, pick: int, junk: Any, de
 @cache
 def small_bench() -> Bench:
     return make_bench(arm_data())
+
+
+@cache
+def entry_of(word: str) -> dict[str, Any]:
+    """A good one."""
+    fresh = replace(small_bench(), columns=Pool())
+    v = library(fresh, (word,))[0]
+    form = describe(fresh, Part(v, 1.0), np.full(len(v.columns), 0.01), np.eye(len(v.columns)))
+    return to_entry(form, {"name": word})
 
 
 # --- prediction ----------------------------------------------------------------------------------
