@@ -89,3 +89,36 @@ def test_wrong_springs_alone_are_named(law: str) -> None:
     assert result.verdict == "joint_stiffness_error"
     assert [e.name for e in result.effects] == ["joint_stiffness_error"]
     assert result.remainder < result.bench.noise.stated  # springs are laws: exact
+
+
+OFF = np.array([1.0, 1.0, 2.0, 0.7, 1.0, 1.0])  # compliance of two springs, times as simulated
+LAG_S = 1.5
+
+
+def two_off(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+    return np.zeros(len(rows)), lever * rows["force_N"].to_numpy()[:, None] * (OFF - 1) / TRUE
+
+
+def shown_late(rows: pd.DataFrame) -> pd.DataFrame:
+    """The force as a first-order filter shows it, which follows a hand that turns evenly and lets
+    go a second before the first sample."""
+    out, dt = rows.copy(), 0.05
+    for _, run in rows.groupby(["pose", "direction", "repetition"], sort=False):
+        force, shown = run["force_N"].to_numpy(), float(run["force_N"].iloc[0])
+        for k, gap in enumerate(np.diff(run["time_s"]), start=1):
+            way = np.clip(np.arange(dt, gap + dt / 2, dt) / max(gap - 1.0, dt), 0.0, 1.0)
+            for there in way:
+                load = force[k - 1] + there * (force[k] - force[k - 1])
+                shown += (load - shown) * dt / LAG_S
+            out.loc[run.index[k], "force_N"] = shown
+    return out
+
+
+def test_a_force_that_lags_on_springs_that_are_off_has_one_lag_in_all_directions() -> None:
+    """Each direction shows as much of it as its own springs give way."""
+    design = DESIGNS["medium"]
+    found = explained(gap_data(imported(shown_late(noisy(design, two_off)), meta(design))))
+    assert set(found.names) == {"joint_stiffness_error", "time_lag"}
+    assert found.after < 1.2 * found.noise
+    lag = next(e for e in found.effects if e.name == "time_lag").parameters["lag"]
+    assert lag.value == pytest.approx(LAG_S, rel=0.1)

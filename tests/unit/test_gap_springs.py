@@ -25,18 +25,25 @@ from tests.unit.test_gap_running import SPRING
 SOFTER = np.array([1.25, 0.8, 1.2, 0.85, 1.1, 1.0])
 
 
-def misaligned(bench: Bench) -> Variant:
-    found = library(bench, ["load_misalignment"])
-    return next(v for v in found if v.label == "all directions")
+ASKEW, LATE = ("load_misalignment", "all directions"), ("time_lag", "force filter 1.25 s")
 
 
-def test_columns_about_other_springs_are_those_of_a_rig_with_these_springs() -> None:
+def shape(bench: Bench, of: tuple[str, str]) -> Variant:
+    """A word's variant with that label."""
+    word, label = of
+    return next(v for v in library(bench, [word]) if v.label == label)
+
+
+@pytest.mark.parametrize("of", [ASKEW, LATE])
+def test_columns_about_other_springs_are_those_of_a_rig_with_these_springs(
+    of: tuple[str, str],
+) -> None:
     data = arm_data()
     bench = make_bench(data)
-    v = misaligned(bench)
+    v = shape(bench, of)
     about = EFFECTS[v.word].laws.about_springs(bench, v, bench.compliance * SOFTER)
     there = make_bench(data, compliance=bench.compliance * SOFTER)
-    wanted = misaligned(there)
+    wanted = shape(there, of)
     assert about.label != v.label
     for mine, other in zip(about.columns, wanted.columns, strict=True):
         np.testing.assert_allclose(bench.columns[mine], there.columns[other], rtol=1e-9, atol=1e-18)
@@ -47,11 +54,11 @@ def test_columns_about_other_springs_are_those_of_a_rig_with_these_springs() -> 
         np.testing.assert_allclose(bench.columns[mine], column, rtol=1e-9, atol=1e-18)
 
 
-def slanted(data: GapData, tangent: float) -> GapData:
-    """Springs that are off and a load that is askew: what was measured is linear in neither."""
+def through_others(data: GapData, of: tuple[str, str], size: float) -> GapData:
+    """Springs that are off and what acts through them: what was measured is linear in neither."""
     there = make_bench(data, compliance=data.compliance * SOFTER)
-    v = misaligned(there)
-    effect = tangent * sum(there.columns[c] for c in v.columns)
+    v = shape(there, of)
+    effect = size * sum(there.columns[c] for c in v.columns)
     total = prediction(there) + effect
     rows, layout = there.rows, there.layout
     count = rows.weight.astype(int)
@@ -69,10 +76,13 @@ def slanted(data: GapData, tangent: float) -> GapData:
     )
 
 
-def test_a_load_askew_on_springs_that_are_off_is_met_by_a_finer_shape() -> None:
-    data = slanted(arm_data(), 0.25)
+@pytest.mark.parametrize(("of", "size"), [(ASKEW, 0.25), (LATE, 1.0)])
+def test_what_acts_on_springs_that_are_off_is_met_by_a_finer_shape(
+    of: tuple[str, str], size: float
+) -> None:
+    data = through_others(arm_data(), of, size)
     bench = make_bench(data)
-    variants = library(bench, ["load_misalignment"])
+    variants = library(bench, [of[0]])
     target = bench.observed - prediction(bench)
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 4e-6, 2e-5]))
     singles = score(engine, engine.levels, variants)
@@ -200,3 +210,13 @@ def test_nothing_is_wrong_as_long_as_a_spring_is_about_as_stiff_as_stated(
     meter = replace(data.instruments, displacement=1e-3 * float(u.max()))
     stated = replace(data, instruments=meter, compliance_relative_sd=np.array([sd]))
     assert explained(stated).verdict == word
+
+
+@pytest.mark.parametrize(("hours", "pieces"), [(0.3, 32), (1.25, 50), (9.0, 64)])
+def test_a_bias_current_turns_every_minute_and_a_half(hours: float, pieces: int) -> None:
+    """Of a long session the path has more pieces, and never fewer than that of a room."""
+    data = arm_data()
+    longer = hours * 3600 / float(np.ptp(data.session))
+    bench = make_bench(replace(data, session=data.session * longer))
+    winding = [v for v in library(bench, ["force_drift"]) if v.label == "winding path"]
+    assert [v.info["pieces"] for v in winding] == [pieces]

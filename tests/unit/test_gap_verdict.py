@@ -36,10 +36,11 @@ from identification.gap.judging.choice import chosen_of, foresees
 from identification.gap.judging.leftover import looked_up
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench
-from identification.gap.model.variants import variant
+from identification.gap.model.variants import Variant, variant
 from identification.gap.search.search import (
     SPRINGS,
     _elsewhere,
+    _near,
     _seeds,
     _sharpened,
     _with_one_more,
@@ -376,7 +377,58 @@ def test_pairs_are_looked_for_around_the_best_words(
         for i, w in enumerate(words)
     ]
     monkeypatch.undo()
-    assert _seeds({e.words: e for e in ranked}, 4) == ranked[:4]
+    pool = {e.words: e for e in ranked}
+    assert _seeds(pool, 4) == ranked[:4]
+    assert _near(pool, ranked) == ranked
+
+
+def test_where_one_effect_leaves_no_more_than_noise_others_far_below_are_not_asked_at_once() -> (
+    None
+):
+    best, near, far = (
+        replace(said((part(w, [0]),), (3e-5,)), log_weight=weight)
+        for w, weight in (("joint_creep", 0.0), ("time_lag", -5.0), ("zero_shift", -7.0))
+    )
+    ranked = [best, near, far]
+    assert _near({e.words: e for e in ranked}, ranked) == [best, near]
+    worse = replace(best, eta=1e-6)
+    assert _near({e.words: e for e in [worse, near, far]}, ranked) == ranked
+
+
+@pytest.mark.parametrize(("gained", "again"), [(10.0, False), (30.0, True)])
+def test_what_a_second_effect_wins_for_the_best_is_asked_of_others_as_well(
+    gained: float, again: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One word leaves no more than the noise, another one 20 nats less explains as much."""
+    first = replace(said((part("joint_hysteresis", [0]),), (3e-5,)), log_weight=-100.0)
+    other = replace(said((part("joint_yield", [0]),), (3e-5,)), log_weight=-120.0)
+    asked: list[list[Explanation]] = []
+
+    def deepen(
+        _: Engine,
+        __: list[Variant],
+        pool: dict[frozenset[str], Explanation],
+        front: list[Explanation],
+        *more: int,
+    ) -> list[Explanation]:
+        asked.append(front)
+        both = frozenset({"joint_hysteresis", "joint_creep"})
+        pool[both] = replace(first, log_weight=-100.0 + gained)
+        return []
+
+    where = "identification.gap.search.search."
+    monkeypatch.setattr(where + "_seeds", lambda *_: [first, other])
+    monkeypatch.setattr(where + "_near", lambda *_: [first])
+    monkeypatch.setattr(where + "_in_more_joints", lambda *a: a[3])
+    monkeypatch.setattr(where + "_deepen", deepen)
+    monkeypatch.setattr(where + "_best", lambda pool: max([-100.0, *_weights(pool)]))
+    engine = small_engine(small_bench())
+    search(engine, library(engine.bench, ["zero_shift"]))
+    assert asked == [[first], [other] if again else []]
+
+
+def _weights(pool: dict[frozenset[str], Explanation]) -> list[float]:
+    return [e.log_weight for words, e in pool.items() if len(words) > 1]
 
 
 def test_what_levels_without_an_arm_really_leave_is_looked_up() -> None:

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws.closer import about_springs
+from identification.gap.laws.closer import best_about_springs
 from identification.gap.laws.drift import (
+    WINDING,
     FreePath,
     changes,
     free_path,
@@ -53,7 +54,8 @@ def variants(bench: Bench) -> list[Variant]:
     if not top > 0 or (not bench.imposed and _cannot_drift(bench)):
         return []
     amplifiers = _Amplifiers(bench, _axes(bench))
-    named, free = {k: [p] for k, p in paths(bench, shown=shown).items()}, free_paths(bench)
+    named = {k: [p] for k, p in paths(bench, shown=shown).items()}
+    free = {k: _quick(bench, k, way) for k, way in free_paths(bench).items()}
     if free:
         named["rates"] = rates(bench)
     out = []
@@ -76,6 +78,18 @@ def variants(bench: Bench) -> list[Variant]:
             )
     out += _each_run(bench, scales)
     return out + [v for k, way in free.items() for v in _free(amplifiers, k, way, scales)]
+
+
+def _quick(bench: Bench, label: str, way: FreePath) -> FreePath:
+    """The free path; a winding one with as many pieces as a bias current may turn in, which has no
+    inertia, and which the zero plateaus show."""
+    if label != WINDING:
+        return way
+    pieces = min(int(bench.course.session_span / _BIAS_S), _MOST_BIAS)
+    return way._replace(pieces=max(way.pieces, pieces))
+
+
+_BIAS_S, _MOST_BIAS = 90.0, 64  # s of each piece; pieces
 
 
 def _cannot_drift(bench: Bench) -> bool:
@@ -273,5 +287,5 @@ EFFECT = Effect(
     parameters=_parameters,
     laws=_LAWS,
     lengths=(),
-    finer=partial(about_springs, _LAWS),
+    finer=partial(best_about_springs, _LAWS),
 )

@@ -21,7 +21,7 @@ import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.data import Setup
-from identification.gap.laws.closer import about_springs
+from identification.gap.laws.closer import best_about_springs
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term, along, in_pose, triple
@@ -357,5 +357,5 @@ EFFECT = Effect(
     parameters=_parameters,
     laws=_LAWS,
     lengths=(),
-    finer=partial(about_springs, _LAWS),
+    finer=partial(best_about_springs, _LAWS),
 )

@@ -19,7 +19,14 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws.closer import Word, closing_in, shows
+from identification.gap.laws.closer import (
+    Word,
+    about_springs,
+    closing_in,
+    evidence,
+    scored_beside,
+    shows,
+)
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Law, Laws, Term
@@ -269,6 +276,9 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     does = sum(
         (much * bench.columns[c][:n] for much, c in zip(w, v.columns, strict=True)), np.zeros(n)
     )
+    if "compliance" in info:  # lags are compared as they show through the simulated springs
+        own = bench.slope_of(info["compliance"])
+        does = does * np.divide(bench.slope, own, out=np.zeros(n), where=own > 0)
     total = found.linear(np.ones(len(w)), "1")
     relative = total.sd / max(abs(total.value), 1e-6)
     lags, misses, spread = np.zeros((3, len(KINDS)))
@@ -347,17 +357,24 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
 
 
 def _look_closer(word: Word) -> list[Variant]:
+    """Lags about those that were found; of a force that lags also with the springs as they are, of
+    whose response it shows a part too late."""
     if not shows(word):
         return []
     channels = {s.variant.info["channel"]: s for s in reversed(word.beside or word.alone)}
-    return closing_in(word, refined, list(channels.values()))
+    finer = closing_in(word, refined, list(channels.values()))
+    driven = [v for v in finer if v.info["channel"] == "force"]
+    found = scored_beside(word.engine, word.families, word.ranked, driven)
+    best = max(found, key=evidence, default=None)
+    return finer if best is None else [*finer, about_springs(_LAWS, word.engine, best.variant)]
 
 
+_LAWS = Laws(_describe, _columns, through_springs=True)
 EFFECT = Effect(
     WORD,
     variants=variants,
     parameters=_parameters,
-    laws=Laws(_describe, _columns),
+    laws=_LAWS,
     lengths=(),
     finer=_look_closer,
     beside=True,

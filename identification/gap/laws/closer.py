@@ -144,13 +144,17 @@ def places(
     return [s for i, s in enumerate(found) if s.variant not in [f.variant for f in found[:i]]]
 
 
-def about_springs(laws: Laws, word: Word) -> list[Variant]:
+def about_springs(laws: Laws, engine: Engine, found: Variant) -> Variant:
     """What goes through the springs, with the springs as they are found to be beside it."""
-    bench, out = word.engine.bench, []
-    for found in dict.fromkeys(s[0].variant for s in (word.alone, word.beside) if s):
-        v = found
-        for _ in range(_STEPS):
-            softer = estimate(word.engine, v).softer
-            v = laws.about_springs(bench, found, bench.compliance * np.maximum(1 + softer, 0.1))
-        out.append(v)
-    return out
+    v = found
+    for _ in range(_STEPS):
+        softer = estimate(engine, v).softer
+        compliance = engine.bench.compliance * np.maximum(1 + softer, 0.1)
+        v = laws.about_springs(engine.bench, found, compliance)
+    return v
+
+
+def best_about_springs(laws: Laws, word: Word) -> list[Variant]:
+    """The best alone and beside the leading word, with the springs as they are."""
+    best = dict.fromkeys(s[0].variant for s in (word.alone, word.beside) if s)
+    return [about_springs(laws, word.engine, v) for v in best]

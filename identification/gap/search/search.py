@@ -60,9 +60,17 @@ def search(
     empty = Explanation((), none + LOG_NONE, 0.0, (), none + LOG_NONE)
     pool[frozenset()] = empty
     seeds = _SEEDS if engine.bench.data.arm else _BENCH_SEEDS
-    front = _in_more_joints(engine, all_of_them, pool, _seeds(pool, seeds))
+    singly = _seeds(pool, seeds)
+    near = _near(pool, singly)
+    front, alone_best = _in_more_joints(engine, all_of_them, pool, near), _best(pool)
     for depth in range(2, deepest + 1):
-        front = _deepen(engine, all_of_them, pool, front, depth, max(2, seeds // depth))
+        kept = max(2, seeds // depth)
+        front = _deepen(engine, all_of_them, pool, front, depth, kept)
+        if depth == 2:  # what a second effect wins for the best, it may win for others as well
+            reach = alone_best - (_best(pool) - alone_best)
+            late = [e for e in singly if e not in near and e.log_weight > reach]
+            late = _in_more_joints(engine, all_of_them, pool, late)
+            front += _deepen(engine, all_of_them, pool, late, depth, kept)
         if not front:
             break
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
@@ -139,13 +147,21 @@ def force(
 
 
 def _seeds(pool: dict[frozenset[str], Explanation], most: int) -> list[Explanation]:
-    """Around which explanations another effect is looked for: the `most` best; where the best of
-    all leaves no more than the noise, those of them within half a window of it."""
-    ranked = sorted((e for e in pool.values() if e.parts), key=lambda e: -e.log_weight)
-    best = max(e.log_weight for e in pool.values())
+    """Around which explanations another effect may be looked for: the `most` best."""
+    return sorted((e for e in pool.values() if e.parts), key=lambda e: -e.log_weight)[:most]
+
+
+def _near(pool: dict[frozenset[str], Explanation], seeds: list[Explanation]) -> list[Explanation]:
+    """Around which of them it is looked for at once: where the best of all leaves no more than the
+    noise, those within half a window of it."""
+    best = _best(pool)
     clean = [e for e in pool.values() if e.log_weight == best and e.eta == 0]
     reach = _WINDOW / 2 if clean else np.inf
-    return [e for e in ranked[:most] if e.log_weight > best - reach]
+    return [e for e in seeds if e.log_weight > best - reach]
+
+
+def _best(pool: dict[frozenset[str], Explanation]) -> float:
+    return max(e.log_weight for e in pool.values())
 
 
 def _deepen(
@@ -158,7 +174,7 @@ def _deepen(
 ) -> list[Explanation]:
     """Adds one more effect to each explanation of the front; those that gain, up to `kept`, are the
     next front. The variants grow by what is looked at beside others."""
-    best = max(e.log_weight for e in pool.values())
+    best = _best(pool)
     grown: dict[frozenset[str], Explanation] = {}
     for start in front:
         if len(start.words) != depth - 1:
