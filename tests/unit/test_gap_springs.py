@@ -212,7 +212,7 @@ def test_nothing_is_wrong_as_long_as_a_spring_is_about_as_stiff_as_stated(
     assert explained(stated).verdict == word
 
 
-@pytest.mark.parametrize(("hours", "pieces"), [(0.3, 32), (1.25, 50), (9.0, 64)])
+@pytest.mark.parametrize(("hours", "pieces"), [(0.3, 32), (1.26, 50), (9.0, 64)])
 def test_a_bias_current_turns_every_minute_and_a_half(hours: float, pieces: int) -> None:
     """Of a long session the path has more pieces, and never fewer than that of a room."""
     data = arm_data()
