@@ -24,17 +24,20 @@ PLAY, CURVE = "joint_backlash", "joint_nonlinear_stiffness"
 
 
 class Limits(NamedTuple):
-    """Of a play: stiffness within it, of that of the flanks; way from loose to stiff, of it."""
+    """Of a play: stiffness within it, of that of the flanks; way from loose to stiff, of it; how
+    much stiffer flanks may get towards the ends of the way."""
 
     loose: float
     sharp: float
+    hardens: float
 
 
 # To say play although a curve is likelier; to say it where that is the likelier one, as it is of
-# few curves: what hardens as fast as a cubic spring passes.
-PLAINLY, SOMEHOW = Limits(0.2, 0.2), Limits(0.3, 0.35)
+# few curves: what hardens as fast as a cubic spring passes. Tissue hardens ever more, as exp(u),
+# and leaves its soft middle fast; teeth that are pressed together get stiffer by less (Hertz 1881).
+PLAINLY, SOMEHOW = Limits(0.2, 0.2, 1.75), Limits(0.3, 0.35, np.inf)
 _POINTS = 400  # over the way of the displacement
-_STIFF = 0.75  # quantile of the stiffness that counts as that of the flanks
+_STIFF, _STIFFEST = 0.75, 0.95  # quantiles of the stiffness: that of the flanks; at their ends
 _SOFT, _BACK = 0.4, 0.6  # of it: at the ends of the play; beyond them, and across a step
 _WIDTHS = (0.01, 0.7)  # of the way
 _FEWEST = 100  # places that were read, of the points
@@ -60,7 +63,8 @@ def spoken_for(
     u, force = _curve(engine, best)
     if word == PLAY and _is_a_step(u, force):
         return {}
-    play = has_dead_zone(u, force, PLAINLY if word == CURVE else SOMEHOW)
+    plainly = PLAINLY._replace(hardens=np.inf) if rest else PLAINLY  # what rubs is stiff at turns
+    play = has_dead_zone(u, force, plainly if word == CURVE else SOMEHOW)
     return {} if play == (word == PLAY) else {best.words: other}
 
 
@@ -92,6 +96,8 @@ def has_dead_zone(u: Array, force: Array, limits: Limits) -> bool:
     """Whether force (n,) over displacement u (n,) has a dead zone with sharp ends, inside. None of
     what has no stiff flanks."""
     share = _stiffness(u, force)
+    if np.quantile(share, _STIFFEST) > limits.hardens:
+        return False
     return any(_is_play(share, a, b, limits) for a, b in _soft(share))
 
 
