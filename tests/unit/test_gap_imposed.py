@@ -11,7 +11,12 @@ import pytest
 from identification.arrays import Array
 from identification.gap.data import GapData
 from identification.gap.model.bench import displacement_imposed, make_bench
-from identification.gap.recording.imposed import _Channel, _slides, displacement_simpler
+from identification.gap.recording.imposed import (
+    _Channel,
+    _goes_on,
+    _slides,
+    displacement_simpler,
+)
 from tests.conformance.gap_designs import linear
 from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
@@ -368,3 +373,34 @@ def test_a_rig_that_slides_at_one_force_was_not_driven_by_it() -> None:
     rng = np.random.default_rng(9)
     force = slider(stroke, 0.05) + rng.normal(0, 2e-4, 1200)
     assert displacement_simpler(running(force * 100, 1e-3 * stroke))
+
+
+def necked() -> GapData:
+    """A bar with an extensometer: up its elastic part evenly, which takes half of the readings, on
+    a plateau, up again, and down beyond the neck."""
+    s = np.linspace(0.0, 1.0, 200)
+    moved = np.where(s < 0.5, 0.01 * s, 0.005 + 4.0 * (s - 0.5) ** 2)
+    force = np.interp(s, [0, 0.5, 0.51, 0.6, 0.85, 1.0], [0, 0.65, 0.6, 0.62, 1.0, 0.86])
+    rng = np.random.default_rng(5)
+    return bench_data(
+        8.0 * (force + 1e-3 * rng.standard_normal(200)),
+        2**-10 * (moved + 1e-3 * rng.standard_normal(200)),
+        time=200 * s,
+        session=200 * s,
+        step=np.full(200, -1),
+        branch=np.full(200, 3),
+        run=np.zeros(200, dtype=np.int64),
+        repetition=np.ones(200, dtype=np.int64),
+    )
+
+
+def test_a_pull_that_goes_on_while_its_force_falls_was_no_force_that_was_set() -> None:
+    data = necked()
+    assert displacement_imposed(data)
+    force, moved = data.force, data.displacement
+    assert _goes_on(force, moved, 0.01)
+    assert not _goes_on(np.minimum(force, 0.9 * force.max()), moved, 0.01)  # a twentieth lower
+    assert not _goes_on(force, moved, 0.2)  # that may be noise
+    assert not _goes_on(force, np.minimum(moved, moved[170]), 0.01)  # nothing goes on
+    there_and_back = np.concatenate([moved, moved[::-1]])
+    assert not _goes_on(np.concatenate([force, force[::-1]]), there_and_back, 0.01)

@@ -72,7 +72,7 @@ def displacement_simpler(data: GapData) -> bool:
     most samples; False where they are alike."""
     mine = np.flatnonzero(data.setup == np.bincount(data.setup).argmax())
     force, moved = data.force[mine], data.displacement[mine]
-    if approaches(data, mine):
+    if approaches(data, mine) or _goes_on(force, moved, data.instruments.force):
         return True
     instruments = data.instruments
     stands = (
@@ -123,6 +123,23 @@ _NO_FORCE, _APPROACH = 0.02, 0.3  # of the largest force (or a way back), and of
 _FAST = 2.0  # times as fast as all of it
 _WELL_BEFORE, _NOTHING = 0.75, 4.0  # of the way at no force; standard uncertainties: a curve that
 # begins to stiffen shows more force there
+
+
+def _goes_on(force: Array, moved: Array, sd: float) -> bool:
+    """Whether a single pull, of force (m,) and displacement (m,), goes on while its force falls, as
+    beyond the neck of a bar: under a force that is lowered nothing goes on. sd: of a force."""
+    if len(moved) < _FEWEST or not np.ptp(moved) > 0:
+        return False
+    size, way = np.abs(force), np.abs(moved - moved[0]) / float(np.ptp(moved))
+    first = int(size.argmax())
+    last = first + int(size[first:].argmin())
+    noise = max(white_sd(np.diff(force, 2)), sd)
+    fell = size[first] - size[last] > max(_FALLS * size[first], _CLEARLY * noise)
+    return bool(fell and way[last] - way[first] > _FURTHER and way_back(way) < _TOP)
+
+
+_FALLS, _FURTHER = 0.08, 0.05  # of the largest force; of the way
+_CLEARLY = 8.0  # standard deviations: of many readings the largest two are far apart
 
 
 def on_plateau(data: GapData, hold: Ints) -> bool:
