@@ -10,11 +10,11 @@ import numpy as np
 from identification.uncertainty import TWO_SIDED
 from rig import plotting
 from rig.analysis.analyze import Analysis
+from rig.analysis.quality import RunZeros
 from rig.canvas import DISPLACEMENT, FORCE, blank
 from rig.dataset import Dataset
 from rig.plotting import COLOURS, MARKERS
 from rig.report.compare import aligned
-from rig.report.quality import RunZeros
 from rig.units import KNM, MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:

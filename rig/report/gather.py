@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from rig import schemas
 from rig.analysis.analyze import Analysis, analyze
 from rig.analysis.identify import IdentifyResult, identify
+from rig.analysis.quality import Quality, assess
 from rig.dataset import Dataset, load_each
 from rig.errors import InputError
 from rig.journal import journal_path
 from rig.protocol import parse_protocol
 from rig.report.compare import Pair, compare, same_instruments
 from rig.report.diagnosing import TURNED_OFF, Diagnosed, Waiting, without_name
-from rig.report.quality import Quality, assess
 from rig.report.wishes import Named, Wishes
 from rig.software import software_version
 from rig.terminal import Progress, silent

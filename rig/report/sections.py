@@ -40,6 +40,7 @@ def in_short(session: Session, data: Node) -> Section:
     rows.append(("Joints", _joints(data)))
     rows.append(("Gap to the simulation", _gap(data)))
     rows.append(("Data", _data(session, data)))
+    rows += [("Mind", note.text()) for note in data["analyze"]["notes"]]
     note = Paragraph(("In brackets: 95 % intervals.",), "note")
     return Section("short", "In short", (Facts(tuple(rows)), note), session.dataset.banners())
 
