@@ -1,5 +1,5 @@
 """Builds docs/example.md from docs/example.in.md: python docs/build_example.py
-With a name it writes the page's data set there: python docs/build_example.py out/example/paper_xy.h5
+With a name (out/example/paper_xy.h5) it writes the page's data set there instead.
 
 Every fenced block that begins with ```python is run as a notebook runs a cell: in order, in one
 namespace, followed by what it printed and by its last value. `picture(path, words)` puts a figure

@@ -119,6 +119,10 @@ def couple(
     """
     read = load_model(model)
     spec = _spec(read)
+    if read.effects:
+        from rig.diagnosis.gap_forms import effects_of
+
+        effects_of(read)  # left out here, but refused where nobody could read them
     C = _regular_compliance(read)
     kinds = _kinds(spec)
     single = on_axes(C, np.eye(3))

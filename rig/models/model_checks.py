@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from identification.arm import Arm, tool_offset, tool_transform
@@ -38,8 +40,23 @@ def tool_of(document: Document[ModelFile]) -> Array:
 
 
 def doubts(document: Document[ModelFile], arm: Arm, nominal: Array) -> tuple[str, ...]:
-    """Questions about springs of another order of size than the robot's; nominal (6,) Nm/rad: of
-    the robot file, zeros without one."""
+    """Questions about angles that may be radians, and about springs of another order of size than
+    the robot's; nominal (6,) Nm/rad: of the robot file, zeros without one."""
+    return (*_radians(document), *_springs(document, arm, nominal))
+
+
+def _radians(document: Document[ModelFile]) -> Iterator[str]:
+    """As of a protocol's poses (`rig.plan_margins`)."""
+    q_deg = document.value.pose.q_deg
+    most = max(map(abs, q_deg)) if q_deg else 0.0
+    if 0 < most <= 2 * np.pi:
+        yield (
+            f"{document.at(('pose', 'q_deg'))}: pose.q_deg: all joints within {most:.2f} deg of "
+            "zero, the arm stretched out. If these are radians, write q_rad."
+        )
+
+
+def _springs(document: Document[ModelFile], arm: Arm, nominal: Array) -> tuple[str, ...]:
     springs = document.value.joint_stiffness_Nm_per_rad
     if springs is None:
         return ()

@@ -25,6 +25,7 @@ from rig.diagnosis.gap_path import left_out, predict
 from rig.digits import number
 from rig.errors import InputError
 from rig.models.model import ArmModel, load_model, told_first
+from rig.plan_margins import unit_warnings
 from rig.protocol import MeasurementProtocol, Run, load_protocol
 from rig.units import MM_PER_M, N_PER_MM
 
@@ -196,7 +197,7 @@ def _notes(
     model: ArmModel, procedure: MeasurementProtocol, effects: tuple[Form, ...]
 ) -> tuple[str, ...]:
     notes = [*([model.note] if model.note else []), *model.doubts]
-    notes += _other_setup(model, procedure)
+    notes += [*unit_warnings(procedure), *_other_setup(model, procedure)]
     if procedure.branches == "loading-unloading" and not effects:
         notes.append("Springs unload along the loading curve: each level stands once.")
     if any(run.stop_at_displacement_mm is not None for run in procedure.runs):

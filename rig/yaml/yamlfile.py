@@ -133,6 +133,14 @@ def read_document_text(
     return Document(name, text, value, reader.places)
 
 
+def place_in_text(text: str, name: str, path: Key) -> str:
+    """`NAME:LINE:COLUMN` of the value at `path` (or the nearest enclosing one) in text that is not
+    validated; InputError for text that is no YAML."""
+    reader = Reader()
+    reader.read(compose(text, name))
+    return address(name, _problem(reader.places, path, ""))
+
+
 _KINDS = {
     "rig.protocol": "a protocol",
     "rig.station": "a station",

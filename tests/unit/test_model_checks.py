@@ -99,6 +99,27 @@ def test_springs_of_an_arm_that_no_file_describes(tmp_path: Path) -> None:
     assert load_model(MODELS / "F2.yaml").doubts == ()
 
 
+RADIANS = "[0.2344, -1.7425, -1.8867, -1.0832, 1.5708, -1.3364]"
+ASKED = "all joints within 1.89 deg of zero, the arm stretched out. If these are radians, write"
+
+
+def test_radians_in_the_place_of_degrees_are_asked_about(tmp_path: Path) -> None:
+    degrees = "[13.43, -99.84, -108.10, -62.06, 90.0, -76.57]"
+    path = changed(tmp_path, (degrees, RADIANS))
+    (asked,) = load_model(path).doubts
+    assert asked == f"{path}:5:15: pose.q_deg: {ASKED} q_rad."
+    protocol = tmp_path / "p.yaml"
+    protocol.write_text(PAPER_XY.read_text("utf-8").replace(degrees, RADIANS))
+    notes = simulate(MODELS / "F1.yaml", protocol).notes
+    assert any(note.startswith(f"pose P1: {ASKED}") for note in notes)
+
+
+def test_effects_of_unknown_words_are_refused(tmp_path: Path) -> None:
+    told = refusal(changed(tmp_path, ("effects: []", "effects: [{name: joint_yeild}]")))
+    assert told.startswith("m.yaml:9: effects[0]")
+    assert "joint_yield" in told
+
+
 def test_a_beam_of_no_diameter_is_told_as_such(tmp_path: Path) -> None:
     beam = "kind: {beam: {material: steel, diameter_mm: 0, half_length_mm: 50}}"
     assert refusal(changed(tmp_path, ("kind: rigid", beam))) == (
