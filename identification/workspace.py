@@ -176,7 +176,7 @@ def monte_carlo(
 def _shared(reached: Reached, distance: float) -> float:
     """Volume in which a point and its mirror image in the plane x = distance / 2 are reached."""
     limit = reached.cells.shape[0] * reached.cell
-    step = max(reached.cell, 0.01, limit / 300)
+    step = max(reached.cell, 0.01, limit / 300)  # or the largest arms take half a minute
     half = distance / 2
     if half >= limit:
         return 0.0
