@@ -1,4 +1,5 @@
 """Builds docs/example.md from docs/example.in.md: python docs/build_example.py
+With a name (out/example/paper_xy.h5) it writes the page's data set there instead.
 
 Every fenced block that begins with ```python is run as a notebook runs a cell: in order, in one
 namespace, followed by what it printed and by its last value. `picture(path, words)` puts a figure
@@ -13,6 +14,7 @@ import io
 import os
 import re
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -28,6 +30,7 @@ from rig.worlds.direct import sample_protocol
 
 HERE = Path(__file__).resolve().parent
 SOURCE, PAGE, PICTURES = HERE / "example.in.md", HERE / "example.md", HERE / "pictures"
+DATA = Path("out/example/paper_xy.h5")  # as the page calls it
 SEED = 1
 _CELL = re.compile(r"^```python\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
 _HEAD = "<!-- Built by `python docs/build_example.py` from example.in.md; edit that one. -->\n"
@@ -35,6 +38,7 @@ _HEAD = "<!-- Built by `python docs/build_example.py` from example.in.md; edit t
 
 def measured(path: Path) -> None:
     """Writes the data set that the page works on."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     protocol = load_protocol(HERE.parent / "protocols" / "paper_xy.yaml")
     columns = dict(sample_protocol(make_world("paper", SEED), protocol, SEED))
     columns["discarded"] = np.zeros(len(columns["force_N"]), dtype=bool)
@@ -74,8 +78,7 @@ def build(source: str, pictures: Path | None) -> str:
         return cell.group(0) + shown + "".join(images)
 
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _own_cache(folder):
-        (Path(folder) / "data").mkdir()
-        measured(Path(folder) / "data" / "paper_xy.h5")
+        measured(DATA)
         return _HEAD + _CELL.sub(run, source)
 
 
@@ -107,7 +110,12 @@ def _own_cache(folder: str) -> Any:
 
 
 def main() -> None:
-    """Writes the page and its pictures."""
+    """Writes the page and its pictures, or the data set that is named."""
+    if sys.argv[1:]:
+        path = Path(sys.argv[1])
+        measured(path)
+        print(f"{path}: written")
+        return
     PAGE.write_text(build(SOURCE.read_text("utf-8"), PICTURES), "utf-8")
     print(f"{PAGE}: {len(list(PICTURES.glob('example_*.png')))} pictures")
 

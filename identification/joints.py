@@ -23,6 +23,8 @@ from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 # uncertainties), and when at least nine tenths of what is known of it come from the data.
 IDENTIFIED_RELATIVE = 0.05 / 3
 IDENTIFIED_SHARE = 0.9
+_DUST = 1e-9  # shares below are rounding
+_NO_LEVER = 1e-6  # m: a joint with less is not loaded
 _RANK = 1e-7  # singular values below this share of the largest are rounding
 _ITERATIONS = 60
 
@@ -33,7 +35,8 @@ class Observation:
 
     q (6,) rad; direction (3,) unit vector in the base frame; tool (4, 4) flange_T_tcp or None.
     joints, u_joints (6,) rad/N: how the joint readings moved per force; None when they do not see
-    the deflection; NaN for a joint without a reading. setup: whose gains it shares.
+    the deflection; NaN for a joint without a reading. setup: whose gains it shares. bent_over:
+    lowest and highest force (N) of a curve that is not straight, of which this is an average.
     """
 
     q: Array
@@ -45,6 +48,7 @@ class Observation:
     u_joints: Array | None = None
     setup: int = 0
     label: str = ""
+    bent_over: tuple[float, float] | None = None
 
     def levers(self, arm: Arm) -> Array:
         """`n^T J` (6,): torque of each joint per force, m."""
@@ -147,6 +151,7 @@ def identify(
     covariance: Array = np.asarray(np.linalg.inv(information), dtype=np.float64)
     own = covariance[:JOINTS, :JOINTS]
     share = 1 - np.diag(own) / np.log1p(np.square(prior.relative_sd))
+    share[np.abs(share) < _DUST] = 0.0
     sd = np.sqrt(np.diag(own))
     rank, null, condition = _rank(J[:, :JOINTS])
     return JointFit(
@@ -263,7 +268,9 @@ def _lower_bounds(arm: Arm, observations: Sequence[Observation], gains: Sequence
     for one in observations:
         gain = np.hypot(gains[one.setup].force, gains[one.setup].displacement)
         u = np.hypot(one.u_compliance, gain * one.compliance)
-        out = np.maximum(out, one.levers(arm) ** 2 / (one.compliance + TWO_SIDED_90 * u))
+        lever = one.levers(arm)
+        lever[np.abs(lever) < _NO_LEVER] = 0.0
+        out = np.maximum(out, lever**2 / (one.compliance + TWO_SIDED_90 * u))
     return out
 
 
@@ -284,5 +291,26 @@ def _check_agreement(arm: Arm, observations: Sequence[Observation], gains: Seque
                 raise ValueError(
                     f"{second.label} and {first.label} contradict each other: "
                     f"{1e-3 / second.compliance:.4g} and {1e-3 / first.compliance:.4g} N/mm in the "
-                    "same pose and direction, far beyond their uncertainties"
+                    "same pose and direction, far beyond their uncertainties. "
+                    f"{_why_apart(second, first)}"
                 )
+
+
+def _why_apart(a: Observation, b: Observation) -> str:
+    """What may be behind two compliances that contradict each other, and what to do."""
+    bent = [one for one in (a, b) if one.bent_over is not None]
+    if not bent:
+        return (
+            "Was something mounted, moved or set anew between the two? Leave out the one that no "
+            "longer holds"
+        )
+    ranges = ", ".join(
+        f"{one.label} over {one.bent_over[0]:.4g} to {one.bent_over[1]:.4g} N"
+        for one in bent
+        if one.bent_over is not None
+    )
+    return (
+        "A curve that is not straight has no single stiffness, but an average over what was "
+        f"loaded ({ranges}). Give the data set whose range of force matters, or measure both at "
+        "the same levels; rig diagnose separates springs from effects"
+    )

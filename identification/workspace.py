@@ -11,16 +11,22 @@ from numpy.typing import ArrayLike, NDArray
 from identification.arm import JOINTS, Arm
 from identification.arrays import Array
 
+_MOST_A_SIDE = 500  # cells: with 180 azimuths, 45 MB
 _CHUNK = 50_000  # rows that stay in the processor's cache
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """single, coupled: m^3; definition: in words, because volumes of different ones differ."""
+    """single, coupled: m^3; definition: in words, because volumes of different ones differ.
+
+    thin: share of the single volume in cells that one sample alone fell into; about as much may be
+    missing in cells that none has found (first-order jackknife), 0 where nothing is sampled.
+    """
 
     single: float
     coupled: float
     definition: str
+    thin: float = 0.0
 
     @property
     def ratio(self) -> float:
@@ -64,11 +70,12 @@ def flange_points(arm: Arm, q: ArrayLike) -> Array:
 class Reached:
     """Cells (radius, height, azimuth) about axis 1 that samples fell into; edges of size `cell`.
 
-    One azimuth where joint 1 turns all the way round.
+    One azimuth where joint 1 turns all the way round. once: cells with a single sample.
     """
 
     cells: NDArray[np.bool_]
     cell: float
+    once: NDArray[np.bool_]
 
     def contains(self, x: Array, y: Array, z: Array) -> NDArray[np.bool_]:
         """Whether points (same shapes, m, base frame) lie in a reached cell."""
@@ -87,8 +94,16 @@ class Reached:
 
     def volume(self) -> float:
         """Volume of all reached cells in m^3."""
-        rings = np.pi * self.cell**2 * (2 * np.arange(self.cells.shape[0]) + 1)
-        filled = self.cells.sum(axis=(1, 2)) / self.cells.shape[2]
+        return self._volume(self.cells)
+
+    def thin(self) -> float:
+        """Share of that volume in cells with a single sample."""
+        whole = self.volume()
+        return float(self._volume(self.once) / whole) if whole > 0 else 0.0
+
+    def _volume(self, cells: NDArray[np.bool_]) -> float:
+        rings = np.pi * self.cell**2 * (2 * np.arange(cells.shape[0]) + 1)
+        filled = cells.sum(axis=(1, 2)) / cells.shape[2]
         return float(rings @ filled) * self.cell
 
 
@@ -104,20 +119,21 @@ def sample(
 
     Joints that turn more than once are sampled over one turn. Memory stays below 100 MB whatever
     the number of samples; `progress` gets the share that is done. cell: m; by default it shrinks
-    with the number of samples, so that neither missed cells nor half-filled ones at the rim count.
+    with the number of samples, so that neither missed cells nor half-filled ones at the rim count,
+    and grows with the arm where there would be too many.
     """
     if samples < 1:
         raise ValueError(f"{samples} samples; at least 1 is wanted")
-    cell = _cell(samples) if cell is None else cell
+    cell = max(_cell(samples), outermost(arm) / _MOST_A_SIDE) if cell is None else cell
     if not cell > 0:
         raise ValueError(f"cells of {cell:g} m; above 0 m is wanted")
     rng = np.random.default_rng(seed)
     low, span = arm.q_min, np.minimum(arm.q_max - arm.q_min, 2 * np.pi)
     full_turn = bool(span[0] >= 2 * np.pi)
     sectors = 1 if full_turn else 180
-    limit = _outermost(arm)
+    limit = outermost(arm)
     shape = (int(limit / cell) + 2, int((limit + abs(arm.d[0])) / cell) + 2, sectors)
-    cells = np.zeros(shape, dtype=bool)
+    cells, several = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
     for start in range(0, samples, _CHUNK):
         q = low + span * rng.random((min(_CHUNK, samples - start), JOINTS))
         if full_turn:
@@ -127,10 +143,13 @@ def sample(
         turn = np.arctan2(p[:, 1], p[:, 0]) / (2 * np.pi) % 1.0
         azimuth = np.minimum((turn * sectors).astype(int), sectors - 1)
         radius = (np.hypot(p[:, 0], p[:, 1]) / cell).astype(int)
-        cells[radius, (p[:, 2] / cell).astype(int), azimuth] = True
+        at = np.ravel_multi_index((radius, (p[:, 2] / cell).astype(int), azimuth), shape)
+        hit, count = np.unique(at, return_counts=True)
+        several.flat[hit] |= (count > 1) | cells.flat[hit]
+        cells.flat[hit] = True
         if progress is not None:
             progress(min(1.0, (start + _CHUNK) / samples))
-    return Reached(cells, cell)
+    return Reached(cells, cell, cells & ~several)
 
 
 def monte_carlo(
@@ -150,13 +169,14 @@ def monte_carlo(
         f"Monte Carlo: {samples} joint positions, uniform within the joint limits; cells of "
         f"{reached.cell * 1e3:.3g} mm about axis 1 that the flange falls into, z > 0; coupled "
         f"where its mirror image, base {distance:g} m away, does too",
+        reached.thin(),
     )
 
 
 def _shared(reached: Reached, distance: float) -> float:
     """Volume in which a point and its mirror image in the plane x = distance / 2 are reached."""
-    step = max(reached.cell, 0.01)
     limit = reached.cells.shape[0] * reached.cell
+    step = max(reached.cell, 0.01, limit / 300)  # or the largest arms take half a minute
     half = distance / 2
     if half >= limit:
         return 0.0
@@ -170,10 +190,10 @@ def _shared(reached: Reached, distance: float) -> float:
         both = reached.contains(grid_x, grid_y, level)
         both &= reached.contains(distance - grid_x, grid_y, level)
         count += int(both.sum())
-    return 2 * count * step**3
+    return float(2 * count * step**3)
 
 
-def _outermost(arm: Arm) -> float:
+def outermost(arm: Arm) -> float:
     """The flange is no farther from the base than the sum of all lengths."""
     return float(np.hypot(arm.a, arm.d).sum())
 

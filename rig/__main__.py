@@ -1,5 +1,5 @@
 """`python -m rig` is the command `rig`."""
 
-from rig.cli import main
+from rig.start import main
 
 main()

@@ -15,7 +15,7 @@ from drivers.kistler.settings import KistlerSettings
 from drivers.operator.settings import OperatorSettings
 from drivers.ur10e.settings import Ur10eSettings
 from rig.errors import InputError, did_you_mean
-from rig.yaml.yamlfile import Document, read_document, read_document_text
+from rig.yaml.yamlfile import Document, place_in_text, read_document, read_document_text, read_text
 from rig.yaml.yamlnodes import Key
 
 STATIONS = Path(rig.__file__).resolve().parent.parent / "protocols" / "stations"
@@ -100,7 +100,16 @@ def station_for(protocol_file: Path, its_own: str, other: str | None) -> Station
     """The station that a protocol is carried out on: `other` (--station), or `its_own`."""
     if other is not None:
         return load_station(other, protocol_file.parent, "--station: ")
-    return load_station(its_own, protocol_file.parent, f"{protocol_file}: ")
+    return load_station(its_own, protocol_file.parent, f"{_where(protocol_file)}: ")
+
+
+def _where(protocol_file: Path) -> str:
+    """The line of a protocol that names its station; the file alone if it can't be read again."""
+    name = str(protocol_file)
+    try:
+        return place_in_text(read_text(protocol_file), name, ("station",))
+    except InputError:
+        return name
 
 
 def parse_station(text: str, path: Path) -> Station:

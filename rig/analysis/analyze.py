@@ -12,8 +12,9 @@ from identification import stiffness as st
 from identification.estimate import WEIGHTINGS, Weighting
 from identification.uncertainty import Contribution, Quantity
 from rig import schemas
+from rig.analysis.doubts import doubts
+from rig.analysis.quality import Recorded
 from rig.errors import InputError, close_to
-from rig.measurements import Measurements
 from rig.reduce import curves
 from rig.storage.files import legible
 from rig.units import MM_PER_M, N_PER_MM
@@ -59,7 +60,7 @@ def weighting(word: str) -> Weighting | Literal["auto"]:
     )
 
 
-class Source(Measurements, Protocol):
+class Source(Recorded, Protocol):
     """What is asked of a data set; `rig.dataset.Dataset` has it."""
 
     @property
@@ -94,7 +95,8 @@ class Direction:
 @dataclass(frozen=True)
 class Analysis:
     """directions: by the direction's name, or `pose/direction` where several poses have it.
-    anisotropy: (a, b), two such names within a pose -> ratio of their k."""
+    anisotropy: (a, b), two such names within a pose -> ratio of their k.
+    notes: what makes the numbers doubtful, of the recording as a whole."""
 
     uuid: str
     name: str
@@ -103,6 +105,7 @@ class Analysis:
     banners: tuple[str, ...]
     directions: dict[str, Direction]
     anisotropy: dict[tuple[str, str], Quantity]
+    notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Schema rig.analysis/1: units in the keys, null for what is not defined."""
@@ -111,6 +114,7 @@ class Analysis:
             "dataset": self.uuid,
             "origin": self.origin,
             "complete": self.complete,
+            "notes": list(self.notes),
             "directions": {key: _direction(d) for key, d in self.directions.items()},
             "anisotropy": {f"{a}/{b}": quantity(q) for (a, b), q in self.anisotropy.items()},
         }
@@ -146,6 +150,7 @@ def analyze(dataset: Source, options: Options | None = None) -> Analysis:
         dataset.banners(),
         directions,
         anisotropy,
+        doubts(dataset),
     )
 
 

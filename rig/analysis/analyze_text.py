@@ -19,6 +19,7 @@ def text(analysis: Analysis) -> str:
     if lines:
         lines.append("")
     lines.append(f"{analysis.name}: {answer(analysis)}")
+    lines += [f"Mind: {note}" for note in analysis.notes]
     for key, direction in analysis.directions.items():
         lines += ["", *_direction(key, direction)]
     return "\n".join(lines)

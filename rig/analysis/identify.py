@@ -257,12 +257,35 @@ def _observations(
                 u_joints=u_joints,
                 setup=setup,
                 label=f"{name}: pose {curve.pose}, direction {curve.direction}",
+                bent_over=_range(result) if result.bent else None,
             )
         )
     if not out:
-        raise InputError(f"{name}: no pose and direction has a stiffness. {' '.join(notes)}")
+        raise InputError(_without_stiffness(dataset, name, notes))
     bent = [f"{curve.pose}/{curve.direction}" for curve, result, _ in found if result.bent]
     return out, notes + [_averages(name, bent)] * bool(bent)
+
+
+def _without_stiffness(dataset: Dataset, name: str, notes: list[str]) -> str:
+    """Why a data set says nothing of joints, and what to do."""
+    told = f"{name}: no pose and direction has a stiffness"
+    why = [f"{told}.", *notes] if dataset.rows else [f"{told}: the data set holds no samples."]
+    if dataset.complete:
+        return " ".join([*why, "Leave this data set out."])
+    return " ".join(
+        [
+            *why,
+            "The measurement did not reach its end: go on with rig measure --resume, or leave "
+            "this data set out.",
+        ]
+    )
+
+
+def _range(result: Stiffness) -> tuple[float, float]:
+    """Lowest and highest force N that counts towards k."""
+    levels = [p for p in result.levels if p.branch == "loading"]
+    forces = [p.force for p in levels if p.step not in result.steps_out]
+    return min(forces), max(forces)
 
 
 def _averages(name: str, bent: list[str]) -> str:

@@ -14,6 +14,7 @@ import typer
 
 from rig.cli.commands import app
 from rig.cli.options import say
+from rig.start import hear_interrupts
 
 _UNREAD = 141  # as shells show the end of usual tools (128 + SIGPIPE): 1 would be a bug
 
@@ -52,10 +53,12 @@ def _run() -> None:
     # Only now: another distribution's `drivers` would fail here before it could be named.
     from drivers.errors import DeviceError, SafetyStop
 
+    command = typer.main.get_command(app)
+    hear_interrupts()
     try:
         # Ends the process itself: 0 done, 2 wrong arguments, 130 interrupted. Calling `app`
         # would put typer's hook, which prints tracebacks, in place of ours.
-        typer.main.get_command(app)()
+        command()
     except SystemExit as ending:
         if isinstance(ending.__context__, BrokenPipeError):  # typer's 1 for it
             _end_unread(_UNREAD)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from rig import schemas
 from rig.arrays import Array
 from rig.coupling import coupling_task
 from rig.coupling.coupling_path import read_path, run_path
+from rig.digits import brief
 from rig.errors import InputError
 from rig.models.model import ArmModel, CouplingSpec, load_model
 from rig.units import MM_PER_M, N_PER_MM
@@ -118,6 +119,10 @@ def couple(
     """
     read = load_model(model)
     spec = _spec(read)
+    if read.effects:
+        from rig.diagnosis.gap_forms import effects_of
+
+        effects_of(read)  # left out here, but refused where nobody could read them
     C = _regular_compliance(read)
     kinds = _kinds(spec)
     single = on_axes(C, np.eye(3))
@@ -127,17 +132,19 @@ def couple(
     if not 0 <= dead_band < 1:
         raise InputError(f"--dead-band is {dead_band:g}; wanted: at least 0 and below 1.")
     placement = coupling_task.best_place(read) if best_placement else None
+    workspaces = _workspaces(read, spec, samples, seed, progress)
+    meet = _can_meet(read, spec, workspaces)
     return CouplingResult(
         model=read,
         spec=spec,
-        workspaces=_workspaces(read, spec, samples, seed, progress),
+        workspaces=workspaces,
         single=single,
         u_single=u_single,
         pair=pair,
         u_pair=u_pair,
-        decisions=_decisions(read, C, spec),
-        schedule=run_path(read, spec, track, dead_band) if track is not None else None,
-        notes=tuple(_notes(read, spec)),
+        decisions=_decisions(read, C, spec, meet=meet),
+        schedule=run_path(read, spec, track, dead_band, meet=meet) if track is not None else None,
+        notes=(*_notes(read, spec), *_apart(spec, meet=meet), *_sparse(workspaces)),
         placement=placement,
     )
 
@@ -157,7 +164,10 @@ def _regular_compliance(model: ArmModel) -> Array:
         invert_compliance(C)
     except ValueError as error:
         degrees = ", ".join(f"{v:.4g}" for v in np.rad2deg(model.q))
-        raise InputError(f"{model.name}: pose ({degrees}) deg: {error}.") from error
+        raise InputError(
+            f"{model.pose_at}: pose: ({degrees}) deg: {error}. Give one in which the arm is "
+            "neither stretched out nor folded (UR arms: with q5 away from 0 and 180 deg)."
+        ) from error
     return C
 
 
@@ -195,16 +205,28 @@ def _uncertainty(
     return roots.pop("single"), roots
 
 
-def _decisions(model: ArmModel, C: Array, spec: CouplingSpec) -> tuple[Decision, ...]:
+def _can_meet(model: ArmModel, spec: CouplingSpec, workspaces: Sequence[Workspace]) -> bool:
+    """Whether the tools of both arms reach some point between the bases. The workspaces are the
+    flanges'; a tool adds its length on either side."""
+    if any(w.coupled > 0 for w in workspaces):
+        return True
+    tool = float(np.linalg.norm(model.tool[:3, 3]))
+    farthest = model.reach if model.reach is not None else workspace.outermost(model.arm)
+    return tool > 0 and spec.base_distance < 2 * (farthest + tool)
+
+
+def _decisions(
+    model: ArmModel, C: Array, spec: CouplingSpec, *, meet: bool
+) -> tuple[Decision, ...]:
     """Components of a requirement count in the base axes for the single arm, in the load axes for
-    the pair, as its table does."""
+    the pair, as its table does. Arms that can't meet can't couple."""
     kind = next(k for k in _kinds(spec) if k[0] == spec.kind)
     pair_compliance = coupled(C, spec.beta, kind[1], kind[2])
     axes, out = load_axes(spec.beta, spec.load_axes), []
     for need in model.required:
         single = float(along(C, need.direction))
         pair = float(along(pair_compliance, axes @ np.array(need.direction)))
-        state = decide(need.stiffness, single, pair)
+        state = decide(need.stiffness, single, pair if meet else 0.0)
         out.append(Decision(need.name, need.stiffness, single, pair, state))
     return tuple(out)
 
@@ -230,7 +252,7 @@ def _workspaces(
 
 
 def _notes(model: ArmModel, spec: CouplingSpec) -> list[str]:
-    notes = [model.note] if model.note else []
+    notes = [*([model.note] if model.note else []), *model.doubts]
     node = model.arm.fk(model.q, model.tool)[:3, 3]
     distance = distance_of(node, spec.beta)
     if abs(distance - spec.base_distance) > 0.5e-3:
@@ -244,6 +266,30 @@ def _notes(model: ArmModel, spec: CouplingSpec) -> list[str]:
     if spec.half is None:
         notes.append("No beam in the model: compliant coupling is not computed.")
     return notes
+
+
+def _apart(spec: CouplingSpec, *, meet: bool) -> list[str]:
+    if meet:
+        return []
+    distance = brief(spec.base_distance * MM_PER_M)
+    return [
+        f"base_distance_mm: at {distance} mm the arms can't meet, so what one arm does not reach "
+        "is infeasible. The coupled stiffness is that of the pose, as if they met."
+    ]
+
+
+def _sparse(workspaces: Sequence[Workspace]) -> list[str]:
+    """Where a Monte Carlo workspace rests on too few samples."""
+    return [
+        f"The Monte Carlo workspace rests on few samples: {100 * w.thin:.0f} % of the single "
+        "volume is in cells that one sample alone fell into. Up to about as much may be missing in "
+        "cells that none found, and more of the coupled volume. Give --samples 1000000 or more."
+        for w in workspaces
+        if w.thin > _THIN
+    ]
+
+
+_THIN = 0.03
 
 
 def _published(result: CouplingResult) -> list[dict[str, Any]]:
@@ -264,7 +310,13 @@ def _published(result: CouplingResult) -> list[dict[str, Any]]:
 
 
 def _volumes(w: Workspace) -> dict[str, Any]:
-    return {"single": w.single, "coupled": w.coupled, "ratio": w.ratio, "definition": w.definition}
+    return {
+        "single": w.single,
+        "coupled": w.coupled,
+        "ratio": w.ratio,
+        "definition": w.definition,
+        "hit_once_ratio": w.thin,
+    }
 
 
 def _per_axis(values: Array) -> dict[str, float]:

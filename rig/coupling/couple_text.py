@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.digits import number
 from rig.models.model import told_first
 from rig.units import N_PER_MM
 
@@ -54,7 +55,7 @@ def _stiffness(result: CouplingResult) -> str:
     rows |= {name: (result.pair[name], result.u_pair[name]) for name in result.pair}
     for name, (values, u) in rows.items():
         cells = "".join(
-            f" {f'{v * N_PER_MM:.1f} ({s * N_PER_MM:.1f})':>18}"
+            f" {f'{_tenths(v * N_PER_MM, 1.0)} ({_tenths(s * N_PER_MM)})':>18}"
             for v, s in zip(values, u, strict=True)
         )
         lines.append(f"  {name:<14}{cells}")
@@ -62,6 +63,11 @@ def _stiffness(result: CouplingResult) -> str:
         cells = "".join(f" {f'{g:.2f} times':>18}" for g in values / result.single)
         lines.append(f"  {f'gain {name}':<14}{cells}")
     return "\n".join(lines)
+
+
+def _tenths(value: float, from_: float = 0.05) -> str:
+    """One digit after the point, or two significant digits below `from_`."""
+    return number(value, 2) if 0 < abs(value) < from_ else f"{value:.1f}"
 
 
 def _workspace(result: CouplingResult) -> str:
@@ -79,7 +85,8 @@ def _decisions(result: CouplingResult) -> str:
     for d in result.decisions:
         lines.append(
             f"  {d.direction}: {d.required * N_PER_MM:g} N/mm required, "
-            f"single {d.single * N_PER_MM:.1f}, coupled {d.coupled * N_PER_MM:.1f} -> {d.state}"
+            f"single {_tenths(d.single * N_PER_MM, 1.0)}, "
+            f"coupled {_tenths(d.coupled * N_PER_MM, 1.0)} -> {d.state}"
         )
     return "\n".join(lines) if result.decisions else ""
 

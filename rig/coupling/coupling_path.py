@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
@@ -75,12 +75,15 @@ def read_path(path: Path) -> Path6:
     )
 
 
-def run_path(model: ArmModel, spec: CouplingSpec, path: Path6, dead_band: float) -> Schedule:
-    """The schedule of coupling and release; InputError for rows that make no path."""
+def run_path(
+    model: ArmModel, spec: CouplingSpec, path: Path6, dead_band: float, *, meet: bool = True
+) -> Schedule:
+    """The schedule of coupling and release; InputError for rows that make no path. meet: whether
+    the arms can meet at all; else where they had to couple is infeasible."""
     q = path.q if path.q is not None else np.broadcast_to(model.q, (path.time.size, 6))
     _check_rows(model, path, q)
     try:
-        return schedule(
+        found = schedule(
             model.arm,
             path.time,
             q,
@@ -96,6 +99,10 @@ def run_path(model: ArmModel, spec: CouplingSpec, path: Path6, dead_band: float)
         )
     except ValueError as error:
         raise InputError(f"{path.name}: {error}.") from error
+    if meet:
+        return found
+    alone = ("infeasible" if s == "couple" else s for s in found.states)
+    return replace(found, states=tuple(alone))
 
 
 def _check_rows(model: ArmModel, path: Path6, q: Array) -> None:

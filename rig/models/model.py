@@ -9,11 +9,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from identification.arm import Arm, tool_offset, tool_transform, unit_vector
+from identification.arm import Arm, unit_vector
 from identification.elastic import Beam, cantilever
 from identification.inverse import BRANCHES, solutions, tool_pose
 from rig.arrays import Array
 from rig.errors import InputError, did_you_mean
+from rig.models.model_checks import doubts, tool_of
 from rig.models.model_schema import BeamKind, ComplianceKind, ModelFile, MountingFile
 from rig.models.robot import checked, robot_and_reach, section_of, segments
 from rig.units import MM_PER_M, N_PER_MM
@@ -49,7 +50,8 @@ class Requirement:
 class ArmModel:
     """A model file, read and checked. q (6,) rad, tool (4, 4), mounting: compliance (6, 6) of the
     base or None; `effects` verbatim; `links` in use (empty: rigid links); written_outside: links
-    and mounting as the file has them, of the keys that it has."""
+    and mounting as the file has them, of the keys that it has. pose_at: where in the file the pose
+    stands; doubts: what may be a slip of the unit, to be shown with every result."""
 
     name: str
     arm: Arm
@@ -63,6 +65,8 @@ class ArmModel:
     reach: float | None
     note: str = ""
     written_outside: Mapping[str, Any] = field(default_factory=dict)
+    pose_at: str = ""
+    doubts: tuple[str, ...] = ()
 
     def compliance(self) -> Array:
         """Compliance (6, 6) at the tool of the single arm, effects left out."""
@@ -88,8 +92,9 @@ def load_model(path: str | Path) -> ArmModel:
     document = read_document(Path(path), ModelFile)
     written = document.value
     _check_model(document)
-    arm, reach = _model_arm(document)
-    tool = _tool(document)
+    named, reach = _named_arm(document)
+    arm = _with_springs(document, named)
+    tool = tool_of(document)
     return ArmModel(
         name=document.name,
         arm=arm,
@@ -103,6 +108,8 @@ def load_model(path: str | Path) -> ArmModel:
         reach=reach,
         note=written.note,
         written_outside=_written_outside(written),
+        pose_at=document.at(("pose",)),
+        doubts=doubts(document, arm, named.joint_stiffness),
     )
 
 
@@ -141,23 +148,28 @@ def _check_model(document: Document[ModelFile]) -> None:
     document.refuse(problems)
 
 
-def _model_arm(document: Document[ModelFile]) -> tuple[Arm, float | None]:
+def _named_arm(document: Document[ModelFile]) -> tuple[Arm, float | None]:
+    """The arm with the springs of its robot file (zeros where `dh` is given), and its reach m."""
     written = document.value
-    reach: float | None = None
     if written.robot is not None:
         try:
-            arm, reach = robot_and_reach(_beside(document.name, written.robot))
+            return robot_and_reach(_beside(document.name, written.robot))
         except InputError as error:
             document.refuse([document.problem(("robot",), str(error))])
             raise
-    else:
-        dh = written.dh
-        assert dh is not None
-        arm = checked(
-            document,
-            ("dh",),
-            lambda: Arm("dh", d=np.array(dh.d_m), a=np.array(dh.a_m), alpha=np.array(dh.alpha_rad)),
-        )
+    dh = written.dh
+    assert dh is not None
+    arm = checked(
+        document,
+        ("dh",),
+        lambda: Arm("dh", d=np.array(dh.d_m), a=np.array(dh.a_m), alpha=np.array(dh.alpha_rad)),
+    )
+    return arm, None
+
+
+def _with_springs(document: Document[ModelFile], arm: Arm) -> Arm:
+    """The arm with the springs of the model file, where it states any."""
+    written = document.value
     stiffness = arm.joint_stiffness
     relative = arm.joint_stiffness_relative_sd
     if written.joint_stiffness_Nm_per_rad is not None:
@@ -166,20 +178,12 @@ def _model_arm(document: Document[ModelFile]) -> tuple[Arm, float | None]:
         relative = np.broadcast_to(np.array(written.joint_stiffness_relative_sd, dtype=float), (6,))
     if written.joint_stiffness_sd is not None:
         relative = np.array(written.joint_stiffness_sd) / stiffness
-    return arm.with_stiffness(stiffness, relative), reach
+    return arm.with_stiffness(stiffness, relative)
 
 
 def _beside(model: str, robot: str) -> str | Path:
     """A path of a robot file is meant relative to the model file."""
     return Path(model).parent / robot if robot.endswith((".yaml", ".yml")) else robot
-
-
-def _tool(document: Document[ModelFile]) -> Array:
-    written = document.value.tool
-    if written.flange_T_tcp is None:
-        return tool_offset([0.0, 0.0, (written.length_mm or 0.0) / MM_PER_M])
-    matrix = np.array(written.flange_T_tcp)
-    return checked(document, ("tool", "flange_T_tcp"), lambda: tool_transform(matrix))
 
 
 def _pose(document: Document[ModelFile], arm: Arm, tool: Array) -> Array:

@@ -14,6 +14,9 @@ _Positive = Annotated[float, Gt(0)]
 _SixPositive = Annotated[list[_Positive], Len(6, 6)]
 # From a hair spring to what no drive reaches: beyond, sums of compliances lose their digits.
 _SixSprings = Annotated[list[Annotated[float, Interval(ge=1e-3, le=1e15)]], Len(6, 6)]
+# In m, and longer than the links of any arm: millimetres are beyond.
+_SixLengths = Annotated[list[Annotated[float, Interval(ge=-5, le=5)]], Len(6, 6)]
+LONGEST_TOOL_MM = 2000  # as in protocols
 _SixNotNegative = Annotated[list[Annotated[float, Ge(0)]], Len(6, 6)]
 _Forbid: dict[str, str] = {"extra": "forbid"}
 
@@ -23,8 +26,8 @@ class DhTable:
     """Denavit-Hartenberg parameters in the standard (distal) convention."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = _Forbid
-    d_m: _Six
-    a_m: _Six
+    d_m: _SixLengths
+    a_m: _SixLengths
     alpha_rad: _Six
 
 
@@ -96,7 +99,7 @@ class ToolFile:
     """Along the flange's z axis, or a 4 x 4 matrix in m."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = _Forbid
-    length_mm: float | None = None
+    length_mm: Annotated[float, Interval(ge=0, le=LONGEST_TOOL_MM)] | None = None
     flange_T_tcp: Annotated[list[Annotated[list[float], Len(4, 4)]], Len(4, 4)] | None = None
 
 

@@ -25,6 +25,7 @@ from rig.diagnosis.gap_path import left_out, predict
 from rig.digits import number
 from rig.errors import InputError
 from rig.models.model import ArmModel, load_model, told_first
+from rig.plan_margins import unit_warnings
 from rig.protocol import MeasurementProtocol, Run, load_protocol
 from rig.units import MM_PER_M, N_PER_MM
 
@@ -195,12 +196,40 @@ def _with_effects(
 def _notes(
     model: ArmModel, procedure: MeasurementProtocol, effects: tuple[Form, ...]
 ) -> tuple[str, ...]:
-    notes = [model.note] if model.note else []
+    notes = [*([model.note] if model.note else []), *model.doubts]
+    notes += [*unit_warnings(procedure), *_other_setup(model, procedure)]
     if procedure.branches == "loading-unloading" and not effects:
         notes.append("Springs unload along the loading curve: each level stands once.")
     if any(run.stop_at_displacement_mm is not None for run in procedure.runs):
         notes.append("All levels are shown, also those beyond stop_at_displacement_mm.")
     return tuple(notes)
+
+
+def _other_setup(model: ArmModel, procedure: MeasurementProtocol) -> list[str]:
+    """Where the protocol loads the arm elsewhere than the model's own pose and tool say."""
+    poses = {run.pose: procedure.poses[run.pose] for run in procedure.runs}
+    tcp = MM_PER_M * model.tool[:3, 3]
+    others = [n for n, p in poses.items() if np.abs(tcp - p.tcp_xyz_mm).max() > _SAME_MM]
+    notes = []
+    if not any(np.abs(model.q - p.q_rad).max() <= _SAME_RAD for p in poses.values()):
+        notes.append(
+            f"The model's own pose, {_listed(np.rad2deg(model.q))} deg, is not used: the curves "
+            f"are those of the protocol's {' and '.join(poses)}."
+        )
+    for name in others:
+        notes.append(
+            f"The model's tool, {_listed(tcp)} mm from the flange, is not used: in pose {name} the "
+            f"protocol loads the point tcp_xyz_mm {_listed(np.array(poses[name].tcp_xyz_mm))} mm. "
+            "Put the tool there if it is mounted."
+        )
+    return notes
+
+
+_SAME_RAD, _SAME_MM = 2e-3, 0.1
+
+
+def _listed(values: Array) -> str:
+    return "(" + ", ".join(f"{v + 0.0:.4g}" for v in values) + ")"
 
 
 def _levels(c: PredictedCurve) -> list[str]:

@@ -6,7 +6,9 @@ those say so by their serial numbers, one gain moves both k the same way, and on
 its effects counts; otherwise the gains are independent. Degrees of freedom after Welch and
 Satterthwaite, probability from Student's t, two-sided; with several comparisons at once, adjusted
 after Holm (Scand. J. Statist. 6 (1979) 65), so that 5 % is the risk of one false alarm in all of
-them. What mounting the arm or the instruments anew does to k is not in the scatter of one session.
+them. Where the curves are bent and the levels differ, k over the common levels is compared
+(`common_levels`). What mounting the arm or the instruments anew does to k is not in the scatter of
+one session.
 """
 
 from __future__ import annotations
@@ -20,6 +22,17 @@ from identification.stiffness import Stiffness
 from identification.uncertainty import Contribution, Quantity, combined
 from rig.analysis.analyze import Analysis, Direction, quantity
 from rig.dataset import Dataset
+from rig.digits import counted
+from rig.reduce import curves
+from rig.report.common_levels import (
+    Side,
+    averages_differ,
+    counting,
+    in_common,
+    other_ranges,
+    over_common_levels,
+    span,
+)
 from rig.units import N_PER_MM
 
 LEVEL = 0.05
@@ -40,7 +53,8 @@ class Pair:
     """One pose and direction in the first data set and in a later one, by its number. N/m; ratio of
     the later one over the first.
 
-    p: of so large a difference by chance; adjusted: for all comparisons of the report."""
+    p: of so large a difference by chance; adjusted: for all comparisons of the report. force_N:
+    lowest and highest of the levels compared, where these are not all that count towards k."""
 
     second: int
     key: str
@@ -49,6 +63,7 @@ class Pair:
     p: float
     adjusted: float
     remarks: tuple[str, ...]
+    force_N: tuple[float, float] | None = None
 
     @property
     def differs(self) -> bool:
@@ -61,6 +76,7 @@ class Pair:
             "first": 0,
             "second": self.second,
             "direction": self.key,
+            "force_N": None if self.force_N is None else list(self.force_N),
             "difference_N_per_mm": quantity(self.difference, N_PER_MM),
             "ratio": quantity(self.ratio),
             "p": self.p,
@@ -70,21 +86,69 @@ class Pair:
         }
 
 
-def compare(sets: Sequence[tuple[Dataset, Analysis]]) -> list[Pair]:
+@dataclass(frozen=True)
+class Unlike:
+    """A pose and direction whose two k are not the same quantity, and why."""
+
+    second: int
+    key: str
+    reason: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"first": 0, "second": self.second, "direction": self.key, "reason": self.reason}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What could be tested, and what could not."""
+
+    pairs: tuple[Pair, ...] = ()
+    unlike: tuple[Unlike, ...] = ()
+
+
+def compare(sets: Sequence[tuple[Dataset, Analysis]]) -> Comparison:
     """Every later data set against the first, direction by direction where both have a k."""
-    found: list[Pair] = []
     if not sets:
-        return found
+        return Comparison()
+    found: list[Pair | Unlike] = []
     first_data, first = sets[0]
     for i, (data, analysis) in enumerate(sets[1:], start=1):
         shared = same_instruments(first_data, data)
         for key, (mine, other) in aligned([first, analysis]).items():
             if mine is None or other is None:
                 continue
-            a, b = first.directions[mine].result, analysis.directions[other].result
-            if a.k is not None and b.k is not None:
-                found.append(paired(i, key, a, b, shared=shared))
-    return adjusted(found)
+            a, b = first.directions[mine], analysis.directions[other]
+            if a.result.k is not None and b.result.k is not None:
+                sides = _side(first_data, a), _side(data, b)
+                found.append(_compared(i, key, *sides, shared=shared))
+    pairs = adjusted([p for p in found if isinstance(p, Pair)])
+    return Comparison(tuple(pairs), tuple(u for u in found if isinstance(u, Unlike)))
+
+
+def _side(data: Dataset, direction: Direction) -> Side:
+    return Side(curves(data)[direction.pose, direction.direction], direction.result)
+
+
+def _compared(second: int, key: str, a: Side, b: Side, *, shared: bool) -> Pair | Unlike:
+    """k against k, over the common levels where the k as they are would not be comparable."""
+    if not averages_differ(a, b):
+        return paired(second, key, a.found, b.found, shared=shared)
+    whole = _shown(a.found, b.found)
+    common = in_common(a, b)[0]
+    both = over_common_levels(a, b)
+    if both is None:
+        reason = (
+            "the curve is bent, so k is an average over its levels, and of these the two have "
+            f"{counted(len(common), 'level')} in common ({whole}). Measure both at the same levels"
+        )
+        return Unlike(second, key, reason)
+    pair = paired(second, key, *both, shared=shared)
+    remark = (
+        f"compared over the {len(common)} levels that both have: the curve is bent, and the k "
+        f"above rest on other levels ({whole})"
+    )
+    return replace(pair, remarks=(remark, *pair.remarks), force_N=span(common))
 
 
 def same_instruments(a: Dataset, b: Dataset) -> bool:
@@ -190,10 +254,8 @@ def _remarks(a: Stiffness, b: Stiffness) -> tuple[str, ...]:
     found = []
     if a.choice != b.choice:
         found.append(f"the lines differ ({a.choice.label}; {b.choice.label})")
-    ranges = [_range(side) for side in (a, b)]
-    if max(abs(x - y) for x, y in zip(*ranges, strict=True)) > 0.1 * max(map(abs, ranges[0])):
-        shown = "; ".join(f"{low:.4g} to {high:.4g} N" for low, high in ranges)
-        found.append(f"they rest on other ranges of force ({shown})")
+    if other_ranges(a, b):
+        found.append(f"they rest on other ranges of force ({_shown(a, b)})")
     if min(len(a.by_repetition), len(b.by_repetition)) < 2:
         found.append("a single repetition shows no scatter, so the stated uncertainty stands in")
     if not a.status == b.status == "ok":
@@ -201,8 +263,7 @@ def _remarks(a: Stiffness, b: Stiffness) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _range(side: Stiffness) -> tuple[float, float]:
-    """Of the forces that count towards k."""
-    levels = [p for p in side.levels if p.branch == "loading"]
-    forces = [p.force for p in levels if p.step not in side.steps_out]
-    return (min(forces), max(forces)) if forces else (0.0, 0.0)
+def _shown(a: Stiffness, b: Stiffness) -> str:
+    """The ranges of the forces that count towards k."""
+    ranges = [span(counting(side)) for side in (a, b)]
+    return "; ".join(f"{low:.4g} to {high:.4g} N" for low, high in ranges)

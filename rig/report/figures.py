@@ -10,17 +10,18 @@ import numpy as np
 from identification.uncertainty import TWO_SIDED
 from rig import plotting
 from rig.analysis.analyze import Analysis
+from rig.analysis.quality import RunZeros
 from rig.canvas import DISPLACEMENT, FORCE, blank
 from rig.dataset import Dataset
 from rig.plotting import COLOURS, MARKERS
 from rig.report.compare import aligned
-from rig.report.quality import RunZeros
 from rig.units import KNM, MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Json = dict[str, Any]
+_SMALL_MM = 0.05  # displacements below are shown in µm
 MOST_POINTS = 4000  # of a recording that are drawn: more than a page has dots
 
 
@@ -148,11 +149,19 @@ def _force_zero(axes: Any, dataset: Dataset, zeros: Sequence[RunZeros]) -> None:
 
 
 def _displacement_zero(axes: Any, dataset: Dataset, zeros: Sequence[RunZeros]) -> None:
-    _plateaus(axes, dataset, zeros, "displacement")
-    axes.set_ylabel("Displacement at\nzero load, mm", fontsize=8)
+    unit, scale = small_mm(max(abs(p.displacement) for run in zeros for p in run.plateaus))
+    _plateaus(axes, dataset, zeros, "displacement", scale)
+    axes.set_ylabel(f"Displacement at\nzero load, {unit}", fontsize=8)
 
 
-def _plateaus(axes: Any, dataset: Dataset, zeros: Sequence[RunZeros], what: str) -> None:
+def small_mm(value: float) -> tuple[str, float]:
+    """Unit to show a displacement of so many mm in, and the factor to it."""
+    return ("µm", 1e3) if 0 < value < _SMALL_MM else ("mm", 1.0)
+
+
+def _plateaus(
+    axes: Any, dataset: Dataset, zeros: Sequence[RunZeros], what: str, scale: float = 1.0
+) -> None:
     on_clock = "session_s" in dataset.columns
     setups = list(dict.fromkeys((r.pose, r.direction) for r in zeros))
     named: set[tuple[str, str]] = set()
@@ -165,7 +174,7 @@ def _plateaus(axes: Any, dataset: Dataset, zeros: Sequence[RunZeros], what: str)
         named.add((run.pose, run.direction))
         axes.plot(
             at,
-            [getattr(p, what) for p in run.plateaus],
+            [scale * getattr(p, what) for p in run.plateaus],
             color=COLOURS[i % len(COLOURS)],
             marker=MARKERS[i % len(MARKERS)],
             markersize=4,

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from rig import schemas
 from rig.analysis.analyze import Analysis, analyze
 from rig.analysis.identify import IdentifyResult, identify
+from rig.analysis.quality import Quality, assess
 from rig.dataset import Dataset, load_each
 from rig.errors import InputError
 from rig.journal import journal_path
 from rig.protocol import parse_protocol
-from rig.report.compare import Pair, compare, same_instruments
+from rig.report.compare import Comparison, compare, same_instruments
 from rig.report.diagnosing import TURNED_OFF, Diagnosed, Waiting, without_name
-from rig.report.quality import Quality, assess
 from rig.report.wishes import Named, Wishes
 from rig.software import software_version
 from rig.terminal import Progress, silent
@@ -80,7 +80,7 @@ class Gathered:
     """All sessions, how they compare, and the coupled pair if a model was given."""
 
     sessions: tuple[Session, ...]
-    pairs: tuple[Pair, ...]
+    compared: Comparison
     coupling: CouplingResult | None
     software: str
     made: str
@@ -104,8 +104,9 @@ class Gathered:
             "comparison": [
                 pair.to_json()
                 | {"same_instruments": same_instruments(first, self.sessions[pair.second].dataset)}
-                for pair in self.pairs
+                for pair in self.compared.pairs
             ],
+            "not_compared": [unlike.to_json() for unlike in self.compared.unlike],
             "couple": None if self.coupling is None else self.coupling.to_json(),
         }
 
@@ -122,7 +123,7 @@ def gather(names: Sequence[Named], wishes: Wishes, progress: Progress = silent) 
         sessions.append(_session(name, dataset))
     return Gathered(
         tuple(sessions),
-        tuple(compare([(s.dataset, s.analysis) for s in sessions])),
+        compare([(s.dataset, s.analysis) for s in sessions]),
         coupling,
         software_version(),
         wishes.made,

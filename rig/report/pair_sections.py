@@ -112,15 +112,16 @@ def comparison(gathered: Gathered, data: Node, pictures: Pictures) -> Section:
     """Several data sets side by side, and whether they differ."""
     sessions = gathered.sessions
     blocks: list[Block] = [_overview(sessions, data)]
-    pairs = list(data["comparison"])
+    pairs, unlike = list(data["comparison"]), list(data["not_compared"])
+    if pairs or unlike:
+        blocks.append(_in_words(gathered, pairs, unlike))
     if pairs:
         blocks += [
-            _in_words(gathered, pairs),
             _tested(gathered, pairs),
             *_remarks(gathered, pairs),
             *_how_tested(pairs),
         ]
-    else:
+    elif not unlike:
         words = "No pose and direction has a stiffness in the first data set and in another one."
         blocks.append(Paragraph((words,), "warning"))
     blocks += pictures.compared(gathered)
@@ -147,9 +148,17 @@ def _overview(sessions: Sequence[Session], data: Node) -> Table:
     return Table("The data sets", header, tuple(rows), 5)
 
 
-def _in_words(gathered: Gathered, pairs: Sequence[Node]) -> Block:
-    """What the tests found, one sentence a comparison."""
-    return Bullets(tuple(_sentence(gathered, p) for p in pairs))
+def _in_words(gathered: Gathered, pairs: Sequence[Node], unlike: Sequence[Node]) -> Block:
+    """What the tests found, one sentence a comparison, and what could not be tested."""
+    tested = [_sentence(gathered, p) for p in pairs]
+    return Bullets((*tested, *(_no_sentence(gathered, u) for u in unlike)))
+
+
+def _no_sentence(gathered: Gathered, unlike: Node) -> Rich:
+    first, second = (gathered.sessions[unlike[side].value].label for side in ("first", "second"))
+    head = f"Direction {unlike['direction'].text()}: "
+    told = Word(f"{second} and {first} are not compared", "strong")
+    return (head, told, f": {unlike['reason'].text()}.")
 
 
 def _sentence(gathered: Gathered, pair: Node) -> Rich:
@@ -157,11 +166,14 @@ def _sentence(gathered: Gathered, pair: Node) -> Rich:
     ratio, low, high = pair["ratio"]["value"], *pair["ratio"]["ci95"]
     shown = (*ratio.number(), " times as stiff as ", first)
     within = (" (95 %: ", *low.number(), " to ", *high.number(), " times)")
-    head = f"Direction {pair['direction'].text()}: "
+    head: Rich = (f"Direction {pair['direction'].text()}: ",)
+    if pair["force_N"]:
+        low_N, high_N = (edge.number(3) for edge in pair["force_N"])
+        head = (f"Direction {pair['direction'].text()}, from ", *low_N, " to ", *high_N, " N: ")
     if pair["differs"].value:
         word = "stiffer" if pair["difference_N_per_mm"]["value"].value > 0 else "softer"
-        return (head, Word(f"{second} is {word}", "strong"), ", ", *shown, *within, ".")
-    return (head, "no difference is shown; ", second, " is ", *shown, *within, ".")
+        return (*head, Word(f"{second} is {word}", "strong"), ", ", *shown, *within, ".")
+    return (*head, "no difference is shown; ", second, " is ", *shown, *within, ".")
 
 
 def _tested(gathered: Gathered, pairs: Sequence[Node]) -> Table:

@@ -46,8 +46,11 @@ class Pictures:
             points = setup_drawing.arm_points(meta, meta.poses[pose])
             names = ("base", *(f"frame {i}" for i in range(1, 6)), "flange", "point of load")
             rows = tuple((n, *map(float, p)) for n, p in zip(names, points, strict=True))
-            words = f"The arm in pose {pose}: where the screw pushes and where the laser looks."
-            plot: Callable[[], Plot] = lambda: marked(setup_drawing.arm_setup(meta, pose, loads))  # noqa: E731
+            sign = setup_drawing.laser_sign(session.dataset.calibration)
+            seen = "how displacement counts" if sign is None else "from where the laser looks"
+            words = f"The arm in pose {pose}: where the screw pushes and {seen}."
+            draw = partial(setup_drawing.arm_setup, meta, pose, loads, sign)
+            plot: Callable[[], Plot] = lambda: marked(draw())  # noqa: E731
         else:
             header = ("direction", "x", "y", "z")
             rows = tuple((one.name, *one.vector) for one in loads)

@@ -16,6 +16,7 @@ from rig.report.document import (
     Table,
     Word,
 )
+from rig.report.figures import small_mm
 from rig.report.gather import Session
 from rig.report.pictures import Pictures
 from rig.report.results import NOTHING, Node, quantity
@@ -40,6 +41,7 @@ def in_short(session: Session, data: Node) -> Section:
     rows.append(("Joints", _joints(data)))
     rows.append(("Gap to the simulation", _gap(data)))
     rows.append(("Data", _data(session, data)))
+    rows += [("Mind", note.text()) for note in data["analyze"]["notes"]]
     note = Paragraph(("In brackets: 95 % intervals.",), "note")
     return Section("short", "In short", (Facts(tuple(rows)), note), session.dataset.banners())
 
@@ -110,7 +112,8 @@ def data_quality(session: Session, data: Node, pictures: Pictures) -> Section:
         rows.append(("Force at zero load moves by", (*parts, *rate)))
     for zero in q["displacement_zero"]:
         where = " ".join(filter(None, (zero["pose"].value, zero["direction"].text())))
-        apart = zero["apart_mm"].number(3, unit="mm")
+        unit, scale = small_mm(zero["apart_mm"].value)
+        apart = zero["apart_mm"].number(3, scale, unit)
         rows.append((f"Unloaded positions, {where}", (*apart, " apart over the repetitions")))
     blocks: list[Block] = [Facts(tuple(rows)), *_per_device(q)]
     figure = pictures.quality(session)

@@ -3,7 +3,7 @@ act. Places of screw and laser are schematic: a data set knows their line, not t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _ARM, _LASER = "0.35", "#CC3311"
 _LINE_POINTS, _LINE_MM = 13.0, 60.0  # of names above each other; about as much in the drawing
+_BESIDE_MM = 45.0  # between screw and laser on the same side
 _VIEWS = (("From above", 0, 1), ("From the side", 0, 2))
 
 
@@ -41,8 +42,17 @@ def arm_points(meta: Meta, pose: MetaPose) -> Array:
     return np.vstack([frames[:, :3, 3], tcp[:3, 3]]) * MM_PER_M
 
 
-def arm_setup(meta: Meta, name: str, loads: Sequence[Load]) -> Figure:
-    """One pose: the arm from above and from the side, with every direction of load measured."""
+def laser_sign(calibration: Mapping[str, Any]) -> int | None:
+    """The laser's `sign` in a data set's settings: 1 where a motion along the direction makes the
+    distance longer, -1 where it makes it shorter; None where none is recorded."""
+    laser = calibration.get("laser")
+    sign = laser.get("sign") if isinstance(laser, Mapping) else None
+    return sign if sign in (1, -1) else None
+
+
+def arm_setup(meta: Meta, name: str, loads: Sequence[Load], sign: int | None) -> Figure:
+    """One pose: the arm from above and from the side, with every direction of load measured. sign:
+    of the laser, as `laser_sign` has it."""
     points = arm_points(meta, meta.poses[name])
     figure = blank(9.0, 4.4)
     panels = figure.subplots(1, 2)
@@ -51,7 +61,7 @@ def arm_setup(meta: Meta, name: str, loads: Sequence[Load]) -> Figure:
         at, taken = points[-1, [i, j]], list[tuple[float, ...]]()
         for n, load in enumerate(loads):
             colour = COLOURS[n % len(COLOURS)]
-            spot = _load(axes, at, np.array(load.vector), (i, j), colour)
+            spot = _load(axes, at, np.array(load.vector), (i, j), colour, sign)
             _label(axes, spot, taken.count(spot.key), load.name, colour)
             taken.append(spot.key)
         axes.set_title(f"{title}, pose {name}", fontsize=10)
@@ -59,7 +69,7 @@ def arm_setup(meta: Meta, name: str, loads: Sequence[Load]) -> Figure:
         axes.set_ylabel(f"{'xyz'[j]} of the base in mm")
         axes.set_aspect("equal")
     _same_scale(panels)
-    _legend(figure, loads)
+    _legend(figure, loads, sign)
     return figure
 
 
@@ -108,8 +118,10 @@ class _Spot:
         return tuple(round(v / _LINE_MM) for v in self.at)
 
 
-def _load(axes: Any, at: Array, vector: Array, view: tuple[int, int], colour: str) -> _Spot:
-    """Screw and force on one side of the point of load, the laser's beam on the other."""
+def _load(
+    axes: Any, at: Array, vector: Array, view: tuple[int, int], colour: str, sign: int | None
+) -> _Spot:
+    """Screw and force behind the point of load, and the laser where its sign says it stands."""
     inside = vector[list(view)]
     length = float(np.hypot(*inside))
     if length < 0.05:  # along the line of sight
@@ -117,7 +129,7 @@ def _load(axes: Any, at: Array, vector: Array, view: tuple[int, int], colour: st
         axes.plot(*at, "o", color="none", markeredgecolor=colour, markersize=16, zorder=5)
         axes.plot(*at, "." if towards else "x", color=colour, markersize=9, zorder=7)
         return _Spot((at[0], at[1]), (12.0, 12.0), "left")
-    tail, laser = at - 250 * inside, at + 250 * inside
+    tail = at - 250 * inside
     axes.annotate(
         "",
         xy=at - 18 * inside,
@@ -125,14 +137,27 @@ def _load(axes: Any, at: Array, vector: Array, view: tuple[int, int], colour: st
         zorder=5,
         arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.5},
     )
-    block, head = at - 290 * inside, at + 280 * inside
+    block = at - 290 * inside
     axes.plot(*block, "s", color=colour, markersize=10, zorder=5)
-    axes.plot([at[0], laser[0]], [at[1], laser[1]], ":", color=_LASER, linewidth=1.6, zorder=4)
-    axes.plot(*head, "D", color=_LASER, markersize=8, zorder=4)  # behind an opposite screw
+    _laser(axes, at, inside, sign)
     upright = abs(inside[1]) > abs(inside[0])  # never on the line of its own arrow
     return _Spot(
         (block[0], block[1]), *(((10.0, 0.0), "left") if upright else ((0.0, 13.0), "center"))
     )
+
+
+def _laser(axes: Any, at: Array, inside: Array, sign: int | None) -> None:
+    """Its beam and place. A distance that grows with the motion is seen from behind, beside the
+    screw and away from its name; one that shrinks, from ahead. Not recorded: the line alone."""
+    ahead, beside = 250 * inside, np.zeros(2)
+    if sign == 1:
+        across = np.array([-inside[1], inside[0]]) / np.hypot(*inside)
+        down = across if (abs(across[1]) < 1e-9 and across[0] < 0) or across[1] < 0 else -across
+        ahead, beside = -250 * inside, _BESIDE_MM * down
+    start, end = at + beside, at + beside + ahead
+    axes.plot([start[0], end[0]], [start[1], end[1]], ":", color=_LASER, linewidth=1.6, zorder=4)
+    if sign is not None:
+        axes.plot(*(start + 1.12 * ahead), "D", color=_LASER, markersize=8, zorder=4, label="laser")
 
 
 def _label(axes: Any, spot: _Spot, above: int, name: str, colour: str) -> None:
@@ -161,7 +186,7 @@ def _same_scale(panels: Sequence[Any]) -> None:
             getattr(axes, put)((low + high) / 2 - half, (low + high) / 2 + half)
 
 
-def _legend(figure: Figure, loads: Sequence[Load]) -> None:
+def _legend(figure: Figure, loads: Sequence[Load], sign: int | None) -> None:
     from matplotlib.lines import Line2D
 
     marks = [
@@ -176,9 +201,12 @@ def _legend(figure: Figure, loads: Sequence[Load]) -> None:
         )
         for i, load in enumerate(loads)
     ]
+    seen = Line2D([], [], color=_LASER, marker="D", linestyle=":", label="laser")
+    if sign is None:
+        seen = Line2D([], [], color=_LASER, linestyle=":", label="displacement, along this line")
     marks += [
         Line2D([], [], color="black", marker="s", linestyle="", markersize=9, label="base"),
-        Line2D([], [], color=_LASER, marker="D", linestyle=":", label="laser"),
+        seen,
         Line2D([], [], color="white", marker="o", markeredgecolor="black", label="point of load"),
     ]
     figure.legend(

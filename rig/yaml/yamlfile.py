@@ -20,7 +20,7 @@ from pydantic import TypeAdapter, ValidationError
 from rig.errors import InputError, close_to, closest, did_you_mean
 from rig.storage.files import neighbours
 from rig.yaml import yamlwords as words
-from rig.yaml.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, compose, refuse
+from rig.yaml.yamlnodes import PLAIN_NUMBER, Key, Place, Problem, Reader, address, compose, refuse
 
 T = TypeVar("T")
 _UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
@@ -40,6 +40,10 @@ class Document(Generic[T]):
     def problem(self, path: Key, what: str) -> Problem:
         """A problem with the value at `path` (or the nearest enclosing one that is in the file)."""
         return _problem(self.places, path, what)
+
+    def at(self, path: Key) -> str:
+        """`FILE:LINE:COLUMN` of the value at `path`, for messages of later work."""
+        return address(self.name, self.problem(path, ""))
 
     def refuse(self, problems: Sequence[Problem]) -> None:
         """Raises one InputError for all problems; returns when there are none."""
@@ -127,6 +131,14 @@ def read_document_text(
     if reader.problems or value is None:
         refuse(name, reader.problems)
     return Document(name, text, value, reader.places)
+
+
+def place_in_text(text: str, name: str, path: Key) -> str:
+    """`NAME:LINE:COLUMN` of the value at `path` (or the nearest enclosing one) in text that is not
+    validated; InputError for text that is no YAML."""
+    reader = Reader()
+    reader.read(compose(text, name))
+    return address(name, _problem(reader.places, path, ""))
 
 
 _KINDS = {
@@ -248,7 +260,7 @@ class _Judge:
 
     def _error(self, kind: str, path: Key, error: Any) -> None:
         reader = self._reader
-        if reader.is_bad(path):
+        if reader.is_bad(path) or self._of_other_kind(error["loc"]):
             return
         if kind in ("missing", "missing_argument") and path not in reader.places:
             self._missing(path)
@@ -262,6 +274,34 @@ class _Judge:
             self._put_off.append(path)
         else:
             self._value_problem(path, self._at(path))
+
+    def _of_other_kind(self, loc: Sequence[str | int]) -> bool:
+        """Whether an error is that of an alternative which the file does not take: a mapping shows
+        by its keys which one it is."""
+        path: Key = ()
+        for part in loc:
+            if (*path, part) in self._reader.places:
+                path = (*path, part)
+                continue
+            meant = self._meant(path)
+            if meant is not None and part != meant and not self._is_key(path, part):
+                return True
+        return False
+
+    def _meant(self, path: Key) -> str | None:
+        """The name of the one alternative that knows most keys of a mapping; None where there are
+        no alternatives, or none knows any."""
+        nodes = words.schemas_at(self._schema, path)
+        value = self._at(path)
+        if len(nodes) < 2 or not isinstance(value, dict):
+            return None
+        fits = [sum(key in words.known_keys([node]) for key in value) for node in nodes]
+        best = max(fits)
+        return str(nodes[fits.index(best)].get("title")) if best and fits.count(best) == 1 else None
+
+    def _is_key(self, path: Key, part: str | int) -> bool:
+        """Whether a part of an error's place is a key that the file could have there."""
+        return bool(words.schemas_at(self._schema, (*path, part)))
 
     def _fits_another(self, path: Key) -> bool:
         """Whether a word is one of another alternative, of which something else is wrong."""

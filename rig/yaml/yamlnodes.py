@@ -65,13 +65,14 @@ class Problem:
 def refuse(name: str, problems: Sequence[Problem]) -> NoReturn:
     """Raises one InputError with a line per problem, in the order of the file."""
     ordered = sorted(problems)
-    lines = [f"{_address(name, p)}: {p.text}" for p in ordered[:MAX_SHOWN]]
+    lines = [f"{address(name, p)}: {p.text}" for p in ordered[:MAX_SHOWN]]
     if len(ordered) > MAX_SHOWN:
         lines.append(f"{name}: and {len(ordered) - MAX_SHOWN} more problems.")
     raise InputError("\n".join(lines))
 
 
-def _address(name: str, problem: Problem) -> str:
+def address(name: str, problem: Problem) -> str:
+    """Where a problem is: `FILE:LINE:COLUMN`, as far as that is known."""
     if not problem.line:
         return name
     return f"{name}:{problem.line}:{problem.column}" if problem.column else f"{name}:{problem.line}"

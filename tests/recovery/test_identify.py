@@ -4,6 +4,7 @@ to believe a proposal. Worlds share no code with the identification."""
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -221,6 +222,29 @@ def test_contradictory_sets_are_named(files: Path) -> None:
         assert words in message
 
 
+def test_bent_curves_of_other_ranges_say_what_to_do(files: Path, tmp_path: Path) -> None:
+    """One softening arm, loaded far and loaded a little: the averages contradict each other."""
+    for seed, name, top in ((11, "far", 200.0), (12, "near", 50.0)):
+        runs = [(0, "x", top), (0, "y", 70.0)]
+        asked = protocol(REFERENCE_Q[None], runs, (0.0, 0.0, 0.0), "motor")
+        found = measure(asked, PAPER_C, seed)
+        columns = dict(found.columns)
+        along_x = columns["direction"] == "x"
+        bent = np.where(along_x, 1.0 + columns["force_N"] / 250.0, 1.0)
+        columns["displacement_mm"] = columns["displacement_mm"] * bent
+        write(replace(found, columns=columns), tmp_path / f"{name}.h5")
+    paths = [tmp_path / "far.h5", tmp_path / "near.h5"]
+    with pytest.raises(InputError, match="contradict each other") as caught:
+        identify(paths, proposals=0)
+    message = str(caught.value).replace(f"{tmp_path}/", "")
+    ranges = re.findall(r"(far|near)\.h5: pose P0, direction x over [\d.]+ to ([\d.]+) N", message)
+    assert [(name, round(float(top), -1)) for name, top in ranges] == [("far", 200), ("near", 50)]
+    assert message.endswith(
+        "Give the data set whose range of force matters, or measure both at the same levels; rig "
+        "diagnose separates springs from effects."
+    )
+
+
 @pytest.mark.parametrize("encoder", ["motor", "output"])
 def test_a_repetition_that_was_cut_short_is_as_if_not_measured(
     tmp_path: Path, encoder: str
@@ -287,6 +311,15 @@ def test_data_without_stiffness(files: Path) -> None:
     write(replace(made, columns=columns), files / "unloaded.h5")
     with pytest.raises(InputError, match=r"unloaded\.h5: no pose and direction has a stiffness"):
         identify([files / "unloaded.h5"])
+    none = {name: values[:0] for name, values in made.columns.items()}
+    write(replace(made, columns=none, events=[], complete=False), files / "empty.h5")
+    with pytest.raises(InputError) as caught:
+        identify([files / "empty.h5"])
+    assert str(caught.value) == (
+        f"{files / 'empty.h5'}: no pose and direction has a stiffness: the data set holds no "
+        "samples. The measurement did not reach its end: go on with rig measure --resume, or "
+        "leave this data set out."
+    )
 
 
 # --- campaigns -----------------------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -122,6 +124,17 @@ def test_one_pose_determines_two_combinations(arm: Arm) -> None:
             assert abs(t / s - 1) < 1e-7
 
 
+def test_a_joint_without_a_lever_has_no_share_and_no_bound(arm: Arm) -> None:
+    """Exactly none: rounding had left shares below 0 and bounds of 1e-28 Nm/rad."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        data = draw(rng, PAPER_C, PAPER_Q[None], directions=np.eye(3)[:2], tool=np.zeros(3))
+        fit = identify(arm, data, [GAINS], default_prior(arm))
+        assert (fit.data_share[5], fit.lower_bound[5]) == (0.0, 0.0)
+        assert (fit.data_share[:5] > 0).all()
+        assert (fit.lower_bound[:4] > 0).all()
+
+
 def test_bound_that_holds_for_sure(arm: Arm) -> None:
     """c1 >= ky * lever^2 = 32.3 kNm/rad, less the measurement's uncertainty."""
     s = 1 / 57.42e3
@@ -175,6 +188,11 @@ def test_contradictory_data_are_refused(arm: Arm) -> None:
     second = draw(rng, 1.5 * PAPER_C, PAPER_Q[None], setup=1)
     with pytest.raises(ValueError, match="contradict each other"):
         identify(arm, first + second, [GAINS, GAINS], default_prior(arm))
+    with pytest.raises(ValueError, match="Leave out the one that no longer holds"):
+        identify(arm, first + second, [GAINS, GAINS], default_prior(arm))
+    bent = [replace(o, bent_over=(20.0, 220.0), label="a") for o in first]
+    with pytest.raises(ValueError, match=r"average over what was loaded \(a over 20 to 220 N\)"):
+        identify(arm, bent + second, [GAINS, GAINS], default_prior(arm))
     with pytest.raises(ValueError, match="no observation"):
         identify(arm, [], [GAINS], default_prior(arm))
     negative = Observation(PAPER_Q, np.eye(3)[0], None, -1e-6, 1e-8)

@@ -42,6 +42,11 @@ class Table:
     origin: str = "measured"
     complete: bool = True
     lines: tuple[str, ...] = ()
+    events: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def used(self) -> Any:
+        return ~self.columns["discarded"]
 
     def banners(self) -> tuple[str, ...]:
         return self.lines

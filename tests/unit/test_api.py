@@ -41,6 +41,19 @@ def measured(builder: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> P
     return path
 
 
+def test_the_page_says_how_to_get_the_data_set_that_it_loads(
+    builder: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (HOME / "docs/example.md").read_text("utf-8")
+    command = f"python docs/build_example.py {builder.DATA}"
+    assert page.index(f"`{command}`") < page.index(f'rig.load("{builder.DATA}")')
+    assert f'rig.find("{builder.DATA.parent}"' in page
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", command.split()[1:])
+    builder.main()
+    assert rig.load(builder.DATA).analyze().stiffness["direction"] == ["x", "y"]
+
+
 def test_importing_rig_pulls_nothing_in() -> None:
     code = "import rig, sys; print([m for m in ('numpy', 'h5py', 'pandas') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

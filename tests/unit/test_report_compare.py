@@ -143,6 +143,63 @@ def test_unlike_things_are_remarked(tmp_path: Path) -> None:
     assert found["remarks"] == ["they rest on other ranges of force (20 to 100 N; 10 to 30 N)"]
 
 
+def bent(force: float, r: int) -> float:
+    """A spring that softens, and scatters a little between the repetitions."""
+    return force / 133.0 * (1 + force / 256.0) * (1 + 0.001 * (r - 2))
+
+
+FEW, MANY = (20.0, 40.0, 60.0, 80.0), tuple(20.0 * n for n in range(1, 12))
+
+
+def compared(tmp_path: Path, few: tuple[float, ...], scale: float = 1.0) -> tuple[Any, str]:
+    """JSON and text of a report on one softening spring over many levels, and over a few."""
+    long = rewritten(bench(tmp_path / "long.h5", bent, forces=MANY), devices=DEVICES)
+    law = lambda f, r: scale * bent(f, r)  # noqa: E731
+    short = bench(tmp_path / "short.h5", law, forces=few, comment="short")
+    report = make([long, rewritten(short, devices=DEVICES)], Wishes(gap=False))
+    return report.to_json(), Page(report.to_html()).text
+
+
+def test_bent_curves_are_compared_over_the_levels_that_both_have(tmp_path: Path) -> None:
+    found, text = compared(tmp_path, FEW)
+    k = [d["analyze"]["directions"]["x"]["stiffness_N_per_mm"] for d in found["datasets"]]
+    assert k[1]["value"] > 1.1 * k[0]["value"]  # the averages differ, the springs do not
+    (pair,) = found["comparison"]
+    assert (pair["differs"], pair["force_N"]) == (False, [20.0, 80.0])
+    assert pair["ratio"]["value"] == pytest.approx(1.0, abs=1e-9)
+    assert pair["remarks"] == [
+        "compared over the 4 levels that both have: the curve is bent, and the k above rest on "
+        "other levels (20 to 220 N; 20 to 80 N)"
+    ]
+    told = "Direction x, from 20.0 to 80.0 N: no difference is shown; short.h5 is 1.000 times"
+    assert told in text
+
+
+def test_a_softer_bent_spring_is_still_told(tmp_path: Path) -> None:
+    found, text = compared(tmp_path, FEW, 1.1)
+    (pair,) = found["comparison"]
+    assert pair["ratio"]["value"] == pytest.approx(1 / 1.1, rel=1e-5)
+    assert "Direction x, from 20.0 to 80.0 N: short.h5 is softer, 0.9091 times" in text
+
+
+def test_levels_within_one_range_count_too(tmp_path: Path) -> None:
+    found, _ = compared(tmp_path, (20.0, 200.0, 220.0))
+    assert found["comparison"][0]["ratio"]["value"] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_bent_curves_without_common_levels_are_not_compared(tmp_path: Path) -> None:
+    found, text = compared(tmp_path, (10.0, 30.0, 50.0, 60.0))
+    assert found["comparison"] == []
+    reason = (
+        "the curve is bent, so k is an average over its levels, and of these the two have 1 level "
+        "in common (20 to 220 N; 10 to 60 N). Measure both at the same levels"
+    )
+    entry = {"first": 0, "second": 1, "direction": "x", "reason": reason}
+    assert found["not_compared"] == [entry]
+    assert f"Direction x: short.h5 and long.h5 are not compared: {reason}." in text
+    assert "No pose and direction has a stiffness" not in text
+
+
 def test_nothing_to_compare(tmp_path: Path) -> None:
     zero = bench(tmp_path / "zero.h5", lambda f, r: 0.001 * r, forces=(0.0, 0.0))
     report = make([bench(tmp_path / "a.h5"), zero], Wishes(gap=False))

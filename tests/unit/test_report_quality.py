@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.analysis.quality import assess
 from rig.dataset import Dataset, load
-from rig.report.quality import assess
 from tests.unit.example_data import dataset as measured
 from tests.unit.report_sets import bench
 

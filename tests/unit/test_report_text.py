@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig import cli
+from rig.dataset import load
 from rig.report.document import Block, Bullets, Cell, Facts, Paragraph, Section, Table, Word, rich
 from rig.report.report import make
 from rig.report.wishes import Wishes
@@ -60,6 +61,25 @@ def test_the_text_word_for_word(tmp_path: Path) -> None:
         rewritten(path, created="2026-03-01T10:00:00+01:00", origin="emulated")
     text = "\n".join(lines(make(paths, Wishes(gap=False)).document.sections)) + "\n"
     assert text == GOLDEN.read_text(encoding="utf-8")
+
+
+def test_what_makes_the_numbers_doubtful_stands_in_short(tmp_path: Path) -> None:
+    """And all of it in the chapter on data quality; what is small there has a small unit."""
+    path = bench(tmp_path / "a.h5")
+    columns = dict(load(path).columns)
+    columns["settled"] = (columns["step"] != 2).astype(float)
+    columns["displacement_mm"] = columns["displacement_mm"] + 1e-5 * (columns["repetition"] == 2)
+    behind = {"kind": "behind", "text": "This machine can't keep up.", "session_s": 30.0}
+    rewritten(path, columns=columns, events=[{**behind, "sample": 36}])
+    text = lines(make([path], Wishes(gap=False)).document.sections)
+    short, quality = text.index("# In short"), text.index("# Data quality")
+    (told,) = [line for line in text if line.startswith("Mind: ")]
+    assert short < text.index(told) < text.index("# What was measured")
+    assert told.startswith("Mind: 3 of 15 levels had not settled when they were sampled")
+    chapter = text[quality:]
+    assert "Levels that never settled: 3" in chapter
+    assert "Unloaded positions, x: 0.0100 µm apart over the repetitions" in chapter
+    assert "- 30.00 s: This machine can't keep up." in chapter
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *args: str) -> int:

@@ -80,6 +80,13 @@ def test_an_unknown_station_is_told_with_where_it_was_named(
         station_for(Path("tests/plan.yaml"), "labor", other)
 
 
+def test_the_line_of_a_protocol_that_names_an_unknown_station(tmp_path: Path) -> None:
+    path = tmp_path / "p.yaml"
+    path.write_text("schema: rig.protocol/1\ntitle: t\nstation:   labor\n")
+    with pytest.raises(InputError, match=rf'^{path}:3:12: station "labor" is unknown. Known: '):
+        station_for(path, "labor", None)
+
+
 def test_an_empty_name_is_no_wish_for_the_protocols_station() -> None:
     with pytest.raises(InputError, match=r"^--station: station '': no name of a station"):
         station_for(Path("tests/plan.yaml"), "emulated", "")

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.arrays import Array
 from rig.dataset import Dataset
+from rig.measurements import Measurements
 
 # What an operator or a device did that a reader of the results should know.
 NOTABLE = (
     "band_not_reached",
+    "behind",
     "device_failed",
     "limit",
     "no_value",
@@ -30,6 +32,21 @@ NOTABLE = (
     "values_lost",
 )
 MOST_EVENTS = 40
+STILL = 0.05  # of a run's span of force: a zero-load hold moves by less, unless something is wrong
+_HELD = ("loading", "unloading")
+_LEVEL = ("pose", "direction", "repetition", "branch", "step")
+
+
+class Recorded(Measurements, Protocol):
+    """What the functions here ask of a data set that `rig analyze` reads, too."""
+
+    @property
+    def used(self) -> NDArray[Any]:
+        """(n,) bool: samples that were not discarded."""
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """What happened, each with `kind` and the number of samples before it."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +60,16 @@ class Plateau:
 
 @dataclass(frozen=True)
 class RunZeros:
-    """The zero-load holds of one run, in the order of measurement."""
+    """The zero-load holds of one run, in the order of measurement.
+
+    span_N: between the largest and the smallest force of the run; 0 if it holds no load.
+    """
 
     pose: str
     direction: str
     repetition: int
     plateaus: tuple[Plateau, ...]
+    span_N: float = 0.0
 
     @property
     def change_N(self) -> float | None:
@@ -77,8 +98,9 @@ class Quality:
 
 def assess(dataset: Dataset) -> Quality:
     """All that a data set says of its own quality. Never fails: what is not there is null."""
-    zeros = tuple(_zeros(dataset))
+    zeros = zeros_of(dataset)
     used = dataset.used
+    unsettled = unsettled_levels(dataset)
     facts: dict[str, Any] = {
         "samples": dataset.rows,
         "used": int(used.sum()),
@@ -86,10 +108,10 @@ def assess(dataset: Dataset) -> Quality:
         "discards": _discards(dataset),
         "duration_s": _duration(dataset),
         "lateness_s": _lateness(dataset),
-        "slots_missed": _total(dataset, "slots_missed"),
+        "slots_missed": slots_missed(dataset),
         "clock": next((d["clock"] for d in dataset.devices.values() if "clock" in d), None),
         "devices": _devices(dataset),
-        "unsettled_levels": _unsettled(dataset),
+        "unsettled_levels": None if unsettled is None else unsettled[0],
         "force_zero": _force_zero(zeros),
         "displacement_zero": _displacement_zero(zeros),
         "temperature_C": _temperature(dataset),
@@ -112,7 +134,7 @@ def _lateness(dataset: Dataset) -> dict[str, float] | None:
     return {"median": float(median), "p95": float(p95), "max": float(top)}
 
 
-def _total(dataset: Dataset, column: str) -> int | None:
+def _total(dataset: Recorded, column: str) -> int | None:
     if column not in dataset.columns:
         return None
     return int(_finite(dataset.columns[column].astype(float)).sum())
@@ -146,39 +168,72 @@ def _discards(dataset: Dataset) -> list[dict[str, Any]]:
     ]
 
 
-def _unsettled(dataset: Dataset) -> int | None:
-    """Held levels of which no sample counts as settled; None where nothing says what settled is."""
+def slots_missed(dataset: Recorded) -> int | None:
+    """Sampling slots of which no row was made; None where nothing says so."""
+    return _total(dataset, "slots_missed")
+
+
+def unsettled_levels(dataset: Recorded) -> tuple[int, int] | None:
+    """Held levels that had not settled when they were sampled, and held levels in all; None where
+    nothing says what settled is.
+
+    Not settled is a level of which no sample counts as settled, and one whose settling ended at its
+    deadline: older files mark what was sampled after that as settled.
+    """
     columns = dataset.columns
     if "settled" not in columns:
         return None
-    held = dataset.used & np.isin(columns["branch"], ["loading", "unloading"])
-    held &= columns["step"] > 0
-    keys = ("pose", "direction", "repetition", "branch", "step")
+    held = dataset.used & np.isin(columns["branch"], _HELD) & (columns["step"] > 0)
     level = np.zeros(int(held.sum()), dtype=np.int64)
-    for key in keys:
+    for key in _LEVEL:
         _, number = np.unique(columns[key][held], return_inverse=True)
         level = level * (int(number.max(initial=0)) + 1) + number
     settled = columns["settled"][held] == 1
-    return int(np.setdiff1d(level, level[settled]).size)
+    late = _rows_at_deadlines(dataset)[held]
+    open_ = np.union1d(np.setdiff1d(level, level[settled]), level[late])
+    return int(open_.size), int(np.unique(level).size)
 
 
-def _zeros(dataset: Dataset) -> Iterator[RunZeros]:
+def _rows_at_deadlines(dataset: Recorded) -> NDArray[np.bool_]:
+    """(n,): the last sample of a settling that ended at its deadline. Where the step was measured
+    anew after that, this sample is among the discarded ones."""
+    columns = dataset.columns
+    found = np.zeros(len(columns["step"]), dtype=bool)
+    for event in dataset.events:
+        row = int(event.get("sample", 0)) - 1
+        if event["kind"] == "not_settled" and 0 <= row < found.size:
+            found[row] = event.get("step") == columns["step"][row]
+    return found
+
+
+def zeros_of(dataset: Recorded) -> tuple[RunZeros, ...]:
     """Zero-load holds by run, from the samples in use that have both values."""
+    return tuple(_zeros(dataset))
+
+
+def _zeros(dataset: Recorded) -> Iterator[RunZeros]:
     columns = dataset.columns
     rows = np.flatnonzero(dataset.used)
     if rows.size == 0:
         return
     time = columns["session_s"] if "session_s" in columns else columns["time_s"]
     place = [columns[k][rows] for k in ("pose", "direction", "repetition")]
-    run_starts = _starts(place)
-    for first, last in run_starts:
+    for first, last in _starts(place):
         mine = rows[first:last]
         zero = columns["branch"][mine] == "zero"
-        plateaus = tuple(_plateau(dataset, time, mine[a:b]) for a, b in _starts([zero]) if zero[a])
+        span = 0.0 if zero.all() else _span(columns["force_N"][mine])
+        plateaus = tuple(
+            _plateau(dataset, time, mine[a:b], span) for a, b in _starts([zero]) if zero[a]
+        )
         known = tuple(p for p in plateaus if p is not None)
         if known:
             pose, direction, repetition = (p[first] for p in place)
-            yield RunZeros(str(pose), str(direction), int(repetition), known)
+            yield RunZeros(str(pose), str(direction), int(repetition), known, span)
+
+
+def _span(force: NDArray[Any]) -> float:
+    values = _finite(force.astype(float))
+    return float(np.ptp(values)) if values.size else 0.0
 
 
 def _starts(columns: list[NDArray[Any]]) -> list[tuple[int, int]]:
@@ -192,15 +247,20 @@ def _starts(columns: list[NDArray[Any]]) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _plateau(dataset: Dataset, time: NDArray[Any], rows: NDArray[np.intp]) -> Plateau | None:
+def _plateau(
+    dataset: Recorded, time: NDArray[Any], rows: NDArray[np.intp], span: float
+) -> Plateau | None:
+    """Of a hold that the load was still on its way to, the later half counts, as for k."""
     force = dataset.columns["force_N"][rows].astype(float)
     moved = dataset.columns["displacement_mm"][rows].astype(float)
     good = np.isfinite(force) & np.isfinite(moved) & np.isfinite(time[rows].astype(float))
     if not good.any():
         return None
-    return Plateau(
-        float(time[rows][good].mean()), float(force[good].mean()), float(moved[good].mean())
-    )
+    kept = np.flatnonzero(good)
+    if span > 0 and np.ptp(force[kept]) > STILL * span:
+        kept = kept[kept.size // 2 :]
+    when = time[rows][kept].astype(float)
+    return Plateau(float(when.mean()), float(force[kept].mean()), float(moved[kept].mean()))
 
 
 def _force_zero(zeros: tuple[RunZeros, ...]) -> dict[str, Any] | None:
