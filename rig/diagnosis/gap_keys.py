@@ -242,7 +242,7 @@ GRAMMAR: dict[str, Grammar] = {
     "displacement_scale": Grammar(
         (), (("gain", ()), ("gain", ("at_response",)), ("gain", ("above",)))
     ),
-    "time_lag": Grammar(("channel", "way", "lag"), (("share", ()),)),
+    "time_lag": Grammar(("channel", "way", "lag", "about"), (("share", ()),)),
     "force_drift": Grammar(
         ("path", "quantity", "about"),
         (*_PATHS, *((c, (*shape, "along")) for c, shape in _PATHS), ("drift", ("run", "along"))),
