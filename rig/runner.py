@@ -107,36 +107,63 @@ class Runner:
 
     def _all_steps(self, where: Where) -> None:
         steps = self._protocol.steps(where.run)
-        top_reached = False
-        for step in steps:
+        loading_ended = False
+        for position, step in enumerate(steps, start=1):
             key = (where.index, where.repetition, step.branch, step.number)
-            if key in self._progress.steps or (top_reached and step.branch == "loading"):
+            if key in self._progress.steps or (loading_ended and step.branch == "loading"):
                 continue
             try:
-                self._step_until_accepted(where, step, len(steps))
+                self._step_until_accepted(where, step, (position, len(steps)))
             except TopReached:
-                top_reached = True
-                limit = where.run.stop_at_displacement_mm
-                self._steps.event(where, "top", f"displacement is above {limit:g} mm")
+                loading_ended = True
+                self._tell_top(where, step)
             self._progress.steps.add(key)
 
-    def _step_until_accepted(self, where: Where, step: Step, steps: int) -> None:
+    def _tell_top(self, where: Where, step: Step) -> None:
+        limit = where.run.stop_at_displacement_mm
+        text = f"displacement is above {limit:g} mm"
+        self._steps.event(where, "top", text, branch=step.branch, step=step.number)
+        ends = "loading ends here" if step.branch == "loading" else "this level is left out"
+        self._loader.notify(f"{step.branch} to {step.target_N:g} N: {text}; {ends}")
+
+    def _step_until_accepted(self, where: Where, step: Step, place: tuple[int, int]) -> None:
         data = {"branch": step.branch, "step": step.number}
         text = f"{step.branch} to {step.target_N:g} N"
+        again = False
         while True:
+            if self._below(where, step, again=again):
+                force_N = self._supervision.view.force_N
+                text += f": left out, the force is {force_N:.4g} N and would have to rise"
+                self._steps.event(where, "step_left_out", text, **data)
+                self._loader.notify(text, "warning")
+                return
             first_row = self._recorder.rows
             self._steps.event(where, "step_start", text, **data)
             try:
-                outcome = self._steps.measure(where, step, steps)
+                outcome = self._steps.measure(where, step, place)
             except Wish as wish:
                 if wish.what == "redo_repetition":
                     raise
                 self._recorder.discard(first_row, wish.what.replace("_", " "))
                 if wish.what == "redo_step":
+                    again = True
                     continue
                 outcome = f"skipped: {self._reason()}"
             self._steps.event(where, "step_done", f"{text}: {outcome}", outcome=outcome, **data)
             return
+
+    def _below(self, where: Where, step: Step, *, again: bool) -> bool:
+        """Whether an unloading step would have to be reached from below: that is loading, and might
+        drive an arm on that has given way. Again: the hand may have loosened too far, but not to
+        the next level."""
+        if step.branch != "unloading":
+            return False
+        half_width_N = self._protocol.force_band.half_width_N
+        lowest_N = step.target_N - half_width_N(step.target_N)
+        if again:
+            next_N = max((f for f in where.run.forces_N if f < step.target_N), default=0.0)
+            lowest_N = next_N + half_width_N(next_N)
+        return self._supervision.view.force_N < lowest_N
 
     def _mount(self, where: Where) -> None:
         """Pose and setup, when they change; the amplifier is in Reset meanwhile."""

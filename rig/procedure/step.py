@@ -16,7 +16,7 @@ from rig.protocol import MeasurementProtocol, Run, Step
 
 
 class TopReached(Exception):
-    """The run's own displacement limit ends its loading branch."""
+    """The displacement is above the run's own limit, and the screw would have to push on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +53,13 @@ class StepProcedure:
         """A new setup: earlier steps say nothing about how far to turn."""
         self._done = [(0.0, 0.0)]
 
-    def measure(self, where: Where, step: Step, steps: int) -> str:
-        """Carries out the step and returns how it went, in words."""
+    def measure(self, where: Where, step: Step, place: tuple[int, int]) -> str:
+        """Carries out the step and returns how it went, in words. place: which step of how many,
+        as it is shown; levels share their number with those of the other branch."""
         show = self._supervision.show
         half_width = self._protocol.force_band.half_width_N(step.target_N)
-        show(step=step.number, steps=steps, target_N=step.target_N, band_N=half_width)
+        position, steps = place
+        show(step=position, steps=steps, target_N=step.target_N, band_N=half_width)
         show(branch=step.branch)
         show(samples=0, samples_wanted=self._protocol.samples_of_step)
         deadline = self._supervision.now() + self._protocol.step_deadline_s
@@ -83,7 +85,8 @@ class StepProcedure:
             view = self._supervision.view
             if abs(view.force_N - step.target_N) <= view.band_N:
                 return True
-            if top is not None and step.branch == "loading" and live.displacement_mm > top:
+            pushing = step.branch == "loading" or view.force_N < step.target_N
+            if top is not None and pushing and live.displacement_mm > top:
                 raise TopReached
             if self._supervision.now() > deadline:
                 if self._give_up(where, step):

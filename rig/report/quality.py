@@ -25,6 +25,7 @@ NOTABLE = (
     "pose_accepted",
     "repetition_redone",
     "resumed",
+    "step_left_out",
     "stopped",
     "top",
     "values_lost",
