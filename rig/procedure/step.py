@@ -70,7 +70,7 @@ class StepProcedure:
             if settled != "left the band":
                 break
             self._recorder.discard(first_row, "the force left its band while settling")
-        self._sample(where, step)
+        self._sample(where, step, settled=settled == "settled")
         view = self._supervision.view
         self._done.append((view.force_N, view.displacement_mm))
         words = ["measured"] if reached else ["band not reached"]
@@ -141,12 +141,12 @@ class StepProcedure:
             self._loader.notify(f"{text}; it is recorded, and marked as not settled", "warning")
         return "not settled"
 
-    def _sample(self, where: Where, step: Step) -> None:
+    def _sample(self, where: Where, step: Step, *, settled: bool) -> None:
         taken = 0
         while taken < self._protocol.samples_of_step:
             self._supervision.show(phase="sampling", settle_remaining_s=0.0, samples=taken)
             _, slot = self._supervision.tick()
-            if slot is not None and self.record(slot, where, step, settled=True):
+            if slot is not None and self.record(slot, where, step, settled=settled):
                 taken += 1
 
     def zero_plateau(self, where: Where, seconds: float) -> None:
@@ -157,12 +157,12 @@ class StepProcedure:
             return
         self._supervision.show(step=0, target_N=0.0, band_N=0.0, samples=0, samples_wanted=wanted)
         self._supervision.show(branch="zero")
-        self._settle(where, zero, banded=False)
+        settled = self._settle(where, zero, banded=False) == "settled"
         taken = 0
         while taken < wanted:
             self._supervision.show(phase="zero", samples=taken)
             _, slot = self._supervision.tick()
-            if slot is not None and self.record(slot, where, zero, settled=True):
+            if slot is not None and self.record(slot, where, zero, settled=settled):
                 taken += 1
 
     def record(self, slot: Slot, where: Where, step: Step, *, settled: bool) -> bool:

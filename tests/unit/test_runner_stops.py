@@ -225,6 +225,8 @@ def test_an_arm_that_does_not_settle(bench: Bench, at_deadline: str, outcome: st
     else:
         bench.run()
         assert all(outcome in e["outcome"] for e in bench.events("step_done"))
+        assert len(bench.events("not_settled")) == 2 * (1 + 3 + 1)  # zero plateaus, too
+        assert not any(row["values"]["settled"] for row in bench.records("sample"))
 
 
 def test_leading_the_arm_to_its_pose_is_no_fault(bench: Bench) -> None:
