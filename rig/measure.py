@@ -32,6 +32,7 @@ from rig.procedure.progress import Progress, read_progress
 from rig.procedure.progress_bar import LoaderWithBar
 from rig.procedure.recorder import Recorder
 from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
+from rig.resuming import interrupted, resumed
 from rig.runner import Runner
 from rig.software import software_version
 from rig.station import Station, parse_station, station_for
@@ -83,7 +84,6 @@ def measure(
     _check_output(path)
     start: dict[str, object] = {
         "uuid": str(uuid.uuid4()),
-        "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "origin": "emulated" if station.emulation else "measured",
         "title": protocol.title,
         "software": software_version(),
@@ -95,6 +95,7 @@ def measure(
         start["speed"] = speed
     # The devices come first: a run that never began leaves no file behind.
     with _opened(protocol, station, Progress(), say, panel) as rig:
+        start["created"] = datetime.now().astimezone().isoformat(timespec="seconds")
         journal = Journal.create(journal_path(path), start, _synced(station))
         return _carry_out(Job(path, protocol, station, journal, Progress()), rig, say)
 
@@ -102,7 +103,7 @@ def measure(
 def resume(
     path: Path, say: Say, panel: PanelOptions | None = None, speed: float | None = None
 ) -> Path:
-    """Goes on with an interrupted measurement at the step where it stopped."""
+    """Goes on with an interrupted measurement, with the repetition in which it stopped."""
     journal_file = journal_path(path)
     if not journal_file.exists():
         hint = "A complete measurement needs no resuming; measure again for another data set."
@@ -124,6 +125,8 @@ def resume(
     if speed is not None:
         station = _at_speed(station, speed)
     progress = read_progress(records)
+    if words := interrupted(protocol, progress):
+        say(words)
     # The journal comes first: devices with which another measurement is busy are left alone.
     with (
         Journal.reopen(journal_file, _synced(station)) as journal,
@@ -131,7 +134,7 @@ def resume(
     ):
         for record in records:  # the page shows the whole run, not only what is still to come
             rig.onlooker.record(record.kind, record.data)
-        journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
+        journal.append("event", resumed(start["created"], progress, emulated=rig.emulated))
         return _carry_out(Job(path, protocol, station, journal, progress), rig, say)
 
 
@@ -169,6 +172,11 @@ class _Rig:
     clock: Clock
     onlooker: Onlooker
 
+    @property
+    def emulated(self) -> bool:
+        """Whether nothing here is real."""
+        return self.station.emulation is not None
+
 
 @contextmanager
 def _opened(
@@ -190,7 +198,7 @@ def _opened(
         loader = make_loader(station, clock)
         scripted = station.operator.driver == "scripted"
         if scripted:
-            loader = LoaderWithBar(loader, protocol, len(progress.steps))
+            loader = LoaderWithBar(loader, protocol, progress.done_steps)
             say(_NO_HAND if panel is None else _PAGE_ALONE)
         loader = onlooker.operator(loader, clock, scripted=scripted)
         stack.callback(loader.close)

@@ -23,6 +23,7 @@ from rig.procedure.recorder import Recorder, Slot, Vector
 PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
 OF_A_STEP = ("redo_step", "skip")  # without a step under way there is nothing that they could mean
 ONLY_ABORT = "Meanwhile nothing is heard but an abort"
+TO_STOP = "Stop the measurement? --resume then measures a repetition under way anew, as a whole."
 HEARD = "Ctrl-C was heard; the open question comes first. Ctrl-C again stops at once."
 
 
@@ -212,7 +213,7 @@ class Supervision:
 
     def _hear_interrupt(self) -> None:
         if self._interrupts:
-            prompt = Prompt("interrupt", "Stop the measurement?", ("abort", "continue"))
+            prompt = Prompt("interrupt", TO_STOP, ("abort", "continue"))
             answer = self.ask(prompt)
             self._interrupts = 0
             self.obey(answer)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import nullcontext
 from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,12 +16,13 @@ from rig import measure
 from rig.dataset import journal_path, load
 from rig.emulation.host import EmulationHost
 from rig.errors import InputError
-from rig.journal import Journal
+from rig.journal import Journal, Record
 from rig.panel.onlooker import Onlooker
 from rig.procedure.devices import in_short
 from rig.procedure.limits import UNLOAD
-from rig.procedure.progress import Progress
+from rig.procedure.progress import Progress, read_progress
 from rig.protocol import load_protocol
+from rig.resuming import interrupted, resumed
 from rig.station import load_station
 from tests.unit.example_data import write_journal
 from tests.unit.runner_bench import Bench
@@ -112,6 +114,43 @@ def test_an_interrupt_is_told_where_the_screen_no_longer_covers_it(
         with pytest.raises(KeyboardInterrupt):
             measure._carry_out(job, rig, said.append)
     assert said[:2] == ["(the screen goes)", f"Interrupted. {UNLOAD}"]
+
+
+@pytest.mark.parametrize(("minutes_ago", "session_s"), [(25, 1500.0), (1, 128.4)])
+def test_the_session_clock_counts_the_time_between_stop_and_resume(
+    minutes_ago: float, session_s: float
+) -> None:
+    """Never backwards, whatever the computer's clock says."""
+    progress = Progress(session_s=128.4)
+    created = datetime.now().astimezone() - timedelta(minutes=minutes_ago)
+    event = resumed(created.isoformat(timespec="seconds"), progress, emulated=False)
+    assert progress.session_s == pytest.approx(session_s, abs=3.0)
+    assert event["session_s"] == pytest.approx(progress.session_s, abs=1e-3)
+    assert datetime.fromisoformat(str(event["at"])).tzinfo is not None
+    assert str(event["text"]).endswith("s after the last record")
+
+
+def test_the_session_clock_of_an_emulated_rig_goes_on_where_it_stopped() -> None:
+    progress = Progress(session_s=128.4)
+    event = resumed("2026-01-01T00:00:00+00:00", progress, emulated=True)
+    assert (progress.session_s, event["session_s"]) == (128.4, 128.4)
+    assert event["text"] == "measurement resumed; the emulated rig stood still meanwhile"
+
+
+def test_the_session_clock_never_goes_back_behind_an_event() -> None:
+    sample = Record(1, "sample", {"session_s": 135.06, "segment": 1})
+    stopped = Record(2, "event", {"kind": "stopped", "text": "interrupted", "session_s": 135.42})
+    assert read_progress([sample, stopped]).session_s == 135.42
+
+
+def test_what_becomes_of_an_interrupted_repetition_is_told() -> None:
+    protocol = load_protocol(PROTOCOL)
+    progress = Progress(rows=46, first_rows={(0, 1): 0, (0, 2): 12}, repetitions={(0, 1)})
+    assert interrupted(protocol, progress) == (
+        "Pose P1, direction x: repetition 2 was interrupted and is measured anew as a whole. Its "
+        "34 rows so far stay in the file, marked as discarded."
+    )
+    assert interrupted(protocol, replace(progress, repetitions={(0, 1), (0, 2)})) == ""
 
 
 def test_a_resumed_run_does_not_meet_the_scatter_of_its_beginning_again(
