@@ -139,7 +139,7 @@ class Runner:
         text = f"{step.branch} to {step.target_N:g} N"
         again = False
         while True:
-            if self._below(where, step, again=again):
+            if self._steps.below(where, step, again=again):
                 force_N = self._supervision.view.force_N
                 text += f": left out, the force is {force_N:.4g} N and would have to rise"
                 self._steps.event(where, "step_left_out", text, **data)
@@ -152,26 +152,13 @@ class Runner:
             except Wish as wish:
                 if wish.what == "redo_repetition":
                     raise
-                self._recorder.discard(first_row, wish.what.replace("_", " "))
+                self._recorder.discard(first_row, wish.why)
                 if wish.what == "redo_step":
                     again = True
                     continue
                 outcome = f"skipped: {self._reason()}"
             self._steps.event(where, "step_done", f"{text}: {outcome}", outcome=outcome, **data)
             return
-
-    def _below(self, where: Where, step: Step, *, again: bool) -> bool:
-        """Whether an unloading step would have to be reached from below: that is loading, and might
-        drive an arm on that has given way. Again: the hand may have loosened too far, but not to
-        the next level."""
-        if step.branch != "unloading":
-            return False
-        half_width_N = self._protocol.force_band.half_width_N
-        lowest_N = step.target_N - half_width_N(step.target_N)
-        if again:
-            next_N = max((f for f in where.run.forces_N if f < step.target_N), default=0.0)
-            lowest_N = next_N + half_width_N(next_N)
-        return self._supervision.view.force_N < lowest_N
 
     def _mount(self, where: Where) -> None:
         """Pose and setup, when they change; the amplifier is in Reset meanwhile."""

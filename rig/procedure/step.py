@@ -11,7 +11,8 @@ from rig.errors import MeasurementStopped
 from rig.procedure.limits import UNLOAD
 from rig.procedure.recorder import Place, Recorder, Slot, Vector
 from rig.procedure.settle import SettleWindow
-from rig.procedure.supervision import Supervision
+from rig.procedure.supervision import Supervision, Wish
+from rig.procedure.touched import Touched
 from rig.protocol import MeasurementProtocol, Run, Step
 
 
@@ -69,12 +70,28 @@ class StepProcedure:
             settled = self._settle(where, step, banded=reached)
             if settled != "left the band":
                 break
-            self._recorder.discard(first_row, "the force left its band while settling")
+            why = "the force left its band while settling"
+            if self.below(where, step, again=True):
+                raise Wish("redo_step", why)
+            self._recorder.discard(first_row, why)
         self._sample(where, step, settled=settled == "settled")
         view = self._supervision.view
         self._done.append((view.force_N, view.displacement_mm))
         words = ["measured"] if reached else ["band not reached"]
         return ", ".join(words if settled == "settled" else [*words, settled])
+
+    def below(self, where: Where, step: Step, *, again: bool) -> bool:
+        """Whether an unloading step would have to be reached from below: that is loading, and might
+        drive an arm on that has given way. Again: the hand may have loosened too far, but not to
+        the next level."""
+        if step.branch != "unloading":
+            return False
+        half_width_N = self._protocol.force_band.half_width_N
+        lowest_N = step.target_N - half_width_N(step.target_N)
+        if again:
+            next_N = max((f for f in where.run.forces_N if f < step.target_N), default=0.0)
+            lowest_N = next_N + half_width_N(next_N)
+        return self._supervision.view.force_N < lowest_N
 
     def _approach(self, where: Where, step: Step, deadline: float) -> bool:
         """Guides the hand until the force is in its band; False if it was given up."""
@@ -143,11 +160,25 @@ class StepProcedure:
 
     def _sample(self, where: Where, step: Step, *, settled: bool) -> None:
         taken = 0
+        touched = Touched(self._protocol.settle, self._supervision.view.band_N)
         while taken < self._protocol.samples_of_step:
             self._supervision.show(phase="sampling", settle_remaining_s=0.0, samples=taken)
             _, slot = self._supervision.tick()
+            view = self._supervision.view
+            if what := touched.look(self._supervision.now(), view.force_N, view.displacement_mm):
+                self._touched(where, step, what)
             if slot is not None and self.record(slot, where, step, settled=settled):
                 taken += 1
+
+    def _touched(self, where: Where, step: Step, what: str) -> None:
+        text = f"{step.branch} to {step.target_N:g} N: while it was sampled {what}"
+        self.event(where, "touched", text, branch=step.branch, step=step.number)
+        self._loader.notify(
+            f"{text}. The screw was turned, or the arm was touched: the step is measured again. "
+            "After a large change redo the repetition: an arm remembers.",
+            "warning",
+        )
+        raise Wish("redo_step", "screw or arm were moved while it was sampled")
 
     def zero_plateau(self, where: Where, seconds: float) -> None:
         """Samples without load for so long, once the unloaded arm has settled."""

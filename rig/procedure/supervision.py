@@ -51,11 +51,13 @@ class Changes(TypedDict, total=False):
 
 
 class Wish(Exception):
-    """The operator wants the step under way to be left."""
+    """The operator, or what happened at the screw, wants the step under way to be left. why: in
+    words, for what is discarded."""
 
-    def __init__(self, what: Command) -> None:
+    def __init__(self, what: Command, why: str = "") -> None:
         super().__init__(what)
         self.what = what
+        self.why = why or what.replace("_", " ")
 
 
 class Supervision:

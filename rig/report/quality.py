@@ -28,6 +28,7 @@ NOTABLE = (
     "step_left_out",
     "stopped",
     "top",
+    "touched",
     "values_lost",
 )
 MOST_EVENTS = 40
