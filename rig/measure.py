@@ -27,7 +27,7 @@ from rig.plan import plan
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.devices import Devices, make_devices, make_loader, open_devices, station_clock
 from rig.procedure.limits import UNLOAD
-from rig.procedure.pace import Pace
+from rig.procedure.pace import Pace, speed_named
 from rig.procedure.progress import Progress, read_progress
 from rig.procedure.progress_bar import LoaderWithBar
 from rig.procedure.recorder import Recorder
@@ -94,7 +94,7 @@ def measure(
     if speed is not None:  # the station's text says another one
         start["speed"] = speed
     # The devices come first: a run that never began leaves no file behind.
-    with _opened(protocol, station, Progress(), say, panel) as rig:
+    with speed_named(_speed(station)), _opened(protocol, station, Progress(), say, panel) as rig:
         start["created"] = datetime.now().astimezone().isoformat(timespec="seconds")
         journal = Journal.create(journal_path(path), start, _synced(station))
         return _carry_out(Job(path, protocol, station, journal, Progress()), rig, say)
@@ -130,6 +130,7 @@ def resume(
     # The journal comes first: devices with which another measurement is busy are left alone.
     with (
         Journal.reopen(journal_file, _synced(station)) as journal,
+        speed_named(_speed(station)),
         _opened(protocol, station, progress, say, panel) as rig,
     ):
         for record in records:  # the page shows the whole run, not only what is still to come
@@ -140,7 +141,12 @@ def resume(
 
 def _synced(station: Station) -> bool:
     """Whether rows wait for the disk: always, but where the clock runs ahead of real time."""
-    return station.emulation is None or station.emulation.speed <= 1
+    return _speed(station) <= 1
+
+
+def _speed(station: Station) -> float:
+    """Times real time."""
+    return 1.0 if station.emulation is None else station.emulation.speed
 
 
 def default_output(protocol_file: Path) -> Path:

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from drivers.errors import ReadTimeout
 from drivers.interfaces import LiveView
 from rig import measure
 from rig.dataset import journal_path, load
@@ -151,6 +152,35 @@ def test_what_becomes_of_an_interrupted_repetition_is_told() -> None:
         "34 rows so far stay in the file, marked as discarded."
     )
     assert interrupted(protocol, replace(progress, repetitions={(0, 1), (0, 2)})) == ""
+
+
+def fails(*_: object) -> object:
+    raise ReadTimeout("dynamometer", "no samples for 1 s", "Check its cable.")
+
+
+def test_the_speed_is_named_where_a_device_fails_far_ahead_of_real_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(measure, "_opened", fails)
+    with pytest.raises(ReadTimeout, match=r"no samples for 1 s\. At 999 times real time"):
+        measure.measure(PROTOCOL, "emulated", tmp_path / "a.h5", print, speed=999)
+
+
+def test_resuming_tells_first_what_is_measured_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "b.h5"
+    texts = {"protocol": load_protocol(PROTOCOL).text, "station": load_station("emulated").text}
+    with Journal.create(journal_path(target), texts) as journal:
+        place = {"run": 0, "repetition": 1, "session_s": 0.5}
+        journal.append("event", {"kind": "repetition_start", "text": "x, 1", **place})
+        journal.append("sample", {"session_s": 1.0, "segment": 1})
+    monkeypatch.setattr(measure, "_opened", fails)
+    said: list[str] = []
+    with pytest.raises(ReadTimeout, match=r"no samples for 1 s\. At 999 times real time"):
+        measure.resume(target, said.append, speed=999)
+    assert len(said) == 1
+    assert said[0].startswith("Pose P1, direction x: repetition 1 was interrupted and is measured")
 
 
 def test_a_resumed_run_does_not_meet_the_scatter_of_its_beginning_again(
