@@ -1,5 +1,10 @@
 """`python -m rig` is the command `rig`."""
 
-from rig.cli import main
+import sys
 
-main()
+try:
+    from rig.cli import main
+
+    main()
+except KeyboardInterrupt:  # while modules are read, or as the last word is said
+    sys.exit(130)
