@@ -125,8 +125,6 @@ def resume(
     if speed is not None:
         station = _at_speed(station, speed)
     progress = read_progress(records)
-    if words := interrupted(protocol, progress):
-        say(words)
     # The journal comes first: devices with which another measurement is busy are left alone.
     with (
         Journal.reopen(journal_file, _synced(station)) as journal,
@@ -210,6 +208,8 @@ def _opened(
         stack.callback(loader.close)
         if progress.rows:
             say(f"resuming after {counted(progress.rows, 'row')}")
+        if words := interrupted(protocol, progress):
+            say(words)
         say(SAFETY_NOTE)
         loader.open()  # from here on the screen moves, and what is said would be painted over
         yield _Rig(station, devices, loader, clock, onlooker)

@@ -46,9 +46,12 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
     for name, stand_in in stand_ins.items():
         monkeypatch.setattr(measure, name, stand_in)
     protocol, station = load_protocol(PROTOCOL), load_station("emulated")
-    with measure._opened(protocol, station, Progress(rows=225), said.append, None):
-        assert "no keys are heard" in said[-4]
-        assert said[-3:] == ["resuming after 225 rows", measure.SAFETY_NOTE, "(screen)"]
+    progress = Progress(rows=225, first_rows={(0, 1): 191})
+    with measure._opened(protocol, station, progress, said.append, None):
+        assert "no keys are heard" in said[-5]
+        anew = interrupted(protocol, progress)
+        assert "34 rows" in anew
+        assert said[-4:] == ["resuming after 225 rows", anew, measure.SAFETY_NOTE, "(screen)"]
 
 
 def test_units_stand_behind_what_devices_say_of_themselves() -> None:
@@ -166,21 +169,15 @@ def test_the_speed_is_named_where_a_device_fails_far_ahead_of_real_time(
         measure.measure(PROTOCOL, "emulated", tmp_path / "a.h5", print, speed=999)
 
 
-def test_resuming_tells_first_what_is_measured_anew(
+def test_the_speed_is_named_where_a_device_fails_after_resuming(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "b.h5"
     texts = {"protocol": load_protocol(PROTOCOL).text, "station": load_station("emulated").text}
-    with Journal.create(journal_path(target), texts) as journal:
-        place = {"run": 0, "repetition": 1, "session_s": 0.5}
-        journal.append("event", {"kind": "repetition_start", "text": "x, 1", **place})
-        journal.append("sample", {"session_s": 1.0, "segment": 1})
+    Journal.create(journal_path(target), texts).close()
     monkeypatch.setattr(measure, "_opened", fails)
-    said: list[str] = []
     with pytest.raises(ReadTimeout, match=r"no samples for 1 s\. At 999 times real time"):
-        measure.resume(target, said.append, speed=999)
-    assert len(said) == 1
-    assert said[0].startswith("Pose P1, direction x: repetition 1 was interrupted and is measured")
+        measure.resume(target, print, speed=999)
 
 
 def test_a_resumed_run_does_not_meet_the_scatter_of_its_beginning_again(
