@@ -97,7 +97,7 @@ class Plan:
             f"at least {self.samples} samples",
             f"Duration: about {_time(self.duration_s)}"
             + (
-                f"; at {self.speed:g} times real time {_time(self.duration_s / self.speed)}"
+                f"; at {self.speed:g} times real time at least {_time(self.duration_s / self.speed)}"
                 if self.speed > 1
                 else ""
             ),
