@@ -141,7 +141,8 @@ class LiveView:
     """All that the person at the screw sees, ten times a second.
 
     `stale` names devices whose value is older than its deadline; their numbers must not look live.
-    Ages are wall-clock seconds of the newest single value at the time of the view.
+    Ages are wall-clock seconds of the newest single value at the time of the view. `step` counts
+    from 1 to `steps` over both branches; 0 without a step under way.
     """
 
     phase: Phase

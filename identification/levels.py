@@ -234,13 +234,15 @@ _BEYOND, _LITTLE_WORK = 3.0, 0.1  # standard deviations of the mean; of the work
 
 
 def hysteresis(curve: Curve, loading: Grid, unloading: Grid) -> Hysteresis | None:
-    """Area of the loop in the (u, F) plane (shoelace formula); None without an unloading branch."""
+    """Area of the loop in the (u, F) plane (shoelace formula); None without an unloading branch.
+    Unloading counts up to the largest load of its own loading: beyond that is no loop."""
     areas, works = [], []
     after = _remaining(curve)
     for row, repetition in enumerate(loading.repetitions):
         if repetition not in unloading.repetitions:
             continue
-        up, down = loading.run(row), unloading.run(unloading.repetitions.index(repetition))
+        up = loading.run(row)
+        down = _up_to(up, unloading.run(unloading.repetitions.index(repetition)))
         end = after.get(repetition)
         first, last = ([0.0], [0.0]) if curve.origin else ([], [])
         closing = [end] if end is not None and curve.origin else []
@@ -257,6 +259,24 @@ def hysteresis(curve: Curve, loading: Grid, unloading: Grid) -> Hysteresis | Non
     remaining = float(np.mean(list(after.values()))) if after else float("nan")
     relative = float(np.mean(areas)) / work if work > 0 and curve.origin else float("nan")
     return Hysteresis(float(np.mean(areas)), sd, relative, remaining, len(areas))
+
+
+_SAME_LOAD = 1.05  # no hand comes back to a level more exactly
+
+
+def _up_to(up: LevelTable, down: LevelTable) -> LevelTable:
+    """The levels of `down` under which `up` went, too."""
+    if not up.size:
+        return down
+    top = float(up.force[np.argmax(np.abs(up.force))])
+    mask = down.force * np.sign(top) <= _SAME_LOAD * abs(top)
+    return LevelTable(
+        down.force[mask],
+        down.displacement[mask],
+        down.u_force[mask],
+        down.u_displacement[mask],
+        down.scatter[mask],
+    )
 
 
 def _remaining(curve: Curve) -> dict[int, float]:

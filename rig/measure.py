@@ -27,11 +27,12 @@ from rig.plan import plan
 from rig.procedure.acquisition import Acquisition
 from rig.procedure.devices import Devices, make_devices, make_loader, open_devices, station_clock
 from rig.procedure.limits import UNLOAD
-from rig.procedure.pace import Pace
+from rig.procedure.pace import Pace, speed_named
 from rig.procedure.progress import Progress, read_progress
 from rig.procedure.progress_bar import LoaderWithBar
 from rig.procedure.recorder import Recorder
 from rig.protocol import MeasurementProtocol, load_protocol, parse_protocol
+from rig.resuming import interrupted, resumed
 from rig.runner import Runner
 from rig.software import software_version
 from rig.station import Station, parse_station, station_for
@@ -83,7 +84,6 @@ def measure(
     _check_output(path)
     start: dict[str, object] = {
         "uuid": str(uuid.uuid4()),
-        "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "origin": "emulated" if station.emulation else "measured",
         "title": protocol.title,
         "software": software_version(),
@@ -94,7 +94,8 @@ def measure(
     if speed is not None:  # the station's text says another one
         start["speed"] = speed
     # The devices come first: a run that never began leaves no file behind.
-    with _opened(protocol, station, Progress(), say, panel) as rig:
+    with speed_named(_speed(station)), _opened(protocol, station, Progress(), say, panel) as rig:
+        start["created"] = datetime.now().astimezone().isoformat(timespec="seconds")
         journal = Journal.create(journal_path(path), start, _synced(station))
         return _carry_out(Job(path, protocol, station, journal, Progress()), rig, say)
 
@@ -102,7 +103,7 @@ def measure(
 def resume(
     path: Path, say: Say, panel: PanelOptions | None = None, speed: float | None = None
 ) -> Path:
-    """Goes on with an interrupted measurement at the step where it stopped."""
+    """Goes on with an interrupted measurement, with the repetition in which it stopped."""
     journal_file = journal_path(path)
     if not journal_file.exists():
         hint = "A complete measurement needs no resuming; measure again for another data set."
@@ -127,17 +128,23 @@ def resume(
     # The journal comes first: devices with which another measurement is busy are left alone.
     with (
         Journal.reopen(journal_file, _synced(station)) as journal,
+        speed_named(_speed(station)),
         _opened(protocol, station, progress, say, panel) as rig,
     ):
         for record in records:  # the page shows the whole run, not only what is still to come
             rig.onlooker.record(record.kind, record.data)
-        journal.append("event", {"kind": "resumed", "text": "measurement resumed"})
+        journal.append("event", resumed(start["created"], progress, emulated=rig.emulated))
         return _carry_out(Job(path, protocol, station, journal, progress), rig, say)
 
 
 def _synced(station: Station) -> bool:
     """Whether rows wait for the disk: always, but where the clock runs ahead of real time."""
-    return station.emulation is None or station.emulation.speed <= 1
+    return _speed(station) <= 1
+
+
+def _speed(station: Station) -> float:
+    """Times real time."""
+    return 1.0 if station.emulation is None else station.emulation.speed
 
 
 def default_output(protocol_file: Path) -> Path:
@@ -169,6 +176,11 @@ class _Rig:
     clock: Clock
     onlooker: Onlooker
 
+    @property
+    def emulated(self) -> bool:
+        """Whether nothing here is real."""
+        return self.station.emulation is not None
+
 
 @contextmanager
 def _opened(
@@ -190,12 +202,14 @@ def _opened(
         loader = make_loader(station, clock)
         scripted = station.operator.driver == "scripted"
         if scripted:
-            loader = LoaderWithBar(loader, protocol, len(progress.steps))
+            loader = LoaderWithBar(loader, protocol, progress.done_steps)
             say(_NO_HAND if panel is None else _PAGE_ALONE)
         loader = onlooker.operator(loader, clock, scripted=scripted)
         stack.callback(loader.close)
         if progress.rows:
             say(f"resuming after {counted(progress.rows, 'row')}")
+        if words := interrupted(protocol, progress):
+            say(words)
         say(SAFETY_NOTE)
         loader.open()  # from here on the screen moves, and what is said would be painted over
         yield _Rig(station, devices, loader, clock, onlooker)

@@ -1,9 +1,11 @@
 """From second values to curves: where the assumptions of the evaluation sit.
 
 1. Discarded samples do not count. A sample that the procedure marked as unsettled counts only
-   where its level has no settled one. A table that does not say what is settled: the first half of
-   every hold is left out, because the arm creeps on after the screw has stopped; and samples that
-   it has under the name of the level they leave count to the next one, where they lead.
+   where its level has no settled one, and there in the later half. A table that does not say what
+   is settled: the first half of every hold is left out, because the arm creeps on after the screw
+   has stopped; and samples that it has under the name of the level they leave count to the next
+   one, where they lead. Repetitions that were taken up again midway count only where their setup
+   has no others.
 2. Zero lines. An amplifier drifts: between neighbouring zero-load plateaus of a run its zero is
    taken as a straight line over time and subtracted; before the first and after the last plateau
    it keeps its value. With a plateau on one side only, that one counts. Of a plateau that the load
@@ -26,17 +28,15 @@ No threshold here is absolute; all refer to ranges of the data or to stated unce
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.arrays import Flags
 from identification.curve import Curve, Point
-from identification.running import first_rows, stretches
+from identification.running import stretches
 from identification.stairs import steps_of_stairs
 from identification.turns import turning_points
 from identification.ways import leading_on
@@ -44,22 +44,19 @@ from rig.arrays import Array
 from rig.digits import counted
 from rig.measurements import Measurements
 from rig.passes import TURN, between_levels, binned, is_held
+from rig.runs import (
+    Run,
+    blocks,
+    left_out,
+    of_setup,
+    of_stitched,
+    said_of_stitched,
+    setups,
+    stitched,
+)
 from rig.units import M_PER_MM
 
 MOST_REPETITIONS = 50  # into which the cycles of a recording are gathered
-
-
-@dataclass(frozen=True)
-class _Run:
-    """Samples of one run in the order of measurement, (n,) each; displacement in m."""
-
-    repetition: int
-    time: Array
-    branch: NDArray[np.str_]
-    step: NDArray[np.int64]
-    force: Array
-    displacement: Array
-    settled: NDArray[np.bool_] | None
 
 
 @dataclass(frozen=True)
@@ -88,15 +85,20 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
         dataset.meta.instruments.displacement.standard_uncertainty_mm * M_PER_MM,
     )
     result: dict[tuple[str, str], Curve] = {}
-    way = between_levels(dataset.columns)
-    columns = _without(dataset.columns, way)
-    for (pose, direction), taken in _setups(columns):
+    torn = stitched(dataset.columns)
+    whole = left_out(dataset.columns, of_stitched(dataset.columns))
+    way = between_levels(whole)
+    columns = left_out(whole, way)
+    for (pose, direction), taken in setups(columns):
         runs = [_leading_on(run, stated) for run in _numbered(taken, stated)]
         points: list[Point] = []
         notes: list[str] = []
+        if (pose, direction) in torn:
+            repetitions, others = torn[pose, direction]
+            notes.append(said_of_stitched(repetitions, others=others))
         if _bare(taken) and not _bare(runs):
             notes.append("No steps are numbered; the levels at which the load stands were found.")
-        lost = int(way[_of_setup(columns, pose, direction)].sum())
+        lost = int(way[of_setup(columns, pose, direction)].sum())
         if lost:
             notes.append(f"{counted(lost, 'sample')} of held runs without a step: left out.")
         held = is_held([(r.branch, r.step, r.force, r.displacement) for r in runs])
@@ -122,65 +124,12 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
     return result
 
 
-def _setups(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[tuple[str, str], list[_Run]]]:
-    """Runs of each pose and direction. Rows may be interleaved; their order within a run stays."""
-    used = ~columns["discarded"] if "discarded" in columns else np.ones(_rows(columns), dtype=bool)
-    pose, direction, repetition = (columns[n] for n in ("pose", "direction", "repetition"))
-    change = np.ones(used.size, dtype=bool)
-    if used.size > 1:
-        change[1:] = np.logical_or.reduce([c[1:] != c[:-1] for c in (pose, direction, repetition)])
-    starts = np.flatnonzero(change)
-    pieces: dict[tuple[str, str], dict[int, list[int]]] = {}
-    for index, at in enumerate(starts):
-        setup = (str(pose[at]), str(direction[at]))
-        pieces.setdefault(setup, {}).setdefault(int(repetition[at]), []).append(index)
-    bounds = np.append(starts, used.size)
-    for setup, by_repetition in pieces.items():
-        runs = []
-        for number, indices in by_repetition.items():
-            rows = np.concatenate([np.arange(bounds[i], bounds[i + 1]) for i in indices])
-            rows = rows[used[rows]]
-            if rows.size:
-                runs.append(_run(columns, number, rows))
-        if runs:
-            yield setup, runs
-
-
-def _of_setup(columns: Mapping[str, NDArray[Any]], pose: str, direction: str) -> Flags:
-    return np.asarray((columns["pose"] == pose) & (columns["direction"] == direction))
-
-
-def _without(columns: dict[str, NDArray[Any]], rows: Flags) -> dict[str, NDArray[Any]]:
-    """The columns with rows (n,) not to be used."""
-    if not rows.any():
-        return columns
-    return columns | {"discarded": columns["discarded"] | rows if "discarded" in columns else rows}
-
-
-def _rows(columns: dict[str, NDArray[Any]]) -> int:
-    return len(columns["force_N"])
-
-
-def _run(columns: dict[str, NDArray[Any]], repetition: int, rows: NDArray[np.intp]) -> _Run:
-    time = columns["session_s"] if "session_s" in columns else columns["time_s"]
-    settled = columns["settled"][rows] != 0 if "settled" in columns else None
-    return _Run(
-        repetition,
-        np.asarray(time[rows], dtype=np.float64),
-        columns["branch"][rows],
-        np.asarray(columns["step"][rows], dtype=np.int64),
-        np.asarray(columns["force_N"][rows], dtype=np.float64),
-        np.asarray(columns["displacement_mm"][rows], dtype=np.float64) * M_PER_MM,
-        settled,
-    )
-
-
-def _bare(runs: list[_Run]) -> bool:
+def _bare(runs: list[Run]) -> bool:
     """Whether no step of any run bears a number."""
     return all(bool(np.all(run.step < 0)) for run in runs)
 
 
-def _numbered(runs: list[_Run], stated: _Stated) -> list[_Run]:
+def _numbered(runs: list[Run], stated: _Stated) -> list[Run]:
     """The runs with the steps of staircases numbered that bear no numbers; samples without a value
     like the one before."""
     there = [np.isfinite(run.force) & np.isfinite(run.displacement) for run in runs]
@@ -198,7 +147,7 @@ def _numbered(runs: list[_Run], stated: _Stated) -> list[_Run]:
     return out
 
 
-def _leading_on(run: _Run, stated: _Stated) -> _Run:
+def _leading_on(run: Run, stated: _Stated) -> Run:
     """The run with samples that a table has under the name of the level they leave, on their way to
     the next one, under the name of that. The procedure marks what is settled, and names no way."""
     branch, step = run.branch.copy(), run.step.copy()
@@ -214,19 +163,13 @@ def _leading_on(run: _Run, stated: _Stated) -> _Run:
     return replace(run, branch=branch, step=step)
 
 
-def _blocks(run: _Run) -> Iterator[slice]:
-    """Neighbouring samples of one branch and step."""
-    edges = [*first_rows(run.branch, run.step).tolist(), run.force.size]
-    yield from (slice(a, b) for a, b in pairwise(edges))
-
-
-def _settled(run: _Run, block: slice) -> NDArray[np.intp]:
+def _settled(run: Run, block: slice) -> NDArray[np.intp]:
     """Rows of a hold that count (assumption 1), those without a value left out."""
     rows = np.arange(block.start, block.stop)
-    if run.settled is None:
-        rows = rows[rows.size // 2 :]
-    elif run.settled[rows].any():
+    if run.settled is not None and run.settled[rows].any():
         rows = rows[run.settled[rows]]
+    else:
+        rows = rows[rows.size // 2 :]
     valid = np.isfinite(run.force[rows]) & np.isfinite(run.displacement[rows])
     return rows[valid]
 
@@ -240,12 +183,12 @@ def _mean(values: Array, stated: float) -> tuple[float, float]:
     return float(values.mean()), float(values.std(ddof=1) / np.sqrt(values.size))
 
 
-def _plateaus(run: _Run, stated: _Stated) -> list[_Plateau]:
+def _plateaus(run: Run, stated: _Stated) -> list[_Plateau]:
     """The run's zero-load holds; all their samples count, since nothing creeps there that the
     load has moved before the run; but not the way down, where that was recorded under their name:
     then the later half."""
     found, still = [], _STILL * float(np.nanmax(np.abs(run.force), initial=0.0))
-    for block in _blocks(run):
+    for block in blocks(run):
         if run.branch[block.start] != "zero":
             continue
         rows = np.arange(block.start, block.stop)
@@ -263,7 +206,7 @@ def _plateaus(run: _Run, stated: _Stated) -> list[_Plateau]:
 _STILL = 0.05  # of the largest force of the run: no load is further from none
 
 
-def _zeroed(run: _Run, plateaus: list[_Plateau]) -> _Run:
+def _zeroed(run: Run, plateaus: list[_Plateau]) -> Run:
     """Force from the zero line, displacement from the first plateau (assumptions 2, 3)."""
     if not plateaus:
         return run
@@ -282,9 +225,9 @@ def _zero_uncertainty(plateaus: list[_Plateau], time: float) -> tuple[float, flo
     return float(np.sqrt(squares)), plateaus[0].u_displacement
 
 
-def _levels(zeroed: _Run, run: _Run, plateaus: list[_Plateau], stated: _Stated) -> Iterator[Point]:
+def _levels(zeroed: Run, run: Run, plateaus: list[_Plateau], stated: _Stated) -> Iterator[Point]:
     before = 0.0
-    for block in _blocks(run):
+    for block in blocks(run):
         rows = _settled(run, block)
         force, scatter_force = _mean(zeroed.force[rows], stated.force)
         displacement, scatter_displacement = _mean(zeroed.displacement[rows], stated.displacement)
@@ -306,9 +249,7 @@ def _levels(zeroed: _Run, run: _Run, plateaus: list[_Plateau], stated: _Stated) 
         )
 
 
-def _bins(
-    runs: list[_Run], zeros: list[list[_Plateau]], stated: _Stated
-) -> tuple[list[Point], str]:
+def _bins(runs: list[Run], zeros: list[list[_Plateau]], stated: _Stated) -> tuple[list[Point], str]:
     """Points of a continuous recording (assumption 5), and the sentence that says so."""
     loaded = []
     for run, plateaus in zip(runs, zeros, strict=True):
@@ -377,13 +318,14 @@ def _lacking(repetitions: list[int], runs: int) -> str:
     return f"Repetitions {', '.join(first)} and {last} have no zero-load plateau"
 
 
-def _notes(runs: list[_Run], zeros: list[list[_Plateau]], datum: str) -> list[str]:
+def _notes(runs: list[Run], zeros: list[list[_Plateau]], datum: str) -> list[str]:
     """What the zero lines were made of, in sentences."""
     without = [r.repetition for r, z in zip(runs, zeros, strict=True) if not z]
     if without:
-        return [f"{_lacking(without, len(runs))}: force and displacement are taken as measured."]
+        lacking = f"{_lacking(without, len(runs))}: force and displacement are taken as measured."
+        return [lacking, *_unsettled(runs)]
     single = sum(1 for z in zeros if len(z) == 1)
-    notes = []
+    notes = _unsettled(runs)
     if single:
         notes.append(
             f"{single} of {len(runs)} runs have one zero-load plateau: "
@@ -397,3 +339,23 @@ def _notes(runs: list[_Run], zeros: list[list[_Plateau]], datum: str) -> list[st
             "each repetition counts from its own."
         )
     return notes
+
+
+def _unsettled(runs: list[Run]) -> list[str]:
+    """What is said of holds that were recorded before they had come to rest."""
+    late = {"levels": 0, "zero-load plateaus": 0}
+    count = late.copy()
+    for run in runs:
+        if run.settled is None:
+            continue
+        for block in blocks(run):
+            kind = "zero-load plateaus" if run.branch[block.start] == "zero" else "levels"
+            count[kind] += 1
+            late[kind] += not np.any(run.settled[block])
+    parts = [f"{n} of {count[kind]} {kind}" for kind, n in late.items() if n]
+    if not parts:
+        return []
+    return [
+        f"{' and '.join(parts)} had not settled when they were sampled: what still moved there is "
+        "part of the curve. Of such a level the later half counts."
+    ]

@@ -63,8 +63,6 @@ class Runner:
 
     def run(self) -> None:
         """All runs and repetitions that are not done yet."""
-        if self._progress.open_step_row is not None:
-            self._recorder.discard(self._progress.open_step_row, "interrupted before its end")
         for index, run, repetition in self._protocol.sequence():
             if (index, repetition) not in self._progress.repetitions:
                 self._repetition_until_accepted(index, run, repetition)
@@ -72,27 +70,37 @@ class Runner:
 
     def _repetition_until_accepted(self, index: int, run: Run, repetition: int) -> None:
         where = Where(index, run, repetition, self._protocol.directions[run.direction])
-        first_row = self._progress.first_rows.get((index, repetition), self._recorder.rows)
+        begun = self._progress.first_rows.get((index, repetition), self._recorder.rows)
+        if begun < self._recorder.rows:
+            self._measure_anew(where, begun, "repetition interrupted before its end")
         self._supervision.show(
             pose=run.pose, direction=run.direction, repetition=repetition, step=0
         )
         self._supervision.look_along(where.unit_vector)
         while True:
+            first_row = self._recorder.rows
             self._steps.event(where, "repetition_start", f"{run.direction}, {repetition}")
             try:
                 self._repetition(where)
+                self._steps.event(where, "repetition_done", "measured", outcome="measured")
+                self._progress.repetitions.add((index, repetition))
+                self._rest()
             except Wish:  # to redo the repetition; what is wished of a step stays there
-                self._recorder.discard(first_row, "repetition redone")
-                self._steps.event(where, "repetition_redone", "measured again")
-                self._progress.forget_repetition(index, repetition)
+                self._measure_anew(where, first_row, "repetition redone")
                 continue
-            self._steps.event(where, "repetition_done", "measured", outcome="measured")
-            self._progress.repetitions.add((index, repetition))
             self._loader.notify(f"{run.direction}, repetition {repetition}: measured")
             return
 
+    def _measure_anew(self, where: Where, first_row: int, reason: str) -> None:
+        self._recorder.discard(first_row, reason)
+        self._steps.event(where, "repetition_redone", f"{reason}: measured anew as a whole")
+        self._progress.forget_repetition(where.index, where.repetition)
+
     def _repetition(self, where: Where) -> None:
         self._mount(where)
+        if self._progress.resting:  # it was interrupted, and the arm still creeps back
+            self._rest()
+            self._progress.resting = False
         where = self._zeroed(where)
         self._steps.zero_plateau(where, self._protocol.zero.before_s)
         self._all_steps(where)
@@ -100,6 +108,8 @@ class Runner:
         self._unload()
         self._steps.event(where, "unloaded", "screw turned back")
         self._steps.zero_plateau(where, self._protocol.zero.after_s)
+
+    def _rest(self) -> None:
         self._supervision.show(phase="rest")
         until = self._supervision.now() + self._protocol.rest_s
         while self._supervision.now() < until:
@@ -107,32 +117,44 @@ class Runner:
 
     def _all_steps(self, where: Where) -> None:
         steps = self._protocol.steps(where.run)
-        top_reached = False
-        for step in steps:
-            key = (where.index, where.repetition, step.branch, step.number)
-            if key in self._progress.steps or (top_reached and step.branch == "loading"):
+        loading_ended = False
+        for position, step in enumerate(steps, start=1):
+            if loading_ended and step.branch == "loading":
                 continue
             try:
-                self._step_until_accepted(where, step, len(steps))
+                self._step_until_accepted(where, step, (position, len(steps)))
             except TopReached:
-                top_reached = True
-                limit = where.run.stop_at_displacement_mm
-                self._steps.event(where, "top", f"displacement is above {limit:g} mm")
-            self._progress.steps.add(key)
+                loading_ended = True
+                self._tell_top(where, step)
 
-    def _step_until_accepted(self, where: Where, step: Step, steps: int) -> None:
+    def _tell_top(self, where: Where, step: Step) -> None:
+        limit = where.run.stop_at_displacement_mm
+        text = f"displacement is above {limit:g} mm"
+        self._steps.event(where, "top", text, branch=step.branch, step=step.number)
+        ends = "loading ends here" if step.branch == "loading" else "this level is left out"
+        self._loader.notify(f"{step.branch} to {step.target_N:g} N: {text}; {ends}")
+
+    def _step_until_accepted(self, where: Where, step: Step, place: tuple[int, int]) -> None:
         data = {"branch": step.branch, "step": step.number}
         text = f"{step.branch} to {step.target_N:g} N"
+        again = False
         while True:
+            if self._steps.below(where, step, again=again):
+                force_N = self._supervision.view.force_N
+                text += f": left out, the force is {force_N:.4g} N and would have to rise"
+                self._steps.event(where, "step_left_out", text, **data)
+                self._loader.notify(text, "warning")
+                return
             first_row = self._recorder.rows
             self._steps.event(where, "step_start", text, **data)
             try:
-                outcome = self._steps.measure(where, step, steps)
+                outcome = self._steps.measure(where, step, place)
             except Wish as wish:
                 if wish.what == "redo_repetition":
                     raise
-                self._recorder.discard(first_row, wish.what.replace("_", " "))
+                self._recorder.discard(first_row, wish.why)
                 if wish.what == "redo_step":
+                    again = True
                     continue
                 outcome = f"skipped: {self._reason()}"
             self._steps.event(where, "step_done", f"{text}: {outcome}", outcome=outcome, **data)

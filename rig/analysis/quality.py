@@ -27,8 +27,10 @@ NOTABLE = (
     "pose_accepted",
     "repetition_redone",
     "resumed",
+    "step_left_out",
     "stopped",
     "top",
+    "touched",
     "values_lost",
 )
 MOST_EVENTS = 40

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import io
 import os
+import signal
 import sys
 import tempfile
 import traceback
@@ -21,6 +23,16 @@ _UNREAD = 141  # as shells show the end of usual tools (128 + SIGPIPE): 1 would 
 
 def main() -> None:
     """Runs the command and turns every ending into its exit status; no traceback for users."""
+    # Registered first, called last: while Python takes itself down Ctrl-C would kill the process,
+    # with a status that is none of ours, when all has been done and said.
+    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+    try:
+        _main()
+    except KeyboardInterrupt:  # outside of what the library looks after
+        sys.exit(130)
+
+
+def _main() -> None:
     from rig.errors import InputError, MeasurementStopped
     from rig.intruders import refuse_intruders
     from rig.threads import one_each

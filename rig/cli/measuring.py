@@ -14,7 +14,7 @@ _Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DATASET.h5", help="The new data set.")
 ]
 _Resume = Annotated[
-    Path | None, typer.Option(metavar="DATASET.h5", help="Go on where an interrupted run stopped.")
+    Path | None, typer.Option(metavar="DATASET.h5", help="Go on with an interrupted run.")
 ]
 _Panel = Annotated[
     bool, typer.Option("--panel", help="Serve the operator's page, and print its link.")

@@ -23,6 +23,7 @@ from rig.models.model import ArmModel
 from rig.models.robot import load_robot
 from rig.oddities import CHANNELS, incomplete_channels
 from rig.passes import between_levels
+from rig.runs import left_out, of_stitched, said_of_stitched, stitched
 from rig.storage.columns import SAMPLE_NUMBER
 from rig.units import M_PER_MM
 
@@ -97,8 +98,12 @@ def _in_use(dataset: Dataset, where: str) -> tuple[Flags, tuple[str, ...], tuple
     used &= np.isfinite(dataset.columns["displacement_mm"])
     if not used.any():
         raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
-    way = used & between_levels(dataset.columns)
-    used, aside, without = _without_holes(dataset, used & ~way)
+    torn = used & of_stitched(dataset.columns)
+    way = used & between_levels(left_out(dataset.columns, torn))
+    used, aside, without = _without_holes(dataset, used & ~way & ~torn)
+    for (pose, direction), (repetitions, others) in stitched(dataset.columns).items():
+        said = said_of_stitched(repetitions, others=others)
+        aside = (*aside, f"Pose {pose}, direction {direction}: {said}")
     if way.any():
         lost = f"{counted(int(way.sum()), 'sample')} of held runs without a step: set aside."
         aside = (*aside, lost)

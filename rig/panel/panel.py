@@ -39,7 +39,10 @@ SILENT_EVENTS = (
     "not_settled",
     "device_failed",
     "repetition_done",
+    "step_left_out",
     "stopped",
+    "top",
+    "touched",
 )
 WISHES = 8  # commands that wait to be heard; more is somebody hammering on a button
 INVALID_REMEDY = "One is no harm; when it goes on, see the table of faults for this device."

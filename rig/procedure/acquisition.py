@@ -76,11 +76,15 @@ class Acquisition:
         self._clock.sleep(seconds)
         devices = self.devices
         readings = devices.robot.collect(), devices.dynamometer.collect(), devices.laser.collect()
-        # Slots that passed while the rig was being tared are not missed: nothing was to be sampled.
+        self.leave_out_slots()
+        return readings
+
+    def leave_out_slots(self) -> None:
+        """Slots that have passed are not missed: nothing was to be sampled (tare, a file that was
+        written in a pause)."""
         self._next_slot += self._period * max(
             0.0, ceil((self._clock.now() - self._next_slot) / self._period)
         )
-        return readings
 
     def live(self, displacement_mm: Callable[[float], float]) -> Live:
         """The newest values of all devices; raises the error of one that has none."""

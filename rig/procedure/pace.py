@@ -7,10 +7,14 @@ meanwhile: the emulators' process has its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
+from drivers.errors import DeviceError, SafetyStop
+
 _ENOUGH = 20  # slots before anything is said
+_USUAL_SPEED = 50  # of the project's emulated station
 _MOST_MISSED = 1 / 3  # of them; up to there steps settle and the hand finds its levels
 
 
@@ -49,3 +53,19 @@ class Pace:
             "turns the screw sees the force too late: levels may be overshot, and values be wrong. "
             f"Measure again with --speed {kept} or less."
         )
+
+
+@contextmanager
+def speed_named(speed: float) -> Iterator[None]:
+    """A device that seems to have failed far ahead of real time may only have been given no time:
+    the error then says so, ahead of the remedy for a device."""
+    try:
+        yield
+    except DeviceError as error:
+        if speed <= _USUAL_SPEED or isinstance(error, SafetyStop):
+            raise
+        hint = (
+            f"At {speed:g} times real time this may be the emulation that can't keep up: try "
+            f"--speed {_USUAL_SPEED} or less. If that does not help: "
+        )
+        raise type(error)(error.device, error.fault, hint + error.remedy) from error

@@ -21,10 +21,13 @@ class JournalRecord(Protocol):
 
 @dataclass
 class Progress:
-    """Repetitions and steps that are done, and the counters that a resumed run goes on with.
+    """Repetitions that are done, and the counters that a resumed run goes on with.
 
-    repetitions: (run index, repetition); steps: (run index, repetition, branch, step number).
-    A skipped one counts as done.
+    repetitions: (run index, repetition); steps: (run index, repetition, branch, step number). A
+    skipped step counts as done. A repetition counts as a whole: force and datum are zeroed anew for
+    every one, and what an arm does on the way down depends on how far it has been up.
+    first_rows: of the repetitions that were begun. resting: the rest after the last one had not
+    passed.
     """
 
     repetitions: set[tuple[int, int]] = field(default_factory=set)
@@ -32,12 +35,27 @@ class Progress:
     rows: int = 0
     segment: int = 0
     session_s: float = 0.0
-    first_rows: dict[tuple[int, int], int] = field(default_factory=dict)  # of each repetition
-    open_step_row: int | None = None  # first row of a step that was under way
+    first_rows: dict[tuple[int, int], int] = field(default_factory=dict)
+    resting: bool = False
+
+    @property
+    def done_steps(self) -> int:
+        """Steps of the repetitions that are done."""
+        return sum(step[:2] in self.repetitions for step in self.steps)
+
+    @property
+    def interrupted(self) -> tuple[int, int, int] | None:
+        """Run index and repetition that are to be measured anew, and how many rows they have."""
+        for key, first in self.first_rows.items():
+            if key not in self.repetitions and first < self.rows:
+                return (*key, self.rows - first)
+        return None
 
     def forget_repetition(self, run: int, repetition: int) -> None:
         """The repetition is to be measured again."""
         self.steps = {s for s in self.steps if s[:2] != (run, repetition)}
+        self.repetitions.discard((run, repetition))
+        self.first_rows.pop((run, repetition), None)
 
 
 def read_progress(records: Iterable[JournalRecord]) -> Progress:
@@ -45,9 +63,9 @@ def read_progress(records: Iterable[JournalRecord]) -> Progress:
     progress = Progress()
     for record in records:
         data = record.data
+        progress.session_s = max(progress.session_s, data.get("session_s") or 0.0)
         if record.kind == "sample":
             progress.rows += 1
-            progress.session_s = max(progress.session_s, data["session_s"])
             progress.segment = max(progress.segment, data["segment"])
         elif record.kind == "event":
             _apply(progress, data)
@@ -59,18 +77,13 @@ def _apply(progress: Progress, event: dict[str, Any]) -> None:
     if kind == "repetition_start":
         repetition = (event["run"], event["repetition"])
         progress.first_rows.setdefault(repetition, progress.rows)
-    elif kind == "step_start":
-        progress.open_step_row = progress.rows
     elif kind == "step_done":
         key = (event["run"], event["repetition"], event["branch"], event["step"])
         progress.steps.add(key)
-        progress.open_step_row = None
     elif kind == "repetition_done":
         progress.repetitions.add((event["run"], event["repetition"]))
+        progress.resting = True
     elif kind == "repetition_redone":
         progress.forget_repetition(event["run"], event["repetition"])
-        progress.open_step_row = None
     elif kind == "tared":
-        progress.open_step_row = None
-    elif kind == "discard" and progress.open_step_row is not None:
-        progress.open_step_row = progress.rows  # what follows still belongs to the open step
+        progress.resting = False

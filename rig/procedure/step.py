@@ -11,12 +11,13 @@ from rig.errors import MeasurementStopped
 from rig.procedure.limits import UNLOAD
 from rig.procedure.recorder import Place, Recorder, Slot, Vector
 from rig.procedure.settle import SettleWindow
-from rig.procedure.supervision import Supervision
+from rig.procedure.supervision import Supervision, Wish
+from rig.procedure.touched import Touched
 from rig.protocol import MeasurementProtocol, Run, Step
 
 
 class TopReached(Exception):
-    """The run's own displacement limit ends its loading branch."""
+    """The displacement is above the run's own limit, and the screw would have to push on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +54,13 @@ class StepProcedure:
         """A new setup: earlier steps say nothing about how far to turn."""
         self._done = [(0.0, 0.0)]
 
-    def measure(self, where: Where, step: Step, steps: int) -> str:
-        """Carries out the step and returns how it went, in words."""
+    def measure(self, where: Where, step: Step, place: tuple[int, int]) -> str:
+        """Carries out the step and returns how it went, in words. place: which step of how many,
+        as it is shown; levels share their number with those of the other branch."""
         show = self._supervision.show
         half_width = self._protocol.force_band.half_width_N(step.target_N)
-        show(step=step.number, steps=steps, target_N=step.target_N, band_N=half_width)
+        position, steps = place
+        show(step=position, steps=steps, target_N=step.target_N, band_N=half_width)
         show(branch=step.branch)
         show(samples=0, samples_wanted=self._protocol.samples_of_step)
         deadline = self._supervision.now() + self._protocol.step_deadline_s
@@ -67,12 +70,28 @@ class StepProcedure:
             settled = self._settle(where, step, banded=reached)
             if settled != "left the band":
                 break
-            self._recorder.discard(first_row, "the force left its band while settling")
-        self._sample(where, step)
+            why = "the force left its band while settling"
+            if self.below(where, step, again=True):
+                raise Wish("redo_step", why)
+            self._recorder.discard(first_row, why)
+        self._sample(where, step, settled=settled == "settled")
         view = self._supervision.view
         self._done.append((view.force_N, view.displacement_mm))
         words = ["measured"] if reached else ["band not reached"]
         return ", ".join(words if settled == "settled" else [*words, settled])
+
+    def below(self, where: Where, step: Step, *, again: bool) -> bool:
+        """Whether an unloading step would have to be reached from below: that is loading, and might
+        drive an arm on that has given way. Again: the hand may have loosened too far, but not to
+        the next level."""
+        if step.branch != "unloading":
+            return False
+        half_width_N = self._protocol.force_band.half_width_N
+        lowest_N = step.target_N - half_width_N(step.target_N)
+        if again:
+            next_N = max((f for f in where.run.forces_N if f < step.target_N), default=0.0)
+            lowest_N = next_N + half_width_N(next_N)
+        return self._supervision.view.force_N < lowest_N
 
     def _approach(self, where: Where, step: Step, deadline: float) -> bool:
         """Guides the hand until the force is in its band; False if it was given up."""
@@ -83,7 +102,8 @@ class StepProcedure:
             view = self._supervision.view
             if abs(view.force_N - step.target_N) <= view.band_N:
                 return True
-            if top is not None and step.branch == "loading" and live.displacement_mm > top:
+            pushing = step.branch == "loading" or view.force_N < step.target_N
+            if top is not None and pushing and live.displacement_mm > top:
                 raise TopReached
             if self._supervision.now() > deadline:
                 if self._give_up(where, step):
@@ -138,13 +158,27 @@ class StepProcedure:
             self._loader.notify(f"{text}; it is recorded, and marked as not settled", "warning")
         return "not settled"
 
-    def _sample(self, where: Where, step: Step) -> None:
+    def _sample(self, where: Where, step: Step, *, settled: bool) -> None:
         taken = 0
+        touched = Touched(self._protocol.settle, self._supervision.view.band_N)
         while taken < self._protocol.samples_of_step:
             self._supervision.show(phase="sampling", settle_remaining_s=0.0, samples=taken)
             _, slot = self._supervision.tick()
-            if slot is not None and self.record(slot, where, step, settled=True):
+            view = self._supervision.view
+            if what := touched.look(self._supervision.now(), view.force_N, view.displacement_mm):
+                self._touched(where, step, what)
+            if slot is not None and self.record(slot, where, step, settled=settled):
                 taken += 1
+
+    def _touched(self, where: Where, step: Step, what: str) -> None:
+        text = f"{step.branch} to {step.target_N:g} N: while it was sampled {what}"
+        self.event(where, "touched", text, branch=step.branch, step=step.number)
+        self._loader.notify(
+            f"{text}. The screw was turned, or the arm was touched: the step is measured again. "
+            "After a large change redo the repetition: an arm remembers.",
+            "warning",
+        )
+        raise Wish("redo_step", "screw or arm were moved while it was sampled")
 
     def zero_plateau(self, where: Where, seconds: float) -> None:
         """Samples without load for so long, once the unloaded arm has settled."""
@@ -154,12 +188,12 @@ class StepProcedure:
             return
         self._supervision.show(step=0, target_N=0.0, band_N=0.0, samples=0, samples_wanted=wanted)
         self._supervision.show(branch="zero")
-        self._settle(where, zero, banded=False)
+        settled = self._settle(where, zero, banded=False) == "settled"
         taken = 0
         while taken < wanted:
             self._supervision.show(phase="zero", samples=taken)
             _, slot = self._supervision.tick()
-            if slot is not None and self.record(slot, where, zero, settled=True):
+            if slot is not None and self.record(slot, where, zero, settled=settled):
                 taken += 1
 
     def record(self, slot: Slot, where: Where, step: Step, *, settled: bool) -> bool:

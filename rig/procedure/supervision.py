@@ -22,6 +22,8 @@ from rig.procedure.recorder import Recorder, Slot, Vector
 
 PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
 OF_A_STEP = ("redo_step", "skip")  # without a step under way there is nothing that they could mean
+ONLY_ABORT = "Meanwhile nothing is heard but an abort"
+TO_STOP = "Stop the measurement? --resume then measures a repetition under way anew, as a whole."
 HEARD = "Ctrl-C was heard; the open question comes first. Ctrl-C again stops at once."
 
 
@@ -49,11 +51,13 @@ class Changes(TypedDict, total=False):
 
 
 class Wish(Exception):
-    """The operator wants the step under way to be left."""
+    """The operator, or what happened at the screw, wants the step under way to be left. why: in
+    words, for what is discarded."""
 
-    def __init__(self, what: Command) -> None:
+    def __init__(self, what: Command, why: str = "") -> None:
         super().__init__(what)
         self.what = what
+        self.why = why or what.replace("_", " ")
 
 
 class Supervision:
@@ -78,6 +82,8 @@ class Supervision:
         self._interrupts = 0
         self._moving = False
         self._prompts = 0
+        self._paused = False
+        self._standing: tuple[Breach, ...] = ()  # limits that pause, passed at the last look
         self.view = LiveView(
             phase="idle",
             pose="",
@@ -142,6 +148,7 @@ class Supervision:
         live = self._acquisition.live(self._recorder.displacement_mm)
         force = sum(f * e for f, e in zip(live.force_N, self._unit_vector, strict=True))
         breaches = self._watch.breaches(live)
+        self._standing = tuple(b for b in breaches if b.action == "pause")
         self.show(
             force_N=force,
             displacement_mm=live.displacement_mm,
@@ -149,6 +156,9 @@ class Supervision:
             displacement_age_s=live.displacement_age_s,
             limits=self._watch.levels,
         )
+        self._stop_at(breaches)
+        if not self._prompts:  # ahead of a pause, which may leave the step: Ctrl-C is heard always
+            self._hear_interrupt()
         for breach in breaches:
             self._on_breach(breach)
         self._loader.guide(self.view)  # during prompts too: unloading is done by the live force
@@ -203,15 +213,19 @@ class Supervision:
         if answer == "skip":
             raise Wish("skip")
 
-    def _hear(self) -> None:
-        """What the operator has asked for since the last tick."""
+    def _hear_interrupt(self) -> None:
         if self._interrupts:
-            prompt = Prompt("interrupt", "Stop the measurement?", ("abort", "continue"))
+            prompt = Prompt("interrupt", TO_STOP, ("abort", "continue"))
             answer = self.ask(prompt)
             self._interrupts = 0
             self.obey(answer)
+
+    def _hear(self) -> None:
+        """What the operator has asked for since the last tick."""
         command = self._loader.command()
-        if command == "pause":
+        if self._paused and command not in (None, "abort"):
+            self._loader.notify(f"{ONLY_ABORT}.", "warning")
+        elif command == "pause":
             self._pause("Paused. The arm may be under load.")
         elif command in OF_A_STEP and not self.view.step:
             wish = command.replace("_", " ")
@@ -224,19 +238,41 @@ class Supervision:
         phase = self.view.phase
         self.show(phase="paused")
         self._checkpoint()
-        answer = self.ask(Prompt("paused", text, self.answers(PAUSE_ANSWERS)))
+        self._acquisition.leave_out_slots()
+        self._paused = True
+        try:
+            answer = self.ask(Prompt("paused", text, self.answers(PAUSE_ANSWERS)))
+            if answer != "abort":
+                self._wait_for_limits()
+        finally:
+            self._paused = False
         self.show(phase=phase)
         self._recorder.event("resume", f"after the pause: {answer}")
         # What was under way before a pause of unknown length is measured again from its start.
         self.obey("redo_step" if answer == "continue" and self.view.step else answer)
 
+    def _wait_for_limits(self) -> None:
+        """Going on beyond a limit would only pause again, and again."""
+        told = False
+        while self._standing:
+            self.tick()
+            if self._standing and not told:
+                told = True
+                text = (
+                    f"Still paused: {self._standing[0].text}. It goes on once that is within its "
+                )
+                self._loader.notify(f"{text}limit. {ONLY_ABORT} or Ctrl-C.", "warning")
+
+    def _stop_at(self, breaches: list[Breach]) -> None:
+        for breach in breaches:
+            if breach.action == "stop":
+                self._recorder.event("limit", breach.text, action="stop")
+                text = f"{breach.text}; the measurement is stopped. {UNLOAD}"
+                self._loader.notify(text, "error")
+                raise MeasurementStopped(text)
+
     def _on_breach(self, breach: Breach) -> None:
-        if breach.action == "stop":
-            self._recorder.event("limit", breach.text, action="stop")
-            text = f"{breach.text}; the measurement is stopped. {UNLOAD}"
-            self._loader.notify(text, "error")
-            raise MeasurementStopped(text)
-        if breach.action == "pause" and not self._prompts:
+        if breach.action == "pause" and not self._prompts and not self._paused:
             self._recorder.event("limit", breach.text, action="pause")
             self._pause(f"{breach.text}. {UNLOAD}")
         elif breach.quantity not in self._warned:

@@ -45,6 +45,7 @@ class Arm:
     broken: dict[str, DeviceError] = field(default_factory=dict)
     tared_at: float = 0.0
     offset_N: float = 3.0  # what the amplifier shows before taring
+    temperature_C: float = 30.0  # of all joints
 
     @property
     def force(self) -> float:
@@ -93,7 +94,9 @@ class FakeRobot(FakeDevice):
         self.arm.broken.pop("robot", None)
 
     def state(self) -> RobotState:
-        return RobotState(self.arm.q, self.arm.q, (30.0,) * 6, 7, 1, 1, 2, 0.0, 0.0)
+        return RobotState(
+            self.arm.q, self.arm.q, (self.arm.temperature_C,) * 6, 7, 1, 1, 2, 0.0, 0.0
+        )
 
     def go_to_reference(
         self,

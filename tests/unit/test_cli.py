@@ -181,6 +181,42 @@ def test_a_bug_is_status_1_and_a_file_for_the_report(tmp_path: Path) -> None:
     assert "unforeseen" in reports[0].read_text()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(
+    ("code", "status"),
+    [
+        # After everything: modules are taken down.
+        (
+            "import os, sys\n"
+            "class Late:\n"
+            "    def __del__(self, kill=os.kill, me=os.getpid()): kill(me, 2)\n"
+            "late = Late(); sys.argv = ['rig', '--version']\n"
+            "from rig.cli import main; main()\n",
+            0,
+        ),
+        # Before any command runs.
+        (
+            "import os, rig.intruders\n"
+            "rig.intruders.refuse_intruders = lambda: os.kill(os.getpid(), 2)\n"
+            "from rig.cli import main; main()\n",
+            130,
+        ),
+        # While the last word is said.
+        (
+            "import os, sys, rig.cli.endings as endings\n"
+            "endings.say = lambda _: os.kill(os.getpid(), 2)\n"
+            "sys.argv = ['rig', 'check', 'never.yaml']; endings.main()\n",
+            130,
+        ),
+    ],
+)
+def test_ctrl_c_at_an_odd_moment_kills_nothing(code: str, status: int) -> None:
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=HOME, capture_output=True, text=True, check=False
+    )
+    assert (result.returncode, "Traceback" in result.stderr) == (status, False), result.stderr
+
+
 def test_help_imports_nothing_heavy() -> None:
     code = (
         "import sys; sys.argv = ['rig', '--help']\n"

@@ -39,6 +39,20 @@ def test_what_had_not_settled_is_said(tmp_path: Path, origin: Origin, advice: st
     assert advice in note
 
 
+def test_a_repetition_that_was_resumed_midway_is_set_aside(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(TABLE)
+    (tmp_path / "m.yaml").write_text(META)
+    import_table(tmp_path / "t.csv", tmp_path / "m.yaml", tmp_path / "d.h5")
+    dataset = load(tmp_path / "d.h5")
+    repetition = dataset.columns["repetition"]
+    segment = repetition.copy()
+    segment[np.flatnonzero(repetition == 2)[-3:]] = 9
+    data = gap_data(replace(dataset, columns={**dataset.columns, "segment": segment}))
+    assert 2 in gap_data(dataset).repetition
+    assert 2 not in data.repetition
+    assert any("Repetition 2 was interrupted and taken up again midway" in n for n in data.aside)
+
+
 def test_a_force_that_never_changes_was_not_answered_to_a_stroke() -> None:
     """Levels in name only: the displacement comes and goes without a force."""
     step = np.tile(np.repeat([0, 1, 2, 1], 6), 3)

@@ -5,22 +5,25 @@ from __future__ import annotations
 import os
 from contextlib import nullcontext
 from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from drivers.errors import ReadTimeout
 from drivers.interfaces import LiveView
 from rig import measure
 from rig.dataset import journal_path, load
 from rig.emulation.host import EmulationHost
 from rig.errors import InputError
-from rig.journal import Journal
+from rig.journal import Journal, Record
 from rig.panel.onlooker import Onlooker
 from rig.procedure.devices import in_short
 from rig.procedure.limits import UNLOAD
-from rig.procedure.progress import Progress
+from rig.procedure.progress import Progress, read_progress
 from rig.protocol import load_protocol
+from rig.resuming import interrupted, resumed
 from rig.station import load_station
 from tests.unit.example_data import write_journal
 from tests.unit.runner_bench import Bench
@@ -43,9 +46,12 @@ def test_what_must_be_read_is_said_before_the_screen_moves(
     for name, stand_in in stand_ins.items():
         monkeypatch.setattr(measure, name, stand_in)
     protocol, station = load_protocol(PROTOCOL), load_station("emulated")
-    with measure._opened(protocol, station, Progress(rows=225), said.append, None):
-        assert "no keys are heard" in said[-4]
-        assert said[-3:] == ["resuming after 225 rows", measure.SAFETY_NOTE, "(screen)"]
+    progress = Progress(rows=225, first_rows={(0, 1): 191})
+    with measure._opened(protocol, station, progress, said.append, None):
+        assert "no keys are heard" in said[-5]
+        anew = interrupted(protocol, progress)
+        assert "34 rows" in anew
+        assert said[-4:] == ["resuming after 225 rows", anew, measure.SAFETY_NOTE, "(screen)"]
 
 
 def test_units_stand_behind_what_devices_say_of_themselves() -> None:
@@ -112,6 +118,66 @@ def test_an_interrupt_is_told_where_the_screen_no_longer_covers_it(
         with pytest.raises(KeyboardInterrupt):
             measure._carry_out(job, rig, said.append)
     assert said[:2] == ["(the screen goes)", f"Interrupted. {UNLOAD}"]
+
+
+@pytest.mark.parametrize(("minutes_ago", "session_s"), [(25, 1500.0), (1, 128.4)])
+def test_the_session_clock_counts_the_time_between_stop_and_resume(
+    minutes_ago: float, session_s: float
+) -> None:
+    """Never backwards, whatever the computer's clock says."""
+    progress = Progress(session_s=128.4)
+    created = datetime.now().astimezone() - timedelta(minutes=minutes_ago)
+    event = resumed(created.isoformat(timespec="seconds"), progress, emulated=False)
+    assert progress.session_s == pytest.approx(session_s, abs=3.0)
+    assert event["session_s"] == pytest.approx(progress.session_s, abs=1e-3)
+    assert datetime.fromisoformat(str(event["at"])).tzinfo is not None
+    assert str(event["text"]).endswith("s after the last record")
+
+
+def test_the_session_clock_of_an_emulated_rig_goes_on_where_it_stopped() -> None:
+    progress = Progress(session_s=128.4)
+    event = resumed("2026-01-01T00:00:00+00:00", progress, emulated=True)
+    assert (progress.session_s, event["session_s"]) == (128.4, 128.4)
+    assert event["text"] == "measurement resumed; the emulated rig stood still meanwhile"
+
+
+def test_the_session_clock_never_goes_back_behind_an_event() -> None:
+    sample = Record(1, "sample", {"session_s": 135.06, "segment": 1})
+    stopped = Record(2, "event", {"kind": "stopped", "text": "interrupted", "session_s": 135.42})
+    assert read_progress([sample, stopped]).session_s == 135.42
+
+
+def test_what_becomes_of_an_interrupted_repetition_is_told() -> None:
+    protocol = load_protocol(PROTOCOL)
+    progress = Progress(rows=46, first_rows={(0, 1): 0, (0, 2): 12}, repetitions={(0, 1)})
+    assert interrupted(protocol, progress) == (
+        "Pose P1, direction x: repetition 2 was interrupted and is measured anew as a whole. Its "
+        "34 rows so far stay in the file, marked as discarded."
+    )
+    assert interrupted(protocol, replace(progress, repetitions={(0, 1), (0, 2)})) == ""
+
+
+def fails(*_: object) -> object:
+    raise ReadTimeout("dynamometer", "no samples for 1 s", "Check its cable.")
+
+
+def test_the_speed_is_named_where_a_device_fails_far_ahead_of_real_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(measure, "_opened", fails)
+    with pytest.raises(ReadTimeout, match=r"no samples for 1 s\. At 999 times real time"):
+        measure.measure(PROTOCOL, "emulated", tmp_path / "a.h5", print, speed=999)
+
+
+def test_the_speed_is_named_where_a_device_fails_after_resuming(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "b.h5"
+    texts = {"protocol": load_protocol(PROTOCOL).text, "station": load_station("emulated").text}
+    Journal.create(journal_path(target), texts).close()
+    monkeypatch.setattr(measure, "_opened", fails)
+    with pytest.raises(ReadTimeout, match=r"no samples for 1 s\. At 999 times real time"):
+        measure.resume(target, print, speed=999)
 
 
 def test_a_resumed_run_does_not_meet_the_scatter_of_its_beginning_again(

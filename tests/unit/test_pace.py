@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from rig.procedure.pace import Pace
+import pytest
+
+from drivers.errors import ReadTimeout, SafetyStop
+from rig.procedure.pace import Pace, speed_named
 
 
 def run(speed: float, missed: list[int]) -> tuple[list[str], str | None]:
@@ -13,6 +16,25 @@ def run(speed: float, missed: list[int]) -> tuple[list[str], str | None]:
         pace.record("event", {"kind": "note", "text": "not counted"})
         pace.record("sample", {"values": {"slots_missed": float(n), "force_N": 1.0}})
     return said, pace.text()
+
+
+@pytest.mark.parametrize("speed", [1.0, 50.0, 1000.0])
+def test_a_device_that_fails_far_ahead_of_real_time_may_have_had_no_time(speed: float) -> None:
+    fault = ReadTimeout("dynamometer", "no samples for 1 s", "Check its cable.")
+    with pytest.raises(ReadTimeout) as raised, speed_named(speed):
+        raise fault
+    hint = (
+        "At 1000 times real time this may be the emulation that can't keep up: try --speed 50 or "
+        "less. If that does not help: "
+    )
+    told = f"dynamometer: no samples for 1 s. {hint if speed > 50 else ''}Check its cable."
+    assert str(raised.value) == told
+
+
+def test_a_safety_stop_is_never_put_down_to_the_speed() -> None:
+    told = r"^robot: protective stop\. Keep clear\.$"
+    with pytest.raises(SafetyStop, match=told), speed_named(999):
+        raise SafetyStop("robot", "protective stop", "Keep clear.")
 
 
 def test_it_is_said_once_and_with_a_speed_that_will_do() -> None:

@@ -130,8 +130,45 @@ def test_samples_known_to_be_settled_count() -> None:
     data = table(creeping())
     data.columns["settled"] = np.array([float(i % 4 == 3) for i in range(len(creeping()))])
     assert {p.n for p in loading(only(data))} == {1}
+    assert not [note for note in only(data).notes if "settled" in note]
     data.columns["settled"][:] = 0.0
-    assert {p.n for p in loading(only(data))} == {4}  # none settled: all that there are
+    assert {p.n for p in loading(only(data))} == {2}  # none settled: nearest to rest at its end
+
+
+def test_levels_that_never_settled_are_told() -> None:
+    data = table(run(lambda f: f / 100, LEVELS))
+    data.columns["settled"] = np.ones(len(data.columns["step"]))
+    data.columns["settled"][data.columns["step"] == 2] = 0.0
+    data.columns["settled"][-4:] = 0.0  # the plateau after the run
+    (note,) = (note for note in only(data).notes if "settled" in note)
+    assert note.startswith("1 of 4 levels and 1 of 2 zero-load plateaus had not settled when they")
+
+
+def resumed_midway(repetitions: tuple[int, ...]) -> Table:
+    """As earlier versions went on: the third and the fourth level after another tare."""
+    rows, segment = [], []
+    for n in repetitions:
+        rows += run(lambda f: f / 100, LEVELS, repetition=n)
+        midway = n == 2
+        segment += [3 * n + (midway and i >= 12) for i in range(24)]
+    data = table(rows)
+    data.columns["segment"] = np.array(segment)
+    return data
+
+
+def test_a_repetition_that_was_resumed_midway_is_left_out() -> None:
+    curve = only(resumed_midway((1, 2, 3)))
+    assert {p.repetition for p in curve.points} == {1, 3}
+    assert curve.notes[0] == (
+        "Repetition 2 was interrupted and taken up again midway, with the force tared anew and "
+        "from no load: left out."
+    )
+
+
+def test_the_only_repetition_counts_with_a_warning_if_it_was_resumed_midway() -> None:
+    curve = only(resumed_midway((2,)))
+    assert {p.repetition for p in curve.points} == {2}
+    assert "from no load: it counts, because there is no other; measure it" in curve.notes[0]
 
 
 def test_a_sample_without_value_is_skipped() -> None:

@@ -1,4 +1,4 @@
-"""The procedure on a rig in memory: limits, faults, stops, arms that move, resume."""
+"""The procedure on a rig in memory: limits, faults, stops, arms that move."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivers.interfaces import Command, LiveView, Prompt
 from rig.errors import MeasurementStopped
 from rig.procedure.supervision import HEARD
 from rig.protocol import parse_protocol
-from tests.unit.runner_bench import ALL, MOVING, PROTOCOL, Bench, at, resumed
+from tests.unit.runner_bench import ALL, MOVING, PROTOCOL, Bench, at
 
 
 @pytest.fixture
@@ -59,21 +59,6 @@ def test_a_dead_device_ends_the_run_and_keeps_the_rows(bench: Bench) -> None:
     with pytest.raises(ReadTimeout, match=r"laser: silent for 1\.0 s\. Check its cable\."):
         bench.run()
     assert bench.steps()[:1] == ALL[:1]
-
-
-@pytest.mark.parametrize("step", [1, 2, 3])
-def test_resume_goes_on_at_the_interrupted_step(bench: Bench, step: int) -> None:
-    error = ReadTimeout("laser", "silent", "Check.")
-    at(bench, step, lambda: bench.arm.broken.update(laser=error))
-    with pytest.raises(ReadTimeout):
-        bench.run()
-    before = resumed(bench)
-    assert bench.steps() == ALL
-    assert len(bench.records("sample")) > before
-    settled = [r for r in bench.good() if r["step"] == step and r["values"]["settled"]]
-    assert len(settled) == 6, "rows of the broken step must not count twice"
-    clock = [r["session_s"] for r in bench.records("sample")]
-    assert clock == sorted(clock)
 
 
 def test_the_first_ctrl_c_asks_and_the_second_stops(bench: Bench) -> None:
@@ -182,22 +167,6 @@ def test_a_wrong_pose_is_noticed(bench: Bench) -> None:
     assert "deg away from pose P1 (allowed 0.5 deg)" in prompt.text
 
 
-def test_resume_does_not_repeat_what_is_done(bench: Bench) -> None:
-    error = ReadTimeout("laser", "silent", "Check.")
-
-    def script(view: LiveView) -> None:
-        if (view.repetition, view.step, view.phase) == (2, 2, "sampling"):
-            bench.arm.broken["laser"] = error
-
-    bench.loader.script = script
-    with pytest.raises(ReadTimeout):
-        bench.run()
-    before = resumed(bench)
-    assert bench.steps() == ALL
-    assert {r["repetition"] for r in bench.records("sample")[before:]} == {2}
-    assert {r["step"] for r in bench.records("sample")[before:]} == {0, 2, 3}
-
-
 def test_an_operator_who_cannot_be_asked_is_a_failed_device(bench: Bench) -> None:
     error = ReadTimeout("operator", "no terminal to ask at", "Start rig in a terminal.")
 
@@ -225,6 +194,8 @@ def test_an_arm_that_does_not_settle(bench: Bench, at_deadline: str, outcome: st
     else:
         bench.run()
         assert all(outcome in e["outcome"] for e in bench.events("step_done"))
+        assert len(bench.events("not_settled")) == 2 * (1 + 3 + 1)  # zero plateaus, too
+        assert not any(row["values"]["settled"] for row in bench.records("sample"))
 
 
 def test_leading_the_arm_to_its_pose_is_no_fault(bench: Bench) -> None:

@@ -193,6 +193,15 @@ def test_only_loading_counts_and_the_loop_is_reported() -> None:
     assert {p.branch for p in result.levels} == {"loading", "unloading"}
 
 
+def test_unloading_beyond_the_largest_load_is_no_part_of_the_loop() -> None:
+    """Loading ended at 60 N; levels of 100 and 80 N were held after it all the same."""
+    short = curve(levels=LEVELS[:3], factors=(1.0, 1.0, 1.0))
+    back = unloading(short, lambda f: f / (1e5 if f <= 60 else 3e4), 0.0)
+    beyond = analyze_curve(back).hysteresis
+    assert beyond is not None
+    assert beyond.area == pytest.approx(0.0, abs=1e-9)
+
+
 def test_without_a_measured_origin_the_line_may_miss_it() -> None:
     offset = replace(curve(lambda f: 1e-4 + f / 1e5, factors=(1.0, 1.0)), origin=False)
     result = analyze_curve(offset)

@@ -1,0 +1,134 @@
+"""The runs of a data set, sample by sample, as the evaluation takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arrays import Flags
+from identification.running import first_rows
+from rig.arrays import Array
+from rig.units import M_PER_MM
+
+
+@dataclass(frozen=True)
+class Run:
+    """Samples of one run in the order of measurement, (n,) each; displacement in m."""
+
+    repetition: int
+    time: Array
+    branch: NDArray[np.str_]
+    step: NDArray[np.int64]
+    force: Array
+    displacement: Array
+    settled: NDArray[np.bool_] | None
+
+
+def setups(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[tuple[str, str], list[Run]]]:
+    """Runs of each pose and direction. Rows may be interleaved; their order within a run stays."""
+    used = ~columns["discarded"] if "discarded" in columns else np.ones(_rows(columns), dtype=bool)
+    pose, direction, repetition = (columns[n] for n in ("pose", "direction", "repetition"))
+    change = np.ones(used.size, dtype=bool)
+    if used.size > 1:
+        change[1:] = np.logical_or.reduce([c[1:] != c[:-1] for c in (pose, direction, repetition)])
+    starts = np.flatnonzero(change)
+    pieces: dict[tuple[str, str], dict[int, list[int]]] = {}
+    for index, at in enumerate(starts):
+        setup = (str(pose[at]), str(direction[at]))
+        pieces.setdefault(setup, {}).setdefault(int(repetition[at]), []).append(index)
+    bounds = np.append(starts, used.size)
+    for setup, by_repetition in pieces.items():
+        runs = []
+        for number, indices in by_repetition.items():
+            rows = np.concatenate([np.arange(bounds[i], bounds[i + 1]) for i in indices])
+            rows = rows[used[rows]]
+            if rows.size:
+                runs.append(_run(columns, number, rows))
+        if runs:
+            yield setup, runs
+
+
+def of_setup(columns: Mapping[str, NDArray[Any]], pose: str, direction: str) -> Flags:
+    """(n,) samples of one pose and direction."""
+    return np.asarray((columns["pose"] == pose) & (columns["direction"] == direction))
+
+
+def left_out(columns: dict[str, NDArray[Any]], rows: Flags) -> dict[str, NDArray[Any]]:
+    """The columns with rows (n,) not to be used."""
+    if not rows.any():
+        return columns
+    return columns | {"discarded": columns["discarded"] | rows if "discarded" in columns else rows}
+
+
+def _rows(columns: dict[str, NDArray[Any]]) -> int:
+    return len(columns["force_N"])
+
+
+def _run(columns: dict[str, NDArray[Any]], repetition: int, rows: NDArray[np.intp]) -> Run:
+    time = columns["session_s"] if "session_s" in columns else columns["time_s"]
+    settled = columns["settled"][rows] != 0 if "settled" in columns else None
+    return Run(
+        repetition,
+        np.asarray(time[rows], dtype=np.float64),
+        columns["branch"][rows],
+        np.asarray(columns["step"][rows], dtype=np.int64),
+        np.asarray(columns["force_N"][rows], dtype=np.float64),
+        np.asarray(columns["displacement_mm"][rows], dtype=np.float64) * M_PER_MM,
+        settled,
+    )
+
+
+def blocks(run: Run) -> Iterator[slice]:
+    """Neighbouring samples of one branch and step."""
+    edges = [*first_rows(run.branch, run.step).tolist(), run.force.size]
+    yield from (slice(a, b) for a, b in pairwise(edges))
+
+
+def stitched(columns: Mapping[str, NDArray[Any]]) -> dict[tuple[str, str], tuple[list[int], bool]]:
+    """(pose, direction) -> repetitions within which the force was tared anew, and whether there are
+    others beside them.
+
+    Earlier versions took up an interrupted repetition where it had stopped. Its force and its
+    displacement then have two zeros, and its unloading may have been reached from no load.
+    """
+    if "segment" not in columns:
+        return {}
+    used = ~columns["discarded"]
+    names = ("pose", "direction", "repetition", "segment")
+    rows = zip(*(columns[name][used].tolist() for name in names), strict=True)
+    tarings: dict[tuple[str, str], dict[int, int]] = {}
+    for pose, direction, repetition, _ in dict.fromkeys(rows):
+        of_repetition = tarings.setdefault((str(pose), str(direction)), {})
+        of_repetition[repetition] = of_repetition.get(repetition, 0) + 1
+    found = {}
+    for setup, count in tarings.items():
+        torn = [repetition for repetition, n in count.items() if n > 1]
+        if torn:
+            found[setup] = torn, len(torn) < len(count)
+    return found
+
+
+def of_stitched(columns: Mapping[str, NDArray[Any]]) -> Flags:
+    """(n,) samples of stitched repetitions that there are others beside."""
+    rows = np.zeros(len(columns["force_N"]), dtype=bool)
+    for (pose, direction), (repetitions, others) in stitched(columns).items():
+        if others:
+            mine = np.isin(columns["repetition"], repetitions)
+            rows |= of_setup(columns, pose, direction) & mine
+    return rows
+
+
+def said_of_stitched(repetitions: list[int], *, others: bool) -> str:
+    """The sentence for one pose and direction."""
+    *first, last = map(str, repetitions)
+    which = f"Repetitions {', '.join(first)} and {last} were" if first else f"Repetition {last} was"
+    ending = "left out." if others else "it counts, because there is no other; measure it again."
+    return (
+        f"{which} interrupted and taken up again midway, with the force tared anew and from no "
+        f"load: {ending}"
+    )
