@@ -322,10 +322,9 @@ def _notes(runs: list[Run], zeros: list[list[_Plateau]], datum: str) -> list[str
     """What the zero lines were made of, in sentences."""
     without = [r.repetition for r, z in zip(runs, zeros, strict=True) if not z]
     if without:
-        lacking = f"{_lacking(without, len(runs))}: force and displacement are taken as measured."
-        return [lacking, *_unsettled(runs)]
+        return [f"{_lacking(without, len(runs))}: force and displacement are taken as measured."]
     single = sum(1 for z in zeros if len(z) == 1)
-    notes = _unsettled(runs)
+    notes = []
     if single:
         notes.append(
             f"{single} of {len(runs)} runs have one zero-load plateau: "
@@ -339,23 +338,3 @@ def _notes(runs: list[Run], zeros: list[list[_Plateau]], datum: str) -> list[str
             "each repetition counts from its own."
         )
     return notes
-
-
-def _unsettled(runs: list[Run]) -> list[str]:
-    """What is said of holds that were recorded before they had come to rest."""
-    late = {"levels": 0, "zero-load plateaus": 0}
-    count = late.copy()
-    for run in runs:
-        if run.settled is None:
-            continue
-        for block in blocks(run):
-            kind = "zero-load plateaus" if run.branch[block.start] == "zero" else "levels"
-            count[kind] += 1
-            late[kind] += not np.any(run.settled[block])
-    parts = [f"{n} of {count[kind]} {kind}" for kind, n in late.items() if n]
-    if not parts:
-        return []
-    return [
-        f"{' and '.join(parts)} had not settled when they were sampled: what still moved there is "
-        "part of the curve. Of such a level the later half counts."
-    ]

@@ -135,15 +135,6 @@ def test_samples_known_to_be_settled_count() -> None:
     assert {p.n for p in loading(only(data))} == {2}  # none settled: nearest to rest at its end
 
 
-def test_levels_that_never_settled_are_told() -> None:
-    data = table(run(lambda f: f / 100, LEVELS))
-    data.columns["settled"] = np.ones(len(data.columns["step"]))
-    data.columns["settled"][data.columns["step"] == 2] = 0.0
-    data.columns["settled"][-4:] = 0.0  # the plateau after the run
-    (note,) = (note for note in only(data).notes if "settled" in note)
-    assert note.startswith("1 of 4 levels and 1 of 2 zero-load plateaus had not settled when they")
-
-
 def resumed_midway(repetitions: tuple[int, ...]) -> Table:
     """As earlier versions went on: the third and the fourth level after another tare."""
     rows, segment = [], []
