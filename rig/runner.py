@@ -4,6 +4,7 @@ plateau, steps, unload, zero plateau, rest.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from math import degrees, isnan, nan, radians
@@ -23,6 +24,7 @@ from rig.protocol import MeasurementProtocol, Run, Step
 # Within this the arm counts as standing in its reference pose: RTDE shows commanded poses to
 # 0.001 deg, and by hand on the pendant a joint is brought there to about a tenth of a degree.
 POSE_TOLERANCE_DEG = 0.5
+STATE_COMES_S = 1.0  # wall clock: far longer than a robot's state is on its way
 TO_RESET = "Turn the charge amplifier to Reset, then confirm."
 TO_OPERATE = "Turn the charge amplifier to Operate, then confirm."
 
@@ -206,9 +208,7 @@ class Runner:
 
     def _verify_pose(self, name: str, q_rad: tuple[float, ...]) -> None:
         while True:
-            self._devices.robot.accept_present_state()
-            q = self._devices.robot.state().q
-            off = [degrees(abs(a - b)) for a, b in zip(q, q_rad, strict=True)]
+            off = self._off_pose(q_rad)
             worst = max(range(len(off)), key=off.__getitem__)
             if off[worst] <= POSE_TOLERANCE_DEG:
                 return
@@ -223,6 +223,18 @@ class Runner:
                 return
             if answer == "abort":
                 raise MeasurementStopped(text)
+
+    def _off_pose(self, q_rad: tuple[float, ...]) -> list[float]:
+        """deg that each joint is off. The newest state may be older than the answer that the arm is
+        there (an emulated one is there at once): for a moment newer ones are waited for."""
+        deadline = time.monotonic() + STATE_COMES_S
+        while True:
+            self._devices.robot.accept_present_state()
+            q = self._devices.robot.state().q
+            off = [degrees(abs(a - b)) for a, b in zip(q, q_rad, strict=True)]
+            if max(off) <= POSE_TOLERANCE_DEG or time.monotonic() > deadline:
+                return off
+            time.sleep(STATE_COMES_S / 20)
 
     def _unload(self) -> None:
         text = "Turn the screw back until it no longer touches the arm, then confirm."

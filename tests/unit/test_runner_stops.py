@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -165,6 +166,22 @@ def test_a_wrong_pose_is_noticed(bench: Bench) -> None:
         bench.run()
     prompt = next(p for p in bench.loader.asked if p.key == "pose")
     assert "deg away from pose P1 (allowed 0.5 deg)" in prompt.text
+
+
+def test_a_state_that_is_still_on_its_way_is_waited_for(bench: Bench) -> None:
+    """The newest state may be older than the answer that the arm is there."""
+    robot, late = bench.devices.robot, [3]
+    state = robot.state
+
+    def behind() -> Any:
+        late[0] -= 1
+        there = state()
+        return replace(there, q=(0.5,) * 6) if late[0] > 0 else there
+
+    robot.state = behind  # type: ignore[method-assign]
+    bench.run()
+    assert late[0] <= 0
+    assert "pose" not in [p.key for p in bench.loader.asked]
 
 
 def test_an_operator_who_cannot_be_asked_is_a_failed_device(bench: Bench) -> None:

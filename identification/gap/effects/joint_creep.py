@@ -4,7 +4,7 @@ Kelvin-Voigt elements behind a joint's spring: `T z' = tau - z`; any linear cree
 spectrum of retardation times (Prony series, power and log laws included; Findley 1976), the last
 of them so long that it flows and does not come back (Burgers 1935). Large stresses creep more than
 in proportion: the same of the squared torque. The coefficients are compliances in units of the
-joint's own, of what flows over one session: polymers, grease and gears 1 to 50 %.
+joint's own, of what flows over one run: polymers, grease and gears 1 to 50 %.
 
 What crept goes back between two runs, as the session's clock tells; or nothing is left of it where
 the rig is turned to another direction, which may take hours that no clock counts.
@@ -55,10 +55,11 @@ def times(bench: Bench) -> np.ndarray:
     return np.append(out, VISCOUS * bench.course.session_span) if bench.data.arm else out
 
 
-def in_session(bench: Bench, times_s: Array) -> Array:
+def in_a_run(bench: Bench, times_s: Array) -> Array:
     """(k,) in how many units of its coefficient an element of a time (k,) s ends: what flows counts
-    by what it does under a load that stands for one session."""
-    return np.where(times_s < VISCOUS * bench.course.session_span, 1.0, VISCOUS)
+    by what it does under a load that stands for one run, however many runs there are."""
+    flows = times_s >= VISCOUS * bench.course.session_span
+    return np.where(flows, times_s / max(run_seconds(bench), row_time(bench.rows), 1e-6), 1.0)
 
 
 def scales(bench: Bench) -> tuple[float, ...]:
@@ -110,7 +111,7 @@ def _elements(
     """Column of an element of every time (k,)."""
     load = np.tile(bench.true_torque[:, joint][:, None], (1, len(times_s)))
     z = retarded(bent(load) if is_bent else load, times_s, bench.rows, bench.rest, fresh)
-    unit = bench.sense * bench.compliance[joint] * in_session(bench, times_s)
+    unit = bench.sense * bench.compliance[joint] * in_a_run(bench, times_s)
     return [bench.add_joint(joint, y) for y in (unit * z).T]
 
 
@@ -163,7 +164,7 @@ def bent(load: Array) -> Array:
 
 def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
     times, seconds = np.asarray(v.info["times_s"]), run_seconds(bench)
-    whole = in_session(bench, times)
+    whole = in_a_run(bench, times)
     power = np.maximum(found.w, 0.0)
     mean = (
         float(np.exp(power @ np.log(times) / power.sum())) if power.sum() > 0 else float(times[0])
@@ -200,7 +201,7 @@ def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     times = np.asarray(v.info["times_s"])
     terms = tuple(Term(name, {"retardation_time": float(t)}) for t in times)
     forgets = {"forgets": ANEW} if v.info["memory"] else {}
-    return Law({"joint": joint} | forgets, terms), unit * in_session(bench, times)
+    return Law({"joint": joint} | forgets, terms), unit * in_a_run(bench, times)
 
 
 def _columns(bench: Bench, law: Law) -> list[Array]:
