@@ -334,7 +334,15 @@ def _notes(runs: list[Run], zeros: list[list[_Plateau]], datum: str) -> list[str
         firsts = [z[0].displacement for z in zeros]
         apart = (max(firsts) - min(firsts)) / M_PER_MM
         notes.append(
-            f"The unloaded positions before the repetitions lie {apart:.2g} mm apart; "
+            f"The unloaded positions before the repetitions lie {_length(apart)} apart; "
             "each repetition counts from its own."
         )
     return notes
+
+
+def _length(mm: float) -> str:
+    """In the unit that shows it."""
+    return f"{1e3 * mm:.2g} µm" if 0 < mm < _SMALL_MM else f"{mm:.2g} mm"
+
+
+_SMALL_MM = 0.05
