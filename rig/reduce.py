@@ -341,8 +341,8 @@ def _notes(runs: list[Run], zeros: list[list[_Plateau]], datum: str) -> list[str
 
 
 def _length(mm: float) -> str:
-    """In the unit that shows it."""
-    return f"{1e3 * mm:.2g} µm" if 0 < mm < _SMALL_MM else f"{mm:.2g} mm"
+    """With no more digits than anybody reads a laser by."""
+    return "less than 0.001 mm" if 0 < mm < _LEAST_MM else f"{mm:.2g} mm"
 
 
-_SMALL_MM = 0.05
+_LEAST_MM = 0.001
