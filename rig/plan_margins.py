@@ -115,14 +115,22 @@ def beyond_joints(protocol: MeasurementProtocol, arm: Arm) -> Iterator[tuple[Key
 
 
 def unit_warnings(protocol: MeasurementProtocol) -> Iterator[str]:
-    """Radians under q_deg put the arm near its zero, stretched out, where nobody measures."""
+    """Poses whose angles may have been meant otherwise."""
     for name, pose in protocol.poses.items():
-        most = float(np.rad2deg(max(map(abs, pose.q_rad))))
-        if 0 < most <= 2 * np.pi:
-            yield (
-                f"pose {name}: all joints within {most:.2f} deg of zero, the arm stretched out. "
-                "If these are radians, write q_rad."
-            )
+        if doubt := may_be_radians(np.rad2deg(pose.q_rad).tolist()):
+            yield f"pose {name}: {doubt}"
+
+
+def may_be_radians(q_deg: Sequence[float]) -> str:
+    """Of joint positions in deg; "" where there is no doubt. Radians in their place put the arm
+    near its zero, stretched out, where nobody measures."""
+    most = max(map(abs, q_deg), default=0.0)
+    if not 0 < most <= 2 * np.pi:
+        return ""
+    return (
+        f"all joints within {most:.2f} deg of zero, the arm stretched out. "
+        "If these are radians, write q_rad."
+    )
 
 
 def time_warnings(protocol: MeasurementProtocol, runs: Sequence[PlannedRun]) -> Iterator[str]:

@@ -17,6 +17,8 @@ from annotated_types import Gt, Interval, Le, MinLen
 from rig.errors import did_you_mean
 from rig.yaml.yamlnodes import Key
 
+LONGEST_TOOL_MM = 2000  # of protocols and models
+
 Triple = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 _FORBID = {"extra": "forbid"}
@@ -246,10 +248,11 @@ def _poses(written: ProtocolFile) -> Found:
             what = f"{', '.join(beyond)} {unit}: beyond a full turn; allowed: -{turn:.5g} to "
             yield (*path, key), f"{what}{turn:.5g} {unit}.{hint}"
         for i, value in enumerate(pose.tcp_xyz_mm):
-            if abs(value) > 2000:
+            if abs(value) > LONGEST_TOOL_MM:
                 yield (
                     (*path, "tcp_xyz_mm", i),
-                    f"{value:.10g} mm is no tool; allowed: -2000 to 2000 mm.",
+                    f"{value:.10g} mm is no tool; allowed: "
+                    f"{-LONGEST_TOOL_MM} to {LONGEST_TOOL_MM} mm.",
                 )
         if pose.program is not None and not pose.program.isprintable():
             what = f"{pose.program!r} holds a character that cannot be printed; write the "

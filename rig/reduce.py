@@ -86,7 +86,7 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
     )
     result: dict[tuple[str, str], Curve] = {}
     torn = stitched(dataset.columns)
-    whole = left_out(dataset.columns, of_stitched(dataset.columns))
+    whole = left_out(dataset.columns, of_stitched(dataset.columns, torn))
     way = between_levels(whole)
     columns = left_out(whole, way)
     for (pose, direction), taken in setups(columns):

@@ -33,10 +33,9 @@ def setups(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[tuple[str, str], 
     """Runs of each pose and direction. Rows may be interleaved; their order within a run stays."""
     used = ~columns["discarded"] if "discarded" in columns else np.ones(_rows(columns), dtype=bool)
     pose, direction, repetition = (columns[n] for n in ("pose", "direction", "repetition"))
-    change = np.ones(used.size, dtype=bool)
-    if used.size > 1:
-        change[1:] = np.logical_or.reduce([c[1:] != c[:-1] for c in (pose, direction, repetition)])
-    starts = np.flatnonzero(change)
+    if not used.size:
+        return
+    starts = first_rows(pose, direction, repetition)
     pieces: dict[tuple[str, str], dict[int, list[int]]] = {}
     for index, at in enumerate(starts):
         setup = (str(pose[at]), str(direction[at]))
@@ -113,10 +112,13 @@ def stitched(columns: Mapping[str, NDArray[Any]]) -> dict[tuple[str, str], tuple
     return found
 
 
-def of_stitched(columns: Mapping[str, NDArray[Any]]) -> Flags:
-    """(n,) samples of stitched repetitions that there are others beside."""
+def of_stitched(
+    columns: Mapping[str, NDArray[Any]], found: Mapping[tuple[str, str], tuple[list[int], bool]]
+) -> Flags:
+    """(n,) samples of stitched repetitions (found: as `stitched` gives them) that there are others
+    beside."""
     rows = np.zeros(len(columns["force_N"]), dtype=bool)
-    for (pose, direction), (repetitions, others) in stitched(columns).items():
+    for (pose, direction), (repetitions, others) in found.items():
         if others:
             mine = np.isin(columns["repetition"], repetitions)
             rows |= of_setup(columns, pose, direction) & mine

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.running import first_rows
 from rig.arrays import Array
 from rig.dataset import Dataset
 from rig.measurements import Measurements
@@ -220,12 +221,12 @@ def _zeros(dataset: Recorded) -> Iterator[RunZeros]:
         return
     time = columns["session_s"] if "session_s" in columns else columns["time_s"]
     place = [columns[k][rows] for k in ("pose", "direction", "repetition")]
-    for first, last in _starts(place):
+    for first, last in _stretches(*place):
         mine = rows[first:last]
         zero = columns["branch"][mine] == "zero"
         span = 0.0 if zero.all() else _span(columns["force_N"][mine])
         plateaus = tuple(
-            _plateau(dataset, time, mine[a:b], span) for a, b in _starts([zero]) if zero[a]
+            _plateau(dataset, time, mine[a:b], span) for a, b in _stretches(zero) if zero[a]
         )
         known = tuple(p for p in plateaus if p is not None)
         if known:
@@ -238,15 +239,9 @@ def _span(force: NDArray[Any]) -> float:
     return float(np.ptp(values)) if values.size else 0.0
 
 
-def _starts(columns: list[NDArray[Any]]) -> list[tuple[int, int]]:
-    """Stretches of equal values, as (first, behind the last)."""
-    n = columns[0].size
-    change = np.zeros(n, dtype=bool)
-    change[:1] = True
-    for column in columns:
-        change[1:] |= column[1:] != column[:-1]
-    edges = [*np.flatnonzero(change).tolist(), n]
-    return list(pairwise(edges))
+def _stretches(*keys: NDArray[Any]) -> Iterator[tuple[int, int]]:
+    """Those in which no key (n,) changes, as (first, behind the last)."""
+    return pairwise([*first_rows(*keys).tolist(), keys[0].size])
 
 
 def _plateau(

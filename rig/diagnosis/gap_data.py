@@ -98,10 +98,11 @@ def _in_use(dataset: Dataset, where: str) -> tuple[Flags, tuple[str, ...], tuple
     used &= np.isfinite(dataset.columns["displacement_mm"])
     if not used.any():
         raise InputError(f"{where}: no sample in use; every one is discarded or not finite.")
-    torn = used & of_stitched(dataset.columns)
+    midway = stitched(dataset.columns)
+    torn = used & of_stitched(dataset.columns, midway)
     way = used & between_levels(left_out(dataset.columns, torn))
     used, aside, without = _without_holes(dataset, used & ~way & ~torn)
-    for (pose, direction), (repetitions, others) in stitched(dataset.columns).items():
+    for (pose, direction), (repetitions, others) in midway.items():
         said = said_of_stitched(repetitions, others=others)
         aside = (*aside, f"Pose {pose}, direction {direction}: {said}")
     if way.any():

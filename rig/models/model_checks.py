@@ -8,8 +8,10 @@ import numpy as np
 
 from identification.arm import Arm, tool_offset, tool_transform
 from rig.arrays import Array
-from rig.models.model_schema import LONGEST_TOOL_MM, ModelFile
+from rig.models.model_schema import ModelFile
 from rig.models.robot import checked
+from rig.plan_margins import may_be_radians
+from rig.protocolfile import LONGEST_TOOL_MM
 from rig.units import MM_PER_M
 from rig.yaml.yamlfile import Document
 
@@ -46,14 +48,8 @@ def doubts(document: Document[ModelFile], arm: Arm, nominal: Array) -> tuple[str
 
 
 def _radians(document: Document[ModelFile]) -> Iterator[str]:
-    """As of a protocol's poses (`rig.plan_margins`)."""
-    q_deg = document.value.pose.q_deg
-    most = max(map(abs, q_deg)) if q_deg else 0.0
-    if 0 < most <= 2 * np.pi:
-        yield (
-            f"{document.at(('pose', 'q_deg'))}: pose.q_deg: all joints within {most:.2f} deg of "
-            "zero, the arm stretched out. If these are radians, write q_rad."
-        )
+    if doubt := may_be_radians(document.value.pose.q_deg or []):
+        yield f"{document.at(('pose', 'q_deg'))}: pose.q_deg: {doubt}"
 
 
 def _springs(document: Document[ModelFile], arm: Arm, nominal: Array) -> tuple[str, ...]:

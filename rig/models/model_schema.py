@@ -7,6 +7,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge, Gt, Interval, Len, MinLen
 
+from rig.protocolfile import LONGEST_TOOL_MM
+
 _Row3 = tuple[float, float, float]
 _Six = Annotated[list[float], Len(6, 6)]
 _Matrix6 = Annotated[list[_Six], Len(6, 6)]
@@ -16,7 +18,6 @@ _SixPositive = Annotated[list[_Positive], Len(6, 6)]
 _SixSprings = Annotated[list[Annotated[float, Interval(ge=1e-3, le=1e15)]], Len(6, 6)]
 # In m, and longer than the links of any arm: millimetres are beyond.
 _SixLengths = Annotated[list[Annotated[float, Interval(ge=-5, le=5)]], Len(6, 6)]
-LONGEST_TOOL_MM = 2000  # as in protocols
 _SixNotNegative = Annotated[list[Annotated[float, Ge(0)]], Len(6, 6)]
 _Forbid: dict[str, str] = {"extra": "forbid"}
 

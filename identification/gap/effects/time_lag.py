@@ -357,13 +357,14 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
 
 
 def _look_closer(word: Word) -> list[Variant]:
-    """Lags about those that were found; of a force that lags also with the springs as they are, of
-    whose response it shows a part too late."""
+    """Lags about those that were found; of a driven force that lags also with the springs as they
+    are, of whose response it shows a part too late."""
     if not shows(word):
         return []
     channels = {s.variant.info["channel"]: s for s in reversed(word.beside or word.alone)}
     finer = closing_in(word, refined, list(channels.values()))
-    driven = [v for v in finer if v.info["channel"] == "force"]
+    imposed = word.engine.bench.imposed
+    driven = [v for v in finer if v.info["channel"] == "force" and not imposed]
     found = scored_beside(word.engine, word.families, word.ranked, driven)
     best = max(found, key=evidence, default=None)
     return finer if best is None else [*finer, about_springs(_LAWS, word.engine, best.variant)]
