@@ -74,6 +74,37 @@ class Instruments:
 
 
 @dataclass(frozen=True, eq=False)
+class Curve:
+    """Forces (k,) N, ascending and distinct, at least two, and displacements (k,) m there; straight
+    between these points, and straight on beyond the ends."""
+
+    force: Array
+    displacement: Array
+
+    def at(self, force: Array) -> Array:
+        """(n,) m at forces (n,) N."""
+        return _along(force, self.force, self.displacement)
+
+    def carried(self, displacement: Array) -> Array:
+        """(n,) N at displacements (n,) m. Where the curve goes back as the force grows, several
+        forces belong to one displacement: the largest before it does."""
+        way = -1.0 if self.displacement[-1] < self.displacement[0] else 1.0
+        out = np.maximum.accumulate(way * self.displacement)
+        new = np.append(True, np.diff(out) > 0)
+        if new.sum() < 2:
+            return np.full(len(displacement), np.nan)
+        return _along(way * displacement, out[new], self.force[new])
+
+
+def _along(x: Array, at: Array, values: Array) -> Array:
+    """Values (k,), known at ascending places (k,), at x (n,)."""
+    inner = np.interp(x, at, values)
+    below = values[0] + (x - at[0]) * (values[1] - values[0]) / (at[1] - at[0])
+    above = values[-1] + (x - at[-1]) * (values[-1] - values[-2]) / (at[-1] - at[-2])
+    return np.where(x < at[0], below, np.where(x > at[-1], above, inner))
+
+
+@dataclass(frozen=True, eq=False)
 class GapData:
     """n samples in the order of measurement.
 
@@ -82,7 +113,7 @@ class GapData:
     across it. q (n, m) rad or None: joint readings minus commanded pose. temperature (n, t) degC or
     None: of the joints, or what was read of a rig.
     compliance (m,) rad/Nm (m/N for a bench) as simulated; compliance_relative_sd (m,).
-    simulated (n,) m or None: displacement that another simulator predicts for every sample.
+    curves: what another simulator predicts, a curve for every setup; None: the springs do.
     lets_go: whether readings were left out after a part had let go of the stroke (slack.py).
     timed: whether `time` was recorded; it counts samples otherwise. on_the_way (n,) or None:
     samples of ramps under the name of the level they lead to (ramps.py). aside, notes: what is to
@@ -110,7 +141,7 @@ class GapData:
     datum: Literal["setup", "repetition"] = "setup"
     tare: Literal["session", "run"] = "session"
     imposed: Literal["force", "displacement"] | None = None
-    simulated: Array | None = None
+    curves: tuple[Curve, ...] | None = None
     timed: bool = True
     lets_go: bool = False
     on_the_way: Flags | None = None

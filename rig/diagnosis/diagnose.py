@@ -98,7 +98,7 @@ class Diagnosis:
 
     def _outside(self) -> list[str]:
         """What the simulation has beside springs and effects."""
-        curves = self.result.bench.data.simulated is not None  # the simulation is what they are
+        curves = self.result.bench.data.curves is not None  # the simulation is what they are
         if self.model is None or not self.model.written_outside or curves:
             return []
         keys = " and ".join(f"`{key}`" for key in self.model.written_outside)

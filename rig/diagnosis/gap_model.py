@@ -41,7 +41,7 @@ def model_text(diagnosis: Diagnosis, dataset: Dataset) -> str:
     against another simulator's curves (its springs are not ours to correct).
     """
     meta, result = dataset.meta, diagnosis.result
-    check_writable(dataset, others=result.bench.rows.simulated is not None)
+    check_writable(dataset, others=result.bench.data.curves is not None)
     pose = meta.poses[result.bench.data.setups[0].pose]
     made = f"Springs and effects of the diagnosis of {dataset.uuid}."
     if result.verdict == "unknown":  # nothing of the data set is in it, so it is not named here

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from identification.gap.data import GapData, Setup
+from identification.gap.data import Curve, GapData, Setup
 from rig.arrays import Array
 from rig.errors import InputError
 from rig.storage.columns import Values
@@ -25,33 +24,25 @@ SAME_FORCE = 1e-9
 
 
 def with_curves(data: GapData, csv: Path) -> GapData:
-    """Displacement that the curves (pose, direction, force_N, displacement_mm) give per sample.
-
-    Straight between the points and beyond the ends; points at one force count as their mean, and
-    where that is no small matter a note says so. InputError for a table that holds no such curves.
+    """With the curves (pose, direction, force_N, displacement_mm) of the data's setups. Points at
+    one force count as their mean, and where that is no small matter a note says so. InputError for
+    a table that holds no such curves.
     """
     table = _read(csv)
-    simulated, notes = np.empty(len(data.force)), list(data.notes)
+    curves, notes = list[Curve](), list(data.notes)
     for s, setup in enumerate(data.setups):
-        curve = _curve(csv, table, setup)
-        rows = data.setup == s
-        notes += _doubts(csv, curve, setup, data.force[rows], data.instruments.force)
-        simulated[rows] = _along(data.force[rows], curve.force, curve.displacement)
-    return replace(data, simulated=simulated, notes=tuple(notes))
+        curve, apart = _curve(csv, table, setup)
+        measured = data.force[data.setup == s]
+        notes += _doubts(csv, curve, apart, setup, measured, data.instruments.force)
+        curves.append(curve)
+    return replace(data, curves=tuple(curves), notes=tuple(notes))
 
 
-class _Curve(NamedTuple):
-    """Forces (n,) N, ascending and distinct, displacements (n,) m there, and how far those of one
-    force are apart (n,) m."""
-
-    force: Array
-    displacement: Array
-    apart: Array
-
-
-def _doubts(csv: Path, curve: _Curve, setup: Setup, measured: Array, noise: float) -> Iterator[str]:
-    """What is odd about a curve, beside the forces (k,) N that were measured with that noise, N.
-    InputError where it covers too little of them."""
+def _doubts(
+    csv: Path, curve: Curve, apart: Array, setup: Setup, measured: Array, noise: float
+) -> Iterator[str]:
+    """What is odd about a curve, whose values at one force are apart (k,) m, beside the forces (n,)
+    N that were measured with that noise, N. InputError where it covers too little of them."""
     where = f"direction {setup.direction}" + (f" in pose {setup.pose}" if setup.pose else "")
     low, high = float(measured.min()), float(measured.max())
     first, last = float(curve.force[0]), float(curve.force[-1])
@@ -65,13 +56,13 @@ def _doubts(csv: Path, curve: _Curve, setup: Setup, measured: Array, noise: floa
     if moves and max(first - low, high - last) > _LITTLE * (high - low):
         yield f"The curve of {where} was {needed}: it was taken to go straight on beyond its ends."
     size = float(np.ptp(curve.displacement))
-    if curve.apart.max() > _LITTLE * size:
-        at = float(curve.force[curve.apart.argmax()])
+    if apart.max() > _LITTLE * size:
+        at = float(curve.force[apart.argmax()])
         yield (
-            f"The curve of {where} has values that are {MM_PER_M * curve.apart.max():.3g} mm apart "
+            f"The curve of {where} has values that are {MM_PER_M * apart.max():.3g} mm apart "
             f"at {at:.4g} N: their mean was taken."
         )
-    unloaded = float(_along(np.zeros(1), curve.force, curve.displacement)[0])
+    unloaded = float(curve.at(np.zeros(1))[0])
     if first <= 0 <= last and abs(unloaded) > _LITTLE * size:
         yield (
             f"The curve of {where} shows {MM_PER_M * unloaded:.3g} mm without load, where the "
@@ -122,8 +113,8 @@ def _check_finite(file: CsvFile, block: Block, name: str, values: Values) -> Non
         )
 
 
-def _curve(csv: Path, table: dict[str, Values], setup: Setup) -> _Curve:
-    """Of a setup."""
+def _curve(csv: Path, table: dict[str, Values], setup: Setup) -> tuple[Curve, Array]:
+    """Of a setup, and how far (k,) m its values at one force are apart."""
     mine = np.ones(len(table["force_N"]), dtype=bool)
     for key, value in (("pose", setup.pose), ("direction", setup.direction)):
         if key in table:
@@ -143,14 +134,5 @@ def _curve(csv: Path, table: dict[str, Values], setup: Setup) -> _Curve:
         )
     starts = np.flatnonzero(new)
     apart = np.maximum.reduceat(displacement, starts) - np.minimum.reduceat(displacement, starts)
-    return _Curve(
-        np.bincount(level, force) / count, np.bincount(level, displacement) / count, apart
-    )
-
-
-def _along(force: Array, f: Array, u: Array) -> Array:
-    """Linear between the curve's points, straight on beyond its ends."""
-    inner = np.interp(force, f, u)
-    below = u[0] + (force - f[0]) * (u[1] - u[0]) / (f[1] - f[0])
-    above = u[-1] + (force - f[-1]) * (u[-1] - u[-2]) / (f[-1] - f[-2])
-    return np.where(force < f[0], below, np.where(force > f[-1], above, inner))
+    mean = np.bincount(level, displacement) / count
+    return Curve(np.bincount(level, force) / count, mean), apart

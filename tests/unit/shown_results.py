@@ -92,7 +92,7 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
     }
     probabilities = {verdict: p, "base_slip": 0.9961 - p, "zero_shift": 0.0039}
     unseen = dict.fromkeys(("engine", "fit", "found"), NOWHERE)
-    arm: Any = SimpleNamespace(data=SimpleNamespace(arm=True, simulated=None))
+    arm: Any = SimpleNamespace(data=SimpleNamespace(arm=True, curves=None))
     return GapResult(verdict=verdict, probabilities=probabilities, bench=arm, **known, **unseen)
 
 
@@ -170,7 +170,7 @@ def without_gap() -> Diagnosis:
 
 def without_arm(found: Diagnosis) -> Diagnosis:
     """The same of a rig without an arm."""
-    bench: Any = SimpleNamespace(data=SimpleNamespace(arm=False, simulated=None))
+    bench: Any = SimpleNamespace(data=SimpleNamespace(arm=False, curves=None))
     return replace(found, result=replace(found.result, bench=bench))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from identification.gap.answer.notes import FAULT, UNDECIDED, notes_of
 from identification.gap.answer.scale import off_scale
-from identification.gap.data import GapData
+from identification.gap.data import Curve, GapData
 from identification.gap.model.bench import make_bench
 from tests.conformance.gap_designs import linear
 from tests.explained import explained
@@ -17,7 +17,7 @@ from tests.explained import explained
 
 def said(data: GapData) -> list[str]:
     bench = make_bench(data)
-    simulated = bench.rows.simulated
+    simulated = bench.simulated
     predicted = bench.stated_slope * bench.load if simulated is None else simulated
     return [note.text for note in off_scale(bench, predicted)]
 
@@ -46,9 +46,10 @@ def test_a_wrong_unit_is_asked_for(
 
 def test_simulated_curves_that_go_the_other_way_are_told() -> None:
     data = linear("bench")
-    simulated = data.displacement - data.displacement[0]
-    assert said(replace(data, simulated=simulated)) == []
-    (text,) = said(replace(data, simulated=-simulated))
+    slope = float(data.setups[0].lever**2 @ data.compliance)
+    ends = np.array([-100.0, 100.0])
+    assert said(replace(data, curves=(Curve(ends, slope * ends),))) == []
+    (text,) = said(replace(data, curves=(Curve(ends, -slope * ends),)))
     assert "go the other way" in text
 
 

@@ -30,7 +30,8 @@ def data(tmp_path: Path) -> GapData:
 def simulated_mm(data: GapData, folder: Path, text: str) -> list[float]:
     """At 0, 20 ... 100 N."""
     (folder / "c.csv").write_text(text)
-    return [1e3 * u for u in with_curves(data, folder / "c.csv").simulated[:6]]
+    (curve,) = with_curves(data, folder / "c.csv").curves or ()
+    return [1e3 * u for u in curve.at(data.force[:6])]
 
 
 def test_straight_between_the_points_and_beyond_them(data: GapData, tmp_path: Path) -> None:

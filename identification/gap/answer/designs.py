@@ -195,7 +195,7 @@ def planned(design: Design, bench: Bench) -> GapData:
         q=np.zeros((n, data.joints)) if design.readings else None,
         output_encoder=design.readings or data.output_encoder,
         temperature=None,
-        simulated=None,
+        curves=None,
         on_the_way=None,
         imposed="displacement" if bench.imposed else "force",
     )

@@ -34,7 +34,7 @@ def off_scale(bench: Bench, predicted: Array) -> tuple[Note, ...]:
     times = times_as_far(bench, predicted)
     if not times.size:
         return ()
-    if bench.rows.simulated is not None and np.all(times < 0):
+    if bench.data.curves is not None and np.all(times < 0):
         text = "The simulated curves go the other way than what was measured: see to their signs."
         return (Note(FAULT, text),)
     size = float(np.exp(np.median(np.log(np.maximum(np.abs(times), _LEAST)))))

@@ -135,9 +135,8 @@ def stated_prediction(engine: Engine) -> Array:
     """(n,) response that the simulation as stated predicts."""
     bench = engine.bench
     known = 0.0 if bench.known is None else bench.known.does[: bench.rows.n]
-    if bench.rows.simulated is not None:
-        return bench.rows.simulated + known
-    return bench.stated_slope * bench.load + known
+    curves = bench.simulated
+    return (bench.stated_slope * bench.load if curves is None else curves) + known
 
 
 def _stacked_keep(engine: Engine, out: Flags) -> Flags:

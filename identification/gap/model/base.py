@@ -10,6 +10,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.model.bench import Bench
 from identification.gap.model.encoders import ENCODER_OFFSET_RAD
+from identification.gap.model.other_springs import doubt
 
 HALF = 0.5  # of the geometry is expected, and as much may be missing or there
 # Of a piezoelectric dynamometer, relative; and what data sheets allow at most.
@@ -32,11 +33,11 @@ class Base:
 
 def prediction(bench: Bench) -> Array:
     """Stacked: what springs of `bench.compliance` predict, or another simulator, and the effects
-    that the simulation has; of another simulator nobody knows how the joints turn, so that these
-    are taken to do as the springs do."""
+    that the simulation has. How the joints of another simulator turn, nobody knows: as springs do
+    that give way as it does (`springs_behind`), and `_others_joints` leaves open by how much."""
     known = 0.0 if bench.known is None else bench.known.does
-    if bench.rows.simulated is not None:
-        return bench.stacked(bench.rows.simulated, bench.elastic) + known
+    if bench.simulated is not None:
+        return bench.stacked(bench.simulated, bench.elastic) + known
     return bench.stacked(bench.slope * bench.load, bench.elastic) + HALF * _geometry(bench) + known
 
 
@@ -48,6 +49,7 @@ def base_columns(bench: Bench) -> Base:
     parts += _gains(bench)
     parts += _datums(bench)
     parts += _offsets(bench)
+    parts += _others_joints(bench)
     parts += _crosstalk(bench)
     if bench.known is not None:
         parts += [(n, c, 1.0) for n, c in zip(bench.known.names, bench.known.free.T, strict=True)]
@@ -209,6 +211,17 @@ def _offsets(bench: Bench) -> list[_Part]:
             q[mine, j] = 1.0
             out.append((f"offset {name} {j + 1}", bench.stacked(q=q), sd))
     return out
+
+
+def _others_joints(bench: Bench) -> list[_Part]:
+    """By how much each joint turns in another simulator, whose curves tell the whole only."""
+    if not bench.has_q or bench.data.curves is None:
+        return []
+    sd, turned = doubt(bench.data, bench.compliance), np.eye(bench.data.joints)
+    return [
+        (f"other simulator {j + 1}", bench.stacked(q=bench.elastic * turned[j]), float(sd[j]))
+        for j in range(bench.data.joints)
+    ]
 
 
 def _crosstalk(bench: Bench) -> list[_Part]:

@@ -21,6 +21,7 @@ from identification.gap.model.driven import driven
 from identification.gap.model.history import moves, rests
 from identification.gap.model.layout import Layout, layout_of
 from identification.gap.model.noise import Noise, estimate_noise
+from identification.gap.model.other_springs import springs_behind
 from identification.gap.model.path import Path, path_of
 from identification.gap.model.pool import Pool
 from identification.gap.recording.course import Course
@@ -262,6 +263,19 @@ class Bench:
         return out
 
     @cached_property
+    def simulated(self) -> Array | None:
+        """(n,) m: the response that another simulator's curves predict; None where there are
+        none."""
+        if self.data.curves is None:
+            return None
+        out = np.empty(self.rows.n)
+        for s, curve in enumerate(self.data.curves):
+            mine = self.rows.setup == s
+            slope, load = self.stated_slope[mine], self.load[mine]
+            out[mine] = slope * curve.carried(slope * load) if self.imposed else curve.at(load)
+        return out
+
+    @cached_property
     def stated_slope(self) -> Array:
         """(n,) m/N: compliance along the direction as simulated, by which a response is a force."""
         return self.slope_of(self.data.compliance)
@@ -367,7 +381,7 @@ class Bench:
 def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None = None) -> Bench:
     """The bench of a data set. compliance (m,): point about which springs are linearised."""
     rows = rows or reduce_rows(data)
-    c = data.compliance if compliance is None else compliance
+    c = springs_behind(data) if compliance is None else compliance
     lever = np.stack([s.lever for s in data.setups])[rows.setup]
     outside = data.outside_of(rows.setup)
     slope, stated = (lever**2 @ springs + outside for springs in (c, data.compliance))

@@ -64,7 +64,6 @@ class Rows:
     tangential: Array | None
     q: Array | None
     temperature: Array | None
-    simulated: Array | None
     zero: Flags
     on_the_way: Flags
     steady: Flags
@@ -201,7 +200,6 @@ def reduce_rows(data: GapData) -> Rows:
         tangential=bins.mean_of(data.tangential),
         q=bins.mean_of(data.q),
         temperature=bins.mean_of(data.temperature),
-        simulated=bins.mean_of(data.simulated),
         zero=at_zero & ~coming,
         on_the_way=ramp,
         continuous=bins.running,
