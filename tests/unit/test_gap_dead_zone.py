@@ -107,6 +107,24 @@ def test_a_play_that_a_free_curve_meets_as_well_is_a_play(name: str, cycles: int
     assert found.probabilities[PLAY] > 0.6
 
 
+def test_a_part_that_rubs_in_its_play_meets_the_same_ends_there_and_back() -> None:
+    """At other forces: between the two ways it looks stiff and loose by turns."""
+    u = to_and_fro(cycles=2)
+    rubbing = gap(0.15)(u) + 0.05 * np.sign(np.gradient(u))
+    assert has_dead_zone(u, rubbing, PLAINLY)
+
+
+def test_stages_of_a_gear_that_rubs_are_a_curve_beside_friction() -> None:
+    """The friction's other way back is no part of what the curve is judged by."""
+    swings = [s * top for top in (0.4, 0.7, 1.0) for s in (1, -1, 1, -1)]
+    force = np.interp(np.linspace(0, 13, N), np.arange(14), [0.0, *swings, 0.0])
+    grid = np.linspace(-1.5, 1.5, 3001)
+    u = np.interp(force, stages(1.85, 0.3)(grid), grid)
+    u = u + sum(0.06 * held(force, r) for r in (0.05, 0.1, 0.2, 0.4))
+    found = explained(a_bench(force, u, "force").data)
+    assert {e.name for e in found.effects} == {CURVE, FRICTION}
+
+
 @pytest.mark.parametrize("name", ["contact", "cubic"])
 def test_a_curve_that_a_soft_play_beside_a_curve_meets_better_is_a_curve(name: str) -> None:
     u = to_and_fro(cycles=8)

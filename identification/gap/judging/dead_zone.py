@@ -76,9 +76,12 @@ def _is_one_beside(explanation: Explanation, rest: frozenset[str]) -> bool:
 
 def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:
     """Displacement (m,) and force (m,) of a fit, in the units of the load, in the direction in
-    which its largest effect sits."""
+    which its largest effect sits; without what takes another way there than back."""
     bench, fitted = engine.bench, fit(engine, explanation)
     response = bench.response - engine.target[: bench.rows.n] + fitted.response
+    for i, part in enumerate(explanation.parts):
+        if part.word not in FLANKS:
+            response = response - fitted.contribution(engine, i)[: bench.rows.n]
     response = response / bench.slope
     mine = _where(bench, explanation)
     both = bench.load[mine], response[mine]
@@ -114,14 +117,32 @@ _UNSEEN = 3  # readings in a row
 
 
 def _stiffness(u: Array, force: Array) -> Array:
-    """(p,) of force (n,) over displacement u (n,), at even points of its way, as a share of that
-    of the flanks; ones where none is stiff."""
-    order = np.argsort(u, kind="stable")
-    read, answer = _distinct(u[order], force[order])
-    at = np.linspace(float(read[0]), float(read[-1]), _POINTS)
-    stiffness = np.gradient(np.interp(at, read, answer)) if len(read) > 1 else np.zeros(_POINTS)
+    """(p,) of force (n,) over displacement u (n,), row by row, at even points of its way, as a
+    share of that of the flanks; ones where none is stiff. The mean of there and back: a part that
+    stays where it was left in its play meets the same ends at other forces."""
+    at = np.linspace(float(u.min()), float(u.max()), _POINTS)
+    back = _falls(u)
+    ways = [_rise(u[mine], force[mine], at) for mine in (~back, back) if mine.sum() > 1]
+    count = np.isfinite(ways).sum(axis=0)
+    stiffness = np.nansum(ways, axis=0) / np.maximum(count, 1)
+    stiffness = np.interp(at, at[count > 0], stiffness[count > 0])
     flank = float(np.quantile(stiffness, _STIFF))
     return stiffness / flank if flank > 0 else np.ones(_POINTS)
+
+
+def _falls(u: Array) -> Flags:
+    """(n,) rows on the way down; where it stands, as it came."""
+    change = np.diff(u, prepend=u[:1])
+    last = np.maximum.accumulate(np.where(change != 0, np.arange(len(u)), 0))
+    return np.asarray(change[last] < 0)
+
+
+def _rise(u: Array, force: Array, at: Array) -> Array:
+    """(p,) of force (n,) from point to point of displacement; NaN where that was not read."""
+    order = np.argsort(u, kind="stable")
+    read, answer = _distinct(u[order], force[order])
+    rise = np.gradient(np.interp(at, read, answer))
+    return np.where((at >= read[0]) & (at <= read[-1]), rise, np.nan)
 
 
 def _distinct(u: Array, force: Array) -> tuple[Array, Array]:
