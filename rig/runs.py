@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -86,6 +86,20 @@ def blocks(run: Run) -> Iterator[slice]:
     """Neighbouring samples of one branch and step."""
     edges = [*first_rows(run.branch, run.step).tolist(), run.force.size]
     yield from (slice(a, b) for a, b in pairwise(edges))
+
+
+def ends_of_loading(
+    columns: Mapping[str, NDArray[Any]], events: Iterable[Mapping[str, Any]]
+) -> Iterator[tuple[int, int, bool]]:
+    """Where loading ended at the run's own limit of displacement: the number of samples before that
+    moment, the step that was on its way, and whether what was reached is recorded under its number.
+    Earlier versions did not; then no row shows how far the arm was pushed."""
+    branch, step = columns["branch"], columns["step"]
+    for event in events:
+        if event["kind"] == "top" and event.get("branch") == "loading":
+            at, number = int(event["sample"]), int(event["step"])
+            there = at < len(step) and branch[at] == "loading" and step[at] == number
+            yield at, number, bool(there)
 
 
 def stitched(columns: Mapping[str, NDArray[Any]]) -> dict[tuple[str, str], tuple[list[int], bool]]:
