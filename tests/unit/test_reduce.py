@@ -349,9 +349,7 @@ def test_a_level_at_which_the_displacement_ended_loading_is_no_part_of_k() -> No
     assert "without that level k is 100 N/mm" in every.notes[-1]
 
 
-def test_an_end_of_loading_that_was_discarded_or_not_recorded_leaves_the_levels_as_they_are() -> (
-    None
-):
+def test_an_end_of_loading_without_rows_in_use_leaves_the_levels_as_they_are() -> None:
     assert not only(ended(recorded=False)).ends
     data = ended(recorded=True)
     data.columns["discarded"][data.columns["step"] == 4] = True
