@@ -32,7 +32,9 @@ class Curve:
     to every point.
     origin: force and displacement count from an unloaded state that was measured, so that a line
     through (0, 0) is a statement of the data. held: the points are levels that were held; False:
-    bins of a continuous recording. notes: what was assumed on the way here, in sentences.
+    bins of a continuous recording. ends: steps on whose way a limit of the displacement ended
+    loading; they were held wherever the force stood. notes: what was assumed on the way here, in
+    sentences.
     """
 
     pose: str
@@ -43,4 +45,5 @@ class Curve:
     gain_sd_displacement: float
     origin: bool = True
     held: bool = True
+    ends: frozenset[int] = frozenset()
     notes: tuple[str, ...] = ()

@@ -33,7 +33,7 @@ from identification.estimate import (
     stated_uncertainty,
     stiffness,
 )
-from identification.knee import Kink, find_knee, locate
+from identification.knee import MIN_BEFORE, SLOPE_RATIO, Kink, find_knee, locate
 from identification.levels import (
     Grid,
     Hysteresis,
@@ -52,7 +52,7 @@ from identification.uncertainty import Contribution, Quantity, combined
 class Options:
     """weighting, intercept None: the default, which depends on the data (see `default_choice`).
 
-    keep_after_knee: steps after a knee count towards k.
+    keep_after_knee: steps after a knee, or where the displacement ended loading, count towards k.
     """
 
     weighting: Weighting | None = None
@@ -148,9 +148,11 @@ def analyze_curve(curve: Curve, options: Options | None = None) -> Stiffness:
         return replace(bare, sentence=problem)
     knee, behind = _knee(curve, loading)
     used = loading
-    if knee is not None and not options.keep_after_knee:
-        used = loading.keep(s for s in loading.steps if s not in behind)
-        excluded = (*excluded, *(Exclusion(s, _why(knee)) for s in behind))
+    if not options.keep_after_knee:
+        past = {} if knee is None else dict.fromkeys(behind, _why(knee))
+        out = dict.fromkeys(curve.ends, ENDED) | past
+        used = loading.keep(s for s in loading.steps if s not in out)
+        excluded = (*excluded, *(Exclusion(s, out[s]) for s in loading.steps if s in out))
     loop = hysteresis(curve, loading, unloading)
     described = replace(
         bare,
@@ -164,6 +166,10 @@ def analyze_curve(curve: Curve, options: Options | None = None) -> Stiffness:
     return _with_k(described, curve, loading, used)
 
 
+ENDED = (
+    "the displacement ended loading there, ahead of the force: a level by itself may be where the "
+    "arm gives way"
+)
 WRONG_WAY = (
     "The loop runs the wrong way: more work came back than was put in, which no rig does. See to "
     "the names of the branches, the order of the rows, the signs, and to what lags or drifts."
@@ -228,16 +234,34 @@ def _with_k(described: Stiffness, curve: Curve, loading: Grid, used: Grid) -> St
     highest = float(np.abs(table.force).max())
     before = [p for p in described.pointwise if abs(p.force) <= highest]
     bends = bend(before, [a.value for a in rivals if not a.after_knee])
+    alone = () if described.knee is not None else _last_alone(curve, used, choice)
     return replace(
         described,
         status=status,
         sentence=sentence,
-        notes=(*described.notes, *bends),
+        notes=(*described.notes, *bends, *alone),
         k=combined(k, budget),
         intercept=fit.intercept,
         budget=budget,
         by_repetition=each,
         alternatives=rivals,
+    )
+
+
+def _last_alone(curve: Curve, used: Grid, choice: Choice) -> tuple[str, ...]:
+    """A note where the arm may have given way behind the last level but one: a single level behind
+    a knee tells none, and counts."""
+    slopes = pointwise(used, origin=curve.origin)
+    if not curve.held or len(slopes) < MIN_BEFORE:
+        return ()
+    before, last = (p.stiffness for p in slopes[-2:])
+    if not last < SLOPE_RATIO * before:
+        return ()
+    without = stiffness(used.keep(used.steps[:-1]).mean(), choice)
+    return (
+        f"At the last level, step {used.steps[-1]}, the slope falls from {before * 1e-3:.3g} to "
+        f"{last * 1e-3:.3g} N/mm. If the arm gives way there, k describes it no more; without that "
+        f"level k is {without * 1e-3:.4g} N/mm. More levels beyond it would tell.",
     )
 
 

@@ -45,5 +45,9 @@ class Measurements(Protocol):
         """Name -> (n,)."""
 
     @property
+    def events(self) -> list[dict[str, Any]]:
+        """What happened, each with `kind` and the number of samples before it."""
+
+    @property
     def meta(self) -> _Meta:
         """Directions, instruments, datum."""

@@ -47,6 +47,7 @@ from rig.passes import TURN, between_levels, binned, is_held
 from rig.runs import (
     Run,
     blocks,
+    ends_of_loading,
     left_out,
     of_setup,
     of_stitched,
@@ -119,9 +120,22 @@ def curves(dataset: Measurements) -> dict[tuple[str, str], Curve]:
             dataset.meta.instruments.displacement.gain_relative_sd,
             origin=all(zeros),
             held=held,
+            ends=_ends(dataset, pose, direction),
             notes=tuple(notes),
         )
     return result
+
+
+def _ends(dataset: Measurements, pose: str, direction: str) -> frozenset[int]:
+    """Steps at which loading ended before the force had come to them."""
+    columns = dataset.columns
+    mine = of_setup(columns, pose, direction)
+    ends = ends_of_loading(columns, dataset.events)
+    return frozenset(
+        step
+        for at, step, recorded in ends
+        if recorded and mine[at] and not columns["discarded"][at]
+    )
 
 
 def _bare(runs: list[Run]) -> bool:

@@ -127,14 +127,6 @@ class Runner:
                 self._step_until_accepted(where, step, (position, len(steps)))
             except TopReached:
                 loading_ended = True
-                self._tell_top(where, step)
-
-    def _tell_top(self, where: Where, step: Step) -> None:
-        limit = where.run.stop_at_displacement_mm
-        text = f"displacement is above {limit:g} mm"
-        self._steps.event(where, "top", text, branch=step.branch, step=step.number)
-        ends = "loading ends here" if step.branch == "loading" else "this level is left out"
-        self._loader.notify(f"{step.branch} to {step.target_N:g} N: {text}; {ends}")
 
     def _step_until_accepted(self, where: Where, step: Step, place: tuple[int, int]) -> None:
         data = {"branch": step.branch, "step": step.number}

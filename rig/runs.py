@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Flags
-from identification.running import first_rows
+from identification.running import first_rows, stretches
 from rig.arrays import Array
 from rig.units import M_PER_MM
 
@@ -86,6 +86,39 @@ def blocks(run: Run) -> Iterator[slice]:
     """Neighbouring samples of one branch and step."""
     edges = [*first_rows(run.branch, run.step).tolist(), run.force.size]
     yield from (slice(a, b) for a, b in pairwise(edges))
+
+
+def ends_of_loading(
+    columns: Mapping[str, NDArray[Any]], events: Iterable[Mapping[str, Any]]
+) -> Iterator[tuple[int, int, bool]]:
+    """Where loading ended at the run's own limit of displacement: the number of samples before that
+    moment, the step that was on its way, and whether what was reached is recorded under its number.
+    Earlier versions did not; then no row shows how far the arm was pushed."""
+    branch, step = columns["branch"], columns["step"]
+    for event in events:
+        if event["kind"] == "top" and event.get("branch") == "loading":
+            at, number = int(event["sample"]), int(event["step"])
+            there = at < len(step) and branch[at] == "loading" and step[at] == number
+            yield at, number, bool(there)
+
+
+def unseen_ends(
+    columns: Mapping[str, NDArray[Any]], events: Iterable[Mapping[str, Any]], used: Flags
+) -> Array:
+    """(n,) by what share of the last load an end of loading lay beyond it that no sample shows, at
+    the first sample in use (used: (n,)) behind it; 0 elsewhere. It lay on the way to another level,
+    and is taken in the middle of one as wide as the last."""
+    out = np.zeros(len(used))
+    run = stretches(*(columns[n] for n in ("pose", "direction", "repetition")))
+    for at, _, recorded in ends_of_loading(columns, events):
+        level = at - 1
+        if recorded or not used[level] or columns["branch"][level] != "loading":
+            continue
+        mine = np.flatnonzero(used & (run == run[level]))
+        other = mine[(mine < at) & (columns["step"][mine] != columns["step"][level])]
+        last, before = columns["force_N"][level], columns["force_N"][other[-1]] if other.size else 0
+        out[mine[mine >= at][:1]] = 0.5 * (last - before) / last if last else 0.0
+    return out
 
 
 def stitched(columns: Mapping[str, NDArray[Any]]) -> dict[tuple[str, str], tuple[list[int], bool]]:

@@ -116,8 +116,9 @@ class GapData:
     curves: what another simulator predicts, a curve for every setup; None: the springs do.
     lets_go: whether readings were left out after a part had let go of the stroke (slack.py).
     timed: whether `time` was recorded; it counts samples otherwise. on_the_way (n,) or None:
-    samples of ramps under the name of the level they lead to (ramps.py). aside, notes: what is to
-    be said of samples that were set aside, and of others.
+    samples of ramps under the name of the level they lead to (ramps.py). onward (n,) or None: share
+    of its load by which the sample before was followed by more that no sample shows, 0 where it was
+    not. aside, notes: what is to be said of samples that were set aside, and of others.
     """
 
     arm: bool
@@ -145,6 +146,7 @@ class GapData:
     timed: bool = True
     lets_go: bool = False
     on_the_way: Flags | None = None
+    onward: Array | None = None
     aside: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 

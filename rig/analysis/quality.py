@@ -47,10 +47,6 @@ class Recorded(Measurements, Protocol):
     def used(self) -> NDArray[Any]:
         """(n,) bool: samples that were not discarded."""
 
-    @property
-    def events(self) -> list[dict[str, Any]]:
-        """What happened, each with `kind` and the number of samples before it."""
-
 
 @dataclass(frozen=True)
 class Plateau:

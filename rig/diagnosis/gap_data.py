@@ -23,7 +23,7 @@ from rig.models.model import ArmModel
 from rig.models.robot import load_robot
 from rig.oddities import CHANNELS, incomplete_channels
 from rig.passes import between_levels
-from rig.runs import left_out, of_stitched, said_of_stitched, stitched
+from rig.runs import left_out, of_stitched, said_of_stitched, stitched, unseen_ends
 from rig.storage.columns import SAMPLE_NUMBER
 from rig.units import M_PER_MM
 
@@ -57,6 +57,7 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         stretches(setup, columns["repetition"].astype(np.int64)),
         _optional(columns, ["session_s"], 1),
     )
+    onward = unseen_ends(dataset.columns, dataset.events, used)[used]
     time, notes = _clock(np.nan_to_num(columns["time_s"].astype(float)), session, run)
     return GapData(
         arm=arm is not None,
@@ -86,8 +87,9 @@ def gap_data(dataset: Dataset, model: ArmModel | None = None) -> GapData:
         tare=meta.tare,
         imposed=meta.imposed,
         timed=dataset.long_names.get("time_s") != SAMPLE_NUMBER,
+        onward=onward,
         aside=aside,
-        notes=(*notes, *without, *_unsettled(dataset)),
+        notes=(*notes, *without, *_unsettled(dataset), *_untold(onward)),
     )
 
 
@@ -157,6 +159,16 @@ def _levels(dataset: Dataset, used: Flags) -> set[tuple[object, ...]]:
     """Levels of all runs that the samples to use (n,) belong to."""
     keys = (dataset.columns[k][used] for k in ("pose", "direction", "repetition", "branch", "step"))
     return set(zip(*(k.tolist() for k in keys), strict=True))
+
+
+def _untold(onward: Array) -> Iterator[str]:
+    """What to say of ends of loading that no row shows (n,)."""
+    if count := int(np.count_nonzero(onward)):
+        yield (
+            f"In {counted(count, 'run')} loading went on to stop_at_displacement_mm, and an "
+            "earlier version recorded no row there: its end is taken half a level beyond the last "
+            "one, and where something gives way is less sure than its interval says. Measure again."
+        )
 
 
 def _unsettled(dataset: Dataset) -> tuple[str, ...]:

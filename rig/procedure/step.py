@@ -17,7 +17,8 @@ from rig.protocol import MeasurementProtocol, Run, Step
 
 
 class TopReached(Exception):
-    """The displacement is above the run's own limit, and the screw would have to push on."""
+    """The displacement is above the run's own limit, and the screw would have to push on. Of
+    loading, what was reached is recorded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,11 @@ class StepProcedure:
         deadline = self._supervision.now() + self._protocol.step_deadline_s
         while True:
             first_row = self._recorder.rows
-            reached = self._approach(where, step, deadline)
+            try:
+                reached = self._approach(where, step, deadline)
+            except TopReached:
+                self._top(where, step)
+                raise
             settled = self._settle(where, step, banded=reached)
             if settled != "left the band":
                 break
@@ -79,6 +84,18 @@ class StepProcedure:
         self._done.append((view.force_N, view.displacement_mm))
         words = ["measured"] if reached else ["band not reached"]
         return ", ".join(words if settled == "settled" else [*words, settled])
+
+    def _top(self, where: Where, step: Step) -> None:
+        """Records, as a level outside of its band, what loading has reached where it ends: an arm
+        that gives way has come far beyond the last level, and remembers it."""
+        loading = step.branch == "loading"
+        text = f"displacement is above {where.run.stop_at_displacement_mm:g} mm"
+        self.event(where, "top", text, branch=step.branch, step=step.number)
+        ends = "loading ends here, and is recorded" if loading else "this level is left out"
+        self._loader.notify(f"{step.branch} to {step.target_N:g} N: {text}; {ends}")
+        if loading:
+            settled = self._settle(where, step, banded=False)
+            self._sample(where, step, settled=settled == "settled")
 
     def below(self, where: Where, step: Step, *, again: bool) -> bool:
         """Whether an unloading step would have to be reached from below: that is loading, and might

@@ -1,13 +1,14 @@
 """Second values to curves: every assumption that `rig.reduce` states."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from identification.curve import Curve, Point
-from identification.stiffness import analyze_curve
+from identification.stiffness import Options, analyze_curve
 from identification.turns import turning_points
 from rig.passes import TURN, binned, is_held
 from rig.reduce import curves
@@ -322,3 +323,34 @@ def test_a_million_samples_of_thousands_of_cycles() -> None:
     assert "every 41 cycles as a repetition" in curve.notes[0]
     assert {p.repetition for p in curve.points} == set(range(1, 50))
     assert sum(p.n for p in curve.points) == 1_000_000
+
+
+def ended(*, recorded: bool) -> Table:
+    """An arm that gives way behind 60 N, with the displacement's limit in the way of step 4; files
+    of earlier versions have no row there."""
+    reached = (20.0, 40.0, 60.0, 65.0)[: 4 if recorded else 3]
+    data = table(run(lambda f: f / 100 if f < 61 else 6.0, reached))
+    rows = 4 + 3 * 4  # the zero plateau, and three levels
+    top = {"kind": "top", "branch": "loading", "step": 4, "sample": rows, "text": ""}
+    return replace(data, events=[top])
+
+
+def test_a_level_at_which_the_displacement_ended_loading_is_no_part_of_k() -> None:
+    curve = only(ended(recorded=True))
+    assert curve.ends == {4}
+    found = analyze_curve(curve)
+    assert found.k is not None
+    assert found.k.value == pytest.approx(1e5)
+    assert [e.step for e in found.excluded] == [4]
+    assert [level.step for level in found.levels if level.branch == "loading"] == [1, 2, 3, 4]
+    every = analyze_curve(curve, Options(keep_after_knee=True))
+    assert every.k is not None
+    assert every.k.value < found.k.value
+    assert "without that level k is 100 N/mm" in every.notes[-1]
+
+
+def test_an_end_of_loading_without_rows_in_use_leaves_the_levels_as_they_are() -> None:
+    assert not only(ended(recorded=False)).ends
+    data = ended(recorded=True)
+    data.columns["discarded"][data.columns["step"] == 4] = True
+    assert not only(data).ends

@@ -14,7 +14,7 @@ from drivers.interfaces import Command, LiveView, Prompt
 from rig.errors import MeasurementStopped
 from rig.journal import Record, replay
 from rig.protocol import parse_protocol
-from tests.unit.runner_bench import ALL, PROTOCOL, Bench, at
+from tests.unit.runner_bench import ALL, PROTOCOL, Bench, at, resumed
 
 
 @pytest.fixture
@@ -244,15 +244,65 @@ def test_a_hold_is_sampled_for_at_least_as_long_as_it_lasts(
     assert len(settled) == 2 * samples
 
 
-def test_loading_ends_at_the_displacement_of_the_run(bench: Bench) -> None:
+def stopped_at_3_mm(bench: Bench) -> None:
+    """An arm that gives way at 50 N, on the way to the last level but one."""
     run = "steps_N: [20, 40, 60]"
-    text = PROTOCOL.replace(run, f"{run}, stop_at_displacement_mm: 3")
+    text = PROTOCOL.replace(run, "steps_N: [20, 40, 60, 80], stop_at_displacement_mm: 3")
     bench.protocol = parse_protocol(text, bench.path)
     bench.arm.yield_N = 50.0
+
+
+def test_loading_ends_at_the_displacement_of_the_run_and_that_is_recorded(bench: Bench) -> None:
+    stopped_at_3_mm(bench)
     bench.run()
-    assert bench.steps() == [s for s in ALL if s[2] != 3]
+    assert bench.steps() == ALL  # the level at 80 N is not gone to
+    reached = [r["values"] for r in bench.good() if r["step"] == 3]
+    assert {v["force_N"] for v in reached} == {50.0}
+    furthest = max(v.displacement_mm for v in bench.loader.views if v.step)
+    assert {v["displacement_mm"] for v in reached} == {furthest}
+    assert sum(v["settled"] for v in reached) == 2 * 3  # samples of a step, twice
     assert [e["text"] for e in bench.events("top")] == ["displacement is above 3 mm"] * 2
     assert not bench.events("band_not_reached")
+
+
+def test_an_end_of_loading_that_never_settles_is_marked(bench: Bench) -> None:
+    stopped_at_3_mm(bench)
+
+    def creep(view: LiveView) -> None:
+        if view.phase == "settling" and view.step == 3:
+            bench.arm.u += 0.001
+
+    bench.loader.script = creep
+    bench.run()
+    reached = [r["values"]["settled"] for r in bench.good() if r["step"] == 3]
+    assert reached
+    assert not any(reached)
+    assert len(bench.events("not_settled")) == 2
+
+
+def test_an_end_of_loading_can_be_redone(bench: Bench) -> None:
+    stopped_at_3_mm(bench)
+    at(bench, 3, lambda: bench.loader.commands.append("redo_step"))
+    bench.run()
+    assert bench.steps() == ALL
+    assert len(bench.events("top")) == 3
+    assert len([r for r in bench.good() if r["step"] == 3 and r["values"]["settled"]]) == 2 * 3
+
+
+def test_a_resumed_run_goes_on_behind_an_end_of_loading(bench: Bench) -> None:
+    """What was interrupted at its top is measured anew; what was done before stays done."""
+    stopped_at_3_mm(bench)
+
+    def abort(view: LiveView) -> None:
+        if view.repetition == 2 and view.step == 3 and view.samples == 1:
+            bench.loader.commands.append("abort")
+
+    bench.loader.script = abort
+    with pytest.raises(MeasurementStopped):
+        bench.run()
+    resumed(bench)
+    assert bench.steps() == ALL
+    assert len(bench.events("repetition_done")) == 2
 
 
 def test_a_slot_without_a_valid_value_is_no_row_but_an_event(bench: Bench) -> None:

@@ -42,12 +42,12 @@ def test_unloading_holds_no_level_that_loading_has_not_reached(tmp_path: Path) -
     bench = Bench(tmp_path, with_top(3))
     bench.arm.yield_N = 50.0
     bench.run()
-    up = [("loading", 1), ("loading", 2)]
+    up = [("loading", 1), ("loading", 2), ("loading", 3)]
     assert measured(bench) == [*up, ("unloading", 2), ("unloading", 1)]
     (left,) = bench.events("step_left_out")
     assert left["text"] == "unloading to 60 N: left out, the force is 50 N and would have to rise"
     assert left["text"] in bench.loader.said
-    told = "loading to 60 N: displacement is above 3 mm; loading ends here"
+    told = "loading to 60 N: displacement is above 3 mm; loading ends here, and is recorded"
     assert told in bench.loader.said
 
 

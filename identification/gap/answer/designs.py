@@ -197,6 +197,7 @@ def planned(design: Design, bench: Bench) -> GapData:
         temperature=None,
         curves=None,
         on_the_way=None,
+        onward=None,
         imposed="displacement" if bench.imposed else "force",
     )
 

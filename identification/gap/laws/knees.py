@@ -84,8 +84,9 @@ def knee_at(
 
 
 def _range(bench: Bench, load: Array) -> float:
-    """Largest size of a load (n,), as far as data reach."""
-    top = float(np.abs(load).max())
+    """Largest size of a load (n,), as far as data reach; where it was told to have gone on beyond
+    a row, so far."""
+    top = float(np.abs(load * (1 + np.append(bench.rows.onward[1:], 0.0))).max())
     return top * bench.reach_of(load) / float(np.ptp(np.append(load, 0.0))) if top > 0 else 0.0
 
 

@@ -305,7 +305,7 @@ class Bench:
         """Of a load (n,), with what no row shows of it; fresh: where the memory is lost, by default
         where the arm goes to another pose. weight (n,): that acts beside the load."""
         lost = self.moved if fresh is None else fresh
-        return path_of(load, self.rest, lost, weight, self.rows.overshoot)
+        return path_of(load, self.rest, lost, weight, self.rows.overshoot, self.rows.onward)
 
     def along(self, overshoot: Array) -> Bench:
         """The bench with loads (n,) that no row shows (`Rows.overshoot`); what is known of it else

@@ -38,14 +38,24 @@ class Path:
         return states if self.kept.all() else states[self.kept]
 
 
-def path_of(load: Array, rest: Flags, fresh: Flags, weight: Array | None, overshoot: Array) -> Path:
+def path_of(
+    load: Array,
+    rest: Flags,
+    fresh: Flags,
+    weight: Array | None,
+    overshoot: Array,
+    onward: Array | float = 0.0,
+) -> Path:
     """The path of a load (n,) that before a row, on the way there, went beyond it by a share
-    (overshoot (n,), 0: it did not) of that load."""
-    row = np.repeat(np.arange(len(load)), 1 + (overshoot != 0))
+    (overshoot (n,), 0: it did not) of that load, or first (onward (n,), likewise) beyond that of
+    the row before."""
+    on = np.broadcast_to(np.asarray(onward), load.shape)
+    further = np.where(on != 0, np.roll(load, 1) * (1.0 + on), load * (1.0 + overshoot))
+    row = np.repeat(np.arange(len(load)), 1 + ((overshoot != 0) | (on != 0)))
     kept = np.append(row[1:] != row[:-1], True)
     first = np.insert(kept[:-1], 0, True)
     return Path(
-        load[row] * np.where(kept, 1.0, 1.0 + overshoot[row]),
+        np.where(kept, load[row], further[row]),
         rest[row] & first,
         fresh[row] & first,
         kept,

@@ -42,7 +42,8 @@ class Rows:
     m^2; of rows of holds also spread (n,) s^2: of their times; force_trend,
     displacement_trend (n,): mean products of time and channel about the row, N s and m s.
     overshoot (n,): share of a row's load by which the load went beyond it before, on the way there,
-    that no row shows: found, not recorded (`search.unseen`), and 0 until then.
+    that no row shows: found, not recorded (`search.unseen`), and 0 until then. onward (n,): share
+    of the load of the row before by which it went on from there, that no row shows: it was told.
     """
 
     time: Array
@@ -78,6 +79,7 @@ class Rows:
     starts: Flags  # first row of a run
     hold_starts: Flags
     overshoot: Array
+    onward: Array
 
     @property
     def n(self) -> int:
@@ -206,6 +208,7 @@ def reduce_rows(data: GapData) -> Rows:
         starts=_changes(run),
         hold_starts=_changes(holds),
         overshoot=np.zeros(len(holds)),
+        onward=np.zeros(len(holds)) if data.onward is None else first(data.onward),
     )
 
 
