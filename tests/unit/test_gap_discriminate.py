@@ -23,12 +23,11 @@ from identification.gap.answer.discriminate import (
     _discrimination,
     _proposal,
     _reached,
-    _Rival,
-    _shapes,
     _told,
     next_measurement,
 )
 from identification.gap.answer.forms import Form, law_of
+from identification.gap.answer.rivals import Rival, _shapes
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
@@ -69,13 +68,13 @@ def test_a_truth_in_the_pool_is_a_measurement_of_it() -> None:
         np.testing.assert_allclose(told.log_base, wanted.log_base, rtol=1e-9)
 
 
-def rival(bench: Bench, word: str, size: float) -> _Rival:
+def rival(bench: Bench, word: str, size: float) -> Rival:
     fresh = replace(bench, columns=Pool())
     v = library(fresh, (word,))[0]
     law, unit = law_of(fresh, v)
     values = np.full(len(v.columns), size) * unit
     form = Form(word, law, values, np.diag(values**2))
-    return _Rival(word, (form,), {}, ((v, law, unit, 0.0),))
+    return Rival(word, (form,), {}, ((v, law, unit, 0.0),))
 
 
 def test_an_effect_too_small_to_be_seen_is_told_from_nothing() -> None:
@@ -101,7 +100,7 @@ def test_what_sits_in_two_joints_is_followed_in_both() -> None:
     laws = [law_of(fresh, v) for v in (one, other)]
     forms = [Form(one.word, law, 0.4 * unit, 0.01 * np.diag(unit**2)) for law, unit in laws]
     shapes = ((one, *laws[0], 0.0),)
-    both = _Rival(one.word, tuple(forms), {}, shapes, ((Part(other, 0.4), *laws[1]),))
+    both = Rival(one.word, tuple(forms), {}, shapes, ((Part(other, 0.4), *laws[1]),))
     seat = rival(bench, "contact_seating", 1e-4)
     design = present_design(bench)
     followed = _discrimination(bench, design, (both, seat))

@@ -24,22 +24,16 @@ from identification.gap.answer.designs import (
     present_design,
 )
 from identification.gap.answer.forms import (
-    Form,
-    describe,
-    lasting,
-    law_of,
-    lawful,
     realise,
     rows_of,
 )
-from identification.gap.answer.twins import PLACE, twin_of
+from identification.gap.answer.rivals import Rival, rival_of, same_elsewhere
 from identification.gap.data import LOADING, GapData
 from identification.gap.effects import EFFECTS
-from identification.gap.evidence.compare import Scored, condition, log_mean, score
+from identification.gap.evidence.compare import condition, log_mean, score
 from identification.gap.evidence.engine import Engine, NoiseLevel, eta_levels
 from identification.gap.evidence.parts import Part
-from identification.gap.explanations.explanation import Explanation, SearchResult, conditioned
-from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.laws.flows import make
 from identification.gap.laws.law import Law
 from identification.gap.model.base import Base, base_columns
@@ -51,8 +45,6 @@ _LITTLE = 0.5  # nats below which no procedure is better than any other
 _DECISIVE = 10.0  # more certainty than this is worth no further minute
 _BESIDES = 2  # further procedures that would do, for who can't do the best
 _REPETITIONS = 2  # simulated
-_SHAPES = 8  # of each word, the best on the present data
-_WITHIN = 12.0  # nats below the best that a shape may lie
 _GAINS = {"force_scale": "force_gain", "displacement_scale": "displacement_gain"}
 
 
@@ -83,23 +75,6 @@ class NextMeasurement:
     reached: tuple[tuple[float, ...], ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class _Rival:
-    """One of the two words: the forms that were fitted with it, changes of the springs by name,
-    and shapes that the first of them may take, with their weights on the present data (log) and
-    units. further: of the word's other forms (it may sit in several joints), which every shape has
-    beside it, the part, law and unit. rest: forms of the other words beside it, as far as they
-    last. eta m: imperfection that the laws are seen to have."""
-
-    word: str
-    forms: tuple[Form, ...]
-    springs: dict[str, float]
-    shapes: tuple[tuple[Variant, Law, Array, float], ...]
-    further: tuple[tuple[Part, Law, Array], ...] = ()
-    rest: tuple[Form, ...] = ()
-    eta: float = 0.0
-
-
 Others = Callable[[], Sequence[Elsewhere]]
 
 
@@ -117,10 +92,10 @@ def next_measurement(
     engine = found.engine
     if not engine.bench.reach > 0 or not np.ptp(engine.bench.load) > 0:
         return None
-    first = _rival(found, chosen, pair[0], pair[0])
+    first = rival_of(found, chosen, pair[0], pair[0])
     if first is None:
         return None
-    second = _same_elsewhere(found, chosen, first, pair[1]) or _rival(
+    second = same_elsewhere(found, chosen, first, pair[1]) or rival_of(
         found, chosen, pair[0], pair[1]
     )
     if second is None:
@@ -193,90 +168,10 @@ def _nats(value: float) -> str:
     return f"{value:.1f} nats" if value < 100 else "more than 100 nats"
 
 
-# --- the two explanations ------------------------------------------------------------------------
-
-
-def _rival(found: SearchResult, chosen: Explanation, first: str, word: str) -> _Rival | None:
-    """The explanation with `word` in the place of `first`, else by itself."""
-    wanted = (chosen.words - {first}) | {word}
-    by_words = {e.words: e for e in found.explanations}
-    explanation = by_words.get(wanted) or by_words.get(frozenset([word]))
-    if explanation is None:
-        return None
-    engine = found.engine
-    fitted = fit(engine, explanation)
-    described = [describe(engine.bench, p, *fitted.of(i)) for i, p in enumerate(explanation.parts)]
-    part, *others = (p for p in explanation.parts if p.word == word)
-    beside = tuple(p for p in explanation.parts if p is not part)
-    return _Rival(
-        word,
-        tuple(lawful(f) for f in described if f.word == word),
-        _springs(engine, fitted),
-        _shapes(engine, [v for v in found.variants if v.word == word], part, beside),
-        tuple((p, *law_of(engine.bench, p.variant)) for p in others),
-        tuple(lasting(f) for f in described if f.word != word),
-        explanation.eta,
-    )
-
-
-def _same_elsewhere(
-    found: SearchResult, chosen: Explanation, first: _Rival, word: str
-) -> _Rival | None:
-    """The first explanation's law at the other word's place, where the data see no difference."""
-    part = next((p for p in chosen.parts if p.word == first.word), None)
-    if part is None or word not in ("joint_yield", "base_slip"):
-        return None
-    fitted = fit(found.engine, chosen)
-    w, _ = fitted.of(chosen.parts.index(part))
-    twin = twin_of(found.engine, part, w, chosen.eta)
-    if twin is None or twin.word != word:
-        return None
-    shapes = tuple(
-        (replace(v, word=word), twin.moved(law), unit * twin.factor**-2, weight)
-        for v, law, unit, weight in first.shapes
-        if all(law.constants.get(k) == first.forms[0].law.constants.get(k) for k in PLACE)
-    )
-    further = tuple(
-        (replace(p, variant=replace(p.variant, word=word)), twin.moved(law), unit * twin.factor**-2)
-        for p, law, unit in first.further
-    )
-    forms = tuple(twin.form(f) for f in first.forms)
-    return replace(first, word=word, forms=forms, shapes=shapes, further=further)
-
-
-def _springs(engine: Engine, fitted: Fit) -> dict[str, float]:
-    names = engine.base.names
-    return {n: float(b) for n, b in zip(names, fitted.base, strict=True) if n.startswith("spring")}
-
-
-def _shapes(
-    engine: Engine, variants: list[Variant], part: Part, rest: tuple[Part, ...]
-) -> tuple[tuple[Variant, Law, Array, float], ...]:
-    """The fitted shape, and the best others of different laws within reach of it, all beside the
-    rest of the explanation: alone, they would stand in for what that explains."""
-    fitted = part.variant
-    levels, already = conditioned(engine, rest)
-    ranked: list[Scored] = sorted(
-        score(engine, levels, variants, already), key=lambda s: -s.log_evidence
-    )
-    best = ranked[0].log_evidence
-    # what the truth is drawn from has a weight, whatever was found nearer since
-    weight = {id(s.variant): max(s.log_evidence, best - _WITHIN) for s in ranked}
-    near = [
-        s.variant for s in ranked if s.log_evidence > best - _WITHIN and s.variant is not fitted
-    ]
-    # shapes that look alike to these data may differ elsewhere: joints and axes first, then laws
-    kinds: dict[object, Variant] = {}
-    for v in near:
-        kinds.setdefault(v.differs_by, v)
-    order = [fitted, *kinds.values(), *(v for v in near if v not in kinds.values())][:_SHAPES]
-    return tuple((v, *law_of(engine.bench, v), weight.get(id(v), best)) for v in order)
-
-
 # --- expectation ---------------------------------------------------------------------------------
 
 
-def _discrimination(bench: Bench, design: Design, rivals: tuple[_Rival, _Rival]) -> float:
+def _discrimination(bench: Bench, design: Design, rivals: tuple[Rival, Rival]) -> float:
     """Log odds (nats) by which the true one is expected to win, whichever of the two it is.
 
     At most two repetitions are simulated: more of them say little that these do not.
@@ -321,7 +216,7 @@ def _told(level: NoiseLevel, place: int) -> NoiseLevel:
 
 
 def _simulated(
-    bench: Bench, design: Design, rivals: tuple[_Rival, _Rival]
+    bench: Bench, design: Design, rivals: tuple[Rival, Rival]
 ) -> tuple[list[Array], Bench]:
     """What each of the two would add to the simulation along the design, and the bench there."""
     data = planned(design, bench)
@@ -338,12 +233,13 @@ def _simulated(
     ], there
 
 
-def _ahead(there: Bench, rivals: tuple[_Rival, _Rival]) -> None:
+def _ahead(there: Bench, rivals: tuple[Rival, Rival]) -> None:
     """Makes all at once, for a bench, what takes a loop over its rows."""
     flows = []
     for r in rivals:
         flow = EFFECTS[r.word].laws.flow
-        laws = [*(f.law for f in r.forms), *(law for _, law, *_ in (*r.shapes, *r.further))]
+        laws = [f.law for f in r.forms] + [law for _, law, *_ in r.shapes]
+        laws += [law for _, law, _ in r.further]
         flows += [flow(there, law) for law in laws] if flow is not None else []
     make(there, flows)
 
@@ -374,7 +270,7 @@ def _with_noise(bench: Bench, there: Bench) -> Bench:
     return replace(there, noise=noise)
 
 
-def _spring_changes(there: Bench, rival: _Rival) -> Array:
+def _spring_changes(there: Bench, rival: Rival) -> Array:
     out = np.zeros(there.layout.size)
     for name, change in rival.springs.items():
         j = int(name.removeprefix("spring")) - 1
@@ -391,7 +287,7 @@ class _Carried:
     further: list[Part]
 
 
-def _carried(there: Bench, rival: _Rival) -> _Carried:
+def _carried(there: Bench, rival: Rival) -> _Carried:
     def placed(variant: Variant, law: Law, unit: Array) -> Variant:
         columns = rows_of(there, rival.word, law) * unit
         return replace(variant, columns=tuple(there.add(c) for c in columns.T))
@@ -405,7 +301,7 @@ def _carried(there: Bench, rival: _Rival) -> _Carried:
 
 
 def _reached(
-    bench: Bench, design: Design, rivals: tuple[_Rival, _Rival]
+    bench: Bench, design: Design, rivals: tuple[Rival, Rival]
 ) -> tuple[tuple[float, ...], ...]:
     """m: how far either explanation, with all that lasts of it, moves on the way up to each level
     of the design, from the first reading of the setup on."""
@@ -427,7 +323,7 @@ def _reached(
     return tuple(out)
 
 
-def _calibrated(design: Design, rivals: tuple[_Rival, _Rival]) -> float:
+def _calibrated(design: Design, rivals: tuple[Rival, Rival]) -> float:
     """What the calibration itself says: the gain is known to u, of a prior of `s`."""
     gained = []
     for k, r in enumerate(rivals):
