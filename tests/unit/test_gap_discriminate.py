@@ -130,6 +130,10 @@ def test_shapes_are_weighed_beside_the_rest_of_the_explanation() -> None:
     assert shapes[0][0] is curve
     assert shapes[0][-1] > max(weight for *_, weight in shapes) - 1
     assert {v.joint for v, *_ in shapes} == {2}
+    far = next(v for v in curves if v.label == "joint 1 cubic")  # the truth, for all that
+    (drawn, *_, own), *near = _shapes(engine, curves, Part(far, 0.15), (Part(creep, 0.5),))
+    assert drawn is far
+    assert own > max(weight for *_, weight in near) - 13
 
 
 def proposed(pair: tuple[str, str], *nats: float) -> NextMeasurement | None:
