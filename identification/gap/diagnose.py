@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
+from math import inf
 
 from identification.gap.answer.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.answer.forms import Form
 from identification.gap.answer.known import knowing
 from identification.gap.answer.posterior import settled
-from identification.gap.answer.result import GapResult, result_of, with_twins
+from identification.gap.answer.result import ALIKE, GapResult, result_of, with_twins
 from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.evidence.compare import score
@@ -163,15 +164,36 @@ def _next(
     result: GapResult,
     others: Others | None,
 ) -> NextMeasurement | None:
-    """For the likeliest pair that can't be told apart; for an unsure verdict, its rival."""
-    verdict, effects, probabilities = result.verdict, result.effects, result.probabilities
-    for e in effects:
-        for other in sorted(e.indistinguishable_from, key=lambda w: -probabilities[w]):
-            proposal = next_measurement(found, chosen, (e.name, other), others)
-            if proposal is not None:
-                return proposal
-    ranked = sorted(probabilities.items(), key=lambda i: -i[1])
-    words = [w for w, p in ranked[:2] if p > 0.02 and w in WORDS]
-    if verdict in WORDS and len(words) == 2:
-        return next_measurement(found, chosen, (words[0], words[1]), others)
+    """For the first open pair for which there is a proposal."""
+    for pair in _open(found, chosen, result):
+        proposal = next_measurement(found, chosen, pair, others)
+        if proposal is not None:
+            return proposal
     return None
+
+
+def _open(found: SearchResult, chosen: Explanation, result: GapResult) -> list[tuple[str, str]]:
+    """Pairs of words that the data leave open: effects and what can't be told from them, the
+    likeliest first; then a verdict and its rivals. No rival is what is there for sure beside it,
+    nor what explains the data without it far worse."""
+    verdict, probabilities = result.verdict, result.probabilities
+    pairs = [
+        (e.name, other)
+        for e in result.effects
+        for other in sorted(e.indistinguishable_from, key=lambda w: -probabilities[w])
+    ]
+    sure = {e.name for e in result.effects if e.probability > _SURE}
+    for word, p in sorted(probabilities.items(), key=lambda i: -i[1]):
+        if word == verdict or not {verdict, word} <= set(WORDS) or p <= _RIVAL:
+            continue
+        without = [
+            e.log_weight for e in found.explanations if word in e.words and verdict not in e.words
+        ]
+        as_good = max(without, default=-inf) > chosen.log_weight - ALIKE
+        if as_good and not {verdict, word} <= sure:
+            pairs.append((verdict, word))
+    return list(dict.fromkeys(pairs))
+
+
+_RIVAL = 0.02  # probability of a word that is asked about
+_SURE = 0.95  # probability that an effect is there, beyond which nobody asks

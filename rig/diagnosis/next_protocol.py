@@ -26,10 +26,14 @@ from rig.protocol_write import limit_lines, numbers, pose_line, settle_lines
 from rig.protocolfile import ForceBand
 from rig.station import load_station
 from rig.storage.files import in_place_of
+from rig.units import MM_PER_M
 
 _LASER_MM = 9.0  # of a range of 10 mm
 _GENTLER = 0.7  # loads times this, where arm, laser or dynamometer could not take them
 _TRIES = 4
+# Where loading ends, of the displacement that is allowed: no later than all levels take.
+_USUAL_STOP, _LATEST_STOP = 0.8, 0.95
+_MARGIN = 1.15  # over what is expected: what flows goes far for a few percent of load
 # No hand holds less: a screw of 0.5 mm a turn that is set to 1 deg brings an arm of 100 N/mm to
 # 0.14 N, and what the dynamometer shows is known to about 0.1 N.
 _HOLDABLE_N = 0.2
@@ -43,7 +47,10 @@ def write_next(diagnosis: Diagnosis, dataset: Dataset, path: Path) -> str:
     check_arm(dataset)
     proposal = diagnosis.result.next_measurement
     if proposal is None:
-        return f"{path}: not written. No two effects are left that a measurement should separate."
+        return (
+            f"{path}: not written. No two effects are left that a measurement is expected to "
+            "separate."
+        )
     if proposal.design is None:
         return f"{path}: not written. {proposal.text}"
     text = next_text(proposal, dataset)
@@ -65,11 +72,13 @@ def next_text(proposal: NextMeasurement, dataset: Dataset) -> str:
     """The protocol file. Loads are lowered until arm, laser and dynamometer can take them."""
     old = _old_protocol(dataset)
     assert proposal.design is not None
-    design = _as_aimed_at(proposal.design, old)
+    most = _LATEST_STOP * _displacement_mm(old)
+    design, stops = _seen_to_the_end(proposal.design, proposal.reached, most)
+    design = _as_aimed_at(design, old)
     station = "emulated" if dataset.origin == "emulated" else old.station if old else "ur10e_lab"
     for _ in range(_TRIES):
         design = _apart(design)
-        text = "\n".join(_lines(proposal, design, dataset, old, station)) + "\n"
+        text = "\n".join(_lines(proposal, design, stops, dataset, old, station)) + "\n"
         try:
             plan(parse_protocol(text, Path("next.yaml")), load_station(station))
         except InputError as error:
@@ -79,6 +88,25 @@ def next_text(proposal: NextMeasurement, dataset: Dataset) -> str:
         else:
             return text
     raise InputError(f"The proposed procedure can't be carried out: {refusal}")
+
+
+def _seen_to_the_end(
+    design: Design, reached: tuple[tuple[float, ...], ...], most_mm: float
+) -> tuple[Design, tuple[float, ...]]:
+    """The design without levels at which the target goes further than may be seen, and where in mm
+    loading ends in each setup: beyond all others, since what flows on the way to a level that is
+    never held is in no row. reached: m, of every level; nothing is known of it where it is empty.
+    The lowest level stays in any case."""
+    usual = _USUAL_STOP / _LATEST_STOP * most_mm
+    if not reached:
+        return design, tuple(usual for _ in design.setups)
+    levels, stops = [], []
+    for loads, far in zip(design.levels, reached, strict=True):
+        needed = [_MARGIN * m * MM_PER_M for m in far]
+        count = max(1, sum(mm <= most_mm for mm in needed))
+        levels.append(loads[:count])
+        stops.append(min(max(usual, needed[count - 1]), most_mm))
+    return replace(design, levels=tuple(levels)), tuple(stops)
 
 
 def _as_aimed_at(design: Design, old: MeasurementProtocol | None) -> Design:
@@ -125,6 +153,7 @@ def _old_protocol(dataset: Dataset) -> MeasurementProtocol | None:
 def _lines(
     proposal: NextMeasurement,
     design: Design,
+    stops: tuple[float, ...],
     dataset: Dataset,
     old: MeasurementProtocol | None,
     station: str,
@@ -143,18 +172,17 @@ def _lines(
     yield "poses:"
     yield from _poses(design, meta)
     yield "move_arm: false"
-    yield f"joint_encoder: {'output' if design.readings else meta.joint_encoder}"
+    yield f"joint_encoder: {meta.joint_encoder}"
     yield "\ndirections:"
     vectors = {s.direction: s.unit_vector for s in design.setups}
     for name, vector in vectors.items():
         sign = _sense(design, name)
         yield f"  {json.dumps(name)}: [{numbers(sign * vector, 9)}]"
-    stop = _displacement_mm(old)
     yield "\nruns:"
-    for setup, levels in zip(design.setups, design.levels, strict=True):
+    for setup, levels, stop in zip(design.setups, design.levels, stops, strict=True):
         yield (
             f"  - {{pose: {setup.pose}, direction: {json.dumps(setup.direction)}, "
-            f"steps_N: [{numbers(np.abs(levels), 3)}], stop_at_displacement_mm: {0.8 * stop:.3g}}}"
+            f"steps_N: [{numbers(np.abs(levels), 3)}], stop_at_displacement_mm: {stop:.3g}}}"
         )
     yield f"repetitions: {design.repetitions}"
     yield f"branches: {'loading-unloading' if design.unload else 'loading'}"
@@ -165,7 +193,7 @@ def _lines(
     allowed = None if old is None else old.limits.force_N
     yield from limit_lines(
         top,
-        f"{stop:g}",
+        f"{_displacement_mm(old):g}",
         "  displacement_rate_mm_per_s: {max: 3, at: warn}",
         most_N=math.inf if allowed is None else allowed.max,
     )

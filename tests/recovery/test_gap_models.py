@@ -359,6 +359,10 @@ def test_every_proposal_is_a_procedure(paper: tuple[Dataset, Diagnosis]) -> None
         text = next_text(proposal, dataset)
         seen[c.kind] = parse_protocol(text, Path("next.yaml"))
         assert plan(seen[c.kind], load_station("emulated")).runs
+    readings = replace(proposal, design=replace(design, readings=True))
+    meta = dataset.meta.model_copy(update={"joint_encoder": "motor"})
+    text = next_text(readings, replace(dataset, meta=meta))  # what the robot has, stays
+    assert parse_protocol(text, Path("next.yaml")).joint_encoder == "motor"
     assert seen["unload"].branches == "loading-unloading"
     assert seen["holds"].hold_s == pytest.approx(120)
     assert seen["plateaus"].zero.before_s == 60

@@ -8,17 +8,29 @@ import numpy as np
 import pytest
 
 from identification.gap.answer import discriminate
-from identification.gap.answer.designs import Design, candidates, present_design, reverse
+from identification.gap.answer.designs import (
+    Candidate,
+    Design,
+    candidates,
+    planned,
+    present_design,
+    reverse,
+)
 from identification.gap.answer.discriminate import (
     ENOUGH,
+    NextMeasurement,
+    Option,
     _discrimination,
-    _Rival,
+    _proposal,
+    _reached,
     _told,
     next_measurement,
 )
 from identification.gap.answer.forms import Form, law_of
+from identification.gap.answer.rivals import Rival, _shapes
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
@@ -56,13 +68,13 @@ def test_a_truth_in_the_pool_is_a_measurement_of_it() -> None:
         np.testing.assert_allclose(told.log_base, wanted.log_base, rtol=1e-9)
 
 
-def rival(bench: Bench, word: str, size: float) -> _Rival:
+def rival(bench: Bench, word: str, size: float) -> Rival:
     fresh = replace(bench, columns=Pool())
     v = library(fresh, (word,))[0]
     law, unit = law_of(fresh, v)
     values = np.full(len(v.columns), size) * unit
     form = Form(word, law, values, np.diag(values**2))
-    return _Rival(word, (form,), {}, ((v, law, unit, 0.0),))
+    return Rival(word, (form,), {}, ((v, law, unit, 0.0),))
 
 
 def test_an_effect_too_small_to_be_seen_is_told_from_nothing() -> None:
@@ -77,6 +89,98 @@ def test_an_effect_too_small_to_be_seen_is_told_from_nothing() -> None:
     assert both_seen > 20
     assert one_hidden < 12
     assert one_hidden == _discrimination(bench, design, (small, large))
+
+
+def test_what_sits_in_two_joints_is_followed_in_both() -> None:
+    """A truth that its own word can't follow wins too little, or loses to any other."""
+    bench = make_bench(arm_data())
+    fresh = replace(bench, columns=Pool())
+    cubic = [v for v in library(fresh, ("joint_nonlinear_stiffness",)) if "cubic" in v.label]
+    one, other = (next(v for v in cubic if v.joint == j) for j in (1, 2))
+    laws = [law_of(fresh, v) for v in (one, other)]
+    forms = [Form(one.word, law, 0.4 * unit, 0.01 * np.diag(unit**2)) for law, unit in laws]
+    shapes = ((one, *laws[0], 0.0),)
+    both = Rival(one.word, tuple(forms), {}, shapes, ((Part(other, 0.4), *laws[1]),))
+    seat = rival(bench, "contact_seating", 1e-4)
+    design = present_design(bench)
+    followed = _discrimination(bench, design, (both, seat))
+    assert followed > 20 + _discrimination(bench, design, (replace(both, further=()), seat))
+
+
+def test_laws_are_no_better_next_time_than_they_are_seen_to_be() -> None:
+    """What differs by less than the laws' imperfection will not decide there either."""
+    bench = make_bench(arm_data())
+    design = present_design(bench)
+    pair = rival(bench, "contact_seating", 3e-6), rival(bench, "joint_creep", 0.01)
+    exact, rough = pair, (replace(pair[0], eta=2e-5), replace(pair[1], eta=2e-5))
+    assert _discrimination(bench, design, exact) > 3 * abs(_discrimination(bench, design, rough))
+
+
+def test_shapes_are_weighed_beside_the_rest_of_the_explanation() -> None:
+    """Alone, the shapes of a small effect stand in for a large one, and its own weighs nothing."""
+    bench = make_bench(arm_data())
+    words = ("joint_nonlinear_stiffness", "joint_creep")
+    variants = library(bench, words)
+    curves, creeps = ([v for v in variants if v.word == w] for w in words)
+    creep, curve = creeps[0], next(v for v in curves if v.label == "joint 3 cubic")
+    large = 0.5 * bench.columns[creep.columns[0]]
+    target = large + 0.1 * bench.columns[curve.columns[0]]
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6, 2e-5]))
+    shapes = _shapes(engine, curves, Part(curve, 0.15), (Part(creep, 0.5),))
+    assert shapes[0][0] is curve
+    assert shapes[0][-1] > max(weight for *_, weight in shapes) - 1
+    assert {v.joint for v, *_ in shapes} == {2}
+    far = next(v for v in curves if v.label == "joint 1 cubic")  # the truth, for all that
+    (drawn, *_, own), *near = _shapes(engine, curves, Part(far, 0.15), (Part(creep, 0.5),))
+    assert drawn is far
+    assert own > max(weight for *_, weight in near) - 13
+
+
+def proposed(pair: tuple[str, str], *nats: float) -> NextMeasurement | None:
+    """From candidates that take ever longer, to calibrate the last one."""
+    design = present_design(small_bench())
+    kinds = [*(f"way {k}" for k in range(1, len(nats))), "calibrate"]
+    rated = [
+        (Option(kind, kind, value, float(k)), Candidate(kind, kind, design))
+        for k, (kind, value) in enumerate(zip(kinds, nats, strict=True))
+    ]
+    return _proposal(rated, pair)
+
+
+def test_where_nothing_helps_nothing_is_proposed() -> None:
+    assert proposed(("joint_creep", "zero_shift"), 0.0, 0.0) is None
+    assert proposed(("joint_creep", "force_scale"), 0.0) is not None
+    gain = proposed(("force_scale", "zero_shift"), 0.0, 0.0)
+    assert gain is not None
+    assert (gain.kind, gain.design) == ("none", None)
+    assert gain.alternatives[0].kind == "calibrate"
+    some = proposed(("joint_creep", "zero_shift"), 2.0, 0.0)
+    assert some is not None
+    assert "The best of 2: way 1" in some.text
+
+
+def test_a_robot_without_output_encoders_is_not_asked_for_their_readings() -> None:
+    design = replace(present_design(make_bench(arm_data())), readings=False)
+    motor = replace(design, output_encoder=False)
+    kinds = [[c.kind for c in candidates(d, True, ())] for d in (design, motor)]
+    assert kinds[0] == ["readings", *kinds[1]]
+    bench = make_bench(replace(arm_data(), output_encoder=False))
+    assert not planned(present_design(bench), bench).output_encoder
+
+
+def test_a_level_is_reached_with_all_that_lasts_of_an_explanation() -> None:
+    """The largest of both explanations, springs and what is no question among it."""
+    bench = make_bench(arm_data())
+    design = present_design(bench)
+    creep, seat = rival(bench, "joint_creep", 1e-9), rival(bench, "contact_seating", 1e-9)
+    plain = np.array(_reached(bench, design, (creep, seat)))
+    assert plain.shape == (len(design.setups), len(design.levels[0]))
+    springs = [s.lever**2 @ bench.data.compliance + s.outside for s in design.setups]
+    np.testing.assert_allclose(plain, np.array(springs)[:, None] * design.levels, rtol=1e-3)
+    beside = replace(seat, rest=rival(bench, "joint_creep", 0.5).forms)
+    more = np.array(_reached(bench, design, (creep, beside)))
+    assert (more[:, -1] > 1.1 * plain[:, -1]).any()
+    assert (np.diff(more) >= 0).all()
 
 
 def test_procedures_are_looked_at_from_the_quickest_until_none_can_be_worth_more(

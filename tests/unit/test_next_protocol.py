@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +11,13 @@ import pytest
 
 from identification.gap.answer.designs import Design
 from identification.gap.data import Instruments
-from rig.diagnosis.next_protocol import _apart, _force_band, _rate_Hz, _seconds
+from rig.diagnosis.next_protocol import (
+    _apart,
+    _force_band,
+    _rate_Hz,
+    _seconds,
+    _seen_to_the_end,
+)
 from rig.protocol_write import limit_lines, pose_line
 
 
@@ -71,6 +78,16 @@ def test_a_band_is_no_finer_than_a_hand_can_hold(
     band = _force_band(planned(levels))
     assert band.absolute_N == pytest.approx(absolute_N)
     assert band.relative == pytest.approx(relative)
+
+
+def test_loading_ends_beyond_all_levels_that_are_to_be_seen() -> None:
+    """What flows after the last level that is held would be in no row."""
+    design = replace(planned((40.0, 80.0), (60.0, 75.0, 82.0, 90.0), (10.0,)), setups=(None,) * 3)
+    reached = (1e-3, 2e-3), (1.2e-3, 2.5e-3, 7e-3, 11e-3), (12e-3,)
+    kept, stops = _seen_to_the_end(design, reached, 8.55)
+    assert kept.levels == ((40.0, 80.0), (60.0, 75.0, 82.0), (10.0,))
+    assert stops == pytest.approx((7.2, 1.15 * 7.0, 8.55))
+    assert _seen_to_the_end(design, (), 8.55) == (design, pytest.approx((7.2,) * 3))
 
 
 def test_levels_that_no_hand_can_set_apart_become_one() -> None:

@@ -42,6 +42,7 @@ class Design:
     readings: bool
     components: bool
     instruments: Instruments
+    output_encoder: bool = True  # whether joint readings, if any, contain the gear's deflection
 
     @property
     def minutes(self) -> float:
@@ -99,6 +100,7 @@ def present_design(bench: Bench) -> Design:
         readings=bench.has_q,
         components=rows.tangential is not None,
         instruments=_averaging(data.instruments, thinned),
+        output_encoder=data.output_encoder,
     )
 
 
@@ -193,7 +195,7 @@ def planned(design: Design, bench: Bench) -> GapData:
         instruments=design.instruments,
         tangential=np.zeros((n, 2)) if design.components else None,
         q=np.zeros((n, data.joints)) if design.readings else None,
-        output_encoder=design.readings or data.output_encoder,
+        output_encoder=design.output_encoder,
         temperature=None,
         curves=None,
         on_the_way=None,
@@ -238,7 +240,7 @@ def candidates(design: Design, arm: bool, elsewhere: Sequence[Elsewhere]) -> lis
 
 
 def _channels(design: Design, arm: bool) -> Iterator[Candidate]:
-    if arm and not design.readings:
+    if arm and design.output_encoder and not design.readings:
         yield Candidate(
             "readings",
             "Record the joint positions (output encoders) during the same procedure: what happens "

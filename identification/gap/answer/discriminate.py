@@ -23,26 +23,28 @@ from identification.gap.answer.designs import (
     planned,
     present_design,
 )
-from identification.gap.answer.forms import Form, describe, law_of, lawful, realise, rows_of
-from identification.gap.answer.twins import PLACE, twin_of
-from identification.gap.data import GapData
+from identification.gap.answer.forms import (
+    realise,
+    rows_of,
+)
+from identification.gap.answer.rivals import Rival, rival_of, same_elsewhere
+from identification.gap.data import LOADING, GapData
 from identification.gap.effects import EFFECTS
-from identification.gap.evidence.compare import Scored, log_mean, score
+from identification.gap.evidence.compare import condition, log_mean, score
 from identification.gap.evidence.engine import Engine, NoiseLevel, eta_levels
+from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult
-from identification.gap.explanations.fit import Fit, fit
 from identification.gap.laws.flows import make
 from identification.gap.laws.law import Law
-from identification.gap.model.base import base_columns
+from identification.gap.model.base import Base, base_columns
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
 
 ENOUGH = 3.0  # nats: odds of 20 to 1
+_LITTLE = 0.5  # nats below which no procedure is better than any other
 _DECISIVE = 10.0  # more certainty than this is worth no further minute
 _BESIDES = 2  # further procedures that would do, for who can't do the best
 _REPETITIONS = 2  # simulated
-_SHAPES = 8  # of each word, the best on the present data
-_WITHIN = 12.0  # nats below the best that a shape may lie
 _GAINS = {"force_scale": "force_gain", "displacement_scale": "displacement_gain"}
 
 
@@ -59,7 +61,9 @@ class Option:
 @dataclass(frozen=True)
 class NextMeasurement:
     """What to do, which two words it separates, what it is expected to give, and the other
-    options, best first. kind "none": nothing that was tried reaches ENOUGH; design is None then."""
+    options, best first. kind "none": nothing that was tried reaches ENOUGH; design is None then.
+    reached: m, of every setup of the design how far loading to each level goes at the most, by
+    either explanation; empty without an arm."""
 
     text: str
     separates: tuple[str, str]
@@ -68,17 +72,7 @@ class NextMeasurement:
     minutes: float = 0.0
     alternatives: tuple[Option, ...] = ()
     design: Design | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class _Rival:
-    """One of the two words: the forms that were fitted with it, changes of the springs by name,
-    and shapes it may take, with their weights on the present data (log) and units."""
-
-    word: str
-    forms: tuple[Form, ...]
-    springs: dict[str, float]
-    shapes: tuple[tuple[Variant, Law, Array, float], ...]
+    reached: tuple[tuple[float, ...], ...] = ()
 
 
 Others = Callable[[], Sequence[Elsewhere]]
@@ -93,15 +87,15 @@ def next_measurement(
     """The proposal for two words, of which the first is in the chosen explanation.
 
     others: setups elsewhere, asked for only here. None where one of the words has no explanation,
-    or no load moves the rig.
+    no load moves the rig, or no procedure gives more than next to nothing.
     """
     engine = found.engine
     if not engine.bench.reach > 0 or not np.ptp(engine.bench.load) > 0:
         return None
-    first = _rival(found, chosen, pair[0], pair[0])
+    first = rival_of(found, chosen, pair[0], pair[0])
     if first is None:
         return None
-    second = _same_elsewhere(found, chosen, first, pair[1]) or _rival(
+    second = same_elsewhere(found, chosen, first, pair[1]) or rival_of(
         found, chosen, pair[0], pair[1]
     )
     if second is None:
@@ -118,7 +112,10 @@ def next_measurement(
             nats += _calibrated(c.design, (first, second))
         rated.append((Option(c.kind, c.text, max(nats, 0.0), c.design.minutes), c))
     rated.sort(key=lambda r: -_worth(r[0]))
-    return _proposal(rated, pair)
+    proposal = _proposal(rated, pair)
+    if proposal is None or proposal.design is None or not engine.bench.data.arm:
+        return proposal
+    return replace(proposal, reached=_reached(engine.bench, proposal.design, (first, second)))
 
 
 def _settled(options: list[Option], minutes: float) -> bool:
@@ -138,6 +135,11 @@ def _worth(option: Option) -> float:
 def _proposal(
     rated: list[tuple[Option, Candidate]], pair: tuple[str, str]
 ) -> NextMeasurement | None:
+    if rated and rated[0][0].expected_nats < _LITTLE:
+        # but a gain can always be calibrated
+        rated = sorted(rated, key=lambda r: r[0].kind != "calibrate")
+        if rated[0][0].kind != "calibrate" or not _GAINS.keys() & set(pair):
+            return None
     if not rated:
         return None
     best, candidate = rated[0]
@@ -166,101 +168,44 @@ def _nats(value: float) -> str:
     return f"{value:.1f} nats" if value < 100 else "more than 100 nats"
 
 
-# --- the two explanations ------------------------------------------------------------------------
-
-
-def _rival(found: SearchResult, chosen: Explanation, first: str, word: str) -> _Rival | None:
-    """The explanation with `word` in the place of `first`, else by itself."""
-    wanted = (chosen.words - {first}) | {word}
-    by_words = {e.words: e for e in found.explanations}
-    explanation = by_words.get(wanted) or by_words.get(frozenset([word]))
-    if explanation is None:
-        return None
-    engine = found.engine
-    fitted = fit(engine, explanation)
-    part = next(p for p in explanation.parts if p.word == word)
-    forms = [
-        lawful(describe(engine.bench, p, *fitted.of(i)))
-        for i, p in enumerate(explanation.parts)
-        if p.word == word
-    ]
-    shapes = _shapes(engine, [v for v in found.variants if v.word == word], part.variant)
-    return _Rival(word, tuple(forms), _springs(engine, fitted), shapes)
-
-
-def _same_elsewhere(
-    found: SearchResult, chosen: Explanation, first: _Rival, word: str
-) -> _Rival | None:
-    """The first explanation's law at the other word's place, where the data see no difference."""
-    part = next((p for p in chosen.parts if p.word == first.word), None)
-    if part is None or word not in ("joint_yield", "base_slip"):
-        return None
-    fitted = fit(found.engine, chosen)
-    w, _ = fitted.of(chosen.parts.index(part))
-    twin = twin_of(found.engine, part, w, chosen.eta)
-    if twin is None or twin.word != word:
-        return None
-    shapes = tuple(
-        (replace(v, word=word), twin.moved(law), unit * twin.factor**-2, weight)
-        for v, law, unit, weight in first.shapes
-        if all(law.constants.get(k) == first.forms[0].law.constants.get(k) for k in PLACE)
-    )
-    return _Rival(word, tuple(twin.form(f) for f in first.forms), first.springs, shapes)
-
-
-def _springs(engine: Engine, fitted: Fit) -> dict[str, float]:
-    names = engine.base.names
-    return {n: float(b) for n, b in zip(names, fitted.base, strict=True) if n.startswith("spring")}
-
-
-def _shapes(
-    engine: Engine, variants: list[Variant], fitted: Variant
-) -> tuple[tuple[Variant, Law, Array, float], ...]:
-    """The fitted shape, and the best others of different laws within reach of it."""
-    ranked: list[Scored] = sorted(
-        score(engine, engine.levels, variants), key=lambda s: -s.log_evidence
-    )
-    best = ranked[0].log_evidence
-    weight = {id(s.variant): s.log_evidence for s in ranked}
-    near = [
-        s.variant for s in ranked if s.log_evidence > best - _WITHIN and s.variant is not fitted
-    ]
-    # shapes that look alike to these data may differ elsewhere: joints and axes first, then laws
-    kinds: dict[object, Variant] = {}
-    for v in near:
-        kinds.setdefault(v.differs_by, v)
-    order = [fitted, *kinds.values(), *(v for v in near if v not in kinds.values())][:_SHAPES]
-    return tuple((v, *law_of(engine.bench, v), weight.get(id(v), best)) for v in order)
-
-
 # --- expectation ---------------------------------------------------------------------------------
 
 
-def _discrimination(bench: Bench, design: Design, rivals: tuple[_Rival, _Rival]) -> float:
+def _discrimination(bench: Bench, design: Design, rivals: tuple[Rival, Rival]) -> float:
     """Log odds (nats) by which the true one is expected to win, whichever of the two it is.
 
     At most two repetitions are simulated: more of them say little that these do not.
     """
     brief = replace(design, repetitions=min(design.repetitions, _REPETITIONS))
     truths, there = _simulated(bench, brief, rivals)
-    variants, weights = _carried(there, rivals)
+    carried = [_carried(there, r) for r in rivals]
     places = [there.add(truth) for truth in truths]
     base = base_columns(there)
-    # every other size of imperfection: to rank procedures, that is fine enough
-    etas = eta_levels(there, base, max(truths, key=lambda t: float(np.abs(t).max())))[::2]
+    etas = _imperfections(there, base, truths, min(r.eta for r in rivals))
     engine = Engine(there, base, np.zeros(there.layout.size), etas)
-    words = np.array([v.word for v in variants])
     won = []
     for k, place in enumerate(places):
         engine.beside((place,), len(engine.levels))  # of all levels at once, for `_told`
         levels = [_told(level, place) for level in engine.levels]
-        found = {id(s.variant): s.log_evidence for s in score(engine, levels, variants)}
-        logs = np.array([found[id(v)] - log(v.prior) for v in variants])
-        marginal = [
-            log_mean(list(logs[words == r.word]), list(weights[words == r.word])) for r in rivals
-        ]
+        marginal = [_marginal(engine, levels, c) for c in carried]
         won.append(marginal[k] - marginal[1 - k])
     return float(min(won))
+
+
+def _imperfections(there: Bench, base: Base, truths: list[Array], seen: float) -> Array:
+    """Sizes m of the imperfection, from the one on that was seen: laws that are so far off now are
+    no better there. Every other size: to rank procedures, that is fine enough."""
+    every = eta_levels(there, base, max(truths, key=lambda t: float(np.abs(t).max())))
+    larger = every[every > 1.01 * seen][1::2]
+    return np.append(seen, larger)
+
+
+def _marginal(engine: Engine, levels: list[NoiseLevel], carried: _Carried) -> float:
+    """log evidence of a word, of its shapes by their weights."""
+    for p in carried.further:
+        levels = [condition(lv, p.variant.columns, p.variant.root, p.scale) for lv in levels]
+    found = {id(s.variant): s.log_evidence for s in score(engine, levels, carried.variants)}
+    return log_mean([found[id(v)] - log(v.prior) for v in carried.variants], carried.weights)
 
 
 def _told(level: NoiseLevel, place: int) -> NoiseLevel:
@@ -271,7 +216,7 @@ def _told(level: NoiseLevel, place: int) -> NoiseLevel:
 
 
 def _simulated(
-    bench: Bench, design: Design, rivals: tuple[_Rival, _Rival]
+    bench: Bench, design: Design, rivals: tuple[Rival, Rival]
 ) -> tuple[list[Array], Bench]:
     """What each of the two would add to the simulation along the design, and the bench there."""
     data = planned(design, bench)
@@ -288,12 +233,13 @@ def _simulated(
     ], there
 
 
-def _ahead(there: Bench, rivals: tuple[_Rival, _Rival]) -> None:
+def _ahead(there: Bench, rivals: tuple[Rival, Rival]) -> None:
     """Makes all at once, for a bench, what takes a loop over its rows."""
     flows = []
     for r in rivals:
         flow = EFFECTS[r.word].laws.flow
-        laws = [*(f.law for f in r.forms), *(law for _, law, *_ in r.shapes)]
+        laws = [f.law for f in r.forms] + [law for _, law, *_ in r.shapes]
+        laws += [law for _, law, _ in r.further]
         flows += [flow(there, law) for law in laws] if flow is not None else []
     make(there, flows)
 
@@ -324,7 +270,7 @@ def _with_noise(bench: Bench, there: Bench) -> Bench:
     return replace(there, noise=noise)
 
 
-def _spring_changes(there: Bench, rival: _Rival) -> Array:
+def _spring_changes(there: Bench, rival: Rival) -> Array:
     out = np.zeros(there.layout.size)
     for name, change in rival.springs.items():
         j = int(name.removeprefix("spring")) - 1
@@ -332,20 +278,52 @@ def _spring_changes(there: Bench, rival: _Rival) -> Array:
     return out
 
 
-def _carried(there: Bench, rivals: tuple[_Rival, _Rival]) -> tuple[list[Variant], Array]:
-    """The shapes of both words on another bench, and their weights."""
-    variants, weights = [], []
+@dataclass(frozen=True, eq=False)
+class _Carried:
+    """A word on another bench: its shapes, their weights, and what each of them has beside it."""
+
+    variants: list[Variant]
+    weights: list[float]
+    further: list[Part]
+
+
+def _carried(there: Bench, rival: Rival) -> _Carried:
+    def placed(variant: Variant, law: Law, unit: Array) -> Variant:
+        columns = rows_of(there, rival.word, law) * unit
+        return replace(variant, columns=tuple(there.add(c) for c in columns.T))
+
+    top = max(w for *_, w in rival.shapes)
+    return _Carried(
+        [placed(v, law, unit) for v, law, unit, _ in rival.shapes],
+        [float(np.exp(weight - top)) for *_, weight in rival.shapes],
+        [replace(p, variant=placed(p.variant, law, unit)) for p, law, unit in rival.further],
+    )
+
+
+def _reached(
+    bench: Bench, design: Design, rivals: tuple[Rival, Rival]
+) -> tuple[tuple[float, ...], ...]:
+    """m: how far either explanation, with all that lasts of it, moves on the way up to each level
+    of the design, from the first reading of the setup on."""
+    there = make_bench(planned(design, bench))
+    n, rows = there.rows.n, there.rows
+    far = []
     for r in rivals:
-        top = max(w for *_, w in r.shapes)
-        for v, law, unit, weight in r.shapes:
-            columns = rows_of(there, r.word, law) * unit
-            places = tuple(there.add(c) for c in columns.T)
-            variants.append(replace(v, columns=places))
-            weights.append(float(np.exp(weight - top)))
-    return variants, np.array(weights)
+        moved = rows.displacement + _spring_changes(there, r)[:n]
+        for form in (*r.forms, *r.rest):
+            moved = moved + realise(there, form)[:n]
+        datum = np.array([moved[np.argmax(rows.setup == s)] for s in range(len(design.setups))])
+        far.append(np.abs(moved - datum[rows.setup]))
+    largest, up = np.max(far, axis=0), rows.branch == LOADING
+    out = []
+    for s, levels in enumerate(design.levels):
+        mine = up & (rows.setup == s)
+        each = [largest[mine & (rows.step == k + 1)].max(initial=0.0) for k in range(len(levels))]
+        out.append(tuple(np.maximum.accumulate(each).tolist()))
+    return tuple(out)
 
 
-def _calibrated(design: Design, rivals: tuple[_Rival, _Rival]) -> float:
+def _calibrated(design: Design, rivals: tuple[Rival, Rival]) -> float:
     """What the calibration itself says: the gain is known to u, of a prior of `s`."""
     gained = []
     for k, r in enumerate(rivals):
