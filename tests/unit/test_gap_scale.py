@@ -44,6 +44,25 @@ def test_a_wrong_unit_is_asked_for(
     assert all(moves in text for text in texts)
 
 
+@pytest.mark.parametrize(
+    ("displacement", "force", "units"),
+    [(1.0, 1 / 4.448, "forces in lbf"), (1 / 25.4, 1.0, "displacements in inches")],
+)
+def test_a_unit_of_an_arm_is_asked_for_by_its_name(
+    displacement: float, force: float, units: str
+) -> None:
+    """Springs of an arm are known to a tenth; those of a bench are often guessed."""
+    data = linear("paper")
+    arm = replace(data, displacement=displacement * data.displacement, force=force * data.force)
+    (text,) = said(arm)
+    assert f"in every pose and direction. Are these {units}?" in text
+    assert said(replace(arm, arm=False)) == []
+    one = np.where(arm.setup == 0, arm.displacement, arm.displacement / 1.3)
+    assert said(replace(arm, displacement=one)) == []  # no factor common to all
+    unsure = np.full(arm.joints, 2.0)
+    assert said(replace(arm, compliance_relative_sd=unsure)) == []
+
+
 def test_simulated_curves_that_go_the_other_way_are_told() -> None:
     data = linear("bench")
     simulated = data.displacement - data.displacement[0]
