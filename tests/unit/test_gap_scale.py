@@ -11,6 +11,8 @@ from identification.gap.answer.notes import FAULT, UNDECIDED, notes_of
 from identification.gap.answer.scale import off_scale
 from identification.gap.data import GapData
 from identification.gap.model.bench import make_bench
+from rig.diagnosis.diagnose import Diagnosis
+from rig.diagnosis.diagnose_text import render
 from tests.conformance.gap_designs import linear
 from tests.explained import explained
 
@@ -89,3 +91,22 @@ def test_where_nothing_moves_no_gap_is_no_finding(still: str, verdict: str, kind
     said = {n.text: n.kind for n in notes_of(make_bench(data), verdict)}
     (text,) = (t for t in said if "The load does not change" in t or "Nothing moves by more" in t)
     assert said[text] == kind
+
+
+def test_where_nothing_moves_nothing_is_learned() -> None:
+    data = linear("bench")
+    still = replace(data, force=1e-9 * data.force, displacement=1e-9 * data.displacement)
+    assert not explained(data).learned_nothing
+    result = explained(still, withhold=["joint_yield"])
+    p = result.probabilities
+    assert p["none"] / p["unknown"] == pytest.approx(10.0)  # the priors
+    assert p["none"] / p["time_lag"] == pytest.approx(0.5 / 0.37 * 18)
+    assert p["joint_yield"] == p["base_compliance"] == 0.0  # taken away; needs an arm
+    assert sum(p.values()) == pytest.approx(1.0)
+    first, *_ = render(result).splitlines()
+    assert first.startswith("none (")
+    assert "nothing can be said of a gap, since nothing moved" in first
+    assert "no gap to close" not in first
+    told = Diagnosis("d", replace(result, before=0.0)).to_json()
+    assert told["nothing_learned"] is True
+    assert told["gap"]["shrink_factor"] == 1.0
