@@ -201,8 +201,9 @@ def _farther(
     words, notes = {f.word for f in forms}, []
     for entry in (e for e in model.effects if e.get("name") in words):
         told = entry.get(SEEN_TO)
-        for run in procedure.runs if isinstance(told, dict) else ():
-            seen, top = told.get(run.direction), max(abs(f) for f in run.forces_N)
+        greatest = told if isinstance(told, dict) else {}
+        for run in procedure.runs:
+            seen, top = greatest.get(run.direction), max(abs(f) for f in run.forces_N)
             if isinstance(seen, int | float) and top > _FARTHER * seen:
                 notes.append(
                     f"{entry['name']}: seen up to {seen:.4g} N along {run.direction}, here up to "
