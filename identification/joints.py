@@ -3,8 +3,8 @@
 A load F along n at the tool turns joint j by `J_nj F / c_j`, so both the laser's compliance
 `s = sum_j J_nj^2 / c_j` and a joint reading's `J_nj / c_j` are linear in 1 / c_j (Salisbury 1980).
 Estimated are ln c_j, with a normal prior in the open, together with the gains of force and
-displacement, which all observations of one set-up share: maximum of the posterior by Gauss-Newton,
-its covariance from the curvature there (Laplace).
+displacement, which all observations of one set-up share (`identification.posterior`). Where data
+and prior contradict each other, the prior gives way.
 """
 
 from __future__ import annotations
@@ -17,6 +17,16 @@ from numpy.typing import NDArray
 
 from identification.arm import JOINTS, Arm, unit_vector
 from identification.arrays import Array
+from identification.posterior import (
+    Conflict,
+    Rows,
+    birge_factor,
+    conflict_of,
+    covariance,
+    maximise,
+    sensitivity,
+    stated_prior,
+)
 from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 
 # A joint counts as identified when its 95 % interval is well inside +-5 % (three standard
@@ -24,9 +34,9 @@ from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 IDENTIFIED_RELATIVE = 0.05 / 3
 IDENTIFIED_SHARE = 0.9
 _DUST = 1e-9  # shares below are rounding
+_APART = 10.0  # times as far: links, mounting and gains are not off by so much, units are
 _NO_LEVER = 1e-6  # m: a joint with less is not loaded
 _RANK = 1e-7  # singular values below this share of the largest are rounding
-_ITERATIONS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +96,8 @@ class JointFit:
     comes from data; lower_bound (6,) Nm/rad holds for sure (95 %) whatever the other joints do;
     null_space (6, null_dimension): changes of ln c that these data do not see; condition_number of
     the weighted sensitivities (infinite with a null space); birge: factor by which the stated
-    uncertainties were enlarged because the residuals ask for it."""
+    uncertainties were enlarged because the residuals ask for it; conflict: of data and prior, None
+    where there is none."""
 
     stiffness: Array
     covariance: Array
@@ -101,6 +112,7 @@ class JointFit:
     dof: float
     birge: float
     prior: Prior
+    conflict: Conflict | None
 
     @property
     def relative_sd(self) -> Array:
@@ -112,16 +124,6 @@ class JointFit:
         """95 % intervals (6, 2) Nm/rad, from those of ln c."""
         half = TWO_SIDED * self.relative_sd
         return self.stiffness[:, None] * np.exp(np.stack([-half, half], axis=-1))
-
-
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """value = (1 + gain . g) (A x); A (m, 6), value, u (m,), gain (m, 2 setups)."""
-
-    A: Array
-    value: Array
-    u: Array
-    gain: Array
 
 
 def identify(
@@ -143,19 +145,23 @@ def identify(
     _check_agreement(arm, observations, gains)
     rows = _rows(arm, observations, len(gains))
     sd_gains = np.array([[g.force, g.displacement] for g in gains]).ravel()
-    parameters, residuals, chi2 = _maximise(rows, prior, sd_gains)
-    J = _sensitivity(rows, parameters)
-    dof = max(0.0, rows.value.size - _effective(J, prior, sd_gains))
-    birge = _birge(chi2, dof)
-    information = J.T @ J / birge**2 + np.diag(_prior_weights(prior, sd_gains))
-    covariance: Array = np.asarray(np.linalg.inv(information), dtype=np.float64)
-    own = covariance[:JOINTS, :JOINTS]
-    share = 1 - np.diag(own) / np.log1p(np.square(prior.relative_sd))
-    share[np.abs(share) < _DUST] = 0.0
+    stated = stated_prior(prior.stiffness, prior.relative_sd, sd_gains)
+    peak, taken = maximise(rows, stated), stated
+    conflict = conflict_of(rows, stated, peak)
+    if conflict is not None:
+        taken = conflict.prior
+        peak = maximise(rows, taken, conflict.parameters)
+    birge, dof = birge_factor(rows, taken, peak)
+    own = covariance(rows, taken, peak, birge)[:JOINTS, :JOINTS]
+    enlarged = 1.0 if conflict is None else conflict.enlarged
+    # what follows a common factor may be less sure than the prior was: nothing of it is data
+    share = np.maximum(0.0, 1 - np.diag(own) * np.diag(stated.information)[:JOINTS] / enlarged**2)
+    share[share < _DUST] = 0.0
     sd = np.sqrt(np.diag(own))
+    J = sensitivity(rows, peak.parameters)
     rank, null, condition = _rank(J[:, :JOINTS])
     return JointFit(
-        stiffness=np.exp(parameters[:JOINTS]),
+        stiffness=np.exp(peak.parameters[:JOINTS]),
         covariance=own,
         data_share=share,
         lower_bound=_lower_bounds(arm, observations, gains),
@@ -163,15 +169,16 @@ def identify(
         null_space=null,
         condition_number=condition,
         identified=(sd <= IDENTIFIED_RELATIVE) & (share >= IDENTIFIED_SHARE),
-        residuals=residuals,
-        chi2=chi2,
+        residuals=peak.residuals,
+        chi2=peak.chi2,
         dof=dof,
         birge=birge,
         prior=prior,
+        conflict=conflict,
     )
 
 
-def _rows(arm: Arm, observations: Sequence[Observation], setups: int) -> _Rows:
+def _rows(arm: Arm, observations: Sequence[Observation], setups: int) -> Rows:
     A, value, u, gain = [], [], [], []
     for one in observations:
         lever = one.levers(arm)
@@ -190,69 +197,7 @@ def _rows(arm: Arm, observations: Sequence[Observation], setups: int) -> _Rows:
             value.append(float(one.joints[j]))
             u.append(float(one.u_joints[j]))
             gain.append(joint)
-    return _Rows(np.array(A), np.array(value), np.array(u), np.array(gain))
-
-
-def _predict(rows: _Rows, p: Array) -> Array:
-    return np.asarray((rows.A @ np.exp(-p[:JOINTS])) * (1 + rows.gain @ p[JOINTS:]))
-
-
-def _sensitivity(rows: _Rows, p: Array) -> Array:
-    """d prediction / d (ln c, gains) over u, (m, 6 + 2 setups)."""
-    x = np.exp(-p[:JOINTS])
-    scale = 1 + rows.gain @ p[JOINTS:]
-    by_joint = -rows.A * x * scale[:, None]
-    by_gain = (rows.A @ x)[:, None] * rows.gain
-    return np.hstack([by_joint, by_gain]) / rows.u[:, None]
-
-
-def _prior_weights(prior: Prior, sd_gains: Array) -> Array:
-    sd = np.concatenate([np.sqrt(np.log1p(np.square(prior.relative_sd))), sd_gains])
-    return np.asarray(1.0 / np.maximum(sd, 1e-9) ** 2)
-
-
-def _maximise(rows: _Rows, prior: Prior, sd_gains: Array) -> tuple[Array, Array, float]:
-    """Gauss-Newton with damping (Levenberg 1944); parameters, residuals over u, their chi^2."""
-    centre = np.concatenate([np.log(prior.stiffness), np.zeros(sd_gains.size)])
-    weights = _prior_weights(prior, sd_gains)
-
-    def cost(p: Array) -> float:
-        r = (rows.value - _predict(rows, p)) / rows.u
-        return float(r @ r + weights @ (p - centre) ** 2)
-
-    p, damping = centre.copy(), 1e-3
-    best = cost(p)
-    for _ in range(_ITERATIONS):
-        J = _sensitivity(rows, p)
-        r = (rows.value - _predict(rows, p)) / rows.u
-        H = J.T @ J + np.diag(weights)
-        step = np.linalg.solve(H + damping * np.diag(np.diag(H)), J.T @ r - weights * (p - centre))
-        step *= min(1.0, 2.0 / max(float(np.abs(step).max()), 1e-300))
-        new = cost(p + step)
-        if new < best:
-            p, damping = p + step, damping / 10
-            if best - new < 1e-12 * best:
-                break
-            best = new
-        else:
-            damping *= 10
-            if damping > 1e12:
-                break
-    r = (rows.value - _predict(rows, p)) / rows.u
-    return p, r, float(r @ r)
-
-
-def _effective(J: Array, prior: Prior, sd_gains: Array) -> float:
-    """Parameters that the data, not the prior, determine: trace of the hat matrix."""
-    H = J.T @ J
-    return float(np.trace(np.linalg.solve(H + np.diag(_prior_weights(prior, sd_gains)), H)))
-
-
-def _birge(chi2: float, dof: float) -> float:
-    """sqrt(chi^2 / dof) where chi^2 is improbably large (3 sigma; Birge 1932), 1 otherwise."""
-    if dof < 1 or chi2 <= dof + 3 * np.sqrt(2 * dof):
-        return 1.0
-    return float(np.sqrt(chi2 / dof))
+    return Rows(np.array(A), np.array(value), np.array(u), np.array(gain))
 
 
 def _rank(J: Array) -> tuple[int, Array, float]:
@@ -276,7 +221,10 @@ def _lower_bounds(arm: Arm, observations: Sequence[Observation], gains: Sequence
 
 def _check_agreement(arm: Arm, observations: Sequence[Observation], gains: Sequence[Gains]) -> None:
     """Observations with the same levers must have the same compliance (six standard
-    uncertainties, gains of different set-ups counted)."""
+    uncertainties, gains of different set-ups counted), and each the one that its joint readings
+    make, but for what moves beside the joints."""
+    for one in observations:
+        _check_readings(arm, one)
     levers = np.abs([one.levers(arm) for one in observations])
     same = np.abs(levers[:, None] - levers[None]).max(axis=-1) <= 1e-3
     for i, first in enumerate(observations):
@@ -294,6 +242,28 @@ def _check_agreement(arm: Arm, observations: Sequence[Observation], gains: Seque
                     "same pose and direction, far beyond their uncertainties. "
                     f"{_why_apart(second, first)}"
                 )
+
+
+def _check_readings(arm: Arm, one: Observation) -> None:
+    """Laser and joint readings of one observation are of the same order of size."""
+    lever = one.levers(arm)
+    if one.joints is None or one.u_joints is None:
+        return
+    read = np.isfinite(one.joints) & (one.u_joints > 0)
+    if not read[np.abs(lever) > _NO_LEVER].all():
+        return
+    turned = float(lever[read] @ one.joints[read])
+    u_turned = TWO_SIDED * float(np.linalg.norm(lever[read] * one.u_joints[read]))
+    u = TWO_SIDED * one.u_compliance
+    beyond = one.compliance - u > _APART * (max(turned, 0.0) + u_turned)
+    if beyond or _APART * (one.compliance + u) < turned - u_turned:
+        raise ValueError(
+            f"{one.label}: displacement and joint readings contradict each other: "
+            f"{1e6 * one.compliance:.3g} mm per kN by the laser, {1e6 * turned:.3g} mm per kN by "
+            "the joints' turning. See whether displacements are in mm, joint readings in rad and "
+            "taken behind the gears (joint_encoder), or go by the laser alone "
+            "(--no-joint-readings)"
+        )
 
 
 def _why_apart(a: Observation, b: Observation) -> str:

@@ -24,6 +24,7 @@ _GAINS = 5.0  # stated standard deviations of the gain
 _SEEN = 20.0  # standard uncertainties of one sample: a force that goes less far has no ratio
 _PLAIN = 5.0  # the same, from one level to the next
 _SEVERAL = 3  # steps
+_CLOCKS = 2.0  # times as fast
 _PARTS = 10  # of a stretch without levels
 
 
@@ -33,6 +34,7 @@ def oddities(meta: Meta, columns: Mapping[str, Values]) -> Iterator[str]:
     yield from _steps(columns)
     yield from _components(meta, columns)
     yield from _branches(meta, columns)
+    yield from _clocks(columns)
 
 
 def incomplete_channels(meta: Meta, columns: Mapping[str, Values]) -> Iterator[str]:
@@ -88,6 +90,26 @@ def _components(meta: Meta, columns: Mapping[str, Values]) -> Iterator[str]:
                 f"and force_z_N are along it (expected: 1 within {100 * allowed:.3g} %); force_N "
                 "counts. Check its gain, and the direction in META"
             )
+
+
+# ------------------------------------------------------------------ clocks
+
+
+def _clocks(columns: Mapping[str, Values]) -> Iterator[str]:
+    """Two clocks of the same runs that do not go alike, from sample to sample."""
+    if "session_s" not in columns:
+        return
+    run = stretches(*(columns[n] for n in ("pose", "direction", "repetition")))
+    time, session = np.diff(columns["time_s"]), np.diff(columns["session_s"])
+    rows = (np.diff(run) == 0) & (time > 0) & (session > 0)
+    if not rows.any():
+        return
+    ratio = float(np.median(time[rows] / session[rows]))
+    if not 1 / _CLOCKS < ratio < _CLOCKS:
+        yield (
+            f"time_s goes {brief(ratio, 3)} times as fast as session_s: both are in seconds. Check "
+            "the unit of the two"
+        )
 
 
 # ------------------------------------------------------------------ branches

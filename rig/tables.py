@@ -41,6 +41,7 @@ _EMULATED_MARK = "# EMULATED:"
 _INCOMPLETE_MARK = "# INCOMPLETE:"
 # Of the identities of imported tables: any UUID would do, as long as it stays this one.
 _TABLES = uuid.UUID("5ddc5a0e-4c0a-4a3b-9c5e-0b7f3e1d6a42")
+_LISTED = 12  # columns of a header that lacks one
 _BIGGEST_COUNT = 2**53  # the largest number up to which float64 holds every whole number
 
 
@@ -167,9 +168,11 @@ class _Table:
             if column.required and column.name not in file.names:
                 hint = close_match(column.name.lower(), [n.lower() for n in file.names])
                 near = next((n for n in file.names if n.lower() == hint), "") if hint else ""
+                more = len(file.names) - _LISTED
+                names = [*file.names[:_LISTED], *([f"and {more} more"] if more > 0 else [])]
                 raise InputError(
                     f"{self._path}: the column {column.name} is missing; the header has "
-                    f"{', '.join(file.names[:12])}.{_meant(near, column.unit)}"
+                    f"{', '.join(names)}.{_meant(near, column.unit)}"
                 )
         self.notes = []
         for name in file.names:

@@ -18,7 +18,7 @@ from identification.gap.evidence.engine import Engine, eta_levels
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import fit
 from identification.gap.judging.choice import chosen_of
-from identification.gap.judging.earned import earned, left_of
+from identification.gap.judging.earned import earned, learned, left_of
 from identification.gap.judging.leftover import looked_up
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
@@ -77,7 +77,7 @@ def explain_gap(
     tell("comparing effects", 0.2)
     found = _with_unseen(_searched(engine, variants), known, withheld)
     tell("withheld data", 0.7)
-    found = earned(found)
+    found = learned(earned(found), withheld)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
     plain = chosen_of(found, verdict)
     chosen = force(found.engine, found.variants, found.explanations, plain, forced)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from identification.joints import Gains, JointFit, Observation, Prior
 from identification.joints import identify as estimate
 from identification.levels import grid_of
 from identification.next_poses import Criterion, Plan, Proposal, propose
+from identification.slips import slip
 from identification.stiffness import Stiffness, analyze_curve
 from rig import schemas
 from rig.arrays import Array
@@ -38,7 +39,8 @@ ENCODER_U_RAD = 1.0e-4
 
 @dataclass(frozen=True, eq=False)
 class IdentifyResult:
-    """Fit, the observations behind it, and the proposed next poses with their load."""
+    """Fit, the observations behind it, and the proposed next poses with their load. doubts: what
+    makes the fit doubtful."""
 
     datasets: tuple[str, ...]
     arm: Arm
@@ -46,6 +48,7 @@ class IdentifyResult:
     observations: tuple[Observation, ...]
     proposals: tuple[Proposal, ...]
     tool_xyz: tuple[float, float, float]
+    doubts: tuple[str, ...]
     notes: tuple[str, ...]
     banners: tuple[str, ...] = ()
     made_from: str = ""
@@ -82,6 +85,7 @@ class IdentifyResult:
                 "relative_sd": [float(v) for v in fit.prior.relative_sd],
                 "source": fit.prior.source,
             },
+            "prior_conflict": _conflict(fit),
             "null_space": fit.null_space.T.tolist(),
             "next_poses": [
                 {
@@ -93,7 +97,7 @@ class IdentifyResult:
                 }
                 for p in self.proposals
             ],
-            "notes": list(self.notes),
+            "notes": [*self.doubts, *self.notes],
         }
 
     def to_text(self) -> str:
@@ -149,6 +153,7 @@ def identify(
         observations=tuple(observations),
         proposals=tuple(next_poses),
         tool_xyz=first.tcp_xyz_mm,
+        doubts=tuple(_contradiction(fit)),
         notes=tuple(notes),
         banners=tuple(dict.fromkeys(b for d in datasets for b in d.banners())),
         made_from=_made_from(datasets, prior),
@@ -390,6 +395,44 @@ def _blind_joints(arm: Arm, observations: Sequence[Observation], fit: JointFit) 
             f"enlarged {fit.birge:.2g} times. rig diagnose looks for what is missing."
         )
     return notes
+
+
+def _contradiction(fit: JointFit) -> Iterator[str]:
+    """Of data and prior, in words."""
+    found = fit.conflict
+    if found is None:
+        return
+    if found.log_factor is None:
+        j = int(np.argmax(np.abs(found.away)))
+        yield (
+            f"Data and prior contradict each other: they agree best if joint {j + 1} is "
+            f"{fit.stiffness[j] / fit.prior.stiffness[j]:.3g} times as stiff as the prior has it, "
+            f"{abs(found.away[j]):.2g} of its standard deviations away. The prior was taken as "
+            f"{found.enlarged:.2g} times as uncertain as stated. See to tool, pose, units and the "
+            "prior; rig diagnose looks for what else gives way."
+        )
+        return
+    units = slip(found.log_factor, found.u_log_factor)
+    smells = "See to units, tool and the prior." if units is None else f"Are these {units}?"
+    yield (
+        "Data and prior contradict each other: they agree if all joints are "
+        f"{np.exp(found.log_factor):.3g} times as stiff as the prior has them, "
+        f"{np.abs(found.away).max():.2g} of its standard deviations away. {smells} The joints were "
+        "taken with that factor, those that repeat the prior, too."
+    )
+
+
+def _conflict(fit: JointFit) -> dict[str, Any] | None:
+    """How far data and prior are apart, and what became of the prior."""
+    found = fit.conflict
+    if found is None:
+        return None
+    factor = None if found.log_factor is None else float(np.exp(found.log_factor))
+    return {
+        "common_factor": factor,
+        "away_in_prior_sd": [float(v) for v in found.away],
+        "prior_sd_enlarged": found.enlarged,
+    }
 
 
 def _finite(value: float) -> float | None:

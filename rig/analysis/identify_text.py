@@ -44,6 +44,7 @@ def text(result: IdentifyResult) -> str:
     prior_sd = dict.fromkeys(f"{100 * sd:.4g}" for sd in fit.prior.relative_sd)
     known = numbers(100 * fit.prior.relative_sd, 4) if len(prior_sd) > 1 else next(iter(prior_sd))
     lines.append(f"Prior: {fit.prior.source}, relative sd {known} %. u: standard uncertainty.")
+    lines += [f"See to this first: {doubt}" for doubt in result.doubts]
     if result.proposals:
         lines.append("Next poses that would tell most, in this order:")
         for p in result.proposals:
@@ -57,7 +58,7 @@ def text(result: IdentifyResult) -> str:
 
 def model_text(result: IdentifyResult) -> str:
     """A model file that holds the identified stiffnesses, in the first measured pose."""
-    fit, note = result.fit, " ".join([*result.banners, result.made_from])
+    fit, note = result.fit, " ".join([*result.banners, result.made_from, *result.doubts])
     lines = [
         f"# Identified from {', '.join(Path(d).name for d in result.datasets)}",
         f"note: {json.dumps(note)}",

@@ -155,15 +155,22 @@ def _answer(r: GapResult) -> str:
     before, after, noise = (brief(v * MM_PER_M, 3) for v in (r.before, r.after, r.noise))
     like = None if r.looks_like is None else looks_like(r.looks_like, arm=r.bench.data.arm)
     meaning = meanings(arm=r.bench.data.arm).get(r.verdict, "")
-    told = answer(r.verdict, meaning, r.names, like)
+    told = answer(r.verdict, meaning, r.names, like, nothing=r.learned_nothing)
     shown = told.format(before=before, after=after, noise=noise)
     return f"{r.verdict} ({likely(r.probabilities[r.verdict])}): {shown}"
 
 
-def answer(verdict: str, meaning: str, names: Iterable[str], like: str | None) -> str:
+def answer(
+    verdict: str, meaning: str, names: Iterable[str], like: str | None, *, nothing: bool
+) -> str:
     """What a verdict says, with {before}, {after} and {noise} where rms in mm are to stand. names:
-    of the effects; like: what an unknown gap looks like."""
+    of the effects; like: what an unknown gap looks like; nothing: that was learned."""
     alone = "the instruments alone leave {noise} mm."
+    if nothing:
+        return (
+            "nothing can be said of a gap, since nothing moved that could show one. The "
+            "probabilities are those from before the measurement."
+        )
     if verdict == "none":
         return (
             f"{OTHERWISE[verdict]} that was measured. There is no gap to close. Of the {{before}} "
@@ -296,7 +303,7 @@ def _gap(r: GapResult) -> str:
 
 
 def _row(name: str, before: float, after: float, noise: float) -> str:
-    shrink = brief(before / after, 3) if after > 0 else "-"
+    shrink = brief(before / after, 3) if min(before, after) > 0 else "-"
     ratio = after / noise if noise > 0 else 1.0
     shown = f"{brief(before * MM_PER_M):>9s} {brief(after * MM_PER_M):>9s} {ratio:11.2f}"
     return f"  {name:22s}{shown}  {shrink:>6s}"

@@ -14,8 +14,10 @@ from identification.gap.laws.law import ACROSS, ANEW, HUNG, HUNG_LOST, KEPT, LOS
 from rig.units import MM_PER_M
 
 # What an entry says besides its law; kept, not interpreted.
+SEEN_TO = "seen_to_N"
 ABOUT = (
     "name",
+    SEEN_TO,
     "dataset",
     "emulated",
     "probability",

@@ -16,7 +16,7 @@ from rig.dataset import Dataset
 from rig.diagnosis.diagnose import Diagnosis
 from rig.diagnosis.diagnose_text import meanings
 from rig.diagnosis.gap_forms import to_entry
-from rig.diagnosis.gap_keys import CONTAINED, SPRINGS
+from rig.diagnosis.gap_keys import CONTAINED, SEEN_TO, SPRINGS
 from rig.digits import likely
 from rig.errors import InputError
 from rig.models.model_write import arm_lines, coupling_lines, flow
@@ -144,6 +144,7 @@ def _about(effect: EffectFound, dataset: Dataset) -> dict[str, Any]:
         "emulated": dataset.origin == "emulated",
         "probability": round(effect.probability, 4),
         "share_of_gap": round(effect.share_of_gap, 4),
+        SEEN_TO: _greatest(dataset),
         "parameters": {
             name: {"value": p.value, "ci95": [p.low, p.high], "unit": p.unit}
             for name, p in effect.parameters.items()
@@ -152,6 +153,15 @@ def _about(effect: EffectFound, dataset: Dataset) -> dict[str, Any]:
     if effect.name == "joint_stiffness_error":
         out[CONTAINED] = SPRINGS
     return out
+
+
+def _greatest(dataset: Dataset) -> dict[str, float]:
+    """Direction -> greatest force N, either way, that counts."""
+    columns = dataset.columns
+    force = np.abs(columns["force_N"])
+    used = ~columns["discarded"]
+    rows = {d: used & (columns["direction"] == d) for d in dataset.meta.directions}
+    return {d: round(float(force[mine].max()), 2) for d, mine in rows.items() if mine.any()}
 
 
 def _comment(effect: EffectFound, meaning: str) -> str:

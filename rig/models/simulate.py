@@ -21,6 +21,7 @@ from identification.uncertainty import TWO_SIDED
 from rig import schemas
 from rig.arrays import Array
 from rig.diagnosis.gap_forms import effects_of
+from rig.diagnosis.gap_keys import SEEN_TO
 from rig.diagnosis.gap_path import left_out, predict
 from rig.digits import number
 from rig.errors import InputError
@@ -123,7 +124,7 @@ def simulate(model: str | Path, protocol: str | Path) -> Simulation:
     notes = (*_notes(read, procedure, lasting), *left_out(effects.forms))
     if lasting:
         curves, more = _with_effects(read, lasting, procedure, curves)
-        notes = (*notes, *more)
+        notes = (*notes, *more, *_farther(read, lasting, procedure))
     names = tuple(dict.fromkeys([*effects.contained, *(f.word for f in lasting)]))
     return Simulation(read.name, str(protocol), procedure.title, curves, notes, names)
 
@@ -191,6 +192,27 @@ def _with_effects(
         force, moved = path.force[mine], path.displacement[mine]
         out.append(replace(curve, force=force, displacement=moved, path=holds))
     return tuple(out), notes
+
+
+def _farther(
+    model: ArmModel, forms: tuple[Form, ...], procedure: MeasurementProtocol
+) -> tuple[str, ...]:
+    """Directions in which effects are loaded further than where they were found."""
+    words, notes = {f.word for f in forms}, []
+    for entry in (e for e in model.effects if e.get("name") in words):
+        told = entry.get(SEEN_TO)
+        greatest = told if isinstance(told, dict) else {}
+        for run in procedure.runs:
+            seen, top = greatest.get(run.direction), max(abs(f) for f in run.forces_N)
+            if isinstance(seen, int | float) and top > _FARTHER * seen:
+                notes.append(
+                    f"{entry['name']}: seen up to {seen:.4g} N along {run.direction}, here up to "
+                    f"{top:.4g} N; what it does beyond is a guess."
+                )
+    return tuple(dict.fromkeys(notes))
+
+
+_FARTHER = 1.02  # times: levels are met no closer
 
 
 def _notes(

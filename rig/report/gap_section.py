@@ -53,6 +53,7 @@ def _answer(found: Node) -> Rich:
         "" if verdict in OTHERWISE else found["meanings"][verdict].text(),
         [e["name"].text() for e in found["effects"]],
         None if like.value is None else like["text"].text(),
+        nothing=found["nothing_learned"].value,
     )
     sizes = {k: found["gap"][f"{k}_rms_mm"].number(3) for k in ("before", "after", "noise")}
     parts = re.split(r"\{(before|after|noise)\}", told)

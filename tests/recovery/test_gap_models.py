@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -170,6 +171,9 @@ def test_a_model_predicts_on_its_own_procedure_what_was_fitted(
     plain, effect = parts.T
     write_model(replace(diagnosis, result=result), dataset, tmp_path / "m.yaml")
     found = simulate(tmp_path / "m.yaml", procedure)
+    assert not any("seen up to" in note for note in found.notes)  # no further than measured
+    far = float(np.abs(dataset.columns["force_N"][dataset.columns["direction"] == "x"]).max())
+    assert re.search(rf"seen_to_N: {{x: {far:.5g}", (tmp_path / "m.yaml").read_text())
     rows = result.bench.rows
     if not EFFECTS[word].laws.lasts:
         assert found.effects == ()

@@ -209,6 +209,39 @@ def test_a_model_file_as_prior(files: Path, tmp_path: Path) -> None:
         prior_of(tmp_path / "sure.yaml")
 
 
+def test_data_that_contradict_the_prior(
+    files: Path, single: IdentifyResult, tmp_path: Path
+) -> None:
+    """In micrometres: said before anything else, in every output, with the unit that fits; of a
+    spring that no unit explains, how far it is away."""
+    assert single.doubts == ()
+    assert single.to_json()["prior_conflict"] is None
+    measured = load(files / "single.h5")
+    columns = dict(measured.columns)
+    columns["displacement_mm"] = 1000 * columns["displacement_mm"]
+    write(replace(measured, columns=columns), tmp_path / "um.h5")
+    found = identify([tmp_path / "um.h5"], proposals=0)
+    (doubt,) = found.doubts
+    assert re.fullmatch(
+        r"Data and prior contradict each other: they agree if all joints are 0\.000\d+ times as "
+        r"stiff as the prior has them, 2\d of its standard deviations away\. Are these "
+        r"displacements in um or forces in kN\? The joints were taken with that factor, those that "
+        r"repeat the prior, too\.",
+        doubt,
+    )
+    lines = found.to_text().splitlines()
+    assert f"See to this first: {doubt}" == next(k for k in lines if k[0] not in " JPE")
+    assert found.to_json()["notes"][0] == doubt
+    assert found.to_json()["prior_conflict"]["common_factor"] < 1e-3
+    assert doubt in model_text(found)
+    stated = prior_of(MODELS / "F1.yaml")
+    stiff = replace(stated, stiffness=stated.stiffness * [10, 1, 1, 1, 1, 1])
+    (doubt,) = identify([files / "seen.h5"], prior=stiff, proposals=0).doubts
+    assert re.match(
+        r"Data and prior .*: they agree best if joint 1 is 0\.1\d* times .*taken as \d", doubt
+    )
+
+
 # --- what cannot be identified -------------------------------------------------------------------
 
 

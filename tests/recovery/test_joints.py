@@ -92,7 +92,7 @@ def test_intervals_cover_and_identified_joints_are_right(arm: Arm) -> None:
     rng = np.random.default_rng(2024)
     prior = default_prior(arm)
     covered, errors = [], []
-    identified = 0
+    identified = conflicts = 0
     for _ in range(100):
         truth = random_truth(rng, prior)
         fit = identify(arm, draw(rng, truth, rich_poses()), [GAINS], prior)
@@ -100,6 +100,8 @@ def test_intervals_cover_and_identified_joints_are_right(arm: Arm) -> None:
         covered.append((fit.ci95[:, 0] <= truth) & (truth <= fit.ci95[:, 1]))
         errors += list(np.abs(fit.stiffness / truth - 1)[fit.identified])
         identified += int(fit.identified.sum())
+        conflicts += fit.conflict is not None
+    assert conflicts <= 3  # of draws from the prior itself: 1 in 370
     assert 0.92 <= np.mean(covered) <= 0.98
     assert identified > 300
     assert max(errors) < 0.05
@@ -180,6 +182,81 @@ def test_unexplained_scatter_widens_the_intervals(arm: Arm) -> None:
     ]
     fit = identify(arm, claimed, [GAINS], default_prior(arm))
     assert 5 < fit.birge < 20
+    assert fit.conflict is None  # it is the data that were stated too sure, not the prior
+
+
+def scaled(data: list[Observation], times: float) -> list[Observation]:
+    """As if the displacement, and the joints' turning, were so many times as far."""
+    return [
+        replace(
+            o,
+            compliance=times * o.compliance,
+            u_compliance=times * o.u_compliance,
+            joints=None if o.joints is None else times * o.joints,
+            u_joints=None if o.u_joints is None else times * o.u_joints,
+        )
+        for o in data
+    ]
+
+
+def seen_by_joints(truth: Array) -> list[Observation]:
+    """Two directions in the published pose, without noise but with its uncertainties."""
+    data = []
+    for n in np.eye(3)[:2]:
+        shift, turned = deflect(PAPER_Q, truth, FORCE * n, np.zeros(3))
+        s = float(n @ shift) / FORCE
+        read, u = turned / FORCE, np.full(6, 1e-6)
+        data.append(Observation(PAPER_Q, n, None, s, 0.003 * s, read, u, label="one"))
+    return data
+
+
+@pytest.mark.parametrize("times", [1000.0, 4.448, 1 / 25.4])
+def test_a_factor_common_to_all_joints_is_found(arm: Arm, times: float) -> None:
+    """Another unit: the answer is the data's, not the prior's, and tells how far they are apart."""
+    prior = default_prior(arm)
+    two = [replace(o, joints=None, u_joints=None) for o in seen_by_joints(PAPER_C)]
+    plain = identify(arm, two, [GAINS], prior)
+    assert plain.conflict is None
+    fit = identify(arm, scaled(two, times), [GAINS], prior)
+    conflict = fit.conflict
+    assert conflict is not None
+    assert conflict.log_factor is not None
+    assert fit.birge == 1.0  # the data agree among themselves
+    assert abs(conflict.log_factor + np.log(times)) < 3 * conflict.u_log_factor
+    assert np.abs(conflict.away).min() > 4
+    # every joint, seen or not: the truth by the same factor, within what is stated
+    assert (np.abs(np.log(fit.stiffness * times / PAPER_C)) < 2.5 * fit.relative_sd).all()
+    assert (fit.data_share[[1, 5]] == 0).all()
+    seen = identify(arm, scaled(seen_by_joints(PAPER_C), times), [GAINS], prior)
+    np.testing.assert_allclose(seen.stiffness[[0, 2]] * times, PAPER_C[[0, 2]], rtol=0.03)
+
+
+def test_a_single_joint_beyond_the_prior_widens_the_prior(arm: Arm) -> None:
+    """Nothing is common to all: unseen joints keep their value, which is less sure."""
+    prior = default_prior(arm)
+    truth = PAPER_C / [1, 1, 10, 1, 1, 1]
+    fit = identify(arm, seen_by_joints(truth), [GAINS], prior)
+    conflict = fit.conflict
+    assert conflict is not None
+    assert conflict.log_factor is None
+    assert np.argmax(np.abs(conflict.away)) == 2
+    # as if the prior were drawn so wide: root mean square of what is seen, about
+    seen = np.log(PAPER_C / prior.stiffness)[[0, 2, 3, 4]] + [0, np.log(0.1), 0, 0]
+    stated = np.sqrt(np.log1p(prior.relative_sd[0] ** 2))
+    assert conflict.enlarged == pytest.approx(np.sqrt(np.mean(seen**2)) / stated, rel=0.15)
+    np.testing.assert_allclose(fit.stiffness[[0, 2]], truth[[0, 2]], rtol=0.03)
+    assert fit.stiffness[5] == pytest.approx(prior.stiffness[5])
+    assert fit.relative_sd[5] == pytest.approx(conflict.enlarged * stated)
+
+
+def test_laser_and_joint_readings_of_different_units_are_refused(arm: Arm) -> None:
+    data = seen_by_joints(PAPER_C)
+    for times in (1000.0, 1 / 25.4):
+        laser = [replace(o, compliance=times * o.compliance) for o in data]
+        with pytest.raises(ValueError, match="one: displacement and joint readings contradict"):
+            identify(arm, laser, [GAINS], default_prior(arm))
+    soft = [replace(o, compliance=1.3 * o.compliance) for o in data]  # a mounting that gives
+    assert identify(arm, soft, [GAINS], default_prior(arm)).birge > 1
 
 
 def test_contradictory_data_are_refused(arm: Arm) -> None:

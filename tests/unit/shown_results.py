@@ -57,6 +57,7 @@ def identified() -> IdentifyResult:
         dof=4.0,
         birge=1.0,
         prior=prior,
+        conflict=None,
     )
     proposals = (
         Proposal(Q, X, "x", 95.4, np.full(6, 0.05), "tells joint 4 (9.3 % to 3.1 %)"),
@@ -70,6 +71,7 @@ def identified() -> IdentifyResult:
         observations=(seen, replace(seen, direction=Y)),
         proposals=proposals,
         tool_xyz=(0.0, 0.0, 0.0),
+        doubts=(),
         notes=("a.h5: pose P1, direction y: 2 steps do not count towards k.",),
         banners=(EMULATED,),
     )

@@ -311,6 +311,7 @@ def test_a_force_that_stays_from_step_to_step_while_all_goes_on_is_an_amplifier_
     assert saturates(replace(full, displacement=still)) is None  # nothing was turned on
     top = replace(data, force=np.where(data.step == 4, 121.0, data.force))
     assert saturates(top) is None  # a last step of 1 N was asked for
+    assert saturates(replace(data, force=1e-3 * data.force)) is None  # kN: finer than stated
     assert saturates(replace(full, arm=False)) is None  # a specimen may flow
 
 

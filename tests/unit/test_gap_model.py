@@ -460,3 +460,13 @@ def test_the_comment_of_an_effect_says_where_it_may_sit() -> None:
     both = explained().result.effects[0]
     assert "; it may sit at joint 1, joint 5; not told apart from base_slip" in _comment(both, "")
     assert "sit at" not in _comment(replace(both, places={"joint 1": 1.0}), "")
+
+
+def test_loads_beyond_those_that_an_effect_was_seen_under_are_told(tmp_path: Path) -> None:
+    top = max(simulate(model(tmp_path), procedure(tmp_path)).curves[0].force)
+    for seen, told in ((top, False), (0.5 * top, True)):
+        entry = {**YIELD, "seen_to_N": {d: float(seen) for d in "xyz"}}
+        notes = simulate(model(tmp_path, entry), procedure(tmp_path)).notes
+        assert any(f"joint_yield: seen up to {seen:.4g} N along" in n for n in notes) is told
+    odd = simulate(model(tmp_path, {**YIELD, "seen_to_N": "far"}), procedure(tmp_path))
+    assert not any("seen up to" in n for n in odd.notes)

@@ -11,6 +11,8 @@ from identification.gap.answer.notes import FAULT, UNDECIDED, notes_of
 from identification.gap.answer.scale import off_scale
 from identification.gap.data import Curve, GapData
 from identification.gap.model.bench import make_bench
+from rig.diagnosis.diagnose import Diagnosis
+from rig.diagnosis.diagnose_text import render
 from tests.conformance.gap_designs import linear
 from tests.explained import explained
 
@@ -44,6 +46,25 @@ def test_a_wrong_unit_is_asked_for(
     assert all(moves in text for text in texts)
 
 
+@pytest.mark.parametrize(
+    ("displacement", "force", "units"),
+    [(1.0, 1 / 4.448, "forces in lbf"), (1 / 25.4, 1.0, "displacements in inches")],
+)
+def test_a_unit_of_an_arm_is_asked_for_by_its_name(
+    displacement: float, force: float, units: str
+) -> None:
+    """Springs of an arm are known to a tenth; those of a bench are often guessed."""
+    data = linear("paper")
+    arm = replace(data, displacement=displacement * data.displacement, force=force * data.force)
+    (text,) = said(arm)
+    assert f"in every pose and direction. Are these {units}?" in text
+    assert said(replace(arm, arm=False)) == []
+    one = np.where(arm.setup == 0, arm.displacement, arm.displacement / 1.3)
+    assert said(replace(arm, displacement=one)) == []  # no factor common to all
+    unsure = np.full(arm.joints, 2.0)
+    assert said(replace(arm, compliance_relative_sd=unsure)) == []
+
+
 def test_simulated_curves_that_go_the_other_way_are_told() -> None:
     data = linear("bench")
     slope = float(data.setups[0].lever**2 @ data.compliance)
@@ -71,3 +92,22 @@ def test_where_nothing_moves_no_gap_is_no_finding(still: str, verdict: str, kind
     said = {n.text: n.kind for n in notes_of(make_bench(data), verdict)}
     (text,) = (t for t in said if "The load does not change" in t or "Nothing moves by more" in t)
     assert said[text] == kind
+
+
+def test_where_nothing_moves_nothing_is_learned() -> None:
+    data = linear("bench")
+    still = replace(data, force=1e-9 * data.force, displacement=1e-9 * data.displacement)
+    assert not explained(data).learned_nothing
+    result = explained(still, withhold=["joint_yield"])
+    p = result.probabilities
+    assert p["none"] / p["unknown"] == pytest.approx(10.0)  # the priors
+    assert p["none"] / p["time_lag"] == pytest.approx(0.5 / 0.37 * 18)
+    assert p["joint_yield"] == p["base_compliance"] == 0.0  # taken away; needs an arm
+    assert sum(p.values()) == pytest.approx(1.0)
+    first, *_ = render(result).splitlines()
+    assert first.startswith("none (")
+    assert "nothing can be said of a gap, since nothing moved" in first
+    assert "no gap to close" not in first
+    told = Diagnosis("d", replace(result, before=0.0)).to_json()
+    assert told["nothing_learned"] is True
+    assert told["gap"]["shrink_factor"] == 1.0

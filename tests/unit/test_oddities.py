@@ -55,6 +55,16 @@ def test_a_rig_without_an_arm_misses_no_joint() -> None:
     assert notes(imported(rows, meta(BENCH))) == []
 
 
+# ------------------------------------------------------------------ clocks
+
+
+def test_clocks_that_do_not_go_alike_are_told() -> None:
+    rows = noisy(BENCH)
+    rows["time_s"] *= 1000  # milliseconds
+    said = "time_s goes 1000 times as fast as session_s: both are in seconds."
+    assert notes(imported(rows, meta(BENCH))) == [f"{said} Check the unit of the two"]
+
+
 # ------------------------------------------------------------------ empty steps
 
 

@@ -242,6 +242,11 @@ REFUSED: list[tuple[str | bytes, str]] = [
         'displacement_mm. Is it "force_kN"? Convert its values to N, then rename it.',
     ),
     (
+        f"{','.join(f'c{i}' for i in range(1, 15))}\n" + "1," * 13 + "1\n",
+        ": the column force_N is missing; the header has c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, "
+        "c11, c12, and 2 more.",
+    ),
+    (
         "force_N,time_s\n1,5\n",
         ": the column displacement_mm is missing; the header has force_N, time_s.",
     ),

@@ -82,6 +82,11 @@ class GapResult:
         return tuple(dict.fromkeys(e.name for e in self.effects))
 
     @property
+    def learned_nothing(self) -> bool:
+        """Nothing moved that could have shown a gap, and the probabilities are the priors."""
+        return self.verdict == "none" and self.bench.still
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What is said, without its kind."""
         return tuple(n.text for n in self.said)

@@ -7,8 +7,8 @@ but for what some data make rarer.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import comb, log
+from collections.abc import Callable, Collection
+from math import comb, exp, log
 from typing import NamedTuple
 
 from identification.gap.model.bench import Bench
@@ -82,6 +82,15 @@ def prior_of(words: frozenset[str], bench: Bench | None = None) -> float:
     named = words - frozenset(NAMELESS)
     first = LOG_ONE if named == words else LOG_UNKNOWN + LOG_SHAPED - log(len(NAMELESS))
     return first + (len(words) - 1) * LOG_MORE - log(comb(len(WORDS), len(named))) + rare
+
+
+def before_data(words: Collection[str]) -> dict[str, float]:
+    """Probability of every word to be the main cause, of `none` and `unknown`, where data taught
+    nothing; 0 of what is not among these words."""
+    logs = {w: prior_of(frozenset({w})) for w in WORDS if w in words}
+    logs |= {"none": LOG_NONE, "unknown": LOG_UNKNOWN}
+    total = sum(exp(v) for v in logs.values())
+    return {w: exp(logs[w]) / total if w in logs else 0.0 for w in [*WORDS, "none", "unknown"]}
 
 
 def _of_course(words: frozenset[str], course: Course) -> float:

@@ -10,6 +10,7 @@ the other one is freedom of its law, and it speaks for both.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -18,11 +19,20 @@ from identification.arrays import Array, Ints
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult, kept_within
 from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.priors import before_data
 from identification.gap.explanations.verdict import foresaw, with_posterior
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.heldout import folds, held_out
 from identification.gap.model.bench import Bench
-from identification.gap.words import BETWEEN_RUNS, DRIFTS, FRICTION, LATE, LINEAR
+from identification.gap.words import (
+    BETWEEN_RUNS,
+    DRIFTS,
+    FRICTION,
+    LATE,
+    LINEAR,
+    NEED_ARM,
+    WORDS,
+)
 
 FAILS = 1.9  # times the noise: then a repetition was not foreseen
 CLOSED = 0.22  # of what the effects move: if no more is left, it was foreseen all the same
@@ -46,6 +56,16 @@ def earned(found: SearchResult) -> SearchResult:
             break
         kept[todo[0].words] = _kept(found, todo[0], fold)
     return with_posterior(found, kept)
+
+
+def learned(found: SearchResult, withheld: Collection[str]) -> SearchResult:
+    """As before any data where nothing moved, and no effect, a drift for instance, is seen: that
+    nothing is missing then is no finding. withheld: words that the library was without."""
+    likeliest = max(found.probabilities, key=lambda w: found.probabilities[w])
+    if likeliest != "none" or not found.engine.bench.still:
+        return found
+    absent = set(withheld) if found.engine.bench.data.arm else NEED_ARM | set(withheld)
+    return replace(found, probabilities=before_data(set(WORDS) - absent))
 
 
 def _comes_again(bench: Bench) -> bool:

@@ -95,6 +95,11 @@ class Bench:
         return bool(q.stop > q.start)
 
     @property
+    def still(self) -> bool:
+        """No load that changes, or nothing that moves by more than a reading is uncertain by."""
+        return not np.ptp(self.load) > 0 or self.reach < self.noise.stated
+
+    @property
     def torque_unit(self) -> str:
         """Of thresholds and friction."""
         return "Nm" if self.data.arm else "N"

@@ -299,6 +299,7 @@ def goes_back(data: GapData) -> int | None:
 
 _SAME_FORCE, _GOES_ON = 3.0, 0.3  # standard uncertainties; of the usual way from step to step
 _SATURATED = 2  # steps
+_NO_STEP = 0.02  # of the largest force: less is no step, whatever a reading is uncertain by
 
 
 def saturates(data: GapData) -> float | None:
@@ -309,12 +310,13 @@ def saturates(data: GapData) -> float | None:
         return None
     first, count = first_rows(hold), np.bincount(hold)
     force, u = (np.add.reduceat(v, first) / count for v in (data.force, data.displacement))
-    same, seen = _SAME_FORCE * data.instruments.force, 0
+    seen = 0
     for run in np.unique(data.run):
         at = np.flatnonzero((data.run[first] == run) & (data.branch[first] == LOADING))
         if not at.size:
             continue
         top = float(force[at][np.abs(force[at]).argmax()])  # below zero where it is pulled
+        same = min(_SAME_FORCE * data.instruments.force, _NO_STEP * abs(top))
         ways, steps = np.sign(top) * np.diff(u[at]), np.diff(data.step[first][at])
         goes_on = ways > max(
             _CLEARLY * data.instruments.displacement,
