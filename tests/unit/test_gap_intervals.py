@@ -23,7 +23,7 @@ from identification.gap.answer.posterior import (
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
-from identification.gap.laws.interval import NOMINAL, Parameter
+from identification.gap.laws.interval import NOMINAL, Parameter, factors
 from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
@@ -87,7 +87,7 @@ def test_no_interval_of_a_threshold_reaches_below_zero(monkeypatch: pytest.Monke
     assert 70.0 < threshold.ci90[1] < threshold.high < top
     assert threshold.cut_at == top
     slope = found["slope_beyond_over_elastic"]
-    assert 0.0 < slope.low < slope.ci90[0]
+    assert 0.0 < slope.low <= slope.ci90[0] <= slope.value
     assert slope.cut_at is None
 
 
@@ -238,6 +238,26 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
     both = known_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_x"]
     assert both.value == pytest.approx(alone.value)
     assert both.high - both.low > 1.02 * (alone.high - alone.low)
+
+
+@pytest.mark.parametrize("by_factors", [False, True])
+def test_intervals_are_quantiles_of_what_is_possible(by_factors: bool) -> None:
+    """Of draws that are above zero and below the largest load; where none is near, as before."""
+    value, half, most = 2.0, 1.5 * 1.959964, 3.0
+    p = Parameter(value, value - half, value + half, "Nm", most=most)
+    drawn = value + 1.5 * np.random.default_rng(0).normal(size=200_000)
+    if by_factors:
+        p = replace(factors(value, np.exp(half), "Nm"), most=most)
+        drawn = value * np.exp(drawn - value)
+    drawn = drawn[(drawn > 0) & (drawn < most)]
+    found = p.possible(0.0)
+    wanted = np.quantile(drawn, [0.025, 0.05, 0.95, 0.975])
+    ends = [found.low, *found.ci90, found.high]
+    assert ends == pytest.approx(wanted, rel=0.02)
+    assert (found.value, found.cut_at) == (value, most)
+    far = replace(p, value=200.0, low=199.0, high=201.0, most=1e3)
+    assert (far.possible(0.0).low, far.possible(0.0).high) == pytest.approx((199.0, 201.0))
+    assert far.possible(0.0).cut_at is None
 
 
 def test_a_shape_beside_which_a_parameter_is_none_says_nothing_of_it() -> None:
