@@ -216,7 +216,8 @@ def _effect(e: EffectFound, data: GapData) -> dict[str, Any]:
 
 
 def _parameter(p: Parameter) -> dict[str, Any]:
-    return {"value": p.value, "ci95": [p.low, p.high], "ci90": list(p.ci90), "unit": p.unit}
+    out = {"value": p.value, "ci95": [p.low, p.high], "ci90": list(p.ci90), "unit": p.unit}
+    return out if p.cut_at is None else {**out, "largest_seen": p.cut_at}
 
 
 def _where(r: GapResult) -> dict[str, Any]:

@@ -279,7 +279,8 @@ def _parameters(found: Mapping[str, Parameter]) -> list[str]:
 
 def _value(p: Parameter) -> str:
     unit = "" if p.unit == "1" else f" {p.unit}"
-    return f"{brief(p.value)}{unit} (95 %: {brief(p.low)} to {brief(p.high)}{unit})"
+    largest = "" if p.cut_at is None else f"; the largest seen is {brief(p.cut_at)}{unit}"
+    return f"{brief(p.value)}{unit} (95 %: {brief(p.low)} to {brief(p.high)}{unit}{largest})"
 
 
 def _gap(r: GapResult) -> str:

@@ -23,7 +23,7 @@ from identification.gap.answer.posterior import (
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
-from identification.gap.laws.interval import NOMINAL, Parameter
+from identification.gap.laws.interval import NOMINAL, Parameter, factors
 from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import Variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
@@ -47,8 +47,10 @@ def test_a_mixture_spans_what_its_parts_span() -> None:
     assert (almost.value, almost.high) == pytest.approx((10.0, 11.96), abs=0.02)
 
 
-def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
-    """The same column under two names of thresholds: neither the data nor the prior decide."""
+@pytest.mark.parametrize("alike", [True, False])
+def test_an_interval_holds_what_fits_alike_at_the_named_joint(alike: bool) -> None:
+    """The same column under two names of thresholds: neither the data nor the prior decide. The
+    value is that of the explanation, not one between; another joint's is no threshold of this."""
     bench = small_bench()
     engine = small_engine(bench)
     common = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0}
@@ -62,17 +64,17 @@ def test_two_thresholds_that_fit_alike_are_both_in_the_interval() -> None:
             info={**common, "centre": c, "joint": j},
             prior=0.5,
         )
-        for c, j in ((30.0, 0), (60.0, 1))
+        for c, j in ((30.0, 0), (60.0, 0 if alike else 1))
     )
     chosen = Explanation((Part(low, 1.0),), 0.0, 0.0, (0.0,), 0.0)
     found = known_of(engine, [low, high], chosen)[0].parameters["threshold"]
-    assert found.value == pytest.approx(30.0, rel=0.01)  # where the explanation says
+    assert found.value == 30.0
     assert found.low < 30.0
-    assert found.high > 60.0
+    assert (found.high > 60.0) == alike
 
 
 def test_no_interval_of_a_threshold_reaches_below_zero(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However much it moves with what stands beside it."""
+    """However much it moves with what stands beside it; nor beyond the largest load."""
     bench = small_bench()
     engine = small_engine(bench)
     info = {"radius": np.array([30.0]), "load": bench.load, "flow_s": 0.0, "centre": 30.0}
@@ -80,9 +82,13 @@ def test_no_interval_of_a_threshold_reaches_below_zero(monkeypatch: pytest.Monke
     monkeypatch.setattr("identification.gap.answer.posterior._moves", lambda *_: 100.0**2)
     chosen = Explanation((Part(v, 1.0),), 0.0, 0.0, (0.0,), 0.0)
     found = known_of(engine, [v], chosen)[0].parameters
-    assert found["threshold"].low == found["threshold"].ci90[0] == 0.0
-    assert found["threshold"].high > 200.0
-    assert found["slope_beyond_over_elastic"].low < 0.0
+    threshold, top = found["threshold"], float(np.abs(bench.load).max())
+    assert 0.0 < threshold.low < threshold.ci90[0] < threshold.value == 30.0
+    assert 70.0 < threshold.ci90[1] < threshold.high < top
+    assert threshold.cut_at == top
+    slope = found["slope_beyond_over_elastic"]
+    assert 0.0 < slope.low <= slope.ci90[0] <= slope.value
+    assert slope.cut_at is None
 
 
 def test_a_joint_that_was_looked_at_more_closely_is_no_likelier_for_that() -> None:
@@ -232,6 +238,26 @@ def test_what_stands_beside_an_effect_moves_its_parameters() -> None:
     both = known_of(engine, [mine, rival, twice], chosen)[0].parameters["factor_x"]
     assert both.value == pytest.approx(alone.value)
     assert both.high - both.low > 1.02 * (alone.high - alone.low)
+
+
+@pytest.mark.parametrize("by_factors", [False, True])
+def test_intervals_are_quantiles_of_what_is_possible(by_factors: bool) -> None:
+    """Of draws that are above zero and below the largest load; where none is near, as before."""
+    value, half, most = 2.0, 1.5 * 1.959964, 3.0
+    p = Parameter(value, value - half, value + half, "Nm", most=most)
+    drawn = value + 1.5 * np.random.default_rng(0).normal(size=200_000)
+    if by_factors:
+        p = replace(factors(value, np.exp(half), "Nm"), most=most)
+        drawn = value * np.exp(drawn - value)
+    drawn = drawn[(drawn > 0) & (drawn < most)]
+    found = p.possible(0.0)
+    wanted = np.quantile(drawn, [0.025, 0.05, 0.95, 0.975])
+    ends = [found.low, *found.ci90, found.high]
+    assert ends == pytest.approx(wanted, rel=0.02)
+    assert (found.value, found.cut_at) == (value, most)
+    far = replace(p, value=200.0, low=199.0, high=201.0, most=1e3)
+    assert (far.possible(0.0).low, far.possible(0.0).high) == pytest.approx((199.0, 201.0))
+    assert far.possible(0.0).cut_at is None
 
 
 def test_a_shape_beside_which_a_parameter_is_none_says_nothing_of_it() -> None:

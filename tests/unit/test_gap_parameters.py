@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.answer.forms import describe
 from identification.gap.answer.parameters import parameters
 from identification.gap.answer.posterior import (
     Known,
@@ -76,6 +77,39 @@ def sd(p: Parameter) -> float:
 
 def no_spread(w: Array) -> Array:
     return np.zeros((len(w), len(w)))
+
+
+SAME = {  # parameter -> key of the term that a model file has for it
+    ("joint_yield", "threshold"): "threshold",
+    ("base_slip", "threshold"): "threshold",
+    ("joint_backlash", "width"): "width",
+    ("joint_creep", "retardation_time"): "retardation_time",
+    ("base_compliance", "compliance_about_x"): "compliance",
+    ("contact_seating", "force_scale"): "force_scale",
+}
+
+
+@pytest.mark.parametrize(("word", "name"), SAME)
+def test_a_parameter_of_a_single_term_is_what_the_model_file_says(word: str, name: str) -> None:
+    """Of what several terms share it is an equivalent (docs/gap.md)."""
+    arm = word.startswith("base")
+    bench, key = make_bench(arm_data()) if arm else up_and_down(), SAME[word, name]
+    single = next(
+        v
+        for v in library(bench, [word])
+        if v.info.get("knee", "sharp") == "sharp" and (not arm or "axis x" in v.label)
+    )
+    if "radius" in single.info:
+        alone = {"radius": single.info["radius"][:1], "centre": single.info["radius"][0]}
+        single = replace(single, columns=single.columns[:1], info={**single.info, **alone})
+    w = np.zeros(len(single.columns))
+    w[0] = 1e-3
+    form = describe(bench, Part(single, 1.0), w, no_spread(w))
+    term = form.law.terms[0]
+    written = term.shape.get(key, form.values[0])
+    assert key in term.shape or key == term.coefficient
+    found = parameters(bench, Part(single, 1.0), w, no_spread(w), NOMINAL)[name]
+    assert found.value * (1e-3 if found.unit == "mm" else 1.0) == pytest.approx(written, rel=1e-9)
 
 
 def test_a_round_knee_has_the_threshold_of_the_sharp_one_with_equal_work() -> None:
@@ -355,7 +389,7 @@ def test_friction_is_not_below_zero() -> None:
     softer = Softer({}, {}, {})
     for way, below in ((-0.1, True), (0.9, False)):
         read = parameters(bench, Part(rubs, 1.0), np.full(k, way), 0.01 * np.eye(k), softer)
-        friction = read["friction"]
+        friction = read["friction"].possible(0.0)
         assert (friction.value == 0.0) is below
         assert (friction.low == 0.0) is below
         assert 0 <= friction.ci90[0] <= friction.ci90[1] <= friction.high

@@ -20,7 +20,7 @@ from identification.gap.laws.interval import Parameter
 from rig import cli
 from rig.blind import text
 from rig.blind.score import report
-from rig.diagnosis import diagnose_text
+from rig.diagnosis import diagnose, diagnose_text
 from tests.unit import shown_results as shown
 from tests.unit.test_blind_judge import campaign
 
@@ -144,3 +144,7 @@ def test_what_each_of_many_runs_has_to_itself_is_one_line_with_its_range() -> No
         "    drift_x_run2 = -1 N (95 %: -1.1 to -0.8 N)",
         "    lag = 1 s (95 %: 0.9 to 1.1 s)",
     ]
+    cut = Parameter(1.0, 0.5, 2.0, "N", most=1.5).possible(0.0)
+    assert diagnose_text._value(cut).endswith(" N; the largest seen is 1.5 N)")
+    assert diagnose._parameter(cut)["largest_seen"] == 1.5
+    assert "largest_seen" not in diagnose._parameter(two["drift_x_run1"])

@@ -21,7 +21,7 @@ from identification.gap.explanations.explanation import Explanation, conditioned
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.penalties import SAME_JOINT, minor_parts
 from identification.gap.explanations.several import family_of
-from identification.gap.laws.interval import Parameter, Softer, from_zero
+from identification.gap.laws.interval import Parameter, Softer
 from identification.gap.model.variants import Variant, place_of
 from identification.gap.search.readings import as_moved
 from identification.gap.search.shares import sized
@@ -51,11 +51,11 @@ def settled(
     """The explanation with its effects at their likeliest joints or axes (a grid's best shape may
     sit where few others do), and parameters and places of each.
 
-    Of parameters: 95 % intervals of the mixture of the effect's likeliest shapes, wherever they
-    sit, under every size of imperfection; value: of those that sit where the explanation says. What
-    names its joint or axis is mixed over the shapes that have it. By how much a value moves with
-    the shapes of the effects beside it, and with which effects these are (rivals: other
-    explanations, by their weights), adds to its variance."""
+    Of parameters: value: that of the explanation itself, whose terms a model file takes; 95 %
+    intervals of the mixture of the effect's likeliest shapes at the same joint or axis, of any
+    depth, under every size of imperfection. By how much a value moves with the shapes of the
+    effects beside it, and with which effects these are (rivals: other explanations, by their
+    weights), adds to its variance. No interval reaches beyond what is possible, or was seen."""
     each = _all_shapes(engine, variants, chosen)
     for shapes in each:
         better = shapes.elsewhere()
@@ -75,17 +75,22 @@ def _known(
 ) -> list[Known]:
     likely = _likely(rivals, chosen)
     others = [(_by_word(e, _read(engine, e)), weight) for e, weight in likely]
-    out = []
+    said, out = _read(engine, chosen), []
     for i, shapes in enumerate(each):
-        word, own = chosen.parts[i].word, shapes.own()
+        word, own = chosen.parts[i].word, shapes.own(said[i])
         beside = [e for e in each if e.index != i]
         of_rivals = [(r[word], w) for r, w in others if word in r]
         wide = {n: _wider(p, _moves(n, p.value, i, beside, of_rivals)) for n, p in own.items()}
         found = {n: _stretched(p) for n, p in wide.items()} if beside else wide
-        sizes = EFFECTS[word].not_negative
-        found = {n: from_zero(p) if n in sizes else p for n, p in found.items()}
+        found = {n: p.possible(_least(word, n)) for n, p in found.items()}
         out.append(Known(found, shapes.places()))
     return out
+
+
+def _least(word: str, name: str) -> float:
+    """Of a parameter, by its name, with or without the direction, axis or segment that ends it."""
+    above_zero = {name, name.rpartition("_")[0]} & {*EFFECTS[word].not_negative}
+    return 0.0 if above_zero else -np.inf
 
 
 # Of 78 parameters in blind mixtures 78 % lay within what should have been 90 % intervals, of 94
@@ -107,7 +112,8 @@ def _stretched(p: Parameter) -> Parameter:
 
 class _Shapes:
     """An effect of an explanation in all shapes that the data leave open, the others as they are;
-    every[0] is the explanation itself, read: parameters of all effects in those that count."""
+    every[0] has the shape of the explanation, read: parameters of all effects in those that count.
+    """
 
     def __init__(
         self, engine: Engine, variants: Sequence[Variant], chosen: Explanation, index: int
@@ -120,21 +126,20 @@ class _Shapes:
         weights = np.array([weight for _, weight in self.open])
         self.share = np.exp(weights - weights.max())
 
-    def own(self) -> Parameters:
-        """Parameters of the effect, the others as they are."""
+    def own(self, said: Parameters) -> Parameters:
+        """Parameters of the effect, the others as they are; said: of the explanation itself."""
         found, index, word = [r[self.index] for r in self.read], self.index, self._part.word
-        place = place_of(self._part.variant)
-        here = np.array([place_of(e.parts[index].variant) == place for e, _ in self.open])
+        place = _named(self._part.variant)
+        here = np.array([_named(e.parts[index].variant) == place for e, _ in self.open])
         beside = _beside(self.every, self.open, index)
         step = _read(self.engine, beside)[index] if beside is not None else {}
         out = {}
-        for name in found[0]:
-            has = np.array([name in f for f in found])
-            mine = has & here
-            mixed = _mixture([f[name] for f in found if name in f], self.share[has])
-            value = _mixture(
-                [f[name] for f, m in zip(found, mine, strict=True) if m], self.share[mine]
-            ).value
+        for name in said:
+            mine = np.array([name in f for f in found])
+            mine &= here | name.startswith(_ANYWHERE)
+            alike = [f[name] for f, m in zip(found, mine, strict=True) if m]
+            value = said[name].value
+            mixed = _mixture(alike, self.share[mine]) if alike else said[name]
             grid = abs(step[name].value - value) / 12**0.5 if name in step else 0.0
             meant = 0.0 if word in LINEAR else self._defined * abs(value)
             out[name] = _wider(replace(mixed, value=value), grid**2 + meant**2)
@@ -169,6 +174,10 @@ class _Shapes:
     @property
     def _part(self) -> Part:
         return self.chosen.parts[self.index]
+
+
+# What means the same wherever an effect sits: pushes at the target, and what names its joint.
+_ANYWHERE = ("onset_", "factor_joint")
 
 
 def _named(variant: Variant) -> str:
@@ -222,9 +231,12 @@ def _wider(p: Parameter, variance: float) -> Parameter:
     sd = variance**0.5
 
     def ends(low: float, high: float, deviations: float) -> tuple[float, float]:
-        below, above = max(p.value - low, 0.0), max(high - p.value, 0.0)
-        more = deviations * sd
-        return p.value - float(np.hypot(below, more)), p.value + float(np.hypot(above, more))
+        if p.by_factors:
+            off, more = np.log([p.value / low, high / p.value]), deviations * sd / p.value
+            below, above = np.exp(np.hypot(np.maximum(off, 0.0), more))
+            return p.value / float(below), p.value * float(above)
+        below, above = np.hypot(np.maximum([p.value - low, high - p.value], 0.0), deviations * sd)
+        return p.value - float(below), p.value + float(above)
 
     low, high = ends(p.low, p.high, TWO_SIDED)
     inner = None if p.inner is None else ends(*p.inner, TWO_SIDED_90)
@@ -368,21 +380,21 @@ def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:
 
 
 def _mixture(each: list[Parameter], share: Array) -> Parameter:
-    """Median and interval of a mixture of normals; one alone keeps its own, skewed as it may be."""
+    """Median and interval of a mixture of normals, of what is known to a factor by its logarithm;
+    one alone keeps its own, skewed as it may be."""
     if len(each) == 1:
         return each[0]
     share = share / share.sum()
     ends = np.array([[p.value, p.low, p.high] for p in each])
-    # what spans factors (a time constant, a force scale) is mixed by its logarithm
-    factors = np.all(ends > 0) and np.any(ends[:, 2] > 1.5 * ends[:, 1])
-    skewed = bool(
-        factors and np.allclose(ends[:, 2] * ends[:, 1], ends[:, 0] ** 2, rtol=0.1, atol=0)
-    )
+    skewed = each[0].by_factors
     mean, low, high = (np.log(ends) if skewed else ends).T
     sd = np.maximum(high - low, 0.0) / (2 * TWO_SIDED) + 1e-300
     out = _quantiles(mean, sd, share, (0.5, 0.025, 0.975, 0.05, 0.95))
     value, least, most, *inner = (float(np.exp(v)) for v in out) if skewed else out
-    return Parameter(value, least, most, each[0].unit, (inner[0], inner[1]))
+    largest = max(p.most for p in each)
+    return replace(
+        each[0], value=value, low=least, high=most, inner=(inner[0], inner[1]), most=largest
+    )
 
 
 def _quantiles(mean: Array, sd: Array, share: Array, of: Sequence[float]) -> list[float]:

@@ -202,4 +202,5 @@ EFFECT = Effect(
     laws=Laws(_describe, _columns),
     lengths=(),
     finer=None,
+    not_negative=("compliance_about",),
 )

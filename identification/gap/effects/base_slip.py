@@ -163,5 +163,5 @@ EFFECT = Effect(
     lengths=("slope_beyond_over_elastic",),
     finer=partial(knees_closer.finer, between=between),
     beside=True,
-    not_negative=("threshold", "threshold_of_force"),
+    not_negative=("threshold", "threshold_of_force", "onset", "slope_beyond_over_elastic"),
 )

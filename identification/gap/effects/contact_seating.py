@@ -14,13 +14,14 @@ Source: flattening of asperities in clamped joints, Greenwood and Williamson 196
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.laws.closer import Word, closing_in
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Coefficients, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter, factors
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -287,12 +288,14 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
 
 
 def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
+    """A force above the largest that was read closes nothing that was seen."""
     f0, top = float(v.info["force_N"]), float(np.abs(bench.load).max())
+    most = float(np.ptp(np.append(bench.rows.measured_force, 0.0))) if bench.imposed else top
     scales = v.info["laws"]
     at_top = np.array([LAWS[law](np.array(top / scale)) for law, scale in scales])
     return {
         "depth": found.linear(at_top, "mm", 1e3),
-        "force_scale": Parameter(f0, f0 / 2, f0 * 2, "N"),
+        "force_scale": replace(factors(f0, 2.0, "N"), most=most),
     }
 
 
@@ -323,4 +326,5 @@ EFFECT = Effect(
     laws=Laws(_describe, _columns),
     lengths=("depth",),
     finer=_look_closer,
+    not_negative=("depth",),
 )

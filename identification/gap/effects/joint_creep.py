@@ -23,7 +23,7 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.laws.curves import BENT_SLOPE
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Coefficients, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter, factors
 from identification.gap.laws.law import ANEW, Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import retarded, row_time
@@ -177,7 +177,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
             -line * whole * np.expm1(-seconds / times), joint
         ),
         "run": Parameter(seconds, seconds, seconds, "s"),
-        "retardation_time": Parameter(mean, mean / 3, mean * 3, "s"),
+        "retardation_time": factors(mean, 3.0, "s"),
     }
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import LEAST_FACTOR, Coefficients, Parameter
+from identification.gap.laws.interval import LEAST_FACTOR, Coefficients, Parameter, factors
 from identification.gap.laws.law import Law, Laws, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -112,7 +112,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
         spread = np.exp(min(nats, -np.log(LEAST_FACTOR)))
         value = whole if bench.imposed else 1 / whole
         name = bench.data.spring_name(j)
-        out[f"factor_{name}"] = Parameter(value, value / spread, value * spread, "1")
+        out[f"factor_{name}"] = factors(value, float(spread), "1")
     return out
 
 

@@ -136,7 +136,8 @@ def _named(bench: Bench, v: Variant, found: Parameter) -> dict[str, Parameter]:
         return {"threshold": moved(found, 0.0, half), "threshold_of_load": push}
     value = abs(found.value + sense * hangs)
     low, high = value - (found.value - found.low), value + (found.high - found.value)
-    net_of = moved(Parameter(value, low, high, found.unit), 0.0, half)
+    most = abs(found.most + sense * hangs)
+    net_of = moved(Parameter(value, low, high, found.unit, most=most), 0.0, half)
     return {"threshold": net_of, "threshold_of_load": found}
 
 
@@ -169,5 +170,5 @@ EFFECT = Effect(
     lengths=("slope_beyond_over_elastic",),
     finer=knees_closer.finer,
     beside=True,
-    not_negative=("threshold", "threshold_of_load"),
+    not_negative=("threshold", "threshold_of_load", "onset", "slope_beyond_over_elastic"),
 )

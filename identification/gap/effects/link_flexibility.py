@@ -131,4 +131,5 @@ EFFECT = Effect(
     laws=Laws(_describe, _columns),
     lengths=(),
     finer=None,
+    not_negative=("bending_compliance_over_nominal", "twist_compliance_over_nominal"),
 )

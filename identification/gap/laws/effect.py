@@ -28,7 +28,8 @@ class Effect:
         None where it is linear in all that is unknown, or hardly changes between two of them.
     beside: whether it is scored beside the leading word before: what that does must not decide
         where a smaller effect is looked for.
-    not_negative: those of the parameters of which no interval reaches below zero.
+    not_negative: those of the parameters of which no interval reaches below zero; without what
+        follows the last underscore where they have one of each direction, axis or segment.
     """
 
     word: str

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws.interval import Coefficients, Parameter, from_zero
+from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import (
     ACROSS,
     ANEW,
@@ -148,7 +150,10 @@ def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Param
         found = found.on_spring(slips - 1, joint)
     if law in ON_TOP:  # of all that gives way at large loads, as of the other convention
         found = found.on_spring(slips, joint)
+    share = found.per_spring(slips, joint)
+    if bench.data.arm or not bench.imposed:  # no friction holds back more than all
+        share = replace(share, most=1.0)
     return {
-        "friction": from_zero(found.linear(slips * radius, bench.torque_unit)),
-        "share_through_friction": found.per_spring(slips, joint),
+        "friction": found.linear(slips * radius, bench.torque_unit),
+        "share_through_friction": share,
     }

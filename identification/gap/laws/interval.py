@@ -13,13 +13,17 @@ from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 @dataclass(frozen=True)
 class Parameter:
     """value with its 95 % interval; inner: the 90 % one, where no normal law gives it: a threshold
-    that may be one joint's or another's has two places, and nothing between."""
+    that may be at one depth or another has two places, and nothing between. most: the largest that
+    is possible: of a threshold the largest load, as none above it is seen. by_factors: it is known
+    to a factor, as a time constant is."""
 
     value: float
     low: float
     high: float
     unit: str
     inner: tuple[float, float] | None = None
+    most: float = np.inf
+    by_factors: bool = False
 
     @property
     def sd(self) -> float:
@@ -31,10 +35,17 @@ class Parameter:
         """The 90 % interval."""
         if self.inner is not None:
             return self.inner
-        low, high = (
-            self.value + TWO_SIDED_90 / TWO_SIDED * (v - self.value) for v in (self.low, self.high)
-        )
+        nearer = TWO_SIDED_90 / TWO_SIDED
+        if self.by_factors:
+            low, high = (self.value * (v / self.value) ** nearer for v in (self.low, self.high))
+        else:
+            low, high = (self.value + nearer * (v - self.value) for v in (self.low, self.high))
         return low, high
+
+    @property
+    def cut_at(self) -> float | None:
+        """The largest load that was seen, where the interval would have gone on beyond it."""
+        return self.most if self.most < np.inf and self.unit != "1" else None
 
     def over(self, factor: Parameter) -> Parameter:
         """Divided by a factor that is known independently of it."""
@@ -46,7 +57,44 @@ class Parameter:
             return value - float(off[0]), value + float(off[1])
 
         inner = self.inner and ends(*self.inner, half * TWO_SIDED_90 / TWO_SIDED)
-        return Parameter(value, *ends(self.low, self.high, half), self.unit, inner)
+        low, high = ends(self.low, self.high, half)
+        most = self.most / factor.value
+        return replace(self, value=value, low=low, high=high, inner=inner, most=most)
+
+    def possible(self, least: float) -> Parameter:
+        """Its intervals by the quantiles of what is possible, from `least` to `most`; most then:
+        infinite where all of the 95 % lay below it anyway."""
+        if not self.low < self.high:
+            return self
+        value = float(np.clip(self.value, least, self.most))
+
+        def of(ends: tuple[float, float], deviations: float) -> tuple[float, float]:
+            if not self.by_factors:
+                return _between(value, ends, deviations, (least, self.most))
+            about, low, high, most = np.log([value, *ends, self.most]).tolist()
+            low, high = _between(about, (low, high), deviations, (-np.inf, most))
+            return float(np.exp(low)), float(np.exp(high))
+
+        low, high = of((self.low, self.high), TWO_SIDED)
+        inner, most = of(self.ci90, TWO_SIDED_90), self.most if self.high > self.most else np.inf
+        return replace(self, value=value, low=low, high=high, inner=inner, most=most)
+
+
+def _between(
+    value: float, ends: tuple[float, float], deviations: float, possible: tuple[float, float]
+) -> tuple[float, float]:
+    """Ends of an interval of so many standard deviations, those on either side of the value its
+    own, in the distribution that ends where nothing more is possible."""
+    from scipy.special import ndtr, ndtri  # its import takes a tenth of a second
+
+    below, above = max(value - ends[0], 0.0) / deviations, max(ends[1] - value, 0.0) / deviations
+    first = ndtr((possible[0] - value) / below) if below > 0 else 0.5
+    last = ndtr((possible[1] - value) / above) if above > 0 else 0.5
+    tail = ndtr(-deviations) * (last - first)
+    low, high = (
+        value + z * (below if z < 0 else above) for z in ndtri([first + tail, last - tail])
+    )
+    return min(float(low), value), max(float(high), value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +184,6 @@ def normal(value: float, variance: float, unit: str) -> Parameter:
     return Parameter(value, value - half, value + half, unit)
 
 
-def from_zero(p: Parameter) -> Parameter:
-    """Of what is not below zero, however little the data tell of it."""
-    if p.low >= 0:
-        return p
-    value, low, high, *inner = (max(v, 0.0) for v in (p.value, p.low, p.high, *p.ci90))
-    return Parameter(value, low, high, p.unit, (inner[0], inner[1]))
+def factors(value: float, spread: float, unit: str) -> Parameter:
+    """A value that is known to a factor."""
+    return Parameter(value, value / spread, value * spread, unit, by_factors=True)

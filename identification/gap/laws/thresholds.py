@@ -7,12 +7,13 @@ same end with the same work: the bilinear curve of equal area, as with push-over
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws.interval import Coefficients, Parameter, normal
+from identification.gap.laws.interval import Coefficients, Parameter, factors, normal
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 from identification.uncertainty import TWO_SIDED
@@ -40,21 +41,22 @@ def of_knee(
     least = v.least  # what bends less does not give way
     value, low, high = (max(s, least) for s in (slope.value, slope.low, slope.high))
     if bench.imposed and not bench.data.arm:
-        threshold = _carried(threshold, *found.of_spring(int(info["joint"])))
+        most = float(np.ptp(np.append(bench.rows.measured_force, 0.0)))
+        threshold = _carried(threshold, *found.of_spring(int(info["joint"])), most)
     out = named(bench, v, threshold)
     if bench.data.arm:
         met = out.get("threshold_of_load", threshold)
         out |= _onsets(bench, np.asarray(info["load"]), met)
     out["slope_beyond_over_elastic"] = Parameter(value, low, high, "1")
     if info["flow_s"]:
-        flow = float(info["flow_s"])
-        out["flow_time"] = Parameter(flow, flow / 3, flow * 3, "s")
+        out["flow_time"] = factors(float(info["flow_s"]), 3.0, "s")
     return out
 
 
 def _threshold(bench: Bench, v: Variant, knee: Coefficients) -> Parameter:
     """`top - sum w (top - r)^2 / sum w (top - r)` of plays of radii r, by its derivatives; one
-    alone is known to the step of its grid. The gain of the force acts on every threshold."""
+    alone is known to the step of its grid. The gain of the force acts on every threshold. One above
+    the largest load can't be seen."""
     info = v.info
     radius = np.asarray(info["radius"])
     top = _top(info)
@@ -67,16 +69,18 @@ def _threshold(bench: Bench, v: Variant, knee: Coefficients) -> Parameter:
         value = float(np.clip(top - mean, radius.min(), min(float(radius.max()), top)))
         variance = float(slope @ knee.cov @ slope)
     shared = bench.data.instruments.force_gain if not bench.imposed else 0.0
-    return normal(value, max(variance, 0.0) + (shared * value) ** 2, bench.torque_unit)
+    found = normal(value, max(variance, 0.0) + (shared * value) ** 2, bench.torque_unit)
+    return replace(found, most=top)
 
 
-def _carried(way: Parameter, stiffer: float, variance: float) -> Parameter:
-    """What the spring really carries where a stroke reaches what the simulated one would carry."""
+def _carried(way: Parameter, stiffer: float, variance: float, most: float) -> Parameter:
+    """What the spring really carries where a stroke reaches what the simulated one would carry;
+    most: the largest force, N."""
     about = float(abs(way.value) * TWO_SIDED * variance**0.5)
     low, high = (stiffer * abs(end - way.value) for end in (way.low, way.high))
     value = stiffer * way.value
     ends = value - float(np.hypot(low, about)), value + float(np.hypot(high, about))
-    return Parameter(value, *ends, way.unit)
+    return Parameter(value, *ends, way.unit, most=most)
 
 
 def _top(info: Mapping[str, Any]) -> float:
@@ -88,7 +92,8 @@ def moved(p: Parameter, shift: float, half: float) -> Parameter:
     """Shifted, its interval wider by what is independent of it."""
     low, high = np.hypot(p.value - p.low, half), np.hypot(p.high - p.value, half)
     value = p.value + shift
-    return Parameter(value, value - float(low), value + float(high), p.unit)
+    most = p.most + shift + half
+    return Parameter(value, value - float(low), value + float(high), p.unit, most=most)
 
 
 def _onsets(bench: Bench, load: Array, threshold: Parameter) -> dict[str, Parameter]:
@@ -110,5 +115,6 @@ def _onsets(bench: Bench, load: Array, threshold: Parameter) -> dict[str, Parame
 
 def over(threshold: Parameter, lever: float) -> Parameter:
     """The force that makes the threshold at a lever, m."""
-    value, low, high = (v / lever for v in (threshold.value, threshold.low, threshold.high))
-    return Parameter(value, low, high, "N")
+    t = threshold
+    value, low, high, most = (v / lever for v in (t.value, t.low, t.high, t.most))
+    return Parameter(value, low, high, "N", most=most)
