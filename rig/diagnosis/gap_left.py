@@ -170,4 +170,4 @@ def _unrepeated(rest: Remainder, *, finer: bool) -> str:
     if rest.unrepeated_rms == 0:
         return "beside it, noise"
     more = "is finer or does not repeat" if finer else "does not repeat"
-    return f"another {rest.unrepeated_rms * MM_PER_M:.2g} mm rms {more}"
+    return f"{'another ' * rest.clear}{rest.unrepeated_rms * MM_PER_M:.2g} mm rms {more}"
