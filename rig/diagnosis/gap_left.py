@@ -112,7 +112,8 @@ def remaining(shown: Shown, points: Points, rest: Remainder) -> Figure:
             axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
         axes.set_title(shown.setup_name(setup), fontsize=10)
     label_below(grid, drive_label(shown.imposed))
-    figure.supylabel(gap_label(shown.imposed, "Left unexplained"), fontsize=10)
+    label = gap_label(shown.imposed, "Left unexplained").replace(" (", "\n(")
+    figure.supylabel(label, fontsize=10)
     set_title(figure, _remainder_title(shown, rest))
     shared_legend(figure, [axes for (axes,) in grid])
     return figure
