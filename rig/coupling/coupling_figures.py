@@ -63,8 +63,8 @@ def stiffness(result: CouplingResult) -> Figure:
         rows.append(("coupled, published", np.array(PUBLISHED_COUPLED), None, COLOURS[1]))
     colours = {"rigid": COLOURS[1], "compliant": COLOURS[2], "point": COLOURS[3]}
     for kind, k in result.pair.items():
-        u = result.u_pair[kind][:2] * N_PER_MM
-        rows.append((f"coupled, {kind}", k[:2] * N_PER_MM, u, colours[kind]))
+        own = result.u_pair[kind][:2] * N_PER_MM
+        rows.append((f"coupled, {kind}", k[:2] * N_PER_MM, own, colours[kind]))
     for i, (label, values, u, colour) in enumerate(rows):
         at = np.arange(2) + (i - (len(rows) - 1) / 2) * 0.8 / len(rows)
         axes.errorbar(
