@@ -14,7 +14,8 @@ from identification.maps import Coupling, Stance, branch_of, stiffness_map
 from rig.arrays import Array
 from rig.canvas import blank
 from rig.coupling.couple_text import PUBLISHED_COUPLED, PUBLISHED_SINGLE, is_published_setup
-from rig.plotting import COLOURS, watermark, write_figures
+from rig.digits import brief
+from rig.plotting import COLOURS, MARKERS, watermark, write_figures
 from rig.units import MM_PER_M, N_PER_MM
 
 if TYPE_CHECKING:
@@ -49,54 +50,48 @@ def _figures(result: CouplingResult) -> list[tuple[str, Figure]]:
 
 
 def stiffness(result: CouplingResult) -> Figure:
-    """Bars along x and y: single and coupled, with standard uncertainties; published beside."""
+    """Points along x and y: single and coupled, with standard uncertainties; published beside."""
     figure = blank(7.5, 4.6)
     axes = figure.add_subplot()
-    bars: list[tuple[str, Array, Array | None, str, str]] = []
+    rows: list[tuple[str, Array, Array | None, str]] = []
     if is_published_setup(result):
-        bars.append(("single, published", np.array(PUBLISHED_SINGLE), None, "white", COLOURS[0]))
-    bars.append(
-        ("single", result.single[:2] * N_PER_MM, result.u_single[:2] * N_PER_MM, COLOURS[0], "")
+        rows.append(("single, published", np.array(PUBLISHED_SINGLE), None, COLOURS[0]))
+    rows.append(
+        ("single", result.single[:2] * N_PER_MM, result.u_single[:2] * N_PER_MM, COLOURS[0])
     )
     if is_published_setup(result):
-        bars.append(("coupled, published", np.array(PUBLISHED_COUPLED), None, "white", COLOURS[1]))
+        rows.append(("coupled, published", np.array(PUBLISHED_COUPLED), None, COLOURS[1]))
     colours = {"rigid": COLOURS[1], "compliant": COLOURS[2], "point": COLOURS[3]}
     for kind, k in result.pair.items():
-        bars.append(
-            (
-                f"coupled, {kind}",
-                k[:2] * N_PER_MM,
-                result.u_pair[kind][:2] * N_PER_MM,
-                colours[kind],
-                "",
-            )
-        )
-    width = 0.8 / len(bars)
-    for i, (label, values, u, fill, edge) in enumerate(bars):
-        at = np.arange(2) + (i - (len(bars) - 1) / 2) * width
-        drawn = axes.bar(
+        own = result.u_pair[kind][:2] * N_PER_MM
+        rows.append((f"coupled, {kind}", k[:2] * N_PER_MM, own, colours[kind]))
+    for i, (label, values, u, colour) in enumerate(rows):
+        at = np.arange(2) + (i - (len(rows) - 1) / 2) * 0.8 / len(rows)
+        axes.errorbar(
             at,
             values,
-            0.92 * width,
-            yerr=u,
-            color=fill,
-            edgecolor=edge or fill,
-            hatch="//" if edge else None,
-            capsize=3,
+            u,
+            fmt=MARKERS[0] if u is not None else MARKERS[1],
+            color=colour,
+            markerfacecolor=colour if u is not None else "white",
+            markersize=5,
+            capsize=4,
             label=label,
         )
-        axes.bar_label(
-            drawn, [f"{v:.1f}" if v < 1000 else f"{v:.0f}" for v in values], fontsize=7.5, padding=2
-        )
+        for x, v in zip(at, values, strict=True):
+            text = f"{v:.1f}" if v < 1000 else f"{v:.0f}"
+            look: Any = {"xytext": (7, 0), "textcoords": "offset points", "va": "center"}
+            axes.annotate(text, (x, v), fontsize=7.5, **look)
     axes.set_yscale("log")
-    axes.margins(y=0.12)
-    axes.set_ylabel(_LABEL)
+    _plain_numbers(axes.yaxis)
+    axes.margins(x=0.08, y=0.12)
+    axes.set_ylabel(f"{_LABEL}, with its standard uncertainty")
     load = "mirror" if result.spec.load_axes == "mirror" else "base"
     axes.set_xticks([0, 1], [f"{a} (coupled: {load} axes)" for a in "xy"])
     axes.grid(visible=False, axis="x")
     beta = np.rad2deg(result.spec.beta)
     axes.set_title(f"One arm and two coupled arms, beta = {beta:g} deg")
-    axes.legend(frameon=False, fontsize=8, ncols=2, loc="upper left")
+    figure.legend(loc="outside lower center", frameon=False, fontsize=8, ncols=3)
     return _finish(figure, result.model)
 
 
@@ -127,62 +122,69 @@ def maps(result: CouplingResult) -> Figure:
     titles = ("one arm", f"two arms, {spec.described}")
     panels = figure.subplots(1, 2, sharey=True, gridspec_kw={"wspace": 0.08})
     name = f"{'xyz'[axis]} of the {spec.load_axes} axes"
+    norm = _colours_of(np.concatenate(found))
     for axes, k, title in zip(panels, found, titles, strict=True):
-        _map_panel(figure, axes, sideways, height, k)
+        image = axes.pcolormesh(
+            sideways, height, k, norm=norm, cmap="viridis", shading="nearest", rasterized=True
+        )
+        axes.set_aspect("equal")
+        axes.grid(visible=False)
         axes.plot(node[:3, 3] @ mirror[:, 1], node[2, 3], "+", color="black", markersize=11)
         axes.set_title(f"{title}\nalong {name}", fontsize=10)
         axes.set_xlabel("Along the mirror plane in m")
     panels[0].set_ylabel("Height in m")
+    # as high as the maps, whose height follows from their width
+    beside = panels[1].inset_axes((1.04, 0.0, 0.045, 1.0))
+    beside.grid(visible=False)
+    _colour_bar(figure.colorbar(image, cax=beside, label=_LABEL, extend="both", extendfrac=0.03))
     return _finish(figure, model)
 
 
-def _map_panel(figure: Figure, axes: Any, x: Array, y: Array, k: Array) -> None:
-    """One map with its own colours on a logarithmic scale; white where the arm does not reach."""
+def _colours_of(values: Array) -> Any:
+    """Colours on a logarithmic scale for all values that are there."""
     from matplotlib.colors import LogNorm
 
-    known = k[np.isfinite(k)]
+    known = values[np.isfinite(values)]
     # the few cells beside a singularity would take all colours
-    low, high = np.quantile(known, [0.01, 0.97]) if known.size else (1.0, 10.0)
-    image = axes.pcolormesh(
-        x,
-        y,
-        k,
-        norm=LogNorm(low, max(high, 1.01 * low)),
-        cmap="viridis",
-        shading="nearest",
-        rasterized=True,
-    )
-    # as high as the map, whose height follows from its width, and beside it, not the next one
-    beside = axes.inset_axes((1.04, 0.0, 0.045, 1.0))
-    beside.grid(visible=False)
-    bar = figure.colorbar(image, cax=beside, label=_LABEL, extend="both", extendfrac=0.03)
-    _plain_numbers(bar.ax.yaxis)
-    axes.set_aspect("equal")
-    axes.grid(visible=False)
+    low, high = np.quantile(known, [0.01, 0.98]) if known.size else (1.0, 10.0)
+    return LogNorm(low, max(high, 1.01 * low))
+
+
+def _colour_bar(bar: Any) -> None:
+    """Numbers at the ends of the colours, and some between."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+
+    low, high = bar.norm.vmin, bar.norm.vmax
+    room = (high / low) ** _ROOM
+    ticks = LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)).tick_values(low, high)
+    between = [t for t in ticks if low * room < t < high / room]
+    bar.ax.yaxis.set_major_locator(FixedLocator([low, *between, high]))
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: brief(v, 3)))
+
+
+_ROOM = 0.07  # of the colours: nearer to their ends no other number stands
 
 
 def place(result: TaskResult) -> Figure:
     """Reached over required stiffness for every base distance and angle, the best marked."""
-    from matplotlib.colors import LogNorm
-
     best = result.best
     figure = blank(7.5, 5.0)
     axes = figure.add_subplot()
     x, y = MM_PER_M * best.distances, np.rad2deg(best.betas)
     margins = best.margins.T
     known = margins[np.isfinite(margins)]
-    low, high = np.quantile(known, [0.01, 0.99])
     image = axes.pcolormesh(
         x,
         y,
         margins,
-        norm=LogNorm(low, max(high, 1.01 * low)),
+        norm=_colours_of(margins),
         cmap="viridis",
         shading="nearest",
         rasterized=True,
     )
-    bar = figure.colorbar(image, ax=axes, label="Reached over required stiffness", extend="both")
-    _plain_numbers(bar.ax.yaxis)
+    label = "Reached over required stiffness"
+    _colour_bar(figure.colorbar(image, ax=axes, label=label, extend="both"))
     if known.min() < 1 < known.max():
         lines = axes.contour(x, y, margins, levels=[1.0], colors="white", linewidths=1.5)
         axes.clabel(lines, fmt={1.0: "just met"}, fontsize=8)

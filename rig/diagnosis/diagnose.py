@@ -278,4 +278,5 @@ def _held(h: HeldOut) -> dict[str, Any]:
         "after_rms_mm": h.after * MM_PER_M,
         "shrink_factor": h.shrink,
         "ci95": list(h.ci95),
+        "own_datum": h.own_datum,
     }

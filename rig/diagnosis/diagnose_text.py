@@ -298,9 +298,17 @@ def _gap(r: GapResult) -> str:
         open_to = f" ({brief(low, 3)} to {brief(high, 3)})" if low < high else ""
         lines.append(_row(f"withheld {h.fold}", h.before, h.after, r.noise) + open_to)
     lines.append(f"  {'noise of the instruments':32s}{brief(r.noise * MM_PER_M):>9s}")
+    told = less_datum(h.fold for h in r.held_out if h.own_datum)
+    lines += [f"  {told}"] if told else []
     for word, after in r.runners_up.items():
         lines.append(f"  withheld, with {word} instead: {brief(after * MM_PER_M)}")
     return "\n".join(lines)
+
+
+def less_datum(folds: Iterable[str]) -> str:
+    """What is said of folds that took their datum with them; empty where there are none."""
+    named = ", ".join(folds)
+    return f"withheld {named}: after is less the datum, which no model can know" if named else ""
 
 
 def _row(name: str, before: float, after: float, noise: float) -> str:

@@ -74,11 +74,11 @@ def _curve_panel(shown: Shown, points: Points, axes: Any, setup: int) -> None:
                 marker,
                 color=edge,
                 markerfacecolor=fill,
-                markersize=1.5 if many else 4,
+                markersize=2 if many else 4,
                 markeredgewidth=0.5 if many else 0.9,
                 label=f"measured, {label}",
                 rasterized=many,
-                zorder=2,
+                zorder=4 if many else 2,  # many lines would hide small dots
             )
     zero = mine & (points.sense == 0)
     if zero.any():
@@ -99,7 +99,7 @@ def _curve_panel(shown: Shown, points: Points, axes: Any, setup: int) -> None:
             (points.after * scale)[leg],
             "-" if len(leg) > 1 else ".",
             color=GREEN,
-            linewidth=1.1,
+            linewidth=0.6 if many else 1.1,
             markersize=4,
             zorder=3,
             label="_" if i else "simulated after (each run)",
@@ -117,11 +117,24 @@ def _gap_panel(shown: Shown, points: Points, axes: Any, setup: int) -> None:
     mine = np.flatnonzero(points.setup == setup)
     noise_band(axes, x[mine], (points.noise * scale)[mine])
     axes.axhline(0, color="0.4", linewidth=0.8)
+    many = len(mine) > MANY  # whose lines would be a tangle
     for leg in legs(points, x, setup):
-        look = {"marker": "." if len(leg) == 1 else "", "markersize": 4}
-        before, after = (points.gap_before * scale)[leg], (points.gap_after * scale)[leg]
-        axes.plot(x[leg], before, linestyle="--", color="black", linewidth=0.9, **look)
-        axes.plot(x[leg], after, linestyle="-", color=GREEN, linewidth=1.1, **look)
+        for gap, colour, line, what in (
+            (points.gap_before, "black", "--", "before"),
+            (points.gap_after, GREEN, "-", "after"),
+        ):
+            dots = many or len(leg) == 1
+            axes.plot(
+                x[leg],
+                (gap * scale)[leg],
+                linestyle="" if dots else line,
+                marker="." if dots else "",
+                markersize=2 if many else 5,
+                color=colour,
+                linewidth=0.9 if what == "before" else 1.1,
+                rasterized=many,
+                label=f"gap {what}: {'each point' if many else 'load taken off'}" if dots else "_",
+            )
 
 
 def noise_band(axes: Any, x: Any, noise: Any) -> None:

@@ -97,20 +97,23 @@ def remaining(shown: Shown, points: Points, rest: Remainder) -> Figure:
                 continue
             x = rest.displacement[here] * MM_PER_M if shown.imposed else rest.load[here]
             mean, sd = rest.mean[here] * MM_PER_M, rest.sd[here] * MM_PER_M
-            axes.plot(
+            axes.errorbar(
                 x,
                 rest.residual[here] * MM_PER_M,
-                marker,
+                2 * rest.noise[here] * MM_PER_M,
+                fmt=marker,
                 color=edge,
+                elinewidth=0.8,
                 markerfacecolor=fill,
                 markersize=4,
-                label=f"{label}: mean",
+                label=f"{label}: mean, ±2 sd of its scatter",
             )
             axes.fill_between(x, mean - 2 * sd, mean + 2 * sd, color=edge, alpha=0.2, linewidth=0)
             axes.plot(x, mean, "-", color=edge, linewidth=2, label=f"{label}: repeats, ±2 sd")
         axes.set_title(shown.setup_name(setup), fontsize=10)
     label_below(grid, drive_label(shown.imposed))
-    figure.supylabel(gap_label(shown.imposed, "Left unexplained"), fontsize=10)
+    label = gap_label(shown.imposed, "Left unexplained").replace(" (", "\n(")
+    figure.supylabel(label, fontsize=10)
     set_title(figure, _remainder_title(shown, rest))
     shared_legend(figure, [axes for (axes,) in grid])
     return figure
@@ -147,7 +150,7 @@ def _of_sense(rest: Remainder, sense: int) -> Any:
 
 def _remainder_title(shown: Shown, rest: Remainder) -> str:
     low, high = (edge * MM_PER_M for edge in rest.ci95)
-    differs = _unrepeated(rest)
+    differs = _unrepeated(rest, finer=shown.continuous)
     if rest.largest is None:
         seen = f"nothing that repeats for sure (95 %: below {high:.2g} mm rms)"
         return f"Left {shown.with_what}: {seen}; {differs}"
@@ -161,9 +164,11 @@ def _remainder_title(shown: Shown, rest: Remainder) -> str:
     )
 
 
-def _unrepeated(rest: Remainder) -> str:
+def _unrepeated(rest: Remainder, *, finer: bool) -> str:
+    """finer: of a load that runs, whose levels are classes, what repeats may be finer than they."""
     if rest.visits <= 1:
         return "each load was met once, so that what repeats can't be told"
     if rest.unrepeated_rms == 0:
         return "beside it, noise"
-    return f"another {rest.unrepeated_rms * MM_PER_M:.2g} mm rms is finer or does not repeat"
+    more = "is finer or does not repeat" if finer else "does not repeat"
+    return f"{'another ' * rest.clear}{rest.unrepeated_rms * MM_PER_M:.2g} mm rms {more}"

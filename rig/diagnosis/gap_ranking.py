@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.canvas import blank
-from rig.diagnosis.diagnose_text import LEAST_PROBABILITY
+from rig.diagnosis.diagnose_text import LEAST_PROBABILITY, less_datum
 from rig.diagnosis.gap_layout import BLUE, GREEN, gap_label, log_axis, set_title, shared_legend
 from rig.diagnosis.gap_points import Shown
 from rig.digits import likely
@@ -103,7 +103,10 @@ def withheld(shown: Shown) -> Figure:
     log_axis(axes)
     for i, (_, before, after, text, _) in enumerate(entries):
         _above(axes, float(np.sqrt(max(before * after * MM_PER_M**2, 1e-300))), i, text)
-    axes.set_xlabel(gap_label(shown.imposed, "Gap", "rms in mm"))
+    told = less_datum(h.fold for h in shown.held_out if h.own_datum)
+    axes.set_xlabel(
+        "\n".join([gap_label(shown.imposed, "Gap", "rms in mm"), told][: 1 + bool(told)])
+    )
     set_title(figure, f"How far the gap shrinks {shown.with_what}")
     shared_legend(figure, [axes])
     return figure

@@ -13,6 +13,7 @@ from rig.diagnosis.diagnose_text import (
     OTHERWISE,
     answer,
     families,
+    less_datum,
 )
 from rig.report.document import (
     Block,
@@ -169,7 +170,8 @@ def _how_far(found: Node) -> Table:
         after = r["held_out_after_rms_mm"].number()
         rows.append(row(f"withheld, with {word} instead", no, after, no, no, no))
     header = ("", "before mm", "after mm", "shrinks by", "95 % from", "to")
-    return Table("How far the gap shrinks (rms)", header, tuple(rows))
+    told = less_datum(h["fold"].text() for h in folds if h and h["own_datum"].value)
+    return Table(f"How far the gap shrinks (rms{'; ' * bool(told)}{told})", header, tuple(rows))
 
 
 def _sizes(node: Node) -> tuple[Rich, Rich, Rich]:

@@ -190,7 +190,10 @@ class Pictures:
         for name, keys in aligned([a for _, a in sets]).items():
             if keys[0] is None or not any(keys[1:]):
                 continue
-            caption = f"Direction {name}: the curves of the data sets over each other."
+            caption = (
+                f"Direction {name}: the curves of the data sets over each other, each with the "
+                "standard deviation of its repetitions."
+            )
             curves = partial(figures.compared_curves, name, keys, sets, gathered.banners)
             rows = _curve_rows(keys, sets)
             yield self._draw(f"compared_{name}", None, caption, caption, curves, header, rows)

@@ -17,7 +17,14 @@ from identification.gap.explanations.penalties import below_noise, cancelling, m
 from identification.gap.explanations.verdict import with_posterior
 from identification.gap.judging.choice import WORTH_OF_THIRD, chosen_of
 from identification.gap.judging.earned import _foretold, earned
-from identification.gap.judging.heldout import ALWAYS_IN, HeldOut, _stacked_keep, folds, held_out
+from identification.gap.judging.heldout import (
+    ALWAYS_IN,
+    HeldOut,
+    _stacked_keep,
+    folds,
+    held_out,
+    stated_prediction,
+)
 from identification.gap.judging.leftover import looked_up
 from identification.gap.laws.drift import FreePath, free_path, free_variant
 from identification.gap.model.base import base_columns, prediction
@@ -205,7 +212,21 @@ def test_a_datum_that_nobody_can_know_is_not_held_against_a_law(datum: str, zero
     n = e.bench.rows.n
     e.target[:n] += np.where(e.bench.rows.repetition == 3, 5e-5, 0.0)
     nothing = Explanation((), 0.0, 0.0, (), 0.0)
-    assert held_out(e, nothing, "repetition", folds(e)["repetition"]).after < 2e-6
+    held = held_out(e, nothing, "repetition", folds(e)["repetition"])
+    assert held.after < 2e-6
+
+
+def test_before_is_the_simulation_as_given_whatever_datum_nobody_can_know() -> None:
+    e = engine(np.full(REPETITIONS, BUMP), "repetition")
+    law = explained([0], "joint_nonlinear_stiffness", 0.0)
+    held, rows = held_out(e, law, "repetition", folds(e)["repetition"]), e.bench.rows
+    judged = ~rows.zero & (rows.repetition > 1)
+    gap, weight = (e.bench.response - stated_prediction(e))[judged], rows.weight[judged]
+    given = np.sqrt(weight @ gap**2 / weight.sum())
+    assert given > 1.2 * gap.std()
+    assert held.before == pytest.approx(given, rel=0.01)
+    assert held.own_datum
+    assert not held_out(e, law, "block", np.arange(rows.n) // 4).own_datum
 
 
 @pytest.mark.parametrize(("worth", "named"), [(2.0, 1), (5.0, 2)])

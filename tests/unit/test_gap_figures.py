@@ -22,7 +22,7 @@ from rig.diagnosis.diagnose import Diagnosis, diagnose
 from rig.diagnosis.diagnose_text import LEAST_PROBABILITY, _share, render
 from rig.diagnosis.gap_curve import curve, legs
 from rig.diagnosis.gap_figures import draw
-from rig.diagnosis.gap_layout import blank, noise_axis
+from rig.diagnosis.gap_layout import GREEN, blank, noise_axis
 from rig.diagnosis.gap_left import residual
 from rig.diagnosis.gap_map import _cells, _lines
 from rig.diagnosis.gap_points import (
@@ -293,11 +293,27 @@ def test_no_line_crosses_what_nobody_looked_at(tmp_path: Path) -> None:
     p = points(result)
     found = [leg.tolist() for leg in legs(p, p.force, 0)]
     assert found == [[0, 1, 2, 3], [4], [5, 6, 7, 8], [9]]
-    upper, lower = curve(shown(result), p).axes[:2]
+    figure = curve(shown(result), p)
+    upper, lower = figure.axes[:2]
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {f"gap {w}: load taken off" for w in ("before", "after")} <= set(told)
     for axes in (upper, lower):  # a point that no line reaches is drawn all the same
         lone = [line for line in axes.lines if len(line.get_xdata()) == 1]
         assert len(lone) == (2 if axes is upper else 4)
         assert {line.get_marker() for line in lone} == {"."}
+
+
+def test_many_points_are_seen_beside_the_lines_of_many_runs(
+    slipped: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rig.diagnosis.gap_curve.MANY", 5)
+    upper, _, lower, _ = curve(shown(slipped.result), points(slipped.result)).axes
+    dots = [line for line in upper.lines if str(line.get_label()).startswith("measured, loading")]
+    after = [line for line in upper.lines if line.get_color() == GREEN]
+    assert dots[0].get_zorder() > max(line.get_zorder() for line in after)
+    gaps = [line for line in lower.lines if len(line.get_xdata()) > 2]
+    assert gaps
+    assert {line.get_linestyle() for line in gaps} == {"None"}
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.gap.answer.remainder import Remainder, _posterior, branches, remainder
+from identification.gap.answer.remainder import Remainder, _excess, _posterior, branches, remainder
 from identification.gap.evidence.engine import Engine, alike
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import Fit, fit
@@ -86,6 +86,26 @@ def test_scatter_of_holds_beyond_the_noise_is_no_structure() -> None:
     _, _, m = left(bumped=False, scatter=scatter)
     assert not m.clear
     assert m.unrepeated_rms == pytest.approx(1e-5, rel=0.3)
+
+
+def test_what_repeats_at_one_level_alone_is_found_there() -> None:
+    """Beside runs that differ by more than their noise; nothing of it is said of other levels."""
+    corner = np.where(np.tile(np.repeat(np.arange(STEPS), SAMPLES), REPETITIONS) == 6, 6e-5, 0.0)
+    slopes = 1e-7 * np.array([-1.5, -0.5, 0.5, 1.5])
+    _, _, m = left(slopes, bumped=False, scatter=corner)
+    assert m.largest is not None
+    assert m.largest.force == pytest.approx(7 * FORCE, abs=1)
+    assert m.largest.mean == pytest.approx(m.residual[6], rel=0.1)
+    assert np.delete(m.mean, 6) == pytest.approx(0, abs=1e-6)
+
+
+def test_what_visits_differ_by_does_not_grow_with_the_noise_of_their_level() -> None:
+    rng = np.random.default_rng(4)
+    level = np.repeat(np.arange(40), 4)
+    variance = np.where(level < 20, 1e-14, 1e-9)
+    value = level * 1e-4 + rng.normal(0, np.sqrt(variance + 1e-10))
+    assert _excess(value, variance, level) == pytest.approx(1e-10, rel=0.3)
+    assert _excess(level * 1e-4, variance, level) == 0.0
 
 
 def test_the_posterior_is_that_of_a_dense_gaussian() -> None:

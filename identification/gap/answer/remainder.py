@@ -2,11 +2,11 @@
 
 The residual of a fit is read as `r = g(setup, branch, force) + noise`, with g a Gaussian process
 over levels of load: alike for neighbouring loads of one setup, half so between branches (as
-`evidence.alike` has it), of unknown size eta. Noise is that of the instruments, widened
-where visits of a level scatter more than that. Everything is Gaussian for a given eta, so the
-posterior of g is exact (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq.
-2.23-2.24), and eta is integrated over a grid. No claim about a cause: this is the size of what no
-effect explains.
+`evidence.alike` has it), of unknown size eta; or g is at one level alone, as where a law cuts a
+corner. Noise is that of the instruments, and what visits of a level scatter beyond that. Everything
+is Gaussian for a given eta, so the posterior of g is exact (Rasmussen and Williams, Gaussian
+Processes for Machine Learning, 2006, eq. 2.23-2.24), and eta is integrated over a grid. No claim
+about a cause: this is the size of what no effect explains.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def remainder(engine: Engine, fit: Fit) -> Remainder:
     load, first = mean_of(bench.load), np.unique(level, return_index=True)[1]
     setup, branch = bench.rows.setup[first], branch[first]
     covariance = alike(setup, branch, load, float(np.ptp(bench.load)))
-    mean, sd, draws = _posterior(covariance, residual, variance)
+    mean, sd, draws = _posterior(covariance, residual, variance, alone=visits > 1)
     weight = samples / samples.sum()
     low, high = np.quantile(np.sqrt(draws**2 @ weight), [0.025, 0.975])
     out = Remainder(
@@ -152,8 +152,8 @@ def _levels(
     visits beyond their noise.
 
     A visit is what one hold (one stretch of a running recording) spends at a level: its rows share
-    what is common to a hold. Where visits of a level differ by more than their noise, the excess
-    widens the variance of all levels alike, by the ratio of chi squared to its degrees of freedom.
+    what is common to a hold. What visits of a level differ by beyond their noise is alike at all
+    levels, and adds to the variance of each visit (`_excess`).
     """
     rows = bench.rows
     pairs = np.column_stack([level_of, rows.hold])
@@ -163,30 +163,56 @@ def _levels(
     value = np.bincount(visit, weights=left / sigma**2) / precision
     common = np.zeros(len(kinds))
     common[visit] = bench.noise.hold
-    p = 1 / (1 / precision + common**2)
+    alone = 1 / precision + common**2
     level = kinds[:, 0]
+    p = 1 / (alone + _excess(value, alone, level))
     total = np.bincount(level, weights=p)
     mean = np.bincount(level, weights=p * value) / total
     free = len(value) - len(total)
-    square = (value - mean[level]) ** 2
-    excess = float(p @ square) / free if free > 0 else 1.0
     samples = np.bincount(visit, weights=rows.weight)
     # the mean of the visits is one of them: it takes its share of their noise
-    beyond = square - (1 / p - 1 / total[level])
+    share = p / total[level]
+    own = (1 - 2 * share) * alone + np.bincount(level, weights=share**2 * alone)[level]
+    beyond = (value - mean[level]) ** 2 - own
     excess_square = float(samples @ beyond) / float(samples.sum()) if free > 0 else 0.0
     unrepeated = float(np.sqrt(max(excess_square, 0.0)))
-    return mean, max(1.0, excess) / total, len(value) / len(total), unrepeated
+    return mean, 1 / total, len(value) / len(total), unrepeated
 
 
-def _posterior(covariance: Array, y: Array, variance: Array) -> tuple[Array, Array, Array]:
+def _excess(value: Array, variance: Array, level: Ints) -> float:
+    """Variance (m^2) to be added to that of all visits (v,), so that they differ within their
+    levels as much as it says: chi squared is its degrees of freedom (Paule and Mandel 1982)."""
+    free = len(value) - int(level.max()) - 1
+
+    def chi_squared(added: float) -> float:
+        p = 1 / (variance + added)
+        mean = np.bincount(level, weights=p * value) / np.bincount(level, weights=p)
+        return float(p @ (value - mean[level]) ** 2)
+
+    if free < 1 or chi_squared(0.0) <= free:
+        return 0.0
+    low, high = 0.0, float(np.var(value)) * len(value) / free  # chi squared is less there
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if chi_squared(middle) > free else (low, middle)
+    return high
+
+
+_HALVINGS = 40
+
+
+def _posterior(
+    covariance: Array, y: Array, variance: Array, *, alone: bool = False
+) -> tuple[Array, Array, Array]:
     """Mean (k,), sd (k,) and draws (d, k) of g, eta integrated over a grid even in its logarithm.
 
-    covariance (k, k): of unit size; y (k,): g plus noise of that variance (k,).
+    covariance (k, k): of unit size; y (k,): g plus noise of that variance (k,). alone: g may be at
+    one level alone, too, which is as likely as all of it.
     """
     floor = _SMALLEST * float(np.sqrt(np.median(variance)))
     top = max(3 * float(np.abs(y).max()), 10 * floor)
-    etas = np.concatenate([[0.0], np.geomspace(floor, top, _SIZES)])
-    logs, means, roots = [], [], []
+    etas = np.geomspace(floor, top, _SIZES)
+    logs, means, roots = [_log_of_none(y, variance)], [np.zeros(len(y))], [np.zeros((len(y), 1))]
     for eta in etas:
         prior = eta**2 * covariance
         factor = np.linalg.cholesky(prior + np.diag(variance))
@@ -195,14 +221,29 @@ def _posterior(covariance: Array, y: Array, variance: Array) -> tuple[Array, Arr
         logs.append(-0.5 * float(white @ white) - float(np.log(np.diag(factor)).sum()))
         means.append(gain.T @ white)
         roots.append(_root(prior - gain.T @ gain))
-    p = np.exp(np.array(logs) - max(logs))
     # none is as likely as the whole grid of sizes
-    p[1:] /= _SIZES
+    each = [1.0] + [1 / _SIZES] * _SIZES
+    # what does not stand out of its noise does not do so alone
+    for k in np.flatnonzero(alone & (np.abs(y) > CLEAR * np.sqrt(variance))):
+        for eta in etas:
+            both = variance[k] + eta**2
+            gained = 0.5 * (y[k] ** 2 / variance[k] - y[k] ** 2 / both - np.log(both / variance[k]))
+            here = np.eye(len(y))[:, [k]]
+            logs.append(logs[0] + float(gained))
+            means.append(here[:, 0] * y[k] * eta**2 / both)
+            roots.append(here * eta * np.sqrt(variance[k] / both))
+            each.append(1 / _SIZES / len(y))
+    p = np.array(each) * np.exp(np.array(logs) - max(logs))
     p /= p.sum()
     draws = _mixture(p, means, roots)
     mean = np.einsum("e,ek->k", p, np.array(means))
     square = sum(w * (m**2 + np.sum(r**2, axis=1)) for w, m, r in zip(p, means, roots, strict=True))
     return mean, np.sqrt(np.maximum(square - mean**2, 0.0)), draws
+
+
+def _log_of_none(y: Array, variance: Array) -> float:
+    """Log density of y (k,) by noise alone, but for a constant."""
+    return -0.5 * float(np.sum(y**2 / variance + np.log(variance)))
 
 
 def _root(covariance: Array) -> Array:
@@ -216,7 +257,7 @@ def _mixture(p: Array, means: list[Array], roots: list[Array]) -> Array:
     rng = np.random.default_rng(0)
     out = []
     for count, mean, root in zip(rng.multinomial(_DRAWS, p), means, roots, strict=True):
-        out.append(mean + rng.standard_normal((count, len(mean))) @ root.T)
+        out.append(mean + rng.standard_normal((count, root.shape[1])) @ root.T)
     return np.concatenate(out)
 
 

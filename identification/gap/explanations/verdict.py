@@ -72,7 +72,8 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         for word, share in _main(_of(e, fewer.words) if fewer is said else said, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
-        mass[_heir(e, ranked, kept, found.engine.bench.noise.stated)] += whole - good
+        heir = _heir(e, ranked, kept, found.engine.bench.noise.stated)
+        mass[heir.parts[0].word if heir else "unknown"] += whole - good
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
     total = sum(mass.values())
@@ -199,6 +200,16 @@ def _tells_of_three(explanation: Explanation) -> bool:
 FLANKS = frozenset({"joint_backlash", "joint_nonlinear_stiffness"})
 
 
+def spokesman(found: SearchResult, explanation: Explanation) -> Explanation | None:
+    """The explanation with fewer of the same effects to whose main one an explanation gives its
+    weight: it explains nearly as much, or is the heir of one that leaves too much; None: itself."""
+    e, ranked, bench = explanation, found.explanations, found.engine.bench
+    fewer = _simpler(e, ranked, found.kept, bench.data.arm)
+    if fewer is not None or e.good:
+        return fewer
+    return _heir(e, ranked, found.kept, bench.noise.stated)
+
+
 def _of(explanation: Explanation, words: frozenset[str]) -> Explanation:
     """With the effects of these words alone, as large as they are beside the others."""
     kept = [
@@ -254,15 +265,15 @@ def _heir(
     ranked: Sequence[Explanation],
     kept: Mapping[frozenset[str], float],
     noise: float,
-) -> str:
+) -> Explanation | None:
     """Who gets the weight of an explanation that leaves too much for its number of effects: the
-    best one with fewer of the same effects that explains enough for itself, else unknown."""
+    best one with fewer of the same effects that explains enough for itself, if any."""
     for e in ranked:
         fewer = e.parts and e.words < explanation.words
         near = e.log_weight > explanation.log_weight - _INHERITS or e.eta < _CLOSELY * noise
         if fewer and near and e.good and foresaw(kept, e.words):
-            return e.parts[0].word
-    return "unknown"
+            return e
+    return None
 
 
 _INHERITS = 40.0  # nats: what explains so much less is no explanation of the same,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
-from identification.gap.explanations.verdict import FORESAW, TAKES_MORE, TAKES_TWO
+from identification.gap.explanations.verdict import FORESAW, TAKES_MORE, TAKES_TWO, spokesman
 from identification.gap.judging.earned import noise_of
 from identification.gap.words import BETWEEN_RUNS, LINEAR
 
@@ -18,16 +18,20 @@ BELOW_NOISE = 0.6
 
 
 def chosen_of(found: SearchResult, verdict: str) -> Explanation:
-    """The best explanation with the verdict as its largest effect; where that is far worse than
-    those with a larger one beside it, which then is one of several alike, the best of these."""
+    """The best explanation with the verdict as its largest effect. Where that is far worse than
+    those with a larger one beside it, the one with fewer effects that made it the verdict, if any;
+    else the larger one is one of several alike, and the best of these is shown."""
     if verdict in ("none", "unknown"):
         return next(e for e in found.explanations if not e.parts)
     mine = [e for e in found.explanations if verdict in e.words]
     mine = [e for e in mine if not _needless(found, e)] or mine
     first = [e for e in mine if e.parts[0].word == verdict]
     most = TAKES_MORE if mine[0].words <= LINEAR else TAKES_TWO
+    told = spokesman(found, mine[0])
     if first and first[0].log_weight > mine[0].log_weight - most:
         mine = first
+    elif told is not None and told in first:
+        mine = [e for e in first if e.words <= told.words]
     held = [e for e in mine if foresees(found, e)]
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]

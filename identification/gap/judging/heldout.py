@@ -5,7 +5,8 @@ repetition of a setup is never withheld: where something slipped or yielded in i
 later ones do not show what happened, and the datum is set in it. The zero-load rows of a withheld
 run stay in: they carry its datum (of the laser, and of a drift), which no model can know; as do the
 forces that it was pushed across with. The datum of a withheld direction, of a laser that is zeroed
-before each run, or of a run that was never read without load is taken from its own mean. Holds that
+before each run, or of a run that was never read without load is taken from its own mean: what is
+left after is less that, as no model knows it. Before is the simulation as given. Holds that
 tell themselves that the load went beyond them before (`search.unseen`) are not judged.
 """
 
@@ -31,12 +32,14 @@ ALWAYS_IN = -1  # number of the fold of rows that are never withheld
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """fold: what was withheld in turn; rms m before and after; shrink factor with ci95, whose ends
-    are one number where too few blocks tell how far it may be off."""
+    are one number where too few blocks tell how far it may be off. own_datum: what is left after is
+    less the mean of each setup, or run, that was withheld as a whole."""
 
     fold: str
     before: float
     after: float
     ci95: tuple[float, float]
+    own_datum: bool = False
 
     @property
     def shrink(self) -> float:
@@ -82,14 +85,12 @@ def held_out(
     """Judges an explanation on every fold in turn. loose: words that no fold foretells of another:
     what they may do within a fold is told by that fold itself."""
     bench, n = engine.bench, engine.bench.rows.n
-    before, after, scatter = np.zeros(n), np.zeros(n), np.zeros(n)
+    after, scatter = np.zeros(n), np.zeros(n)
     judged = ~bench.rows.zero & ~bench.rows.gone_beyond & (fold != ALWAYS_IN)
     within = judged & _within(bench)
     if name == "repetition" and within.any():
         judged = within
-    group = _own_datum(bench)
-    stated = stated_prediction(engine)
-    gap = bench.response - stated
+    group, own_datum = _own_datum(bench), False
     for f in np.unique(fold[fold != ALWAYS_IN]):
         test = (fold == f) & judged
         if not test.any():
@@ -98,11 +99,12 @@ def held_out(
         fitted = fit(engine, explanation, _stacked_keep(engine, out))
         left = engine.target[:n] - fitted.response
         left[out] -= _told(engine, [p for p in explanation.parts if p.word in loose], left, out)
-        whole = _whole(group, out)
+        whole = _whole(group, out) & test
+        own_datum |= bool(whole.any())
         scatter[test] = bench.scatter_about(bench.response - left)[test]
-        after[test] = _less_datum(group, left, whole & test)[test]
-        before[test] = _less_datum(group, gap, whole & test)[test]
-    before = np.sqrt(before**2 + bench.scatter_about(stated))
+        after[test] = _less_datum(group, left, whole)[test]
+    stated = stated_prediction(engine)
+    before = np.sqrt((bench.response - stated) ** 2 + bench.scatter_about(stated))
     after = np.sqrt(after**2 + scatter)
     blocks = bench.rows.run if len(np.unique(bench.rows.run)) > 2 else fold
     return HeldOut(
@@ -116,6 +118,7 @@ def held_out(
             bench.rows.setup[judged],
             bench.rows.weight[judged],
         ),
+        own_datum,
     )
 
 
