@@ -94,7 +94,7 @@ def _gap(verdict: str, p: float, **more: Any) -> GapResult:
     }
     probabilities = {verdict: p, "base_slip": 0.9961 - p, "zero_shift": 0.0039}
     unseen = dict.fromkeys(("engine", "fit", "found"), NOWHERE)
-    arm: Any = SimpleNamespace(data=SimpleNamespace(arm=True, curves=None))
+    arm: Any = SimpleNamespace(data=SimpleNamespace(arm=True, curves=None), still=False)
     return GapResult(verdict=verdict, probabilities=probabilities, bench=arm, **known, **unseen)
 
 
@@ -172,7 +172,7 @@ def without_gap() -> Diagnosis:
 
 def without_arm(found: Diagnosis) -> Diagnosis:
     """The same of a rig without an arm."""
-    bench: Any = SimpleNamespace(data=SimpleNamespace(arm=False, curves=None))
+    bench: Any = SimpleNamespace(data=SimpleNamespace(arm=False, curves=None), still=False)
     return replace(found, result=replace(found.result, bench=bench))
 
 
