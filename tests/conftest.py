@@ -3,9 +3,10 @@ the commands have it."""
 
 from __future__ import annotations
 
+import gc
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import pytest
 
@@ -21,6 +22,18 @@ def cache_of_its_own() -> Iterator[None]:
         os.environ["RIG_CACHE"] = folder
         yield
         del os.environ["RIG_CACHE"]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What is collected stays to the end, millions of objects: the collector of garbage is not to
+    look through them again and again, a tenth of the time that all tests take."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -26,17 +26,18 @@ def chrome() -> Iterator[Chrome]:
 
 
 @pytest.fixture
-def driver(chrome: Chrome) -> Chrome:
+def driver(chrome: Chrome) -> Iterator[Chrome]:
     """The browser with one empty tab. What pages keep is per port: other tests don't see it."""
+    theme(chrome, "light")
+    resize(chrome, 1920, 1080)
+    chrome.get_log("browser")  # type: ignore[no-untyped-call]
+    yield chrome
+    # now, not before the next test: a page that is left open keeps a processor busy until then
     for handle in chrome.window_handles[1:]:
         chrome.switch_to.window(handle)
         chrome.close()
     chrome.switch_to.window(chrome.window_handles[0])
     chrome.get("about:blank")
-    theme(chrome, "light")
-    resize(chrome, 1920, 1080)
-    chrome.get_log("browser")  # type: ignore[no-untyped-call]
-    return chrome
 
 
 @pytest.fixture

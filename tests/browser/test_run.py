@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -29,10 +29,10 @@ START_S, RUN_S = 30.0, 90.0
 class Measurement:
     """`rig measure --panel` in a folder of its own; stopped in any case."""
 
-    def __init__(self, folder: Path, **station: object) -> None:
+    def __init__(self, folder: Path, **wanted: Any) -> None:
         self.folder = folder
         self._log = folder / "log.txt"
-        words = [sys.executable, "-m", "rig", *write_files(folder, **station), "--panel"]
+        words = [sys.executable, "-m", "rig", *write_files(folder, **wanted), "--panel"]
         with self._log.open("w") as log:
             self._process = subprocess.Popen(
                 words,
@@ -80,7 +80,7 @@ class Measurement:
 def measurement(driver: Chrome, tmp_path: Path) -> Iterator[Measurement]:
     """A short one at 20 times real time, which a page keeps up with on a busy machine; the browser
     first, because it may skip."""
-    running = Measurement(tmp_path, speed=20)
+    running = Measurement(tmp_path, steps_N=(20, 40), speed=20)
     yield running
     running.stop()
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import pytest
+
 from rig.dataset import Dataset, load, write
+from rig.report import drawing
+from rig.report.report import Report, make
+from rig.report.wishes import Wishes
 from rig.tables import import_table
 
 VOID = {"meta", "path", "use", "image", "rect", "circle", "line", "br"}
@@ -56,6 +62,21 @@ def rewritten(path: Path, **changes: object) -> Path:
     changed: Dataset = replace(load(path), **changes)  # type: ignore[arg-type]
     write(changed, path)
     return path
+
+
+@contextmanager
+def sketched() -> Iterator[None]:
+    """Figures of a report are plotted, but come out empty: for tests of what stands beside them.
+    To write a figure down takes longer than all else in a report."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drawing, "svg_of", lambda *_: "<svg></svg>")
+        yield
+
+
+def sketch(paths: Sequence[Path], wishes: Wishes | None = None) -> Report:
+    """`make` with empty figures."""
+    with sketched():
+        return make(paths, wishes)
 
 
 @dataclass

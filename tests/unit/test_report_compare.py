@@ -19,9 +19,8 @@ from rig.analysis.analyze import analyze
 from rig.dataset import Dataset, load
 from rig.report.compare import Pair, adjusted, aligned, paired, probability, same_instruments
 from rig.report.figures import compared_curves
-from rig.report.report import make
 from rig.report.wishes import Wishes
-from tests.unit.report_sets import Page, bench, linear, rewritten
+from tests.unit.report_sets import Page, bench, linear, rewritten, sketch
 
 CHOICE = Choice("proportional", intercept=False)
 DEVICES = {
@@ -120,7 +119,7 @@ def test_the_page_tells_a_softer_bench(tmp_path: Path) -> None:
         rewritten(bench(tmp_path / f"{name}.h5", linear(k), comment=name), devices=DEVICES)
         for name, k in (("before", 80.0), ("after", 70.0), ("again", 80.0))
     ]
-    report = make(paths, Wishes(gap=False))
+    report = sketch(paths, Wishes(gap=False))
     first, second = report.to_json()["comparison"]
     assert (first["differs"], second["differs"]) == (True, False)
     assert first["difference_N_per_mm"]["value"] == pytest.approx(-10.0, abs=0.05)
@@ -139,7 +138,7 @@ def test_the_page_tells_a_softer_bench(tmp_path: Path) -> None:
 def test_unlike_things_are_remarked(tmp_path: Path) -> None:
     wide = bench(tmp_path / "wide.h5")
     narrow = bench(tmp_path / "narrow.h5", forces=(10.0, 20.0, 30.0))
-    (found,) = make([wide, narrow], Wishes(gap=False)).to_json()["comparison"]
+    (found,) = sketch([wide, narrow], Wishes(gap=False)).to_json()["comparison"]
     assert found["remarks"] == ["they rest on other ranges of force (20 to 100 N; 10 to 30 N)"]
 
 
@@ -156,7 +155,7 @@ def compared(tmp_path: Path, few: tuple[float, ...], scale: float = 1.0) -> tupl
     long = rewritten(bench(tmp_path / "long.h5", bent, forces=MANY), devices=DEVICES)
     law = lambda f, r: scale * bent(f, r)  # noqa: E731
     short = bench(tmp_path / "short.h5", law, forces=few, comment="short")
-    report = make([long, rewritten(short, devices=DEVICES)], Wishes(gap=False))
+    report = sketch([long, rewritten(short, devices=DEVICES)], Wishes(gap=False))
     return report.to_json(), Page(report.to_html()).text
 
 
@@ -202,7 +201,7 @@ def test_bent_curves_without_common_levels_are_not_compared(tmp_path: Path) -> N
 
 def test_nothing_to_compare(tmp_path: Path) -> None:
     zero = bench(tmp_path / "zero.h5", lambda f, r: 0.001 * r, forces=(0.0, 0.0))
-    report = make([bench(tmp_path / "a.h5"), zero], Wishes(gap=False))
+    report = sketch([bench(tmp_path / "a.h5"), zero], Wishes(gap=False))
     assert report.to_json()["comparison"] == []
     assert "No pose and direction has a stiffness in the first" in Page(report.to_html()).text
 

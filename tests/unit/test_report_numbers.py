@@ -22,7 +22,7 @@ from rig.report.report import Report, make
 from rig.report.results import Node
 from rig.report.wishes import Wishes
 from tests.recovery.emulated_sets import PAPER_C, REFERENCE_Q, measure, protocol
-from tests.unit.report_sets import Page, bench
+from tests.unit.report_sets import Page, bench, sketch
 
 MODEL = Path(__file__).parents[2] / "data" / "models" / "F1.yaml"
 
@@ -42,14 +42,14 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def of_arm(arm: Path) -> Report:
-    return make([arm], Wishes(couple=MODEL, gap=False, made="2026-03-01T12:00:00+01:00"))
+    return sketch([arm], Wishes(couple=MODEL, gap=False, made="2026-03-01T12:00:00+01:00"))
 
 
 @pytest.fixture(scope="module")
 def of_bench(tmp_path_factory: pytest.TempPathFactory) -> Report:
     folder = tmp_path_factory.mktemp("bench")
     soft = bench(folder / "soft.h5", lambda f, r: f / 95 + (f / 60) ** 3 / 95 * (1 + r / 1e3))
-    return make([soft, bench(folder / "stiff.h5")], Wishes(made="now"))
+    return sketch([soft, bench(folder / "stiff.h5")], Wishes(made="now"))
 
 
 def look_up(document: Any, pointer: str) -> Any:

@@ -43,7 +43,7 @@ from rig.report.results import Node
 from rig.report.sections import _gap
 from rig.report.wishes import Wishes, named
 from tests.unit.example_data import write_journal
-from tests.unit.report_sets import META, SIMULATION, Page, bench, rewritten
+from tests.unit.report_sets import META, SIMULATION, Page, bench, rewritten, sketch
 
 QUIET = Wishes(gap=False, made="2026-03-01T12:00:00+01:00")
 EVIL = "<script>alert(1)<script><img src=x onerror=alert(2)> $x^$ \\frac{ #panic() *b*"
@@ -211,7 +211,7 @@ def test_every_place_of_a_document_is_escaped() -> None:
 
 def test_what_the_data_do_not_allow_is_said(tmp_path: Path) -> None:
     zero = bench(tmp_path / "zero.h5", lambda f, r: 0.001 * r, forces=(0.0, 0.0), meta=META)
-    text = Page(make([zero], Wishes(made="now")).to_html()).text
+    text = Page(sketch([zero], Wishes(made="now")).to_html()).text
     assert "The stiffness is undefined: the force is 0 N from its zero throughout." in text
     assert "Robot: none; joint stiffnesses need an arm." in text
     assert "META names no simulation, so there is no gap to diagnose." in text
@@ -223,7 +223,7 @@ def test_an_unknown_gap_is_said_what_it_looks_like(tmp_path: Path) -> None:
     off = {5 * k: (9, -7, 8, -9, 6)[k % 5] for k in range(1, 21)}
     path = tmp_path / "rough.h5"
     bench(path, lambda f, r: f / 95.0 + 3e-3 * off.get(int(f), 0), forces=(*map(float, off),))
-    report = make([path], Wishes(made="now"))
+    report = sketch([path], Wishes(made="now"))
     found = report.to_json()["datasets"][0]["diagnose"]
     assert found["verdict"] == "unknown"
     assert found["looks_like"]["kind"] == "rough"
@@ -316,7 +316,7 @@ def test_poses_are_in_degrees_as_in_protocols() -> None:
 
 
 def test_without_the_gap(tmp_path: Path) -> None:
-    page = Page(make([bench(tmp_path / "a.h5")], QUIET).to_html())
+    page = Page(sketch([bench(tmp_path / "a.h5")], QUIET).to_html())
     assert "Left out, as asked for (--no-gap)." in page.text
     assert "Gap to the simulation" not in [e.text for e in page.all("h2")]
 
@@ -325,7 +325,7 @@ def test_all_samples_discarded(tmp_path: Path) -> None:
     path = bench(tmp_path / "d.h5")
     columns = dict(load(path).columns)
     columns["discarded"] = ~columns["discarded"]
-    text = Page(make([rewritten(path, columns=columns)], Wishes(made="now")).to_html()).text
+    text = Page(sketch([rewritten(path, columns=columns)], Wishes(made="now")).to_html()).text
     assert "There are no samples to analyze." in text
     assert "No sample in use" in text
 
@@ -334,7 +334,7 @@ def test_a_measurement_that_was_cut_off(tmp_path: Path) -> None:
     """There is a journal only; it is the truth, and the checksum is of it."""
     path = tmp_path / "cut.h5"
     write_journal(path, 4)
-    report = make([path], Wishes(made="now"))
+    report = sketch([path], Wishes(made="now"))
     text = Page(report.to_html()).text
     assert "INCOMPLETE: the measurement did not reach its end (it was cut off)." in text
     digest = hashlib.sha256(journal_path(path).read_bytes()).hexdigest()
@@ -367,7 +367,7 @@ def test_two_files_of_one_name(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     paths = [bench(tmp_path / folder / "run.h5", comment=folder) for folder in "ab"]
-    report = make(paths, QUIET)
+    report = sketch(paths, QUIET)
     assert [s.label for s in report.gathered.sessions] == [str(p) for p in paths]
     files = [p.name for p in write_figures(report, tmp_path / "figures")]
     assert len({name.lower() for name in files}) == len(files)
@@ -376,7 +376,7 @@ def test_two_files_of_one_name(tmp_path: Path) -> None:
 def test_a_data_set_is_not_compared_with_itself(tmp_path: Path) -> None:
     path = bench(tmp_path / "a.h5")
     with pytest.raises(InputError, match=r"a\.h5: is given twice"):
-        make([path, path], QUIET)
+        sketch([path, path], QUIET)
 
 
 def test_wrong_names_of_files(tmp_path: Path) -> None:
@@ -389,11 +389,11 @@ def test_wrong_names_of_files(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"does not exist\. Create it first"):
         checked(tmp_path / "none" / "a.html", None)
     with pytest.raises(InputError, match="give at least one data set"):
-        make([])
+        sketch([])
 
 
 def test_the_page_is_written_whole(tmp_path: Path) -> None:
-    report = make([bench(tmp_path / "a.h5")], QUIET)
+    report = sketch([bench(tmp_path / "a.h5")], QUIET)
     write_html(report, tmp_path / "a.html")
     assert (tmp_path / "a.html").read_text("utf-8") == report.to_html()
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv", ".h5", ".html", ".yaml"]
@@ -501,4 +501,4 @@ def test_on_paper_text_fills_the_page_that_has_no_room_for_a_figure() -> None:
 def test_without_typst_there_is_a_hint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "typst", None)
     with pytest.raises(InputError, match=r"--pdf needs the package typst, which is not installed"):
-        make([bench(tmp_path / "a.h5")], QUIET).to_pdf()
+        sketch([bench(tmp_path / "a.h5")], QUIET).to_pdf()

@@ -13,7 +13,7 @@ from rig.dataset import load
 from rig.report.document import Block, Bullets, Cell, Facts, Paragraph, Section, Table, Word, rich
 from rig.report.report import make
 from rig.report.wishes import Wishes
-from tests.unit.report_sets import bench, rewritten
+from tests.unit.report_sets import bench, rewritten, sketch
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "report_text.txt"
 
@@ -59,7 +59,7 @@ def test_the_text_word_for_word(tmp_path: Path) -> None:
     paths = [bench(tmp_path / "a.h5", giving_way, forces=forces), bench(tmp_path / "b.h5")]
     for path in paths:
         rewritten(path, created="2026-03-01T10:00:00+01:00", origin="emulated")
-    text = "\n".join(lines(make(paths, Wishes(gap=False)).document.sections)) + "\n"
+    text = "\n".join(lines(sketch(paths, Wishes(gap=False)).document.sections)) + "\n"
     assert text == GOLDEN.read_text(encoding="utf-8")
 
 
@@ -71,7 +71,7 @@ def test_what_makes_the_numbers_doubtful_stands_in_short(tmp_path: Path) -> None
     columns["displacement_mm"] = columns["displacement_mm"] + 1e-5 * (columns["repetition"] == 2)
     behind = {"kind": "behind", "text": "This machine can't keep up.", "session_s": 30.0}
     rewritten(path, columns=columns, events=[{**behind, "sample": 36}])
-    text = lines(make([path], Wishes(gap=False)).document.sections)
+    text = lines(sketch([path], Wishes(gap=False)).document.sections)
     short, quality = text.index("# In short"), text.index("# Data quality")
     (told,) = [line for line in text if line.startswith("Mind: ")]
     assert short < text.index(told) < text.index("# What was measured")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,8 +85,20 @@ def run_rig(
     return Outcome(result.returncode, result.stdout, result.stderr)
 
 
-def write_files(folder: Path, **changes: object) -> list[str]:
-    """Protocol and station in `folder`; the words of a `rig measure` that writes run.h5 there."""
-    (folder / "short.yaml").write_text(PROTOCOL, encoding="utf-8")
+def write_files(
+    folder: Path,
+    *,
+    repetitions: int = 2,
+    steps_N: Sequence[float] = (20, 40, 60),
+    samples: int = 3,
+    **changes: object,
+) -> list[str]:
+    """Protocol and station in `folder`; the words of a `rig measure` that writes run.h5 there.
+    changes: of the station. Ask for no more than the question at hand needs: every second of a run
+    costs as much of a processor."""
+    text = PROTOCOL.replace("repetitions: 2", f"repetitions: {repetitions}")
+    text = text.replace("steps_N: [20, 40, 60]", f"steps_N: {list(steps_N)}")
+    text = text.replace("samples_per_step: 3", f"samples_per_step: {samples}")
+    (folder / "short.yaml").write_text(text, encoding="utf-8")
     (folder / "test.yaml").write_text(station(**changes), encoding="utf-8")  # type: ignore[arg-type]
     return ["measure", "short.yaml", "--station", "test.yaml", "-o", "run.h5"]

@@ -306,22 +306,11 @@ def test_the_links_end_is_quick_though_somebody_never_reads(served: Served) -> N
             http.client.HTTPConnection(client.host, client.port).request("GET", "/")
 
 
-def short_files(folder: Path, repetitions: int, samples: int = 3, **changes: object) -> list[str]:
-    """As `write_files`, with as many repetitions and samples as the question at hand needs."""
-    words = write_files(folder, **changes)
-    protocol = folder / "short.yaml"
-    text = protocol.read_text(encoding="utf-8")
-    text = text.replace("repetitions: 2", f"repetitions: {repetitions}")
-    text = text.replace("samples_per_step: 3", f"samples_per_step: {samples}")
-    protocol.write_text(text, encoding="utf-8")
-    return words
-
-
 class Measurement:
     """`rig measure --panel` in the background, and its operator."""
 
     def __init__(self, folder: Path, repetitions: int = 1, **changes: Any) -> None:
-        words = [*short_files(folder, repetitions, **changes), "--panel"]
+        words = [*write_files(folder, repetitions=repetitions, **changes), "--panel"]
         self.process = subprocess.Popen(
             [sys.executable, "-m", "rig", *words],
             cwd=folder,
@@ -361,7 +350,7 @@ def measurement(tmp_path: Path) -> Iterator[Measurement]:
 
 def test_a_whole_run_from_the_page(tmp_path: Path) -> None:
     # A second of sampling in each step, so that there is something to redo when the click comes.
-    measurement = Measurement(tmp_path, repetitions=2, samples=40, speed=40)
+    measurement = Measurement(tmp_path, repetitions=2, steps_N=(20, 40), samples=40, speed=40)
     me = measurement.operator
     measurement.answer("mount")
     measurement.answer("unload")
