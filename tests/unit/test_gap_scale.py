@@ -67,7 +67,7 @@ def test_a_unit_of_an_arm_is_asked_for_by_its_name(
 
 def test_simulated_curves_that_go_the_other_way_are_told() -> None:
     data = linear("bench")
-    slope = float(data.setups[0].lever**2 @ data.compliance)
+    slope = float(data.setups[0].lever ** 2 @ data.compliance)
     ends = np.array([-100.0, 100.0])
     assert said(replace(data, curves=(Curve(ends, slope * ends),))) == []
     (text,) = said(replace(data, curves=(Curve(ends, -slope * ends),)))
