@@ -18,7 +18,7 @@ from rig.dataset import load
 from rig.diagnosis.diagnose import diagnose
 from rig.digits import likely
 from rig.report.document import Block, Number, Section, Table, rich
-from rig.report.report import Report, make
+from rig.report.report import Report
 from rig.report.results import Node
 from rig.report.wishes import Wishes
 from tests.recovery.emulated_sets import PAPER_C, REFERENCE_Q, measure, protocol

@@ -11,7 +11,6 @@ import pytest
 from rig import cli
 from rig.dataset import load
 from rig.report.document import Block, Bullets, Cell, Facts, Paragraph, Section, Table, Word, rich
-from rig.report.report import make
 from rig.report.wishes import Wishes
 from tests.unit.report_sets import bench, rewritten, sketch
 
