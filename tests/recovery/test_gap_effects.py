@@ -25,7 +25,7 @@ from identification.gap.model.bench import make_bench
 from identification.gap.search.unseen import unseen
 from identification.gap.words import WORDS
 from rig.dataset import Dataset
-from rig.diagnosis.diagnose import diagnose
+from rig.diagnosis.diagnose import Diagnosis, diagnose
 from rig.diagnosis.gap_data import gap_data
 from rig.diagnosis.gap_model import write_model
 from rig.errors import InputError
@@ -272,9 +272,13 @@ CASES: dict[str, tuple[Law, str]] = {
 
 
 @cache  # and no fixture of all of them: tests of this file run in several processes
-def result_of(name: str) -> GapResult:
+def diagnosis_of(name: str) -> Diagnosis:
     with tempfile.TemporaryDirectory() as folder:
-        return diagnose(measure(Path(folder), CASES[name][0])).result
+        return diagnose(measure(Path(folder), CASES[name][0]))
+
+
+def result_of(name: str) -> GapResult:
+    return diagnosis_of(name).result
 
 
 @pytest.mark.parametrize("name", slow_ones(CASES, ("ripple", "slip", "wander")))
@@ -457,10 +461,10 @@ def test_an_arm_tells_a_gain_that_bends_and_springs_off_beside_one_joint(tmp_pat
     assert labels == {"gain"}
 
 
-def test_json_is_plain_and_complete(tmp_path: Path) -> None:
+def test_json_is_plain_and_complete() -> None:
     import json
 
-    out = diagnose(measure(tmp_path, seats)).to_json()
+    out = diagnosis_of("seat").to_json()
     assert json.loads(json.dumps(out, allow_nan=False)) == out
     assert out["schema"] == "rig.diagnosis/1"
     assert sum(out["probabilities"].values()) == pytest.approx(1.0)
@@ -468,8 +472,8 @@ def test_json_is_plain_and_complete(tmp_path: Path) -> None:
     assert out["gap"]["held_out"]["fold"] == "repetition"
 
 
-def test_text_says_the_answer_first(tmp_path: Path) -> None:
-    text = diagnose(measure(tmp_path, seats)).to_text()
+def test_text_says_the_answer_first() -> None:
+    text = diagnosis_of("seat").to_text()
     assert text.startswith("contact_seating (")
     assert "withheld repetition" in text
     assert diagnose_gap.__doc__

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import cache
 from pathlib import Path
 
@@ -106,7 +106,10 @@ def test_names_of_poses_and_directions_do_not_matter() -> None:
 
 def test_order_of_directions_in_meta_does_not_matter() -> None:
     text = meta(ARM).replace("{x: [1, 0, 0], y: [0, 1, 0]}", "{y: [0, 1, 0], x: [1, 0, 0]}")
-    assert explained(data_of(table(), text)).probabilities == arm_result().probabilities
+    for one, other in zip(
+        astuple(data_of(table(), text)), astuple(data_of(table(), meta(ARM))), strict=True
+    ):
+        np.testing.assert_equal(one, other)
 
 
 @pytest.mark.slow
@@ -169,7 +172,7 @@ def test_noise_lowers_confidence_and_invents_nothing() -> None:
     for times in (1.0, 4.0, 64.0):
         rows = noisy(BENCH, seating, seed=3, noise=times)
         text = meta(BENCH).replace("0.05", f"{0.05 * times}").replace("0.002", f"{0.002 * times}")
-        found = explained(data_of(rows, text))
+        found = bench_result() if times == 1 else explained(data_of(rows, text))
         seen.append(found.probabilities["contact_seating"])
         others = {w: p for w, p in found.probabilities.items() if w != "contact_seating"}
         invented = {w: p for w, p in others.items() if w not in ("none", "unknown")}

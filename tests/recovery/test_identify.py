@@ -59,8 +59,13 @@ def single(files: Path) -> IdentifyResult:
     return identify([files / "single.h5"])
 
 
-def test_rich_data_find_the_springs(files: Path) -> None:
-    fit = identify([files / "rich.h5"], proposals=0).fit
+@pytest.fixture(scope="module")
+def found_of_rich(files: Path) -> IdentifyResult:
+    return identify([files / "rich.h5"], proposals=0)
+
+
+def test_rich_data_find_the_springs(found_of_rich: IdentifyResult) -> None:
+    fit = found_of_rich.fit
     assert fit.rank == 6
     assert fit.identified[:3].all()
     error = np.abs(fit.stiffness / PAPER_C - 1)
@@ -79,18 +84,17 @@ def test_the_published_pose_leaves_four_open(single: IdentifyResult) -> None:
     assert any(note.startswith("Joint 6 has no lever") for note in single.notes)
 
 
-def test_springs_of_bent_curves_are_said_to_be_averages(files: Path, tmp_path: Path) -> None:
+def test_springs_of_bent_curves_are_said_to_be_averages(
+    files: Path, found_of_rich: IdentifyResult, tmp_path: Path
+) -> None:
     straight = load(files / "rich.h5")
     columns = dict(straight.columns)
     bent = (columns["pose"] == "P2") & (columns["direction"] == "y")
     more = np.where(bent, 1e-4 * columns["force_N"] ** 2, 0.0)  # 0.25 mm at 50 N
     columns["displacement_mm"] = columns["displacement_mm"] + more
     write(replace(straight, columns=columns), tmp_path / "bent.h5")
-    notes = [
-        identify([path], proposals=0).notes for path in (files / "rich.h5", tmp_path / "bent.h5")
-    ]
-    assert not any("not straight" in n for n in notes[0])
-    assert notes[1][0] == (
+    assert not any("not straight" in n for n in found_of_rich.notes)
+    assert identify([tmp_path / "bent.h5"], proposals=0).notes[0] == (
         f"{tmp_path / 'bent.h5'}: the curve of P2/y is not straight within the noise: the springs "
         "are averages over what was loaded. rig diagnose separates springs from effects."
     )
@@ -106,8 +110,8 @@ def test_joint_readings_count_where_they_see(files: Path) -> None:
     assert blind.fit.rank == 2
 
 
-def test_several_sets_count_together(files: Path) -> None:
-    alone = identify([files / "rich.h5"], proposals=0).fit
+def test_several_sets_count_together(files: Path, found_of_rich: IdentifyResult) -> None:
+    alone = found_of_rich.fit
     both = identify([files / "rich.h5", files / "seen.h5"], proposals=0).fit
     assert (both.relative_sd < alone.relative_sd * (1 + 1e-9)).all()
     assert both.relative_sd[0] < 0.9 * alone.relative_sd[0]
@@ -380,10 +384,10 @@ def recover(
 
 
 def test_recovery_in_short(tmp_path: Path) -> None:
-    """Five sets: far from a coverage."""
-    coverage, errors, identified = recover(5, tmp_path)
+    """Three sets: far from a coverage."""
+    coverage, errors, identified = recover(3, tmp_path)
     assert coverage >= 0.8
-    assert identified >= 13
+    assert identified >= 8
     assert max(errors) < 0.05
 
 

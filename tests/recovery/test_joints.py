@@ -88,12 +88,12 @@ def test_the_world_is_a_ur10e(arm: Arm) -> None:
 
 
 def test_intervals_cover_and_identified_joints_are_right(arm: Arm) -> None:
-    """100 true sets in six poses and three directions each."""
+    """50 true sets in six poses and three directions each."""
     rng = np.random.default_rng(2024)
     prior = default_prior(arm)
     covered, errors = [], []
     identified = conflicts = 0
-    for _ in range(100):
+    for _ in range(50):
         truth = random_truth(rng, prior)
         fit = identify(arm, draw(rng, truth, rich_poses()), [GAINS], prior)
         assert fit.rank == 6
@@ -103,7 +103,7 @@ def test_intervals_cover_and_identified_joints_are_right(arm: Arm) -> None:
         conflicts += fit.conflict is not None
     assert conflicts <= 3  # of draws from the prior itself: 1 in 370
     assert 0.92 <= np.mean(covered) <= 0.98
-    assert identified > 300
+    assert identified > 150
     assert max(errors) < 0.05
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from rig.dataset import Dataset, load, write
 from rig.report import drawing
-from rig.report.report import Report, make
+from rig.report import report as reports
 from rig.report.wishes import Wishes
 from rig.tables import import_table
 
@@ -66,17 +66,18 @@ def rewritten(path: Path, **changes: object) -> Path:
 
 @contextmanager
 def sketched() -> Iterator[None]:
-    """Figures of a report are plotted, but come out empty: for tests of what stands beside them.
-    To write a figure down takes longer than all else in a report."""
+    """Figures of a report are plotted, but come out empty, and `rig report` starts no process: for
+    tests of what stands beside. To write a figure down takes longer than all else in a report."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(drawing, "svg_of", lambda *_: "<svg></svg>")
+        patch.setattr(reports, "usable_cores", lambda: 1)
         yield
 
 
-def sketch(paths: Sequence[Path], wishes: Wishes | None = None) -> Report:
+def sketch(paths: Sequence[Path], wishes: Wishes | None = None) -> reports.Report:
     """`make` with empty figures."""
     with sketched():
-        return make(paths, wishes)
+        return reports.make(paths, wishes)
 
 
 @dataclass

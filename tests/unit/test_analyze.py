@@ -257,10 +257,11 @@ CASES = sorted(
 @pytest.mark.skipif(
     not CASES, reason="the labelled and real measurements are not beside the project"
 )
-def test_every_measurement_at_hand_is_analyzed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.slow)])
+def test_measurements_at_hand_are_analyzed(tmp_path: Path, every: int) -> None:
     from rig.tables import import_table
 
-    for case in CASES:
+    for case in CASES[::every]:
         data = import_table(case / "samples.csv", case / "meta.yaml", tmp_path / "data.h5")
         result = analyze(data)
         json.dumps(result.to_json(), allow_nan=False)

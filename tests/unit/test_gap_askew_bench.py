@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
+from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.model.bench import make_bench
@@ -47,8 +49,13 @@ def pressed(
     )
 
 
+@cache
+def turned() -> GapResult:
+    return explained(pressed(0.15))
+
+
 def test_a_slant_that_turns_is_seen_by_the_force_across() -> None:
-    found = explained(pressed(0.15))
+    found = turned()
     assert found.verdict == "load_misalignment"
     tangents = [found.effects[0].parameters[f"tangent_x_{k}"].value for k in (1, 2)]
     assert np.abs(tangents) == pytest.approx([0.15, 0.045], rel=0.1)
@@ -71,7 +78,7 @@ def test_a_block_that_gives_nothing_across_shows_a_slant_by_its_force(
     assert found.verdict == verdict
     said = any("the displacement does not move by it" in n for n in found.notes)
     assert said is (verdict == "load_misalignment")
-    assert not any("acts askew" in n for n in explained(pressed(0.15)).notes)
+    assert not any("acts askew" in n for n in turned().notes)
 
 
 def test_a_hook_that_is_hung_anew_for_every_run_moves_the_target_as_it_pulls_across() -> None:

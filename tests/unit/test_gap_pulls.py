@@ -4,6 +4,7 @@ flows far beyond its knee, toes, dents, cracks."""
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -65,10 +66,15 @@ def test_what_draws_out_under_a_weight_yields_however_far() -> None:
     assert found.after < 0.05 * found.before
 
 
+@cache
+def drawn_far() -> GapResult:
+    u = np.concatenate([np.linspace(0, 6e-4, 20), np.linspace(1e-3, 3e-2, 40)])
+    return pulled(voce(u), u)
+
+
 def test_metal_that_flows_far_beyond_its_knee_yields() -> None:
     """A hundred times as far as it was elastic: how far a law is off is no matter of that."""
-    u = np.concatenate([np.linspace(0, 6e-4, 20), np.linspace(1e-3, 3e-2, 40)])
-    found = pulled(voce(u), u)
+    found = drawn_far()
     assert found.verdict == "joint_yield"
     assert found.probabilities["joint_yield"] > 0.6
     assert found.probabilities["unknown"] < 0.25
@@ -170,8 +176,7 @@ LINE = np.linspace(0.0, STROKE, 60)
 
 
 def test_no_energy_is_larger_than_the_response() -> None:
-    u = np.concatenate([np.linspace(0, 6e-4, 20), np.linspace(1e-3, 3e-2, 40)])
-    engine = pulled(voce(u), u).engine
+    engine = drawn_far().engine
     for v in library(engine.bench, ["joint_yield"])[:3]:
         assert energies(engine, (Part(v, 14.0),)).max() <= engine.most
 

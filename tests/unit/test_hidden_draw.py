@@ -21,7 +21,8 @@ from rig.worlds.hidden.scene import make_scene
 
 @pytest.fixture(scope="module")
 def cases() -> list[HiddenCase]:
-    return [draw_case(21, k) for k in range(5)]
+    """One effect and two, in all three designs."""
+    return [draw_case(21, k) for k in (0, 1, 3, 4)]
 
 
 def test_the_same_seed_and_number_give_the_same_case(cases: list[HiddenCase]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
@@ -38,14 +39,21 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(written: Path, tmp_path: Path) -> Path:
     """A measured set, an imported specimen below, an incomplete run, and three that are none."""
-    here = tmp_path / "data"
+    return Path(shutil.copytree(written, tmp_path / "data"))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What each test has a copy of."""
+    where = tmp_path_factory.mktemp("written")
+    here = where / "data"
     (here / "old").mkdir(parents=True)
     (here / ".hidden").mkdir()
     write(dataset(), here / "arm.h5")
     write(dataset(), here / ".hidden/arm.h5")
-    write(specimen(tmp_path), here / "old/specimen.h5")
+    write(specimen(where), here / "old/specimen.h5")
     write_journal(here / "cut.h5", 3)
     (here / "broken.h5").write_bytes((here / "arm.h5").read_bytes()[:9000])
     (here / "notes.h5").write_text("no HDF5 at all")

@@ -125,7 +125,7 @@ def alarms(draws: int) -> dict[str, int]:
 
 
 def test_no_alarm_on_smooth_curves() -> None:
-    assert alarms(20) == dict.fromkeys(SMOOTH, 0)
+    assert alarms(10) == dict.fromkeys(SMOOTH, 0)
 
 
 @pytest.mark.slow
