@@ -45,7 +45,7 @@ class Session:
 @cache
 def session(seed: int, world: str = "paper") -> Session:
     columns = sample_protocol(make_world(world, seed), PROTOCOL, seed)
-    found = curves(SimpleNamespace(columns=columns, meta=META))
+    found = curves(SimpleNamespace(columns=columns, meta=META, events=()))
     x, y = (analyze_curve(found["P1", name]) for name in "xy")
     anisotropy = ratio(x, y)
     assert anisotropy is not None
@@ -123,7 +123,7 @@ def test_no_knee_in_a_world_of_springs() -> None:
 def test_other_weightings_give_what_they_should() -> None:
     """Unweighted over all steps the published y curve gives about 17 N/mm: through the knee."""
     columns = sample_protocol(make_world("paper", 1), PROTOCOL, 1)
-    y = curves(SimpleNamespace(columns=columns, meta=META))["P1", "y"]
+    y = curves(SimpleNamespace(columns=columns, meta=META, events=()))["P1", "y"]
     wish = Options("none", intercept=True, keep_after_knee=True)
     assert k_of(analyze_curve(y, wish)).value == pytest.approx(18e3, rel=0.1)
 
