@@ -107,7 +107,7 @@ def test_a_play_that_a_free_curve_meets_as_well_is_a_play(name: str, cycles: int
     assert found.probabilities[PLAY] > 0.6
 
 
-@pytest.mark.parametrize("name", ["contact", "cubic"])
+@pytest.mark.parametrize("name", ["contact", pytest.param("cubic", marks=pytest.mark.slow)])
 def test_a_curve_that_a_soft_play_beside_a_curve_meets_better_is_a_curve(name: str) -> None:
     u = to_and_fro(cycles=8)
     found = explained(a_bench(CURVES[name](u), u, "displacement").data)
