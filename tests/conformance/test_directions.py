@@ -62,7 +62,11 @@ def creeps(rows: pd.DataFrame, share: Array) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("part", "word"), [(softens, "joint_nonlinear_stiffness"), (rubs, "joint_hysteresis")]
+    ("part", "word"),
+    [
+        pytest.param(softens, "joint_nonlinear_stiffness", marks=pytest.mark.slow),
+        (rubs, "joint_hysteresis"),
+    ],
 )
 def test_the_same_trouble_in_every_direction_is_one_word(part: Part, word: str) -> None:
     found = diagnosed(x=part, y=part)

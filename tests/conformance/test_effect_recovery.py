@@ -152,21 +152,14 @@ def recovered(word: str, design: str) -> str:
     )
 
 
-# The others are found on a bench, or on data of other laws in recovery/test_gap_effects.py and
-# test_pose_beside.py.
-QUICK = (
-    "joint_backlash",
-    "joint_hysteresis",
-    "link_flexibility",
-    "base_compliance",
-    "load_misalignment",
-)
+# The others are found on a bench, or on data of other laws: in recovery/test_gap_effects.py,
+# test_pose_beside.py, test_plays.py (backlash), test_several_joints.py (hysteresis) and
+# test_as_rigs_are.py (a load askew).
+QUICK = (("link_flexibility", "medium"), ("base_compliance", "rich"))
 
 
 def marks(word: str, design: str) -> tuple[pytest.MarkDecorator, ...]:
-    if design == "bench" or (design == "medium" and word in QUICK):
-        return ()
-    return () if (word, design) == ("base_compliance", "rich") else (pytest.mark.slow,)
+    return () if design == "bench" or (word, design) in QUICK else (pytest.mark.slow,)
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ SEATS = {
 }
 
 
-@pytest.mark.parametrize("kind", slow_ones(SEATS, ("logarithmic",)))
+@pytest.mark.parametrize("kind", slow_ones(SEATS, ("logarithmic", "slack")))
 def test_seats_of_other_shapes(kind: str) -> None:
     def law(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
         return 1e-6 * SEATS[kind](rows["force_N"].to_numpy()), np.zeros((len(rows), 6))

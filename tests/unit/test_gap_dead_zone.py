@@ -125,7 +125,7 @@ def test_stages_of_a_gear_that_rubs_are_a_curve_beside_friction() -> None:
     assert {e.name for e in found.effects} == {CURVE, FRICTION}
 
 
-@pytest.mark.parametrize("name", ["contact", "cubic"])
+@pytest.mark.parametrize("name", ["contact", pytest.param("cubic", marks=pytest.mark.slow)])
 def test_a_curve_that_a_soft_play_beside_a_curve_meets_better_is_a_curve(name: str) -> None:
     u = to_and_fro(cycles=8)
     found = explained(a_bench(CURVES[name](u), u, "displacement").data)

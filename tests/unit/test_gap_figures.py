@@ -203,9 +203,18 @@ def test_what_a_report_draws_travels_without_the_samples(tmp_path: Path) -> None
     assert sizes[0] < 20_000
 
 
-def test_every_figure_is_written_with_its_numbers(slipped: Diagnosis, tmp_path: Path) -> None:
-    written = draw(slipped, tmp_path / "new", "slip.h5")
-    names = {p.name for p in written}
+BANNER = "EMULATED: these values come from simulated devices; nothing was measured."
+
+
+@pytest.fixture(scope="module")
+def drawn(slipped: Diagnosis, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Files of a diagnosis of emulated data, in a folder that was not there before."""
+    marked = Diagnosis(slipped.dataset, slipped.result, (BANNER,))
+    return draw(marked, tmp_path_factory.mktemp("drawn") / "new", "slip.h5")
+
+
+def test_every_figure_is_written_with_its_numbers(slipped: Diagnosis, drawn: list[Path]) -> None:
+    names = {p.name for p in drawn}
     assert {f"gap_{f}.{kind}" for f in FIGURES for kind in ("png", "svg")} <= names
     assert {p for p in names if p.endswith(".csv")} == {
         "gap_points.csv",
@@ -213,24 +222,20 @@ def test_every_figure_is_written_with_its_numbers(slipped: Diagnosis, tmp_path: 
         "gap_withheld.csv",
         "gap_remainder.csv",
     }
-    assert all(p.stat().st_size > 100 for p in written)
-    lines = (tmp_path / "new/gap_probabilities.csv").read_text().splitlines()
-    assert lines[0] == f"# rig diagnose slip.h5: {slipped.result.verdict}"
-    total = sum(float(row["probability"]) for row in csv.DictReader(lines[1:]))
+    assert all(p.stat().st_size > 100 for p in drawn)
+    lines = drawn[0].with_name("gap_probabilities.csv").read_text().splitlines()
+    assert lines[1] == f"# rig diagnose slip.h5: {slipped.result.verdict}"
+    total = sum(float(row["probability"]) for row in csv.DictReader(lines[2:]))
     assert total == pytest.approx(1, abs=1e-6)
 
 
-def test_emulated_data_are_marked_in_every_figure_and_table(
-    slipped: Diagnosis, tmp_path: Path
-) -> None:
-    banner = "EMULATED: these values come from simulated devices; nothing was measured."
-    marked = Diagnosis(slipped.dataset, slipped.result, (banner,))
-    for path in draw(marked, tmp_path):
+def test_emulated_data_are_marked_in_every_figure_and_table(drawn: list[Path]) -> None:
+    for path in drawn:
         if path.suffix == ".svg":
             # letters are drawn as paths; matplotlib notes each text as a comment
             assert "<!-- EMULATED -->" in path.read_text(), path.name
         if path.suffix == ".csv":
-            assert path.read_text().startswith(f"# {banner}\n"), path.name
+            assert path.read_text().startswith(f"# {BANNER}\n"), path.name
 
 
 def test_imposed_displacement_is_told_in_newtons(tmp_path: Path) -> None:

@@ -277,7 +277,7 @@ def test_what_is_stated_and_holds_do_not_show_may_differ_from_hold_to_hold() -> 
     assert hidden == pytest.approx([0.6, 0.75, 1.5])
 
 
-@pytest.mark.parametrize("stated", [0.3, 0.5])
+@pytest.mark.parametrize("stated", [pytest.param(0.3, marks=pytest.mark.slow), 0.5])
 def test_an_arm_whose_force_is_stated_far_too_uncertain_is_none(stated: float) -> None:
     """Nothing is wrong, and the noise that could be there reaches beyond all that was seen."""
     data = linear("medium")

@@ -99,7 +99,7 @@ def pulled(knee: bool, imposed: str = "force") -> GapData:
     )
 
 
-@pytest.mark.parametrize("imposed", ["force", "displacement"])
+@pytest.mark.parametrize("imposed", ["force", pytest.param("displacement", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("knee", [True, False])
 def test_what_holds_half_the_load_before_it_gives_way_has_yielded(knee: bool, imposed: str) -> None:
     data = pulled(knee, imposed)

@@ -85,7 +85,15 @@ def test_a_force_that_is_lost_on_the_way_in_breaks_or_snaps() -> None:
     assert without_slack(pressed(100 * breaks[pull], path[pull])).lets_go is False
 
 
-@pytest.mark.parametrize(("cycles", "time_s"), [(2, 60.0), (4, 60.0), (4, 20.0), (6, 60.0)])
+@pytest.mark.parametrize(
+    ("cycles", "time_s"),
+    [
+        pytest.param(2, 60.0, marks=pytest.mark.slow),
+        (4, 60.0),
+        pytest.param(4, 20.0, marks=pytest.mark.slow),
+        (6, 60.0),
+    ],
+)
 def test_what_lets_go_is_no_lag(cycles: int, time_s: float) -> None:
     """Strokes of a crank; nobody says which channel it drives."""
     path = STROKE * (1 - np.cos(2 * np.pi * cycles * np.arange(600) / 600)) / 2

@@ -15,9 +15,8 @@ from identification.cut_short import cut_short
 from identification.stiffness import analyze_curve
 from rig.analysis.analyze import analyze
 from rig.dataset import load
-from rig.report.report import make
 from rig.report.wishes import Wishes
-from tests.unit.report_sets import Page, bench, rewritten
+from tests.unit.report_sets import Page, bench, rewritten, sketch
 from tests.unit.stiffness_tables import run, table
 
 LEVELS = tuple(np.arange(20.0, 221.0, 20.0))
@@ -129,7 +128,7 @@ def test_text_and_json() -> None:
 def test_the_report_says_so_too(tmp_path: Path) -> None:
     path = bench(tmp_path / "a.h5")
     data = stopped(path)
-    report = make([rewritten(path, columns=data)], Wishes(gap=False, made="now"))
+    report = sketch([rewritten(path, columns=data)], Wishes(gap=False, made="now"))
     text = Page(report.to_html()).text
     assert "N/mm (repetition 2 not counted in full)" in text
     assert "repetition 2 ended at 40 of 100 N: left out of the mean" in text

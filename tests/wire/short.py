@@ -94,11 +94,12 @@ def write_files(
     **changes: object,
 ) -> list[str]:
     """Protocol and station in `folder`; the words of a `rig measure` that writes run.h5 there.
-    changes: of the station. Ask for no more than the question at hand needs: every second of a run
-    costs as much of a processor."""
+    changes: of the station, which reads the force five times less often than the project's. Ask for
+    no more than the question at hand needs: every second of a run costs one of a processor."""
     text = PROTOCOL.replace("repetitions: 2", f"repetitions: {repetitions}")
     text = text.replace("steps_N: [20, 40, 60]", f"steps_N: {list(steps_N)}")
     text = text.replace("samples_per_step: 3", f"samples_per_step: {samples}")
     (folder / "short.yaml").write_text(text, encoding="utf-8")
+    changes.setdefault("sample_rate_Hz", 200)
     (folder / "test.yaml").write_text(station(**changes), encoding="utf-8")  # type: ignore[arg-type]
     return ["measure", "short.yaml", "--station", "test.yaml", "-o", "run.h5"]

@@ -49,7 +49,7 @@ def no_process_left(folder: Path) -> bool:
 
 
 def test_a_short_run_ends_complete_and_marked_as_emulated(tmp_path: Path) -> None:
-    outcome = run_rig(*write_files(tmp_path), cwd=tmp_path)
+    outcome = run_rig(*write_files(tmp_path, sample_rate_Hz=1000), cwd=tmp_path)
     assert outcome.status == 0, outcome.stderr
     assert "EMULATED" in outcome.stderr
     dataset = load(tmp_path / "run.h5")
