@@ -13,6 +13,7 @@ import pytest
 
 from rig import cli
 from tests.recovery.emulated_sets import PAPER_C, REFERENCE_Q, measure, protocol
+from tests.unit.report_sets import sketched
 
 HOME = Path(__file__).parents[2]
 GUIDE = (HOME / "docs" / "guide_analyst.md").read_text("utf-8")
@@ -46,7 +47,8 @@ def run(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_quick_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    follow(tmp_path, monkeypatch, skip=SLOW)
+    with sketched():
+        follow(tmp_path, monkeypatch, skip=SLOW)
     for name in (
         "line.json",
         "arm.yaml",
