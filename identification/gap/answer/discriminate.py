@@ -23,10 +23,7 @@ from identification.gap.answer.designs import (
     planned,
     present_design,
 )
-from identification.gap.answer.forms import (
-    realise,
-    rows_of,
-)
+from identification.gap.answer.forms import realise, rows_of
 from identification.gap.answer.rivals import Rival, rival_of, same_elsewhere
 from identification.gap.data import LOADING, GapData
 from identification.gap.effects import EFFECTS

@@ -219,7 +219,7 @@ def _others_joints(bench: Bench) -> list[_Part]:
         return []
     sd, turned = doubt(bench.data, bench.compliance), np.eye(bench.data.joints)
     return [
-        (f"other simulator {j + 1}", bench.stacked(q=bench.elastic * turned[j]), float(sd[j]))
+        (f"other simulator {j + 1}", bench.stacked(q=bench.elastic * turned[j]), sd)
         for j in range(bench.data.joints)
     ]
 

@@ -38,8 +38,7 @@ def _slope(curve: Curve, measured: Array) -> float:
     return float(force @ (does - does.mean())) / square if square > 0 else 0.0
 
 
-def doubt(data: GapData, springs: Array) -> Array:
-    """(m,): relative sd of how much each joint of another simulator turns: as much as its springs
-    (m,) had to be changed on the whole, for any of them may have been, or none."""
-    change = springs / data.compliance - 1
-    return np.full(len(change), float(np.sqrt(np.mean(change**2))))
+def doubt(data: GapData, springs: Array) -> float:
+    """Relative sd of how much each joint of another simulator turns: as much as its springs (m,)
+    had to be changed on the whole, for any of them may have been, or none."""
+    return float(np.sqrt(np.mean((springs / data.compliance - 1) ** 2)))
