@@ -112,7 +112,7 @@ def unseen_ends(
     run = stretches(*(columns[n] for n in ("pose", "direction", "repetition")))
     for at, _, recorded in ends_of_loading(columns, events):
         level = at - 1
-        if recorded or not used[level] or columns["branch"][level] != "loading":
+        if recorded or level < 0 or not used[level] or columns["branch"][level] != "loading":
             continue
         mine = np.flatnonzero(used & (run == run[level]))
         other = mine[(mine < at) & (columns["step"][mine] != columns["step"][level])]

@@ -57,6 +57,14 @@ def test_loading_is_taken_to_have_gone_on_half_a_level() -> None:
     assert not gap_data(told).notes
 
 
+def test_an_end_ahead_of_the_first_sample_is_none_of_the_last_one() -> None:
+    """The last sample in the file is of a loading branch, and has nothing to do with it."""
+    whole = ended()
+    kept = {name: values[:24] for name, values in whole.columns.items()}
+    told = replace(whole, columns=kept, events=[{**whole.events[0], "sample": 0}])
+    assert not np.any(gap_data(told).onward)
+
+
 def test_what_was_discarded_ended_nothing() -> None:
     dataset = ended()
     discarded = dataset.columns["repetition"] == 2
