@@ -79,10 +79,11 @@ class MujocoArm:
         # qpos of hinge i, in the order of `hinges`
         self._order = [int(self._model.joint(f"h{i}").qposadr[0]) for i in range(len(hinges))]
 
-    def load(self, force: Array) -> None:
+    def load(self, force: Array, patience: float = PATIENCE_S) -> None:
         """Goes over to another force (3) N within the turn of the screw, then until all is still.
 
-        A hinge that creeps does not come to rest; the wait ends after PATIENCE_S.
+        patience: after so many seconds the wait ends at the latest. What creeps does not come to
+        rest, and creeps all the while: whoever keeps a clock gives it SETTLE_S.
         """
         new = self._turns * np.asarray(force, dtype=float)
         old, parts = self._force, round(RAMP_S / STEP_S / _AT_ONCE)
@@ -91,7 +92,7 @@ class MujocoArm:
         self._force = new
         self.hold(SETTLE_S)
         waited = SETTLE_S
-        while np.abs(self._data.qvel).max() > self._turns * STILL_RAD_PER_S and waited < PATIENCE_S:
+        while np.abs(self._data.qvel).max() > self._turns * STILL_RAD_PER_S and waited < patience:
             self.hold(0.5)
             waited += 0.5
 

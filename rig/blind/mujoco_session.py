@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.arrays import Array
-from rig.blind.mujoco_arm import RAMP_S, SETTLE_S, Hinge, MujocoArm, places
+from rig.blind.mujoco_arm import PATIENCE_S, RAMP_S, SETTLE_S, Hinge, MujocoArm, places
 from rig.blind.mujoco_effects import Hidden, Rig, spring
 from rig.worlds.arm import place
 
@@ -150,12 +150,13 @@ class _Run:
 
     def _hold(self, branch: str, step: int, force: float, samples: int) -> list[Row]:
         pose, direction, repetition = self._place
-        self._arm.load(force * AXES[direction])
+        creeps = self._hidden is not None and self._hidden.creeps
+        self._arm.load(force * AXES[direction], SETTLE_S if creeps else PATIENCE_S)
         self.clock += RAMP_S + SETTLE_S
         out = []
         for _ in range(samples):
             self.clock += 1.0
-            if self._hidden is not None and self._hidden.creeps:
+            if creeps:
                 self._arm.hold(1.0)
             row = Row(
                 self.clock - self._start,

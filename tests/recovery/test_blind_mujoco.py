@@ -11,8 +11,10 @@ import pytest
 pytest.importorskip("mujoco")
 
 from rig.blind.case import generator, write_dataset
-from rig.blind.mujoco_arm import Hinge, MujocoArm, places
+from rig.blind.mujoco_arm import RAMP_S, Hinge, MujocoArm, places
+from rig.blind.mujoco_effects import Hidden
 from rig.blind.mujoco_rig import EFFECTS, draw_case
+from rig.blind.mujoco_session import Design, session
 from rig.dataset import load
 from rig.worlds.arm import place
 
@@ -118,6 +120,37 @@ def test_a_damped_spring_creeps_with_its_time_constant() -> None:
     after = engine.turned()[6]
     final = float((place(Q).levers(TOOL) @ Y)[0]) * 40.0 / k
     assert (final - after) / (final - before) == pytest.approx(np.exp(-1.0), rel=0.02)
+
+
+def test_what_creeps_has_crept_as_long_as_the_recorded_clock_says() -> None:
+    time, top, k = 12.0, 90.0, 1e5
+    design = Design(
+        poses={"P1": Q},
+        tool=np.zeros(3),
+        forces={"y": top},
+        steps=2,
+        samples=5,
+        repetitions=1,
+        noise_mm=0.001,
+        noise_N=0.1,
+        stated=SPRINGS,
+        relative_sd=0.05,
+        rest_s=0.0,
+    )
+    slow = in_joint1(k, damping=time * k)
+    rows = session(design, SPRINGS, Hidden("joint_creep", "", "", {}, (1,), (slow,), creeps=True))
+    lever = float((place(Q).levers(TOOL) @ Y)[0])
+    state, before, now, fine, crept = 0.0, 0.0, rows[0].session_s, 0.01, []
+    for row in rows:  # Kelvin-Voigt, along the ramp of the screw and through the hold
+        steps = round((row.session_s - now) / fine) or 1
+        ramp = np.minimum(np.arange(1, steps + 1) * fine / RAMP_S, 1.0)
+        for share in ramp if row.force != before else np.ones(steps):
+            at = before + share * (row.force - before)
+            state += fine / time * (lever * at / k - state)
+        now, before = row.session_s, row.force
+        crept.append(state + lever * row.force / SPRINGS[0])
+    turned = np.array([row.turned[0] for row in rows])
+    assert turned == pytest.approx(np.array(crept), abs=0.02 * lever * top / k)
 
 
 def test_a_second_spring_stiffens_reversibly() -> None:
