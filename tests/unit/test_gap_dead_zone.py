@@ -147,6 +147,14 @@ def test_a_step_with_no_reading_inside_is_a_play_however_steep_it_looks() -> Non
     assert found.verdict == PLAY
 
 
+def test_a_play_that_friction_holds_is_no_curve_however_soft_its_mean_looks() -> None:
+    """Its two ways lie apart by the friction, and no curve goes either of them."""
+    force = to_and_fro()
+    inside = np.clip(held(force, 0.05) / 0.02, -0.2, 0.2)
+    found = explained(a_bench(force, force + inside, "force").data)
+    assert found.verdict == PLAY
+
+
 def bolted() -> Bench:
     """A bolt in its hole, which the plates rub along."""
     u = to_and_fro(cycles=5)

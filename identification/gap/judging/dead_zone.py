@@ -41,6 +41,7 @@ _STIFF, _STIFFEST = 0.75, 0.95  # quantiles of the stiffness: that of the flanks
 _SOFT, _BACK = 0.4, 0.6  # of it: at the ends of the play; beyond them, and across a step
 _WIDTHS = (0.01, 0.7)  # of the way
 _FEWEST = 100  # places that were read, of the points
+_FOLLOWS = 10.0  # times the imperfection of the play: a curve that needs more does not go that way
 
 
 def spoken_for(
@@ -59,6 +60,8 @@ def spoken_for(
     others = {min(e.words & FLANKS): e for e in ranked if _is_one_beside(e, rest)}
     other = others.get(PLAY if word == CURVE else CURVE)
     if other is None:
+        return {}
+    if word == PLAY and other.eta > _FOLLOWS * best.eta:
         return {}
     u, force = _curve(engine, best)
     if word == PLAY and _is_a_step(u, force):
