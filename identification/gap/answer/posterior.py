@@ -52,8 +52,8 @@ def settled(
     sit where few others do), and parameters and places of each.
 
     Of parameters: value: that of the explanation itself, whose terms a model file takes; 95 %
-    intervals of the mixture of the effect's likeliest shapes at the same joint or axis, of any
-    depth, under every size of imperfection. By how much a value moves with the shapes of the
+    intervals of the mixture of the effect's likeliest shapes, wherever they sit, under every size
+    of imperfection. By how much a value moves with the shapes of the
     effects beside it, and with which effects these are (rivals: other explanations, by their
     weights), adds to its variance. No interval reaches beyond what is possible, or was seen."""
     each = _all_shapes(engine, variants, chosen)
@@ -129,14 +129,11 @@ class _Shapes:
     def own(self, said: Parameters) -> Parameters:
         """Parameters of the effect, the others as they are; said: of the explanation itself."""
         found, index, word = [r[self.index] for r in self.read], self.index, self._part.word
-        place = _named(self._part.variant)
-        here = np.array([_named(e.parts[index].variant) == place for e, _ in self.open])
         beside = _beside(self.every, self.open, index)
         step = _read(self.engine, beside)[index] if beside is not None else {}
         out = {}
         for name in said:
             mine = np.array([name in f for f in found])
-            mine &= here | name.startswith(_ANYWHERE)
             alike = [f[name] for f, m in zip(found, mine, strict=True) if m]
             value = said[name].value
             mixed = _mixture(alike, self.share[mine]) if alike else said[name]
@@ -174,10 +171,6 @@ class _Shapes:
     @property
     def _part(self) -> Part:
         return self.chosen.parts[self.index]
-
-
-# What means the same wherever an effect sits: pushes at the target, and what names its joint.
-_ANYWHERE = ("onset_", "factor_joint")
 
 
 def _named(variant: Variant) -> str:
