@@ -26,7 +26,7 @@ from identification.gap.recording.rows import Rows
 
 SIZES = (0.03, 0.06, 0.12, 0.24)  # of the largest load, by which it goes beyond a level
 _FEWEST = 8  # holds that a load was brought to: of fewer nobody tells chance from habit
-_MOST = 250_000  # holds times rows: of more it would last longer than all the rest
+_MOST = 1_000_000  # holds times rows: of more it would last longer than all the rest
 _LOOKED_AT = 12  # explanations
 _SWEEPS = 3
 _LOADED = 0.02  # of the largest load: less is none, and nobody pulls at a contact
