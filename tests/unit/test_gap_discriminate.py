@@ -20,6 +20,7 @@ from identification.gap.answer.discriminate import (
     ENOUGH,
     NextMeasurement,
     Option,
+    _calibrated,
     _discrimination,
     _proposal,
     _reached,
@@ -31,6 +32,7 @@ from identification.gap.answer.rivals import Rival, _shapes
 from identification.gap.effects import library
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
+from identification.gap.laws.law import Law
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
@@ -157,6 +159,26 @@ def test_where_nothing_helps_nothing_is_proposed() -> None:
     some = proposed(("joint_creep", "zero_shift"), 2.0, 0.0)
     assert some is not None
     assert "The best of 2: way 1" in some.text
+
+
+@pytest.mark.parametrize("gain", [0.02, 0.1])
+def test_what_a_calibration_gives_is_what_its_readings_give_on_average(gain: float) -> None:
+    """Log odds of a gain of about this size against none, over all readings of it, which scatter by
+    u, whichever is true."""
+    u, design = 0.01, present_design(small_bench())
+    design = replace(design, instruments=replace(design.instruments, force_gain=u))
+    wide = float(np.hypot(gain, u))
+    read = np.linspace(-8 * wide, 8 * wide, 4001)
+    none = np.exp(-0.5 * (read / u) ** 2)
+    odds = 0.5 * (read / u) ** 2 - 0.5 * (read / wide) ** 2 - np.log(wide / u)
+    won = [
+        np.average(odds, weights=np.exp(-0.5 * ((read - gain) / u) ** 2)),
+        np.average(-odds, weights=none),
+    ]
+    law = Law({}, ())
+    scale = Form("force_scale", law, np.array([gain]), np.zeros((1, 1)))
+    rivals = (Rival("force_scale", (scale,), {}, ()), Rival("joint_creep", (), {}, ()))
+    assert _calibrated(design, rivals) == pytest.approx(min(won), rel=1e-3)
 
 
 def test_a_robot_without_output_encoders_is_not_asked_for_their_readings() -> None:

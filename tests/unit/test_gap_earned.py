@@ -13,6 +13,7 @@ from identification.gap.diagnose import diagnose_gap
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, Sizes
 from identification.gap.explanations.explanation import Explanation, SearchResult
+from identification.gap.explanations.fit import fit
 from identification.gap.explanations.penalties import below_noise, cancelling, minor_parts
 from identification.gap.explanations.verdict import with_posterior
 from identification.gap.judging.choice import WORTH_OF_THIRD, chosen_of
@@ -25,7 +26,7 @@ from identification.gap.judging.heldout import (
     held_out,
     stated_prediction,
 )
-from identification.gap.judging.leftover import looked_up
+from identification.gap.judging.leftover import _left, looked_up
 from identification.gap.laws.drift import FreePath, free_path, free_variant
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
@@ -506,3 +507,20 @@ def test_creep_that_leaves_nothing_is_not_something_that_settles(
     said = strange.with_strangers(found(e, creep))
     assert (said.looks_like is None) is creeps
     assert (said.unknown < -100) is creeps
+
+
+def test_what_is_left_beyond_the_noise_is_what_stands_off_in_every_run() -> None:
+    """As much as is stated, here and there from hold to hold, under noise of rows, of holds and,
+    as large, of runs, whose datum is fitted."""
+    bench = engine(np.zeros(REPETITIONS)).bench
+    bench = replace(bench, noise=replace(bench.noise, run=bench.noise.stated))
+    start, rows, noise = quick_engine(bench), bench.rows, bench.noise
+    stands_off = noise.stated * np.where(rows.hold % 2 == 0, 1.0, -1.0)
+    rng, squares = np.random.default_rng(5), []
+    for _ in range(200):
+        row, hold, run = rng.standard_normal((3, rows.n))
+        off = noise.response * row + (noise.hold * hold)[rows.edges][rows.hold]
+        start.target = np.zeros(bench.layout.size)
+        start.target[: rows.n] = stands_off + off + noise.run * run[rows.run]
+        squares.append(_left(start, fit(start, Explanation((), 0.0, 0.0, (), 0.0))) ** 2)
+    assert np.mean(squares) ** 0.5 == pytest.approx(noise.stated, rel=0.15)

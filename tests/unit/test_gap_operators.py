@@ -17,6 +17,7 @@ from identification.gap.model.history import (
     delayed,
     flowing_play,
     play,
+    rests,
     retarded,
 )
 from identification.gap.model.path import path_of, worked_in
@@ -202,6 +203,46 @@ def test_slow_flow_follows_a_staircase_of_thinned_holds(square: bool, beyond: np
     assert both[:, 0] == pytest.approx(np.interp(rows.time, grid, y), abs=limit)
     alone = flowing_play(rows.force, np.array([8.0]), np.array([4.0]), rows, fresh(rows.n))
     assert both[:, 1] == pytest.approx(alone[:, 0], abs=1e-12)  # whatever flows beside it
+
+
+def two_runs() -> tuple[Rows, np.ndarray, np.ndarray]:
+    """Rows of two runs, up a step and back to zero, 10 s apart; the clock and load that made them:
+    nothing is loaded in between until the screw comes to the load in the last five seconds."""
+    corner = np.array([0.0, 3.5, 7.5, 57.5, 61.5, 68.0, 73.0, 77.5, 110.0])
+    there = np.array([0.0, 0.0, 100.0, 100.0, 0.0, 0.0, 0.0, 60.0, 60.0])
+    time = np.concatenate([np.arange(4.0), np.arange(8.0, 58.0), np.arange(62.0, 69.0)])
+    time = np.append(time, np.arange(78.0, 98.0))
+    step = np.repeat([0, 1, 2, 1], [4, 50, 7, 20])
+    force = np.interp(time, corner, there)
+    run = (time > 70.0).astype(np.int64)
+    data = bench_data(force, force * 1e-5, step=step, branch=step, run=run, time=time, session=time)
+    grid = np.arange(0.0, 98.0, 5e-3)
+    return rows_of(data), grid, np.interp(grid, corner, there)
+
+
+def test_what_crept_goes_back_for_the_seconds_of_a_rest() -> None:
+    rows, grid, load = two_runs()
+    z, state = np.zeros_like(grid), 0.0
+    for i in range(1, len(grid)):
+        state += (0.5 * (load[i] + load[i - 1]) - state) * -np.expm1(-5e-3 / 20.0)
+        z[i] = state
+    found = retarded(rows.force[:, None], np.array([20.0]), rows, rests(rows))[:, 0]
+    alone = rows.weight == 1
+    assert found[alone] == pytest.approx(np.interp(rows.time, grid, z)[alone], abs=0.01)
+
+
+@pytest.mark.parametrize("square", [False, True])
+def test_what_flowed_flows_back_for_the_seconds_of_a_rest(square: bool) -> None:
+    rows, grid, load = two_runs()
+    y, state = np.zeros_like(grid), 0.0
+    for i in range(1, len(grid)):
+        over = min(max(state, load[i] - 20.0), load[i] + 20.0) - state
+        state += over * 5e-3 / 25.0 * (abs(over) / 20.0 if square else 1.0)
+        y[i] = state
+    radius, time = np.array([20.0]), np.array([25.0])
+    found = flowing_play(rows.force, radius, time, rows, fresh(rows.n), square=square)[:, 0]
+    alone = rows.weight == 1
+    assert found[alone] == pytest.approx(np.interp(rows.time, grid, y)[alone], abs=0.35)
 
 
 @HANDS

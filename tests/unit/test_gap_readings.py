@@ -14,10 +14,11 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
+from identification.gap.laws.interval import Parameter
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant
-from identification.gap.search.readings import reading_all
+from identification.gap.search.readings import as_moved, reading_all
 from identification.gap.search.search import search
 from tests.unit.test_gap_forms import arm_data
 
@@ -112,3 +113,20 @@ def test_a_laser_that_reads_wrong_beside_creep_is_met_to_the_noise(gain: float) 
     label = next(p.variant.label for p in best.parts if p.word == "displacement_scale")
     assert label.endswith("of all that moves")
     assert len(found.variants) > len(variants)
+
+
+@pytest.mark.parametrize(
+    ("word", "name", "value"),
+    [
+        ("contact_seating", "depth", 0.1),
+        ("thermal_drift", "drift_over_session_x", 0.1),
+        ("time_lag", "lag", 0.125),
+    ],
+)
+def test_a_length_that_the_laser_alone_saw_was_read_by_its_gain_too_large(
+    word: str, name: str, value: float
+) -> None:
+    bench = make_bench(replace(arm_data(), q=None))
+    parts = tuple(Part(library(bench, [w])[0], 0.2) for w in (word, "displacement_scale"))
+    read = [{name: Parameter(0.125, 0.12, 0.13, "mm")}, {"factor": Parameter(1.25, 1.24, 1.26, "")}]
+    assert as_moved(bench, parts, read)[0][name].value == pytest.approx(value)

@@ -321,7 +321,8 @@ def _reached(
 
 
 def _calibrated(design: Design, rivals: tuple[Rival, Rival]) -> float:
-    """What the calibration itself says: the gain is known to u, of a prior of `s`."""
+    """What the calibration itself says: the gain is known to u, of a prior of `s`; what it reads of
+    no gain scatters by u, and passes for one as far as that."""
     gained = []
     for k, r in enumerate(rivals):
         if r.word not in _GAINS:
@@ -329,7 +330,8 @@ def _calibrated(design: Design, rivals: tuple[Rival, Rival]) -> float:
         u = float(getattr(design.instruments, _GAINS[r.word]))
         s = max(abs(float(r.forms[0].values[0])), u)
         occam = 0.5 * log(1 + (s / u) ** 2)
-        won = [occam, occam]  # right to have left the gain out
+        out = occam - 0.5 * s**2 / (s**2 + u**2)
+        won = [out, out]  # right to have left the gain out
         won[k] = 0.5 * (s / u) ** 2 - occam
         gained.append(min(won))
     return max(0.0, sum(gained))

@@ -21,6 +21,7 @@ from identification.gap.explanations.explanation import Explanation, conditioned
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.penalties import SAME_JOINT, minor_parts
 from identification.gap.explanations.several import family_of
+from identification.gap.laws.effect import declared
 from identification.gap.laws.interval import Parameter, Softer
 from identification.gap.model.variants import Variant, place_of
 from identification.gap.search.readings import as_moved
@@ -88,9 +89,8 @@ def _known(
 
 
 def _least(word: str, name: str) -> float:
-    """Of a parameter, by its name, with or without the direction, axis or segment that ends it."""
-    above_zero = {name, name.rpartition("_")[0]} & {*EFFECTS[word].not_negative}
-    return 0.0 if above_zero else -np.inf
+    """Of a parameter, by its name."""
+    return 0.0 if declared(name, EFFECTS[word].not_negative) else -np.inf
 
 
 # Of 78 parameters in blind mixtures 78 % lay within what should have been 90 % intervals, of 94

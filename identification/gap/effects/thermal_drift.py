@@ -165,6 +165,6 @@ EFFECT = Effect(
     variants=variants,
     parameters=_parameters,
     laws=Laws(_describe, _columns, of_session=OF_SESSION, lasts=False),
-    lengths=(),
+    lengths=("drift_over_session",),
     finer=None,
 )

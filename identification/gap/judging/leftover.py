@@ -155,11 +155,11 @@ def _free_paths(fitted: Fit, words: frozenset[str]) -> Iterator[Array]:
 
 
 def _left(engine: Engine, fitted: Fit) -> float:
-    """rms (m) of rows beyond their noise."""
+    """rms (m) of rows beyond their noise; what runs are off by together, the fit has taken."""
     bench, n = engine.bench, engine.bench.rows.n
     weight, noise = bench.rows.weight / bench.rows.weight.sum(), bench.noise
     left = engine.target[:n] - fitted.response
-    known = noise.response**2 + noise.hold**2 + noise.run**2 + open_to_hands(engine, fitted) ** 2
+    known = noise.response**2 + noise.hold**2 + open_to_hands(engine, fitted) ** 2
     square = weight @ (left**2 - known)
     return float(np.sqrt(max(float(square), 0.0)))
 

@@ -23,13 +23,13 @@ class Effect:
     laws: what a variant is in SI units, and what that does on any other bench.
     lengths: those of the parameters that grow with what the laser reads: lengths, and shares of the
         springs as they are; nothing in newtons, seconds, angles that springs give, or of an
-        instrument.
+        instrument. Named as in `declared`.
     finer: finer shapes of the word where it stands out, as points of its grid are too far apart;
         None where it is linear in all that is unknown, or hardly changes between two of them.
     beside: whether it is scored beside the leading word before: what that does must not decide
         where a smaller effect is looked for.
-    not_negative: those of the parameters of which no interval reaches below zero; without what
-        follows the last underscore where they have one of each direction, axis or segment.
+    not_negative: those of the parameters of which no interval reaches below zero. Named as in
+        `declared`.
     """
 
     word: str
@@ -40,3 +40,9 @@ class Effect:
     finer: Callable[[Word], list[Variant]] | None
     beside: bool = False
     not_negative: tuple[str, ...] = ()
+
+
+def declared(name: str, those: tuple[str, ...]) -> bool:
+    """Whether a parameter is one of those, which are named without what follows the last underscore
+    where there is one of each direction, axis or segment."""
+    return name in those or name.rpartition("_")[0] in those

@@ -118,10 +118,11 @@ def _let_go(
 
 @dataclass(frozen=True, eq=False)
 class _Phases:
-    """Seconds (n,) since the row before, in all, and of these: the old load stands on, the load
-    ramps, it stands. After a rest only the last of it is ramp."""
+    """Seconds (n,) since the row before, in all, and of these: nothing is loaded, the old load
+    stands on, the load ramps, it stands. After a rest only the last of it is ramp."""
 
     step: Array
+    unloaded: Array
     pause: Array
     ramp: Array
     stands: Array
@@ -132,7 +133,7 @@ def _phases(rows: Rows, rest: Flags) -> _Phases:
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
     stands = np.minimum(settling_share(rows), ease)
     pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
-    return _Phases(step, pause, np.maximum(ease - stands - pause, 0.0), stands)
+    return _Phases(step, step - ease, pause, np.maximum(ease - stands - pause, 0.0), stands)
 
 
 def retarded(
@@ -144,8 +145,8 @@ def retarded(
     before = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
     before[rest] = 0.0
     phases = _phases(rows, rest)
-    # z_i = keep_i z_{i-1} + gain_i: decay in a rest, or the old load standing on; a ramp to the new
-    # load, then standing there
+    # z_i = keep_i z_{i-1} + gain_i: a rest, or the old load standing on; a ramp to the new load,
+    # then standing there. What there was goes back all the while.
     paused = np.exp(-phases.pause[:, None] / times)
     ramp = phases.ramp[:, None] / times
     held = np.exp(-phases.stands[:, None] / times)
@@ -157,8 +158,7 @@ def retarded(
         there, back = PEAK * ramp[beyond], (1 - PEAK) * ramp[beyond]
         gone = _ramped(before[beyond], peak, there) * np.exp(-back)
         ramped[beyond] = gone + _ramped(peak, load[beyond], back)
-    decayed = np.exp(-phases.step[:, None] / times)
-    keep = held * during * np.where(rest[:, None], decayed, paused)
+    keep = np.exp(-phases.step[:, None] / times)
     if fresh is not None:
         keep[fresh] = 0.0
     stood = during * before * (1 - paused)
@@ -216,8 +216,9 @@ def flowing_play(
     """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
 
     `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
-    falls below it, wherever it has come to. load (n,), or (n, k): of each. square (k,): it
-    flows with the square of the overstress, `T p' = o |o| / r`, and slows down as it comes near.
+    falls below it, wherever it has come to; it flows back in a rest. load (n,), or (n, k): of each.
+    square (k,): it flows with the square of the overstress, `T p' = o |o| / r`, and slows down as
+    it comes near.
     Ramps between holds in _PARTS parts, then standing; within a hold the load hardly moves, and one
     part will do. weight (n,): as in `play`.
     """
@@ -231,18 +232,18 @@ def flowing_play(
     phases = _phases(rows, rest)
     parts = np.where(rows.hold_starts | rest | rows.continuous, _PARTS, 1)
     share = {m: ((np.arange(m) + 0.5) / m)[:, None] for m in (1, _PARTS)}
-    # (n, k): before the load moves, in every part of its way, after it
-    paused, during, stood = (
+    # (n, k): in a rest, before the load moves, in every part of its way, after it
+    rested, paused, during, stood = (
         _flowing(seconds[:, None] / times, square)
-        for seconds in (phases.pause, phases.ramp / parts, phases.stands)
+        for seconds in (phases.unloaded, phases.pause, phases.ramp / parts, phases.stands)
     )
     flown = partial(_flown, radius=radius, square=square, some=bool(np.any(square)))
     state, before = hung[0], np.zeros(load.shape[1])
     for i, x in enumerate(load):
         if fresh[i]:
             state, before = hung[i], 0.0 * x
-        elif rest[i]:  # minutes without load
-            state, before = _clipped(state, below[i], above[i]), 0.0 * x
+        elif rest[i]:
+            state, before = flown(state, rested[i], below[i], above[i]), 0.0 * x
         if phases.pause[i] > 0:
             state = flown(state, paused[i], before + below[i], before + above[i])
         if phases.ramp[i] > 0:

@@ -10,6 +10,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
+from identification.gap.laws.effect import declared
 from identification.gap.laws.interval import Parameter
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
@@ -69,6 +70,6 @@ def as_moved(
     if gain is None or not bench.data.arm or bench.has_q:
         return read
     return [
-        {name: p.over(gain) if name in EFFECTS[part.word].lengths else p for name, p in r.items()}
+        {n: p.over(gain) if declared(n, EFFECTS[part.word].lengths) else p for n, p in r.items()}
         for part, r in zip(parts, read, strict=True)
     ]
