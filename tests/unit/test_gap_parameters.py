@@ -185,6 +185,24 @@ def test_spread_of_a_slope_whose_threshold_is_held_is_that_of_its_path() -> None
     assert sd(found["slope_beyond_over_elastic"]) == pytest.approx((path @ cov @ path) ** 0.5)
 
 
+@pytest.mark.parametrize(("shape", "grows"), [("bend", [0, 1, 1]), ("cubic", [3])])
+def test_change_of_a_compliance_is_over_that_which_was_found(shape: str, grows: list[int]) -> None:
+    """Not over the simulated one, which may be off; a line beside the bends is part of it."""
+    bench = up_and_down()
+    v = of(bench, "joint_nonlinear_stiffness", shape)
+    w = np.linspace(0.3, 0.9, len(grows))
+    found, line = np.append(0.2, w), v.info["kinds"][0] == "line"
+    rng = np.random.default_rng(0)
+    root = 0.02 * rng.normal(size=(len(found),) * 2)
+    cov = root @ root.T
+    softer = Softer({0: 0.2}, {0: cov[0, 0]}, {0: cov[0, 1:]})
+    p = parameters(bench, Part(v, 1.0), w, cov[1:, 1:], softer)["change_of_compliance_over_range"]
+    drawn = found + rng.normal(size=(20000, len(found))) @ root.T
+    values = drawn[:, 1:] @ grows / (1 + drawn[:, 0] + line * drawn[:, 1])
+    assert p.value == pytest.approx(w @ grows / (1.5 if line else 1.2))
+    assert sd(p) == pytest.approx(values.std(), rel=0.03)
+
+
 def test_creep_is_what_comes_late_in_the_end_and_in_a_run() -> None:
     bench = up_and_down()
     assert run_seconds(bench) == 52.0
