@@ -6,7 +6,8 @@ compliance. A joint that carries the arm's weight has its curve over the net tor
 same only while it is pushed to one side in one pose. Gear catalogues: K3/K1 = 1.5 to 1.85.
 
 Size: K3/K1 = 1.5 to 1.85 in gears; 5 to 100 % of the compliance allowed, either sign.
-Prior: curve smooth, either sign, sd out of SCALES, equally likely; half of it on the free curve.
+Prior: curve smooth, either sign, sd out of SCALES, equally likely; half to three quarters of it
+on free curves.
 Source: three-part stiffness in catalogues of strain wave gears.
 """
 
