@@ -139,7 +139,7 @@ def test_laws_that_go_through_springs_name_them_in_model_files() -> None:
 
 def test_what_belongs_to_a_session_is_said_to_be_left_out() -> None:
     gone = {w for w in WORDS if not EFFECTS[w].laws.lasts}
-    assert set(gap_path._WORDS) == gone
+    assert set(gap_path._OF_SESSIONS) == gone
     chance = {c for w in WORDS if w not in gone for c in EFFECTS[w].laws.of_session}
     assert set(gap_path._CHANCE) == chance
 
