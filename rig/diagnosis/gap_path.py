@@ -189,7 +189,7 @@ _CHANCE = {
     "rest": "where it lies in its play when it is sent to a pose",
 }
 _OF_RUNS = "what single runs had to themselves"
-_WORDS = {
+_OF_SESSIONS = {
     "zero_shift": "jumps of the datum",
     "force_drift": "how the amplifier drifted",
     "thermal_drift": "how it drifted with time and temperature",
@@ -202,7 +202,7 @@ def left_out(forms: Sequence[Form]) -> tuple[str, ...]:
     for f in forms:
         laws = EFFECTS[f.word].laws
         if not laws.lasts:
-            whats = [_WORDS[f.word]]
+            whats = [_OF_SESSIONS[f.word]]
         else:
             chance = [t.coefficient for t in f.law.terms if t.coefficient in laws.of_session]
             whats = [_CHANCE[coefficient] for coefficient in chance]

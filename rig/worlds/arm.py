@@ -133,7 +133,9 @@ def _rotation_vectors(rotation: Array) -> Array:
     """(n, 3) axis times angle of rotations (n, 3, 3), angles within 0..pi.
 
     By way of the unit quaternion, whose largest component is taken from the diagonal: stays
-    accurate near half turns, where a tool that points down always is (Shepperd 1978).
+    accurate near half turns, where a tool that points down always is (Shepperd 1978). So is scipy's
+    `Rotation`, which takes up to three times as long, and a fifth of a second to be imported by
+    worlds that need nothing else of scipy.
     """
     diagonal = np.einsum("nii->ni", rotation)
     trace = diagonal.sum(axis=1, keepdims=True)

@@ -6,6 +6,7 @@ Arms and a bench without an arm, force and displacement imposed.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,6 +35,7 @@ from tests.conformance.effect_benches import (
     readings,
 )
 from tests.conformance.gap_designs import (
+    ARMS,
     linear,
 )
 
@@ -61,6 +63,33 @@ def test_file_states_word_sizes_and_source(word: str) -> None:
     assert re.search(r"Prior: .*\w", text)
     assert re.search(r"Size: .*\d", text)
     assert re.search(r"Source: \w+", text)
+
+
+# How much of its prior a file says that some of its shapes have, of an arm: from, to.
+PRIOR_OF: dict[str, tuple[str, Callable[[Variant], object], float, float]] = {
+    "force_drift": ("a quarter to a third of it", lambda v: v.free_pieces, 0.25, 0.34),
+    "displacement_scale": ("half of it", lambda v: v.bends, 0.5, 0.5),
+    "joint_creep": ("half of it, or a little more", lambda v: len(v.times_s) > 2, 0.5, 0.6),
+    "joint_hysteresis": ("two fifths of it", lambda v: "spectrum" in v.label, 0.4, 0.4),
+    "joint_nonlinear_stiffness": (
+        "half to three quarters of it",
+        lambda v: "curve" in v.label,
+        0.5,
+        0.75,
+    ),
+    "zero_shift": ("half of it", lambda v: "shifts" in v.info, 0.5, 0.5),
+}
+
+
+def test_priors_are_shared_as_their_files_say() -> None:
+    said = {w: " ".join((module(w).__doc__ or "").split()) for w in WORDS}
+    assert {w for w, text in said.items() if " of it" in text.split("Prior: ")[1]} == {*PRIOR_OF}
+    for word, (says, mine, least, most) in PRIOR_OF.items():
+        assert says in said[word]
+        for design in ARMS:
+            variants = of(word, design)[1]
+            share = sum(v.prior for v in variants if mine(v)) / sum(v.prior for v in variants)
+            assert least - 1e-9 <= share <= most + 1e-9, (word, design, share)
 
 
 @pytest.mark.parametrize(("word", "design"), PAIRS)

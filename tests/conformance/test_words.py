@@ -6,6 +6,7 @@ A word that one of the tables lacks is missed here, before data show it.
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Collection
 from difflib import get_close_matches
@@ -138,7 +139,7 @@ def test_laws_that_go_through_springs_name_them_in_model_files() -> None:
 
 def test_what_belongs_to_a_session_is_said_to_be_left_out() -> None:
     gone = {w for w in WORDS if not EFFECTS[w].laws.lasts}
-    assert set(gap_path._WORDS) == gone
+    assert set(gap_path._OF_SESSIONS) == gone
     chance = {c for w in WORDS if w not in gone for c in EFFECTS[w].laws.of_session}
     assert set(gap_path._CHANCE) == chance
 
@@ -177,6 +178,18 @@ def test_lengths_and_what_is_not_negative_are_parameters_of_their_word(word: str
     known = names()[word]
     for name in (*effect.lengths, *effect.not_negative):
         assert any(declared(k, (name,)) for k in known), name
+
+
+# What a name ends with: a direction, a pose and a number across it, or what is counted.
+_ENDING = re.compile(r"(_[xyz](_P\d+)?)?(_?(joint|segment|run)?\d+)?$")
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_what_a_parameter_means_is_told(word: str) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "gap.md").read_text("utf-8")
+    rows = page.partition("| parameter | meaning |")[2].partition("\n\n")[0].splitlines()
+    told = {name for row in rows for name in re.findall(r"`(\w+)`", row.split(" | ")[0])}
+    assert {_ENDING.sub("", n) for n in names()[word]} <= {_ENDING.sub("", n) for n in told}
 
 
 @pytest.mark.parametrize(("word", "key"), judge.SHARED)

@@ -152,6 +152,57 @@ def test_spread_of_a_threshold_is_that_of_its_draws_and_of_the_gain() -> None:
     assert sd(found) == pytest.approx(np.hypot(values.std(), gain), rel=0.03)
 
 
+def test_spread_of_a_slope_is_that_of_its_draws_with_the_threshold_that_goes_with_it() -> None:
+    """Where the knee lies and how soft it is beyond follow from the same weights."""
+    bench = up_and_down()
+    knee = of(bench, "joint_yield", "round")
+    k, radius = len(knee.columns), np.asarray(knee.info["radius"])
+    rng = np.random.default_rng(0)
+    w = np.where(np.arange(k) < len(radius), 0.5, 0.0)
+    root = 0.01 * rng.normal(size=(k, k))
+    softer = Softer({0: 0.2}, {0: 0.0}, {0: np.zeros(k)})
+    found = parameters(bench, Part(knee, 1.0), w, root @ root.T, softer)
+    top = 80 - radius
+    drawn = (w + rng.normal(size=(20000, k)) @ root.T)[:, : len(radius)]
+    slope = found["slope_beyond_over_elastic"]
+    assert slope.value == pytest.approx(
+        w[: len(radius)] @ top / (80 - found["threshold"].value) / 1.2
+    )
+    assert sd(slope) == pytest.approx(((drawn @ top) ** 2 / (drawn @ top**2) / 1.2).std(), rel=0.03)
+
+
+def test_spread_of_a_slope_whose_threshold_is_held_is_that_of_its_path() -> None:
+    """A negative weight would put the threshold where no radius is: it is held at the first one."""
+    bench = up_and_down()
+    knee = of(bench, "joint_yield", "sharp")
+    info = {**knee.info, "radius": np.array([32.0, 40.0])}
+    two = replace(knee, columns=knee.columns[:2], root=np.eye(2), info=info)
+    w, cov = np.array([2.0, -1.0]), 1e-6 * np.eye(2)
+    found = parameters(bench, Part(two, 1.0), w, cov)
+    assert found["threshold"].value == 32.0
+    path = np.array([48.0, 40.0]) / 48.0
+    assert found["slope_beyond_over_elastic"].value == pytest.approx(path @ w)
+    assert sd(found["slope_beyond_over_elastic"]) == pytest.approx((path @ cov @ path) ** 0.5)
+
+
+@pytest.mark.parametrize(("shape", "grows"), [("bend", [0, 1, 1]), ("cubic", [3])])
+def test_change_of_a_compliance_is_over_that_which_was_found(shape: str, grows: list[int]) -> None:
+    """Not over the simulated one, which may be off; a line beside the bends is part of it."""
+    bench = up_and_down()
+    v = of(bench, "joint_nonlinear_stiffness", shape)
+    w = np.linspace(0.3, 0.9, len(grows))
+    found, line = np.append(0.2, w), v.info["kinds"][0] == "line"
+    rng = np.random.default_rng(0)
+    root = 0.02 * rng.normal(size=(len(found),) * 2)
+    cov = root @ root.T
+    softer = Softer({0: 0.2}, {0: cov[0, 0]}, {0: cov[0, 1:]})
+    p = parameters(bench, Part(v, 1.0), w, cov[1:, 1:], softer)["change_of_compliance_over_range"]
+    drawn = found + rng.normal(size=(20000, len(found))) @ root.T
+    values = drawn[:, 1:] @ grows / (1 + drawn[:, 0] + line * drawn[:, 1])
+    assert p.value == pytest.approx(w @ grows / (1.5 if line else 1.2))
+    assert sd(p) == pytest.approx(values.std(), rel=0.03)
+
+
 def test_creep_is_what_comes_late_in_the_end_and_in_a_run() -> None:
     bench = up_and_down()
     assert run_seconds(bench) == 52.0

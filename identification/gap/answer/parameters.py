@@ -6,10 +6,11 @@ What they mean, whatever shape was fitted, so that shapes can be compared and mi
   end with the same work (the bilinear curve of equal area, as with push-over curves in FEMA 356);
   of a joint, the net torque there: weights count, and nobody states the tool's. threshold_of_load:
   what the push alone brings then; threshold_of_force: of a stand that slides, the force across;
-- slope beyond, creep: against the elastic compliance as it was found, not as it was simulated;
+- slope beyond, creep, change of compliance: against the elastic compliance as it was found, not as
+  it was simulated;
 - creep_fraction: late share of the elastic deflection in the end, as far as the times of the law
-  reach, and of what flows after one session; creep_fraction_of_run: when a load has stood as long
-  as a run lasts;
+  reach, and of what flows what it does in one run; creep_fraction_of_run: when a load has stood as
+  long as a run lasts;
 - width: of the whole play, in whose middle the joint rests when its weights are balanced;
 - depth (of a seat): at the largest load;
 - lag: mean delay; factor: read over true along the straight line through zero.

@@ -2,7 +2,7 @@
 
 The residual of a fit is read as `r = g(setup, branch, force) + noise`, with g a Gaussian process
 over levels of load: alike for neighbouring loads of one setup, half so between branches (as
-`evidence.alike` has it), of unknown size eta; or g is at one level alone, as where a law cuts a
+`engine.alike` has it), of unknown size eta; or g is at one level alone, as where a law cuts a
 corner. Noise is that of the instruments, and what visits of a level scatter beyond that. Everything
 is Gaussian for a given eta, so the posterior of g is exact (Rasmussen and Williams, Gaussian
 Processes for Machine Learning, 2006, eq. 2.23-2.24), and eta is integrated over a grid. No claim
@@ -192,7 +192,7 @@ def _excess(value: Array, variance: Array, level: Ints) -> float:
     if free < 1 or chi_squared(0.0) <= free:
         return 0.0
     low, high = 0.0, float(np.var(value)) * len(value) / free  # chi squared is less there
-    for _ in range(_HALVINGS):
+    for _ in range(_HALVINGS):  # a root of scipy.optimize costs a tenth of a second of import
         middle = (low + high) / 2
         low, high = (middle, high) if chi_squared(middle) > free else (low, middle)
     return high

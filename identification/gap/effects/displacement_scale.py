@@ -4,7 +4,8 @@ A target tilted by 20 degrees reads 6 % off; a wrong range 20 %. Triangulation b
 and a sensor that changes its range has two gains.
 
 Size: 1 % (10 degrees of tilt: 1.5 %) to 20 %.
-Prior: either sign, sd out of SCALES, equally likely; half of it on a gain that bends or changes.
+Prior: either sign, sd out of SCALES, equally likely; of an arm half of it on a gain that
+bends or changes.
 Source: cosine of the target's tilt; neighbouring ranges of laser sensors; their linearity.
 """
 

@@ -4,7 +4,8 @@ Measured = true + d(t): the joints feel d less than simulated, the zero plateaus
 With a taring before each run only what drifts within a run is left. Up to 0.4 to 4 N/min.
 
 Size: up to 0.4 to 4 N/min; 0.1 to 10 % of the largest force.
-Prior: either sign, sd out of SHARES, equally likely; half of it on a free smooth path.
+Prior: either sign, sd out of SHARES, equally likely; a quarter to a third of it on
+free smooth paths.
 Source: 0.05 pC/s and more in data sheets of charge amplifiers.
 """
 

@@ -5,8 +5,8 @@ Wrong sensitivity or range of a charge amplifier: 2 to 20 %. The gain may bend a
 range, as amplifiers and load cells do.
 
 Size: 2 to 20 %.
-Prior: either sign, sd out of SCALES, equally likely; a third of it on a gain that bends, a fifth as
-much as on one gain on that of each component.
+Prior: either sign, sd out of SCALES, equally likely; of an arm half as much on one that bends
+as on one that does not, a fifth as much on that of each component.
 Source: tolerances and neighbouring ranges of charge amplifiers; their linearity in data sheets.
 """
 

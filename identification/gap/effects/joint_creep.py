@@ -10,7 +10,8 @@ What crept goes back between two runs, as the session's clock tells; or nothing 
 the rig is turned to another direction, which may take hours that no clock counts.
 
 Size: 1 to 50 % of the elastic deflection: polymers, grease, gears.
-Prior: shares positive in sum, sd out of SCALES, equally likely; half of it on the whole spectrum.
+Prior: shares positive in sum, sd out of SCALES, equally likely; half of it, or a little
+more, on whole spectra.
 Source: Findley 1976.
 """
 

@@ -15,8 +15,9 @@ slips instead (plays: Prandtl 1928). The coefficients are the shares of the join
 work through friction, 0 to 1, or what it has more than was stated.
 
 Size: friction of 2 to 20 % of the torque gears see; about 1 arcmin lost at ratio >= 80.
-Prior: shares positive in sum, sd out of SCALES, equally likely; spectrum and single strengths a
-quarter each, exponential laws the rest.
+Prior: shares positive in sum, sd out of SCALES, equally likely; of an arm two fifths of it on
+spectra, as much on exponential laws, in both conventions, a fifth on single strengths; of a
+specimen as much on each of these laws.
 Source: hysteresis loss in catalogues of strain wave gears.
 """
 

@@ -6,7 +6,8 @@ compliance. A joint that carries the arm's weight has its curve over the net tor
 same only while it is pushed to one side in one pose. Gear catalogues: K3/K1 = 1.5 to 1.85.
 
 Size: K3/K1 = 1.5 to 1.85 in gears; 5 to 100 % of the compliance allowed, either sign.
-Prior: curve smooth, either sign, sd out of SCALES, equally likely; half of it on the free curve.
+Prior: curve smooth, either sign, sd out of SCALES, equally likely; half to three quarters of it
+on free curves.
 Source: three-part stiffness in catalogues of strain wave gears.
 """
 
@@ -355,11 +356,14 @@ def _finely(bench: Bench, j: int, top: float) -> tuple[tuple[float, ...], list[i
 
 
 def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
-    """What the compliance at the largest torque has more than at none: a hinge adds itself, a
-    power its exponent, a line nothing."""
+    """What the compliance at the largest torque has more than at none, over that at none: a hinge
+    adds itself, a power its exponent; a line is part of the spring that was found."""
+    joint, kinds = int(v.info["joint"]), v.info["kinds"]
     grows = {"line": 0.0, "quadratic": 2.0, "even": 2.0, "cubic": 3.0}
-    change = np.array([grows.get(kind, 1.0) for kind in v.info["kinds"]])
-    return {"change_of_compliance_over_range": found.linear(change, "1", bench.sense)}
+    change = bench.sense * np.array([grows.get(kind, 1.0) for kind in kinds])
+    line = np.array([float(kind == "line") for kind in kinds])
+    found = found.on_spring(line, joint)
+    return {"change_of_compliance_over_range": found.per_spring(change, joint)}
 
 
 def _look_closer(word: Word) -> list[Variant]:

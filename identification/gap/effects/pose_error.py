@@ -8,8 +8,9 @@ shows it. The target moves with the square of the levers. Offsets of 5 to 300 mm
 degrees, of the base 1 to 15.
 
 Size: tools 5 to 300 mm off, joints 0.2 to 5 degrees, the base 1 to 15 degrees.
-Prior: either sign, sd out of OFFSETS_M, ANGLES_RAD or TURNS_RAD, equally likely; half of it on a
-base that is turned, and on joints that stand elsewhere in one pose only or without being read so.
+Prior: either sign, sd out of OFFSETS_M, ANGLES_RAD or TURNS_RAD, equally likely; half as much on
+a base that is turned, or joints that stand elsewhere in one pose only or without being read so, as
+on a tool, or joints, elsewhere.
 Source: wrong tool frames, zero positions of joints, bases and rigs lined up by eye.
 """
 

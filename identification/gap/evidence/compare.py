@@ -22,8 +22,9 @@ from identification.gap.words import LINEAR
 
 
 class Scored(NamedTuple):
-    """log evidence of a variant, with the scale and level that contribute most. A plain tuple: a
-    diagnosis makes 100 000 of them."""
+    """A variant with the scale and level that contribute most. log_evidence: its evidence times its
+    prior, so that shapes compare as they are likely; `marginal`, and who wants the evidence alone,
+    takes the prior off again. A plain tuple: a diagnosis makes 100 000 of them."""
 
     variant: Variant
     log_evidence: float

@@ -5,8 +5,9 @@ imperfection of a model (no formula is the rig) has a size eta on a grid of leve
 - repeatable: an unknown smooth function of setup, branch and force step, standard deviation eta;
 - per run: a smooth function of branch and force of each run's own, 0.6 eta (memory makes a law's
   mistakes differ from run to run, but alike along one);
-- per hold: each hold off by 0.3 eta; within holds: every row off by 0.3 eta more than its noise;
-- joint readings: each hold off by eta over the joint's lever.
+- per hold: each hold off by 0.3 eta, where it runs on each stretch by 0.6 eta; within holds: every
+  row off by 0.3 eta more than its noise;
+- joint readings of an arm: each hold off by eta over one usual lever, 0.3 m, whichever joint.
 For every level the base (with the repeatable part) is integrated out of the products of the pool
 (`products`); then the evidence of any set of columns with prior covariance `s^2 T T^T` costs one
 small eigendecomposition: `base + 1/2 b' (G + S^-1)^-1 b - 1/2 log|I + S G|`.

@@ -10,11 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from identification.arrays import Array
+from identification.gap.effects import time_lag
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import PATH
 from identification.gap.explanations.fit import Fit
-
-WORD = "time_lag"
 
 
 def open_to_hands(engine: Engine, fitted: Fit) -> Array:
@@ -23,6 +22,6 @@ def open_to_hands(engine: Engine, fitted: Fit) -> Array:
     n = engine.bench.rows.n
     if engine.bench.rows.continuous:
         return np.zeros(n)
-    late = [i for i, p in enumerate(fitted.parts) if p.word == WORD]
+    late = [i for i, p in enumerate(fitted.parts) if p.word == time_lag.WORD]
     moved = sum((fitted.contribution(engine, i)[:n] for i in late), np.zeros(n))
     return np.asarray(PATH * np.abs(moved))

@@ -12,7 +12,6 @@ how far off they are.
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtri, stdtr
 
 from identification.arrays import Array
 from identification.gap.evidence.engine import LEVER_M, Engine
@@ -122,6 +121,8 @@ def _jumps(engine: Engine, part: Part, pulls: Array) -> Array:
     """The largest step (paths,) of every free path against its other ones, by the normal deviate
     that is as seldom: where steps are of one size, however large, none stands out. A steady path
     comes with a place and a rate; steps are what it turns by."""
+    from scipy.special import ndtri, stdtr
+
     pieces, first = part.variant.free_pieces, 2 * part.variant.steady
     seen = np.any(engine.columns(part.variant.columns)[: engine.bench.rows.n] != 0, axis=0)
     out = []

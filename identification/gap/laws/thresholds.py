@@ -35,9 +35,8 @@ def of_knee(
     knee = found.first(len(info["radius"]))  # the rest flows back
     # of the sharp knee that ends where the curve ends: a radius that the load hardly passed, or
     # never, says nothing of the slope
-    threshold, top = _threshold(bench, v, knee), _top(info)
-    beyond = np.maximum(top - np.asarray(info["radius"]), 0.0)
-    slope = knee.per_spring(beyond / max(top - threshold.value, 1e-9 * top), info.get("joint"))
+    threshold = _threshold(bench, v, knee)
+    slope = knee.per_spring(_slope(info, knee, threshold.value), info.get("joint"))
     least = v.least  # what bends less does not give way
     value, low, high = (max(s, least) for s in (slope.value, slope.low, slope.high))
     if bench.imposed and not bench.data.arm:
@@ -71,6 +70,16 @@ def _threshold(bench: Bench, v: Variant, knee: Coefficients) -> Parameter:
     shared = bench.data.instruments.force_gain if not bench.imposed else 0.0
     found = normal(value, max(variance, 0.0) + (shared * value) ** 2, bench.torque_unit)
     return replace(found, most=top)
+
+
+def _slope(info: Mapping[str, Any], knee: Coefficients, threshold: float) -> Array:
+    """(k,) derivatives of the slope beyond, `sum w (top - r) / (top - threshold)`; their product
+    with w is the slope itself. fixed: those at a threshold that stands still; it moves with w
+    unless it is held at an end of the radii."""
+    top, radius = _top(info), np.asarray(info["radius"])
+    fixed = np.maximum(top - radius, 0.0) / max(top - threshold, 1e-9 * top)
+    moves = radius.min() < threshold < min(float(radius.max()), top) and knee.w @ fixed > 0
+    return fixed * (2 - fixed) if moves else fixed
 
 
 def _carried(way: Parameter, stiffer: float, variance: float, most: float) -> Parameter:

@@ -10,8 +10,8 @@ need be zeroed: the crossing lies anywhere. Two laws, by what is driven:
   not pass: the same place of `play_r(x - centre)` instead of `x - centre`, `r` of any size.
 
 They are met to a few percent or not at all: corners are sharp, and a grid of places would miss
-them. So the places are found by least squares, before the evidence is asked. Play: Krasnosel'skii,
-Pokrovskii 1989. Where no play passes through the load's range none is placed.
+them. So the places are found by least squares (compass search), before the evidence is asked. Play:
+Krasnosel'skii, Pokrovskii 1989. Where no play passes through the load's range none is placed.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from identification.gap.recording.rows import Rows
 from identification.gap.recording.white import LEAST_SAMPLES, white_noise
 
 # The stated uncertainty of one sample includes what is common to a hold (vibration, linearity) and
-# to a run (datum); a third of it each leaves nine tenths for the single sample.
+# to a run (datum); a fifth and a third of it leave nine tenths for the single sample.
 HOLD_SHARE = 0.2
 RUN_SHARE = 0.33
 # What is stated of a bench's instruments is known to a factor of two (GUM G.4.2: a type B estimate
