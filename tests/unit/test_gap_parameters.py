@@ -420,6 +420,19 @@ def test_friction_means_the_same_in_both_conventions(label: str) -> None:
     assert held["share_through_friction"].value == pytest.approx(0.3, rel=0.02)
 
 
+def test_friction_is_over_the_spring_that_was_found() -> None:
+    """Half the compliance that META states, and what rubs has 0.3 of META's: twice the friction."""
+    bench = make_bench(arm_data())
+    rubs = of(bench, "joint_hysteresis", "joint 1 r 0.2")
+    joint, w = int(rubs.info["joint"]), np.full(len(rubs.columns), 0.3)
+    softer = Softer({joint: -0.5}, {joint: 0.0}, {joint: np.zeros(len(w))})
+    as_stated, stiffer = (
+        parameters(bench, Part(rubs, 1.0), w, no_spread(w), s) for s in (NOMINAL, softer)
+    )
+    for name in ("friction", "share_through_friction"):
+        assert stiffer[name].value == pytest.approx(2 * as_stated[name].value)
+
+
 @pytest.mark.parametrize(("nearly", "counts"), [(0.7, 1.0), (0.9, 0.5), (0.999, 0.0)])
 def test_strengths_near_the_largest_load_count_the_less(nearly: float, counts: float) -> None:
     load = 80 * np.sin(np.arange(300) / 15)
@@ -428,7 +441,9 @@ def test_strengths_near_the_largest_load_count_the_less(nearly: float, counts: f
     radius = np.array([nearly, 10.0]) * np.abs(bench.torque).max()
     one = replace(rubs, info={**rubs.info, "radius": radius})
     read = parameters(bench, Part(one, 1.0), np.array([0.2, 0.0]), np.zeros((2, 2)))
-    assert read["friction"].value == pytest.approx(0.2 * radius[0] * counts, abs=0.01 * radius[0])
+    spring = 1 - 0.2 * (1 - counts)  # what does not slip is part of it
+    expected = 0.2 * radius[0] * counts / spring
+    assert read["friction"].value == pytest.approx(expected, abs=0.01 * radius[0])
 
 
 def test_friction_is_not_below_zero() -> None:

@@ -153,7 +153,9 @@ def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Param
     share = found.per_spring(slips, joint)
     if bench.data.arm or not bench.imposed:  # no friction holds back more than all
         share = replace(share, most=1.0)
-    return {
-        "friction": found.linear(slips * radius, bench.torque_unit),
-        "share_through_friction": share,
-    }
+    unit = bench.torque_unit
+    if bench.imposed and not bench.data.arm:  # what slips beside the spring: a force, as it is
+        friction = found.linear(slips * radius, unit)
+    else:
+        friction = found.per_spring(slips * radius, joint, unit)
+    return {"friction": friction, "share_through_friction": share}
