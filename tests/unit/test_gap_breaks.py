@@ -102,6 +102,19 @@ def test_what_no_word_names_is_unknown_and_told(force: object, kind: str) -> Non
     assert found.effects == ()
 
 
+@pytest.mark.parametrize(("loose", "until"), [(5e-4, 0.01), (1e-3, 0.004)])
+def test_what_hangs_loose_bears_at_the_same_load_in_every_pass_and_is_no_jerk(
+    loose: float, until: float
+) -> None:
+    """Within a few readings at every beginning and end, pulled by a weak spring."""
+    stroke = 1e-3 * triangle(N, 3)
+    force, noise = SPRING * stroke, np.random.default_rng(2)
+    way = stroke + loose * np.minimum(force / (until * force.max()), 1.0)
+    read = force + noise.normal(0, NOISE_N, N)
+    data = running(read, way + noise.normal(0, 1e-7, N), imposed="force")
+    assert explained(data).verdict == "contact_seating"
+
+
 def sticking(stiffness: float, limit: float) -> Array:
     """Spring and Coulomb slider in series."""
     out, held = np.empty(N), 0.0

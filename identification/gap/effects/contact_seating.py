@@ -30,6 +30,7 @@ WORD = "contact_seating"
 FORCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest force
 # A bench has no second direction that would tell a seat from a curved spring: only low forces.
 BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
+BENCH_SLACKS = (0.0007, 0.002, 0.006, 0.02)  # under which what hangs loose comes to bear
 BENCH_SHARES = (0.01, 0.03, 0.1)
 STEPS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45)  # of it, between which several faces seat
 HERTZ_AT = 0.1  # of the largest force: where its scale is put
@@ -79,6 +80,8 @@ def variants(bench: Bench) -> list[Variant]:
             out.append(_seated(bench, law, share * top, scales))
             if law == "exponential":
                 columns += out[-1].columns
+    if not bench.data.arm and not bench.imposed:
+        out += [_seated(bench, "slack", share * top, scales) for share in BENCH_SLACKS]
     # a ball on a plate has no force of its own
     out.append(_seated(bench, "Hertz", HERTZ_AT * top, scales))
     out.append(
@@ -278,7 +281,7 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     """Slacks about one that was found, close: of the steps of a first look."""
     law, force = found.info["laws"][0]
     wide = force * (1 + close * FINER)
-    if bench.data.arm:
+    if not bench.imposed:
         return [_seated(bench, law, f, found.scales, 1 / len(FINER)) for f in wide.tolist()]
     most = _WIDEST if law == "toe" else 1.0
     wide = wide[wide < most * _stroke(bench)].tolist()

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from identification.arrays import Array, Flags
+from identification.gap.effects.contact_seating import BENCH_SLACKS, pressed
 from identification.gap.evidence.factor import span_of
 from identification.gap.explanations.explanation import PLAIN, Likeness, SearchResult
 from identification.gap.laws.drift import free_path, path_root
@@ -142,12 +143,14 @@ def _jerks(bench: Bench, base: Base, target: Array) -> list[Variant]:
 
 def jump_rows(bench: Bench, base: Base, target: Array, most: int) -> list[int]:
     """Rows, at most so many, from which on a jump of the response takes most of what the base, a
-    smooth curve of the load with a smooth loop, a slow path and the jumps before it leave."""
+    curve of the load, smooth but where it comes to bear, with a smooth loop, a slow path and the
+    jumps before it leave."""
     n = bench.rows.n
     white = 1 / bench.sigma[:n]
     load = _spread(bench.load)
     sense = np.where(rises(bench.load), 1.0, -1.0)
     smooth = [
+        _loose(bench),
         chebvander(load, _CURVE),
         chebvander(load, _LOOP) * sense[:, None],
         chebvander(_spread(bench.rows.session), _SLOW),
@@ -180,6 +183,15 @@ def jump_rows(bench: Bench, base: Base, target: Array, most: int) -> list[int]:
         new = new - from_here_on(jump) ** 2
         out.append(k)
     return out
+
+
+def _loose(bench: Bench) -> Array:
+    """(n, k) what hangs loose gives until it bears: at the same load in every pass, which no jerk
+    does. None where the displacement is imposed: no force jumps there."""
+    if bench.imposed:
+        return np.empty((bench.rows.n, 0))
+    size, sign = pressed(bench)
+    return np.column_stack([sign * np.minimum(size / (s * size.max()), 1.0) for s in BENCH_SLACKS])
 
 
 def _just_turned(bench: Bench) -> Flags:
