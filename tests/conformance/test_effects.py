@@ -6,17 +6,19 @@ Arms and a bench without an arm, force and displacement imposed.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from identification.arrays import Flags
 from identification.gap import effects
 from identification.gap.data import GapData
-from identification.gap.evidence.parts import Part
-from identification.gap.explanations.explanation import Explanation
-from identification.gap.explanations.fit import fit
+from identification.gap.effects import EFFECTS
+from identification.gap.laws.law import Law
 from identification.gap.model.bench import make_bench
 from identification.gap.model.pool import Pool
 from identification.gap.model.variants import Variant
@@ -30,7 +32,6 @@ from tests.conformance.effect_benches import (
     built,
     module,
     of,
-    quick_engine,
     readings,
 )
 from tests.conformance.gap_designs import (
@@ -113,14 +114,65 @@ def test_same_data_same_columns(word: str, design: str) -> None:
 # --- nothing in, nothing out -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("word", "design"), PAIRS)
-def test_null_coefficients_leave_the_springs_alone(word: str, design: str) -> None:
-    bench, variants, _ = of(word, design)
-    engine = quick_engine(bench)
-    for v in (variants[0], variants[-1]):
-        found = fit(engine, Explanation((Part(v, v.scales[0]),), 0.0, 0.0, (0.0,), 0.0))
-        nothing = replace(found, coefficients=np.zeros_like(found.coefficients))
-        assert np.all(nothing.contribution(engine, 0) == 0.0)
+FAR, SOON = 1e7, 1e-6  # against loads, lengths and times of the designs
+# What a law needs besides its coefficients, and where it is switched off by that.
+OFF = {
+    "threshold": FAR,
+    "strength": FAR,
+    "reach": FAR,
+    "zone": FAR,
+    "beyond": FAR,
+    "net_beyond": FAR,
+    "net_above": FAR,
+    "above": FAR,
+    "force_scale": FAR,
+    "at_load": FAR,
+    "at_response": FAR,
+    "retardation_time": FAR,
+    "time_constant": FAR,
+    "lag": SOON,
+}
+HELD_BACK = ("Iwan", "Dahl", "Bouc-Wen")  # friction that comes on top of the spring: none is none
+# In proportion to their coefficients and to nothing else.
+STRAIGHT = ("link_flexibility", "zero_shift", "pose_error", "joint_stiffness_error")
+
+
+def switched_off(law: Law) -> tuple[Law, Flags]:
+    """The law with all its numbers where it does nothing, and (terms,) which of them have one."""
+    off = OFF | dict.fromkeys(("strength", "reach"), SOON)
+    off = off if law.constants.get("law") in HELD_BACK else OFF
+
+    def nulls(shape: Mapping[str, Any]) -> dict[str, Any]:
+        return {key: off.get(key, value) for key, value in shape.items()}
+
+    terms = tuple(replace(t, shape=nulls(t.shape)) for t in law.terms)
+    whole = bool(off.keys() & law.constants)
+    # of a play its place is a number of its own
+    silent = [
+        t.coefficient not in ("place", "rest") and (whole or off.keys() & t.shape)
+        for t in law.terms
+    ]
+    return replace(law, constants=nulls(law.constants), terms=terms), np.array(silent, dtype=bool)
+
+
+@pytest.mark.parametrize("word", [w for w in WORDS if w not in STRAIGHT])
+def test_a_law_switched_off_by_its_shape_does_nothing(word: str) -> None:
+    """Thresholds that no load reaches, times that nothing waits for, a lag of no time."""
+    bench, variants, _ = of(word, "medium")
+    laws, kinds = EFFECTS[word].laws, dict[object, Law]()
+    for v in variants:
+        law, _ = laws.of(bench, v)
+        of_kind = [law.constants.get(key) for key in ("law", "kind", "way")]
+        terms = [(t.coefficient, *t.shape, t.shape.get("law")) for t in law.terms]
+        kinds[(*of_kind, *terms)] = law
+    told = 0
+    for law in kinds.values():
+        off, silent = switched_off(law)
+        as_it_is, left = (np.abs(laws.rows(bench, x)[:, silent]) for x in (law, off))
+        if silent.any():
+            assert left.max() <= 1e-3 * as_it_is.max(), law
+            told += 1
+    assert told > 0
 
 
 # These move or show without a load: paths in time, datums, the amplifier, a joint that stands off.
