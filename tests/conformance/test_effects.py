@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,13 @@ import pytest
 
 from identification.arrays import Flags
 from identification.gap import effects
-from identification.gap.data import GapData
+from identification.gap.data import BRANCH_NAMES, GapData
 from identification.gap.effects import EFFECTS
 from identification.gap.laws.law import Law
-from identification.gap.model.bench import make_bench
+from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
 from identification.gap.model.variants import Variant
-from identification.gap.words import WORDS
+from identification.gap.words import LINEAR, WORDS
 from tests.conformance.effect_benches import (
     IN_JOINTS,
     OUTSIDE,
@@ -189,6 +190,41 @@ def test_without_a_load_only_drifts_and_shifts_move_the_target(word: str) -> Non
     for column in bench.columns:
         loose = word == "joint_backlash"  # lies anywhere in its play, by a free place
         assert loose or not np.any(column[:n])
+
+
+# --- kinds -------------------------------------------------------------------------------------
+
+
+@cache
+def loaded_alike_and_twice_as_far() -> tuple[Bench, Bench, Flags]:
+    """Two benches of one straight rig, and the rows on the way down, where the second is loaded
+    twice as far: after the same loads on the way up, and on another clock."""
+    data = linear("medium")
+    down = data.branch == BRANCH_NAMES.index("unloading")
+
+    def pushed(force: Array, session: Array) -> Bench:
+        loads = replace(data, force=force, displacement=1.1e-5 * force, session=session)
+        return make_bench(loads)
+
+    once = pushed(data.force, data.session)
+    twice = pushed(np.where(down, 2.0, 1.0) * data.force, data.session**1.5)
+    return once, twice, once.rows.branch == BRANCH_NAMES.index("unloading")
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_linear_words_are_those_that_follow_the_load_of_the_moment(word: str) -> None:
+    """Of a linear word some shape is in proportion to the load, whatever went before and whenever:
+    loads superpose. Of the others, which may be less exact than the springs, none is."""
+    once, twice, down = loaded_alike_and_twice_as_far()
+    laws = EFFECTS[word].laws
+    variants = module(word).variants(replace(once, columns=Pool()))
+
+    def superposes(law: Law) -> bool:
+        a, b = (laws.rows(bench, law)[: bench.rows.n][down] for bench in (once, twice))
+        return bool(np.any(a)) and np.allclose(b, 2 * a, rtol=0, atol=1e-6 * np.abs(a).max())
+
+    some = [laws.of(once, v)[0] for v in variants[:: 1 + len(variants) // 20]]
+    assert any(map(superposes, some)) == (word in LINEAR)
 
 
 # --- joints and readings -----------------------------------------------------------------------
