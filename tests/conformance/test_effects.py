@@ -6,6 +6,7 @@ Arms and a bench without an arm, force and displacement imposed.
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -22,7 +23,7 @@ from identification.gap.effects import EFFECTS
 from identification.gap.laws.law import Law
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import Variant, place_of
 from identification.gap.words import LINEAR, WORDS
 from tests.conformance.effect_benches import (
     IN_JOINTS,
@@ -83,6 +84,18 @@ def test_variants_are_well_formed(word: str, design: str) -> None:
         assert 0 < v.prior < np.inf
         assert v.positive is None or (v.positive.shape == (k,) and np.any(v.positive))
         assert np.any(columns[:, list(v.columns)]), v.label
+
+
+@pytest.mark.parametrize(("word", "design"), [p for p in PAIRS if p[1] in ("medium", "bench")])
+def test_shapes_of_one_grid_are_told_by_facts_as_labels_tell_them(word: str, design: str) -> None:
+    """Intervals reach to the next shape on the grid: two that differ in more than numbers are no
+    neighbours. Labels are for people, and may be reworded: facts must tell as much."""
+    by_facts, by_labels = defaultdict(set), defaultdict(set)
+    for v in of(word, design)[1]:
+        said = re.sub(r"(?<![A-Za-z])\d[\d.e+-]*", "#", v.label), place_of(v)
+        by_facts[v.grid].add(said)
+        by_labels[said].add(replace(v, label="another").grid)
+    assert all(len(same) == 1 for same in (*by_facts.values(), *by_labels.values()))
 
 
 class _Apart(Pool):

@@ -156,6 +156,7 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
                 "crossing": "weight",
                 "tool_kg": TOOL_KG,
                 "preload_Nm": float(preload),
+                "against": bool(way * preload < 0),
                 "step_Nm": step,
             }
             label = f"joint {j + 1} preload {way * preload / (high - low):.2g}"
@@ -266,6 +267,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
             _PLACED_PRIOR,
             _least(bench, j, flanks.zone),
             each=(True, True),
+            form=name,
             **info,
         )
         for k, name in ((2, ""), (3, ", other springs"))

@@ -134,6 +134,7 @@ def _family(
             smooth_root(len(columns), 0.5),
             prior=spectrum,
             each=True,
+            form="spectrum",
             times_s=times_s,
             **info,
         )

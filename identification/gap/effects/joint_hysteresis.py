@@ -153,7 +153,8 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
         finer = _spectra(bench, joint, name, span, path, BETWEEN)
     else:
         return []
-    out = [replace(v, label=f"{v.label} fine", info={**v.info, "memory": memory}) for v in finer]
+    more = {"memory": memory, "closely": True}
+    out = [replace(v, label=f"{v.label} fine", info={**v.info, **more}) for v in finer]
     return out + _with_other_springs(bench, out)
 
 
@@ -267,6 +268,7 @@ def _spectra(
                 prior=0.25,
                 each=True,
                 within=friction_law.no_knee(bench, torque, reach * radii),
+                form="spectrum",
                 joint=joint,
                 radius=radii,
                 law=law,

@@ -27,6 +27,7 @@ from identification.gap.model.bench import TOOL_KG, Bench
 from identification.gap.model.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
+BEND = "bend"  # a form: one bend, between neighbouring places
 # Closer at the start: contacts are soft where they begin to bear, as `|tau|^(2/3)` (Hertz 1882).
 HINGES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 PLACES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of corners; of all of the net torque
@@ -85,10 +86,9 @@ def _alike_both_ways(bench: Bench, j: int, line: int, top: float) -> list[Varian
     for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
         pair = hinges[k : k + 2]
         if np.mean(pair) >= seen:
-            label, both = f"joint {j + 1} bend {pair[0]}", [line, *columns[k : k + 2]]
-            out.append(
-                variant(WORD, label, both, SCALES, prior=prior, kinds=("line", *pair), **info)
-            )
+            label, both = f"joint {j + 1} {BEND} {pair[0]}", [line, *columns[k : k + 2]]
+            exact = {"kinds": ("line", *pair), "form": BEND, **info}
+            out.append(variant(WORD, label, both, SCALES, prior=prior, **exact))
     return out
 
 
@@ -300,6 +300,7 @@ def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
         positive=False,
         prior=0.5,
         kinds=("line", *places),
+        form="fine",
         joint=j,
         torque=top,
         hinges=places,
@@ -364,7 +365,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
 
 def _look_closer(word: Word) -> list[Variant]:
     odd = [s for s in word.alone if "line" in s.variant.info]
-    bends = [s for s in word.alone if " bend " in s.variant.label]
+    bends = [s for s in word.alone if s.variant.info.get("form") == BEND]
     return [*closing_in(word, corners, bends[:1]), *closing_in(word, refined, odd[:1])]
 
 

@@ -77,6 +77,7 @@ def _placed(bench: Bench, links: Array, placed: str) -> list[Variant]:
                 SCALES,
                 both,
                 each=True,
+                form="both",
                 segments=list(range(count)),
                 placed=placed,
             )

@@ -75,6 +75,7 @@ def variants(bench: Bench) -> list[Variant]:
             prior=prior * each[0].share,
             directions=names,
             shapes=[k.shapes for k in each],
+            drags=any(shape.drags_N > 0 for shape in each[0].shapes),
             read=[k.read for k in each],
             shown=max(slants[name] for name in names) / MOST_CROSSTALK,
         )

@@ -64,7 +64,7 @@ def with_plain_trouble(found: SearchResult) -> SearchResult:
     if ahead < PLAIN:
         return found
     first = best.parts[0]
-    kind = "slopes" if first.variant.label == EACH_RUN else first.word
+    kind = "slopes" if first.variant.info.get("form") == EACH_RUN else first.word
     return replace(found, looks_like=Likeness(kind, None, best.log_weight))
 
 
@@ -113,7 +113,7 @@ def _of_runs(bench: Bench) -> list[Variant]:
         return []
     spring = bench.slope * bench.load
     columns = [bench.add(bench.outside_column(spring * (bench.rows.run == r))) for r in runs]
-    return [variant(WANDERS, EACH_RUN, columns, LOSSES, positive=False)]
+    return [variant(WANDERS, EACH_RUN, columns, LOSSES, positive=False, form=EACH_RUN)]
 
 
 EACH_RUN = "each run"
