@@ -33,6 +33,7 @@ from identification.arrays import Array, Flags
 from identification.gap.laws import lost_motion_law
 from identification.gap.laws.closer import Word, closing_in, nearly_leads, places, seen
 from identification.gap.laws.effect import Effect
+from identification.gap.laws.flanks import Flanks, placed, shapes
 from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Laws
 from identification.gap.laws.lost_motion import (
@@ -50,7 +51,6 @@ from identification.gap.laws.lost_motion import (
     within_play,
 )
 from identification.gap.model.bench import TOOL_KG, Bench
-from identification.gap.model.flanks import Flanks, placed, shapes
 from identification.gap.model.variants import Variant, variant
 
 WORD = "joint_backlash"
