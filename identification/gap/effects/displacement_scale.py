@@ -39,7 +39,7 @@ def variants(bench: Bench) -> list[Variant]:
                 "gain that bends",
                 [straight, bend],
                 SCALES,
-                BENDS,
+                root=BENDS,
                 positive=False,
                 prior=0.5,
                 full=top,

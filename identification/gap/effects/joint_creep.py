@@ -131,7 +131,7 @@ def _family(
             f"{name} spectrum",
             columns,
             sizes,
-            smooth_root(len(columns), 0.5),
+            root=smooth_root(len(columns), 0.5),
             prior=spectrum,
             each=True,
             form="spectrum",

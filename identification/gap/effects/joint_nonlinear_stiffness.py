@@ -77,7 +77,7 @@ def _alike_both_ways(bench: Bench, j: int, line: int, top: float) -> list[Varian
     kinds = ("line", *hinges)
     free, root = [line, *columns], _root(len(hinges))
     label = f"joint {j + 1} curve"
-    out = [variant(WORD, label, free, SCALES, root, prior=0.5, kinds=kinds, **info)]
+    out = [variant(WORD, label, free, SCALES, root=root, prior=0.5, kinds=kinds, **info)]
     for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
         column = bench.add_joint(j, c * shape)
         label = f"joint {j + 1} {name}"
@@ -110,7 +110,7 @@ def _net(bench: Bench, j: int, line: int) -> list[Variant]:
                 f"joint {j + 1} curve of the net torque",
                 [line, *columns],
                 SCALES,
-                _root(len(places)),
+                root=_root(len(places)),
                 positive=False,
                 prior=0.4,
                 kinds=kinds,
@@ -131,7 +131,7 @@ def _odd(bench: Bench, j: int, line: int, kg: float, prior: float) -> Variant:
         f"joint {j + 1} odd curve, tool {kg:.3g} kg",
         [line, *columns],
         SCALES,
-        _root(),
+        root=_root(),
         positive=False,
         prior=prior,
         kinds=kinds,
@@ -172,7 +172,7 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
                 f"joint {j + 1} corner {b:.3g}",
                 columns,
                 SCALES,
-                np.eye(2),
+                root=np.eye(2),
                 positive=False,
                 prior=share,
                 kinds=("line", b),
@@ -256,7 +256,7 @@ def _level_by_level(bench: Bench, j: int, line: int, top: float) -> list[Variant
             f"joint {j + 1} curve from level to level",
             [line, *columns],
             SCALES,
-            from_level_to_level(places),
+            root=from_level_to_level(places),
             positive=False,
             prior=0.5,
             kinds=("line", *places[1:-1].tolist()),
@@ -278,7 +278,7 @@ def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
         f"joint {j + 1} uneven curve",
         [line, *columns],
         scales,
-        _root(len(places)),
+        root=_root(len(places)),
         positive=False,
         prior=0.4,
         kinds=kinds,
@@ -296,7 +296,7 @@ def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
         f"joint {j + 1} fine curve",
         [line, *columns],
         FINE_SCALES,
-        _root(len(places)),
+        root=_root(len(places)),
         positive=False,
         prior=0.5,
         kinds=("line", *places),
@@ -330,7 +330,7 @@ def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
                 f"joint {j + 1} {name}",
                 [line, *columns],
                 FINE_SCALES,
-                root,
+                root=root,
                 positive=powers.sum(axis=0),
                 within=powers,
                 prior=(0.25 if "stops" in name else 0.5) / (len(STEEPER) - 1),

@@ -138,7 +138,7 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
             "each run",
             [*common, *own, *given],
             SCALES,
-            np.diag(sd),
+            root=np.diag(sd),
             positive=False,
             prior=_ALL * _EACH_RUN_SHARE,
             directions=list(straight),

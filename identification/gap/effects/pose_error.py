@@ -205,7 +205,7 @@ def _variant(
         label,
         columns,
         (1.0,),
-        np.diag(sizes),
+        root=np.diag(sizes),
         positive=False,
         prior=prior,
         kind=kind,

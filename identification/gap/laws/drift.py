@@ -226,7 +226,7 @@ def free_variant(
         label,
         columns,
         scales,
-        path.root(len(names)),
+        root=path.root(len(names)),
         positive=False,
         prior=prior,
         path="free",

@@ -169,6 +169,7 @@ def variant(
     label: str,
     columns: list[int],
     scales: tuple[float, ...],
+    *,
     root: Array | None = None,
     positive: bool | Array = True,
     prior: float = 1.0,

@@ -102,7 +102,7 @@ def _wanders(bench: Bench) -> list[Variant]:
         return []
     spring, hats = bench.slope * bench.load, free_path(bench, pieces)
     columns = [bench.add(bench.outside_column(spring * hat)) for hat in hats.T]
-    return [variant(WANDERS, "in time", columns, LOSSES, path_root(pieces), positive=False)]
+    return [variant(WANDERS, "in time", columns, LOSSES, root=path_root(pieces), positive=False)]
 
 
 def _of_runs(bench: Bench) -> list[Variant]:
