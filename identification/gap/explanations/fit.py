@@ -7,15 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.evidence.engine import (
-    LEVER_M,
-    ROW_PART,
-    RUN_PART,
-    Engine,
-    hold_part,
-    level_columns,
-    run_columns,
-)
+from identification.gap.evidence.alike import level_columns, run_columns
+from identification.gap.evidence.engine import LEVER_M, ROW_PART, RUN_PART, Engine, hold_part
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.model.variants import block
