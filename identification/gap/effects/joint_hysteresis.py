@@ -40,7 +40,7 @@ from identification.gap.laws.friction_law import (
 from identification.gap.laws.law import Laws
 from identification.gap.laws.specimens import with_other_springs
 from identification.gap.model.bench import Bench
-from identification.gap.model.path import Path, bent, worked_in
+from identification.gap.model.path import Path, with_loads, worked_in
 from identification.gap.model.variants import (
     LASTING,
     SET_UP_ANEW,
@@ -310,7 +310,7 @@ def _exponential(bench: Bench, joint: int, name: str, reaches: Array, path: Path
     for law in friction_law.exponential_laws(bench):
         by_load, elastic = law in BY_LOAD, law.startswith("Bouc-Wen")
         reach = span * reaches * (NEARER if by_load else 1.0)
-        way = bent(path, by_ratio(path.load, span)) if by_load else path
+        way = with_loads(path, by_ratio(path.load, span)) if by_load else path
         held = way.bristles(reach, elastic) * (np.abs(torque)[:, None] if by_load else reach)
         held -= torque[:, None] if law in SLIPPING else 0.0
         columns = [bench.add_joint(joint, -bench.sense * c * h) for h in held.T]

@@ -147,13 +147,13 @@ class Engine:
         n, wanted = self.bench.rows.n, [self.bench.columns[i] for i in numbers]
         return np.array([column[:n] for column in wanted]).reshape(len(wanted), n).T
 
-    def alike(self, columns: NDArray[np.intp]) -> Array:
+    def unweighed(self, columns: NDArray[np.intp]) -> Array:
         """(g, v, k, k): what `squares` of the columns (v, k) has in common at all levels."""
-        return self._gathered.white.alike(columns)
+        return self._gathered.white.unweighed(columns)
 
-    def squares(self, columns: NDArray[np.intp], number: int, alike: Array) -> Array:
+    def squares(self, columns: NDArray[np.intp], number: int, unweighed: Array) -> Array:
         """(v, k, k): parts of a level's Gram matrix of the columns (v, k) of every variant."""
-        made = self._gathered.white.squares(columns, self._weights[number], alike)
+        made = self._gathered.white.squares(columns, self._weights[number], unweighed)
         shared = self._bases[number].pool.values[columns]
         return np.asarray(made - shared @ np.swapaxes(shared, 1, 2))
 
@@ -360,4 +360,4 @@ def structural_rms(bench: Bench, base: Base, target: Array) -> float:
 def _variance(bench: Bench) -> float:
     """Mean square (m^2) of the response about its mean per setup: a law that does more, as what
     yields far beyond its threshold on an imposed path, is no further off for that."""
-    return bench.rows.rms(bench.rows.moved(bench.response[:, None])[:, 0]) ** 2
+    return bench.rows.rms(bench.rows.about_means(bench.response[:, None])[:, 0]) ** 2
