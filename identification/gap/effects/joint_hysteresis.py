@@ -153,8 +153,7 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
         finer = _spectra(bench, joint, name, span, path, BETWEEN)
     else:
         return []
-    more = {"memory": memory, "closely": True}
-    out = [replace(v, label=f"{v.label} fine", info={**v.info, **more}) for v in finer]
+    out = [v.known_by(" fine", memory=memory, closely=True) for v in finer]
     return out + _with_other_springs(bench, out)
 
 

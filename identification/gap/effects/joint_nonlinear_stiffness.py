@@ -365,7 +365,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
 
 def _look_closer(word: Word) -> list[Variant]:
     odd = [s for s in word.alone if "line" in s.variant.info]
-    bends = [s for s in word.alone if s.variant.info.get("form") == BEND]
+    bends = [s for s in word.alone if s.variant.form == BEND]
     return [*closing_in(word, corners, bends[:1]), *closing_in(word, refined, odd[:1])]
 
 

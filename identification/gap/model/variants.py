@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -137,6 +137,15 @@ class Variant:
     def differs_by(self) -> tuple[object, ...]:
         """Joint, axis of the base and memory, by which shapes differ most in other designs."""
         return tuple(self.info.get(key) for key in ("joint", "axis", "memory"))
+
+    @property
+    def form(self) -> str | None:
+        """Which of the families of its word's shapes it is of, where no other fact tells that."""
+        return self.info.get("form")
+
+    def known_by(self, more: str, **facts: Any) -> Variant:
+        """The same with more in its label, and the facts that this says."""
+        return replace(self, label=f"{self.label}{more}", info={**self.info, **facts})
 
     @cached_property
     def grid(self) -> tuple[object, ...]:

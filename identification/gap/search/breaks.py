@@ -64,7 +64,7 @@ def with_plain_trouble(found: SearchResult) -> SearchResult:
     if ahead < PLAIN:
         return found
     first = best.parts[0]
-    kind = "slopes" if first.variant.info.get("form") == EACH_RUN else first.word
+    kind = "slopes" if first.variant.form == EACH_RUN else first.word
     return replace(found, looks_like=Likeness(kind, None, best.log_weight))
 
 
