@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from identification.gap.data import UNLOADING
-from identification.gap.evidence import engine
+from identification.gap.evidence import alike, engine
 from identification.gap.model.base import HALF, compliance_found, prediction
 from identification.gap.model.bench import Bench
 from identification.gap.model.encoders import ENCODER_OFFSET_RAD
@@ -82,7 +82,7 @@ def _of_runs(bench: Bench) -> Array:
     rows, out = bench.rows, np.zeros((bench.rows.n, bench.rows.n))
     for run in np.unique(rows.run):
         force = rows.force[rows.run == run]
-        knots = np.linspace(force.min(), force.max(), engine._HATS)
+        knots = np.linspace(force.min(), force.max(), alike.HATS)
         for back in (False, True):
             mine = (rows.run == run) & ((rows.branch == UNLOADING) == back)
             for k in range(len(knots)):

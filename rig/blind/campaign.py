@@ -23,12 +23,15 @@ EACH = "each"  # --withhold: every word in turn
 class Plan:
     """What is drawn and how it is diagnosed.
 
+    word: the effect that every case holds, alone; "" for a draw of all.
     withhold: "" for the complete library, a word, or "each". Then every second case holds the
-    withheld word, so that the right answer is `unknown`; the others are drawn as ever.
+    withheld word, so that the right answer is `unknown`; the others are drawn as ever. With a word
+    to be drawn, all hold that.
     """
 
     cases: int
     seed: int
+    word: str = ""
     withhold: str = ""
     jobs: int = 1
     deadline_s: float = 120.0
@@ -43,12 +46,16 @@ class Plan:
 
     def drawn(self, number: int, words: Sequence[str]) -> str | None:
         """The word that this case must hold; None: as the draw likes."""
+        if self.word:
+            return self.word
         return self.withheld(number, words) if number % 2 == 0 else None
 
     @property
     def command(self) -> str:
         """The command that gives the same cases again."""
         parts = [f"rig blind --cases {self.cases} --seed {self.seed}"]
+        if self.word:
+            parts.append(f"--word {self.word}")
         if self.withhold:
             parts.append(f"--withhold {self.withhold}")
         if self.generator != "hidden":
@@ -110,11 +117,15 @@ def run(
 
 def check_plan(plan: Plan, words: Sequence[str]) -> None:
     """InputError for what can't be done."""
-    if plan.withhold and plan.withhold not in (*words, EACH):
-        raise InputError(
-            f'--withhold: "{plan.withhold}" is not drawn by the generator {plan.generator}.'
-            f"{did_you_mean(plan.withhold, (*words, EACH))}"
-        )
+    for option, word, known in (
+        ("--word", plan.word, words),
+        ("--withhold", plan.withhold, (*words, EACH)),
+    ):
+        if word and word not in known:
+            raise InputError(
+                f'{option}: "{word}" is not drawn by the generator {plan.generator}.'
+                f"{did_you_mean(word, known)}"
+            )
 
 
 @contextmanager

@@ -27,6 +27,7 @@ def report(campaign: Campaign) -> dict[str, Any]:
         "command": plan.command,
         "seed": plan.seed,
         "generator": plan.generator,
+        "word": plan.word,
         "withhold": plan.withhold,
         "software": software_version(),
         "cases_asked": plan.cases,

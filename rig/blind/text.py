@@ -51,6 +51,8 @@ def head(report: dict[str, Any]) -> str:
     out = f"{done} cases of the generator {report['generator']}, seed {report['seed']}"
     if report["interrupted"]:
         out += f" (interrupted; {asked} were asked for)"
+    if report["word"]:
+        out += f", all of {report['word']}"
     if report["withhold"]:
         word = "every word in turn" if report["withhold"] == EACH else report["withhold"]
         out += f", with {word} taken out of the library"

@@ -39,6 +39,7 @@ _Next = Annotated[
 ]
 _Cases = Annotated[int, typer.Option(metavar="N", help="How many are drawn.", min=1)]
 _Seed = Annotated[int, typer.Option(metavar="S", help="The same seed, the same cases.", min=0)]
+_Word = Annotated[str, typer.Option(metavar="WORD", help="Draw this effect, alone, in every case.")]
 _WithholdInHalf = Annotated[
     str,
     typer.Option(
@@ -140,6 +141,7 @@ def _files(
 def blind(
     cases: _Cases = 100,
     seed: _Seed = 1,
+    word: _Word = "",
     withhold: _WithholdInHalf = "",
     jobs: _Jobs = None,
     snr_min: _SnrMin = 3.0,
@@ -156,6 +158,7 @@ def blind(
     plan = Plan(
         cases=cases,
         seed=seed,
+        word=word,
         withhold=withhold,
         jobs=jobs or command.all_cores(),
         deadline_s=deadline,

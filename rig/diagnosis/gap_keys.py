@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from identification.gap.effects import base_slip, contact_seating, time_lag
@@ -158,13 +158,17 @@ MAY_BE_MISSING = (
 )
 
 
+Kind = tuple[str, tuple[str, ...]]  # of terms: a coefficient, and names of its shape
+
+
 @dataclass(frozen=True)
 class Grammar:
-    """What the laws of a word are written with: constants, and the kinds of terms, coefficient and
-    names of its shape."""
+    """What the laws of a word are written with: constants, and the kinds of terms. only_with: of
+    those that do not go with every law, a constant, and which of its values they go with."""
 
     constants: tuple[str, ...]
-    terms: tuple[tuple[str, tuple[str, ...]], ...]
+    terms: tuple[Kind, ...]
+    only_with: Mapping[Kind, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
 
 
 _PLAYS = (
@@ -174,13 +178,27 @@ _PLAYS = (
     ("compliance", ("ratchets_beyond", "after")),
 )
 _GOES = ((), ("at_load",), ("at_load", "power"), ("drags_over",), ("at_load", "drags_over"))
-_PATHS = (
-    ("drift", ("time_constant",)),
-    ("drift_rate", ()),
-    ("drift_per_root", ()),
-    ("drift_knot", ("at",)),
-    ("drift_per_kelvin", ("sensor",)),
-)
+_REACHES = (("compliance", ("reach",)), ("compliance", ("reach", "grows_to")))
+_STRENGTH = ("compliance", ("strength",))
+_BY_A_REACH = tuple(law for law in FRICTION_LAWS if law not in SLIP_AT_A_STRENGTH)
+_PATHS: dict[Kind, tuple[str, ...]] = {  # and the courses in time that are written so
+    ("drift", ("time_constant",)): ("exponential", "rates"),
+    ("drift_rate", ()): ("linear", "rates"),
+    ("drift_per_root", ()): ("root",),
+    ("drift_knot", ("at",)): ("free",),
+    ("drift_per_kelvin", ("sensor",)): ("temperature",),
+}
+_ALONG: dict[Kind, tuple[str, ...]] = {(c, (*s, "along")): path for (c, s), path in _PATHS.items()}
+_OF_RUNS: dict[Kind, tuple[str, ...]] = {("drift", ("run", "along")): ("each run",)}
+_LATE: dict[Kind, tuple[str, ...]] = {
+    ("drift_per_kelvin", ("sensor", "time_constant", "along")): ("temperature",)
+}
+
+
+def _only_with(constant: str, kinds: Mapping[Kind, tuple[str, ...]]) -> dict[Kind, Any]:
+    return {kind: (constant, values) for kind, values in kinds.items()}
+
+
 GRAMMAR: dict[str, Grammar] = {
     "joint_yield": Grammar(
         ("joint", "memory", "flow_time", "flow_exponent"), (*_PLAYS, ("compliance", ()))
@@ -189,11 +207,11 @@ GRAMMAR: dict[str, Grammar] = {
     "joint_hysteresis": Grammar(
         ("joint", "law", "memory", "measured_to", "tool"),
         (
-            ("compliance", ("strength",)),
-            ("compliance", ("reach",)),
-            ("compliance", ("reach", "grows_to")),
+            _STRENGTH,
+            *_REACHES,
             ("compliance", ()),
         ),
+        _only_with("law", {_STRENGTH: SLIP_AT_A_STRENGTH} | dict.fromkeys(_REACHES, _BY_A_REACH)),
     ),
     "joint_backlash": Grammar(
         ("joint", "zone", "crossing", "kind", "tool", "preload"),
@@ -247,14 +265,13 @@ GRAMMAR: dict[str, Grammar] = {
     "time_lag": Grammar(("channel", "way", "lag", "about"), (("share", ()),)),
     "force_drift": Grammar(
         ("path", "quantity", "about"),
-        (*_PATHS, *((c, (*shape, "along")) for c, shape in _PATHS), ("drift", ("run", "along"))),
+        (*_PATHS, *_ALONG, *_OF_RUNS),
+        _only_with("path", _PATHS | _ALONG | _OF_RUNS),
     ),
     "thermal_drift": Grammar(
         ("path", "quantity"),
-        (
-            *((c, (*shape, "along")) for c, shape in _PATHS),
-            ("drift_per_kelvin", ("sensor", "time_constant", "along")),
-        ),
+        (*_ALONG, *_LATE),
+        _only_with("path", _ALONG | _LATE),
     ),
     "zero_shift": Grammar((), (("shift", ("run", "lasts")),)),
 }
@@ -265,28 +282,12 @@ def coefficient_key(name: str, constants: Mapping[str, Any]) -> Key:
     return _COEFFICIENTS.get(name) or _COEFFICIENTS[f"{name} {constants['quantity']}"]
 
 
-_PATH_OF = {
-    "drift": "exponential",
-    "drift_rate": "linear",
-    "drift_per_root": "root",
-    "drift_knot": "free",
-    "drift_per_kelvin": "temperature",
-}
-
-
-def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...]]]:
+def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[Kind]:
     """The kinds of terms that go with these constants."""
-    for coefficient, shape in grammar.terms:
-        path, law = _PATH_OF.get(coefficient), constants.get("law", "")
-        fits = path in (None, constants.get("path"))
-        if constants.get("path") == "rates":
-            fits = coefficient in ("drift", "drift_rate")
-        if constants.get("path") == "each run":
-            fits = coefficient == "drift" and shape == ("run", "along")
-        if shape[:1] in (("strength",), ("reach",)):
-            fits = (law in SLIP_AT_A_STRENGTH) == (shape == ("strength",))
-        if fits:
-            yield coefficient, shape
+    for kind in grammar.terms:
+        constant, values = grammar.only_with.get(kind, (None, ()))
+        if constant is None or constants.get(constant) in values:
+            yield kind
 
 
 def keys_of(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[str]:

@@ -6,22 +6,25 @@ Arms and a bench without an arm, force and displacement imposed.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from identification.arrays import Flags
 from identification.gap import effects
-from identification.gap.data import GapData
-from identification.gap.evidence.parts import Part
-from identification.gap.explanations.explanation import Explanation
-from identification.gap.explanations.fit import fit
-from identification.gap.model.bench import make_bench
+from identification.gap.data import BRANCH_NAMES, GapData
+from identification.gap.effects import EFFECTS
+from identification.gap.laws.law import Law
+from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.pool import Pool
-from identification.gap.model.variants import Variant
-from identification.gap.words import WORDS
+from identification.gap.model.variants import Variant, place_of
+from identification.gap.words import LINEAR, WORDS
 from tests.conformance.effect_benches import (
     IN_JOINTS,
     OUTSIDE,
@@ -31,7 +34,6 @@ from tests.conformance.effect_benches import (
     built,
     module,
     of,
-    quick_engine,
     readings,
 )
 from tests.conformance.gap_designs import (
@@ -112,6 +114,18 @@ def test_variants_are_well_formed(word: str, design: str) -> None:
         assert np.any(columns[:, list(v.columns)]), v.label
 
 
+@pytest.mark.parametrize(("word", "design"), [p for p in PAIRS if p[1] in ("medium", "bench")])
+def test_shapes_of_one_grid_are_told_by_facts_as_labels_tell_them(word: str, design: str) -> None:
+    """Intervals reach to the next shape on the grid: two that differ in more than numbers are no
+    neighbours. Labels are for people, and may be reworded: facts must tell as much."""
+    by_facts, by_labels = defaultdict(set), defaultdict(set)
+    for v in of(word, design)[1]:
+        said = re.sub(r"(?<![A-Za-z])\d[\d.e+-]*", "#", v.label), place_of(v)
+        by_facts[v.grid].add(said)
+        by_labels[said].add(replace(v, label="another").grid)
+    assert all(len(same) == 1 for same in (*by_facts.values(), *by_labels.values()))
+
+
 class _Apart(Pool):
     """A pool in which columns that are alike stand apart."""
 
@@ -142,14 +156,65 @@ def test_same_data_same_columns(word: str, design: str) -> None:
 # --- nothing in, nothing out -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("word", "design"), PAIRS)
-def test_null_coefficients_leave_the_springs_alone(word: str, design: str) -> None:
-    bench, variants, _ = of(word, design)
-    engine = quick_engine(bench)
-    for v in (variants[0], variants[-1]):
-        found = fit(engine, Explanation((Part(v, v.scales[0]),), 0.0, 0.0, (0.0,), 0.0))
-        nothing = replace(found, coefficients=np.zeros_like(found.coefficients))
-        assert np.all(nothing.contribution(engine, 0) == 0.0)
+FAR, SOON = 1e7, 1e-6  # against loads, lengths and times of the designs
+# What a law needs besides its coefficients, and where it is switched off by that.
+OFF = {
+    "threshold": FAR,
+    "strength": FAR,
+    "reach": FAR,
+    "zone": FAR,
+    "beyond": FAR,
+    "net_beyond": FAR,
+    "net_above": FAR,
+    "above": FAR,
+    "force_scale": FAR,
+    "at_load": FAR,
+    "at_response": FAR,
+    "retardation_time": FAR,
+    "time_constant": FAR,
+    "lag": SOON,
+}
+HELD_BACK = ("Iwan", "Dahl", "Bouc-Wen")  # friction that comes on top of the spring: none is none
+# In proportion to their coefficients and to nothing else.
+STRAIGHT = ("link_flexibility", "zero_shift", "pose_error", "joint_stiffness_error")
+
+
+def switched_off(law: Law) -> tuple[Law, Flags]:
+    """The law with all its numbers where it does nothing, and (terms,) which of them have one."""
+    off = OFF | dict.fromkeys(("strength", "reach"), SOON)
+    off = off if law.constants.get("law") in HELD_BACK else OFF
+
+    def nulls(shape: Mapping[str, Any]) -> dict[str, Any]:
+        return {key: off.get(key, value) for key, value in shape.items()}
+
+    terms = tuple(replace(t, shape=nulls(t.shape)) for t in law.terms)
+    whole = bool(off.keys() & law.constants)
+    # of a play its place is a number of its own
+    silent = [
+        t.coefficient not in ("place", "rest") and (whole or off.keys() & t.shape)
+        for t in law.terms
+    ]
+    return replace(law, constants=nulls(law.constants), terms=terms), np.array(silent, dtype=bool)
+
+
+@pytest.mark.parametrize("word", [w for w in WORDS if w not in STRAIGHT])
+def test_a_law_switched_off_by_its_shape_does_nothing(word: str) -> None:
+    """Thresholds that no load reaches, times that nothing waits for, a lag of no time."""
+    bench, variants, _ = of(word, "medium")
+    laws, kinds = EFFECTS[word].laws, dict[object, Law]()
+    for v in variants:
+        law, _ = laws.of(bench, v)
+        of_kind = [law.constants.get(key) for key in ("law", "kind", "way")]
+        terms = [(t.coefficient, *t.shape, t.shape.get("law")) for t in law.terms]
+        kinds[(*of_kind, *terms)] = law
+    told = 0
+    for law in kinds.values():
+        off, silent = switched_off(law)
+        as_it_is, left = (np.abs(laws.rows(bench, x)[:, silent]) for x in (law, off))
+        if silent.any():
+            assert left.max() <= 1e-3 * as_it_is.max(), law
+            told += 1
+    assert told > 0
 
 
 # These move or show without a load: paths in time, datums, the amplifier, a joint that stands off.
@@ -166,6 +231,41 @@ def test_without_a_load_only_drifts_and_shifts_move_the_target(word: str) -> Non
     for column in bench.columns:
         loose = word == "joint_backlash"  # lies anywhere in its play, by a free place
         assert loose or not np.any(column[:n])
+
+
+# --- kinds -------------------------------------------------------------------------------------
+
+
+@cache
+def loaded_alike_and_twice_as_far() -> tuple[Bench, Bench, Flags]:
+    """Two benches of one straight rig, and the rows on the way down, where the second is loaded
+    twice as far: after the same loads on the way up, and on another clock."""
+    data = linear("medium")
+    down = data.branch == BRANCH_NAMES.index("unloading")
+
+    def pushed(force: Array, session: Array) -> Bench:
+        loads = replace(data, force=force, displacement=1.1e-5 * force, session=session)
+        return make_bench(loads)
+
+    once = pushed(data.force, data.session)
+    twice = pushed(np.where(down, 2.0, 1.0) * data.force, data.session**1.5)
+    return once, twice, once.rows.branch == BRANCH_NAMES.index("unloading")
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_linear_words_are_those_that_follow_the_load_of_the_moment(word: str) -> None:
+    """Of a linear word some shape is in proportion to the load, whatever went before and whenever:
+    loads superpose. Of the others, which may be less exact than the springs, none is."""
+    once, twice, down = loaded_alike_and_twice_as_far()
+    laws = EFFECTS[word].laws
+    variants = module(word).variants(replace(once, columns=Pool()))
+
+    def superposes(law: Law) -> bool:
+        a, b = (laws.rows(bench, law)[: bench.rows.n][down] for bench in (once, twice))
+        return bool(np.any(a)) and np.allclose(b, 2 * a, rtol=0, atol=1e-6 * np.abs(a).max())
+
+    some = [laws.of(once, v)[0] for v in variants[:: 1 + len(variants) // 20]]
+    assert any(map(superposes, some)) == (word in LINEAR)
 
 
 # --- joints and readings -----------------------------------------------------------------------

@@ -12,6 +12,7 @@ from collections.abc import Collection
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,14 +22,15 @@ from identification.gap.answer.parameters import parameters
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.parts import Part
 from identification.gap.laws.effect import declared
-from identification.gap.words import IN_JOINTS, KINDS, NEED_ARM, WORDS
+from identification.gap.words import DRIFTS, IN_JOINTS, KINDS, NEED_ARM, WORDS
 from rig.blind import judge, mujoco_effects
 from rig.diagnosis import diagnose_text, gap_keys, gap_path
+from rig.diagnosis.gap_forms import FormError, from_entry
 from rig.worlds.benches import draw as benches
 from rig.worlds.hidden import draw as hidden
 from rig.worlds.hidden import textbook
 from rig.worlds.hidden import words as drawn
-from tests.conformance.effect_benches import OUTSIDE, PAIRS, module, of
+from tests.conformance.effect_benches import OUTSIDE, PAIRS, of
 
 ANSWERS = {"none", "unknown"}
 
@@ -120,11 +122,8 @@ def test_word_is_in_the_table_or_named_as_left_out(name: str) -> None:
 
 
 @pytest.mark.parametrize("word", WORDS)
-def test_every_effect_is_complete(word: str) -> None:
-    """What its file declares is what is used, and its shapes say something on some bench. Whether
-    what it gives is right, test_effects and the tests of model files ask."""
-    assert EFFECTS[word] is module(word).EFFECT
-    assert EFFECTS[word].variants is module(word).variants
+def test_every_effect_says_something_on_some_bench(word: str) -> None:
+    """Whether what it says is right, test_known_laws asks."""
     assert names()[word]
 
 
@@ -152,6 +151,47 @@ def test_what_is_of_a_session_is_a_coefficient_of_model_files(word: str) -> None
 def test_both_sides_say_alike_what_joints_show() -> None:
     assert IN_JOINTS | {"joint_stiffness_error"} == drawn.IN_JOINTS
     assert set(OUTSIDE) == drawn.OUTSIDE_JOINTS
+
+
+def test_drifts_are_drawn_with_the_clock_that_they_live_on() -> None:
+    assert drawn.ON_THE_CLOCK == DRIFTS
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_laws_of_the_library_are_written_with_the_grammar_of_their_word(word: str) -> None:
+    bench, variants, _ = of(word, "rich")
+    grammar, laws = gap_keys.GRAMMAR[word], EFFECTS[word].laws
+    for law in (laws.of(bench, v)[0] for v in variants):
+        assert {*law.constants} <= {*grammar.constants}
+        allowed = {(c, frozenset(shape)) for c, shape in gap_keys.kinds(grammar, law.constants)}
+        assert {(t.coefficient, frozenset(t.shape)) for t in law.terms} <= allowed, law
+
+
+@pytest.mark.parametrize(
+    ("entry", "wanted"),
+    [
+        (
+            {"name": "force_drift", "path": "root", "terms": [{"drift_N_per_s": 1.0}]},
+            "(drift_N_per_sqrt_s) or (along, drift_N_per_sqrt_s).",
+        ),
+        (
+            {
+                "name": "joint_hysteresis",
+                "joint": 1,
+                "law": "Dahl",
+                "memory": "kept",
+                "terms": [{"friction_Nm": 3.0, "compliance_rad_per_Nm": 1e-6}],
+            },
+            "(reach_Nm, compliance_rad_per_Nm) or (reach_Nm, grows_with_net_torque_to_Nm, "
+            "compliance_rad_per_Nm) or (compliance_rad_per_Nm).",
+        ),
+    ],
+)
+def test_terms_of_another_law_of_the_word_are_refused(entry: dict[str, Any], wanted: str) -> None:
+    """A path in time or a friction law has terms of its own: others would be misread."""
+    with pytest.raises(FormError) as caught:
+        from_entry({"quantity": "force"} | entry if "path" in entry else entry)
+    assert str(caught.value).endswith(f"; wanted: {wanted}")
 
 
 # --- names of parameters ------------------------------------------------------------------------

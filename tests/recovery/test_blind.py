@@ -77,12 +77,24 @@ def test_withholding_each_word_in_turn() -> None:
     assert Instant.asked[2] == ("0002.h5", ("force_scale",))
 
 
+def test_one_word_in_every_case_also_taken_out() -> None:
+    for withhold, withheld in (("", None), ("force_scale", "force_scale")):
+        plan = Plan(cases=3, seed=1, word="force_scale", withhold=withhold)
+        out = instantly(plan)
+        assert [o.label["truth"] for o in out.outcomes] == [["force_scale"]] * 3
+        assert [o.withheld for o in out.outcomes] == [withheld] * 3
+        assert ", all of force_scale" in text.head(report(out))
+    assert plan.command == "rig blind --cases 3 --seed 1 --word force_scale --withhold force_scale"
+
+
 def test_a_word_that_is_not_drawn_is_refused() -> None:
     with pytest.raises(InputError) as refused:
         instantly(Plan(cases=1, seed=1, withhold="zero_shit"))
     assert str(refused.value) == (
         '--withhold: "zero_shit" is not drawn by the generator hidden. Did you mean "zero_shift"?'
     )
+    with pytest.raises(InputError, match=r'^--word: "each" is not drawn by the generator hidden'):
+        instantly(Plan(cases=1, seed=1, word="each"))
 
 
 def test_what_could_not_be_drawn_is_listed_and_not_scored() -> None:

@@ -11,9 +11,8 @@ from identification.gap.effects import EFFECTS, base_slip, library
 from identification.gap.evidence.compare import Scored, score
 from identification.gap.laws import flows, knees_closer
 from identification.gap.laws.flows import Flow
-from identification.gap.laws.knees import place_in
 from identification.gap.model.bench import Bench, make_bench
-from identification.gap.model.variants import Variant, place_of
+from identification.gap.model.variants import CALLED, Variant, place_of
 from identification.gap.search.refine import refine
 from tests.conformance.gap_designs import linear
 from tests.explained import explained
@@ -23,7 +22,7 @@ from tests.unit.test_gap_running import SPRING, running
 
 
 def elsewhere(bench: Bench, found: Variant, there: Variant) -> Variant | None:
-    place = place_in(there.label), there.info
+    place = there.info[CALLED], there.info
     return next(iter(knees_closer.elsewhere(bench, [(found, place)])), None)
 
 

@@ -188,7 +188,9 @@ def test_shapes_of_different_sizes_score_together_as_alone() -> None:
         bench.add(bench.stacked(1e-5 * np.sin(bend * bench.load / 20.0)))
     engine = small_engine(bench)
     mixed = [
-        variant("joint_yield", "four", [0, 1, 2, 3], (0.5, 2.0), np.diag([1.0, 0.5, 0.2, 0.1])),
+        variant(
+            "joint_yield", "four", [0, 1, 2, 3], (0.5, 2.0), root=np.diag([1.0, 0.5, 0.2, 0.1])
+        ),
         variant("base_slip", "five", [0, 1, 2, 3, 4], (0.1, 1.0, 9.0), least=0.3, each=True),
         variant(
             "joint_yield",

@@ -15,10 +15,10 @@ from identification.gap.effects import joint_backlash, joint_nonlinear_stiffness
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, part_sizes
 from identification.gap.explanations.penalties import minor_parts
+from identification.gap.laws.flanks import Flanks, _crossed, placed
 from identification.gap.laws.lost_motion import MOST_RUB, PLACED
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
-from identification.gap.model.flanks import Flanks, _crossed, placed
 from identification.gap.model.pool import Pool
 from tests.unit.test_gap_operators import bench_data
 

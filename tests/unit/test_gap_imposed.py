@@ -12,11 +12,11 @@ from identification.arrays import Array
 from identification.gap.data import GapData
 from identification.gap.model.bench import displacement_imposed, make_bench
 from identification.gap.recording.imposed import (
-    _Channel,
     _goes_on,
     _slides,
     displacement_simpler,
 )
+from identification.gap.recording.pieces import Channel
 from tests.conformance.gap_designs import linear
 from tests.explained import explained
 from tests.unit.test_gap_forms import arm_data
@@ -237,7 +237,7 @@ def test_of_two_paths_about_as_simple_a_rig_that_slides_drove_its_stroke(
     monkeypatch.setitem(RIGS, "mine", rig)
     data = measured("mine", by_force=False, n=200)
     left = iter(costs)
-    monkeypatch.setattr("identification.gap.recording.imposed._cost", lambda *_: next(left))
+    monkeypatch.setattr("identification.gap.recording.imposed.cost", lambda *_: next(left))
     assert displacement_simpler(data) is driven
 
 
@@ -255,10 +255,10 @@ def test_what_toggles_between_two_steps_of_its_scale_does_not_slide_to_and_fro()
     force = np.where(t > 0.2, 1.0, 0.0)
     speed = np.round((1 - np.exp(-np.maximum(t - 0.2, 0) / 0.12)) * 15) / 15
     toggles = np.where(np.arange(120) % 2, 1 / 15, 0.0) * (t > 0.5)
-    still, moved = _Channel(t, force, 0.0), _Channel(t, speed + toggles, 0.03)
+    still, moved = Channel(t, force, 0.0), Channel(t, speed + toggles, 0.03)
     assert not _slides(still, moved)
-    there = _Channel(t, np.where(t < 0.6, t, 1.2 - t) / 0.6, 0.03)
-    rubs = _Channel(t, np.where(t < 0.6, 1.0, -1.0), 0.0)
+    there = Channel(t, np.where(t < 0.6, t, 1.2 - t) / 0.6, 0.03)
+    rubs = Channel(t, np.where(t < 0.6, 1.0, -1.0), 0.0)
     assert _slides(rubs, there)
 
 
@@ -272,14 +272,14 @@ def test_noise_of_a_displacement_is_no_sliding_and_no_standing() -> None:
     assert not displacement_simpler(replace(data, instruments=meter))
     held = replace(data, displacement=6e-5 * (u - ramp), instruments=meter)
     assert displacement_simpler(held)  # that one stands
-    assert not _slides(_Channel(t, ramp, 0.0), _Channel(t, u, 0.12))
+    assert not _slides(Channel(t, ramp, 0.0), Channel(t, u, 0.12))
 
 
 @pytest.mark.parametrize("noise", [0.012, 0.2])
 def test_a_spring_that_is_read_in_noise_does_not_slide(noise: float) -> None:
     time, there = np.arange(1000.0), 1 - np.abs(np.arange(1000) / 500 - 1)  # and back
     u = there + noise * np.random.default_rng(4).standard_normal(1000)
-    assert not _slides(_Channel(time, there, 0.0), _Channel(time, u, noise))
+    assert not _slides(Channel(time, there, 0.0), Channel(time, u, noise))
 
 
 def test_strokes_slide_however_finely_they_are_read_in_noise() -> None:
@@ -287,7 +287,7 @@ def test_strokes_slide_however_finely_they_are_read_in_noise() -> None:
     rubs = 0.4 * np.sign(np.gradient(u)) + 0.5
     noisy = u + 0.02 * np.random.default_rng(8).standard_normal(1000)
     time = np.arange(1000.0)
-    assert _slides(_Channel(time, rubs, 0.001), _Channel(time, noisy, 0.02))
+    assert _slides(Channel(time, rubs, 0.001), Channel(time, noisy, 0.02))
 
 
 @pytest.mark.slow

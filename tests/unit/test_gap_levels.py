@@ -203,7 +203,7 @@ def test_products_are_those_of_the_columns() -> None:
         assert rows == pytest.approx(other.beside(tuple(range(6)))[[0, 3]], rel=1e-9)
         assert level.square((0, 3)) == pytest.approx(rows[:, [0, 3]], rel=1e-9)
         two = np.array([[0, 3], [5, 2]])
-        many = engine.squares(two, level.number, engine.alike(two))
+        many = engine.squares(two, level.number, engine.unweighed(two))
         assert many[1] == pytest.approx(other.square((5, 2)), rel=1e-9)
         assert level.moment == pytest.approx(other.moment, rel=1e-9)
 

@@ -112,7 +112,7 @@ def test_of_what_the_springs_hide_a_little_counts(bench: Bench) -> None:
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
     spring = engine.base.index("spring")[:1]
     column = engine.base.columns[: bench.rows.n, spring] * engine.base.sd[spring]
-    moved = 0.5 * engine.bench.rows.moved(column)[:, 0]  # half a standard deviation
+    moved = 0.5 * engine.bench.rows.about_means(column)[:, 0]  # half a standard deviation
     size = np.sqrt(bench.rows.weight @ moved**2 / bench.rows.weight.sum())
     assert _beyond_springs(engine, moved) == pytest.approx(0.03 * size)
     assert _beyond_springs(engine, 100 * moved) > 0.9 * 100 * size
@@ -139,7 +139,7 @@ def test_a_gain_within_what_is_stated_is_no_effect(bench: Bench, word: str) -> N
     engine = Engine(fresh, base_columns(fresh), fresh.observed, np.array([0.0, 3e-6]))
     gain, meter = variants["gain"], fresh.data.instruments
     sd = meter.force_gain if word == "force_scale" else meter.displacement_gain
-    line = engine.bench.rows.moved(engine.columns(gain.columns)[: fresh.rows.n])[:, 0]
+    line = engine.bench.rows.about_means(engine.columns(gain.columns)[: fresh.rows.n])[:, 0]
     one = np.sqrt(fresh.rows.weight @ line**2 / fresh.rows.weight.sum())
 
     def charge(off: float) -> float:
@@ -158,7 +158,7 @@ def test_a_spring_within_what_is_stated_is_none(bench: Bench) -> None:
     sd = float(fresh.data.compliance_relative_sd[spring.info["joint"]])
     column = engine.columns(spring.columns)[: fresh.rows.n]
     weight = fresh.rows.weight
-    one = float(np.sqrt(weight @ engine.bench.rows.moved(column)[:, 0] ** 2 / weight.sum()))
+    one = float(np.sqrt(weight @ engine.bench.rows.about_means(column)[:, 0] ** 2 / weight.sum()))
 
     def charge(off: float) -> float:
         sizes = Sizes(np.zeros(1), np.array([off * one]), 0.0)
@@ -198,7 +198,7 @@ def test_of_many_wrong_springs_those_that_show_are_where_the_gap_lies(bench: Ben
     target = fresh.observed - prediction(fresh)
     engine = Engine(fresh, base_columns(fresh), target, np.array([0.0, 3e-6]))
     v = variants["all joints"]
-    size = np.linalg.norm(fresh.rows.moved(engine.responses(v.columns)), axis=0)
+    size = np.linalg.norm(fresh.rows.about_means(engine.responses(v.columns)), axis=0)
     w = np.array([1.0, 0.3, 0.1, 0.3, 0.0])[: len(size)] / size
     sd = np.array([0.1, 0.1, 0.01, 0.2, 1.0])[: len(size)] / size
     fit = SimpleNamespace(parts=(Part(v, 1.0),), of=lambda i: (w, np.diag(sd**2)))

@@ -20,7 +20,7 @@ from identification.gap.model.history import (
     rests,
     retarded,
 )
-from identification.gap.model.path import path_of, worked_in
+from identification.gap.model.path import load_path, worked_in
 from identification.gap.recording.rows import Rows, reduce_rows
 
 
@@ -103,14 +103,14 @@ def test_dahl_is_exact_on_the_virgin_curve_and_bouc_wen_lets_go_linearly() -> No
 
 def test_worked_in_friction_starts_where_a_cycle_ends() -> None:
     load = np.array([0.0, 10.0, 0.0, 10.0])
-    path = worked_in(path_of(load, fresh(4), fresh(4), None, np.zeros(4)))
+    path = worked_in(load_path(load, fresh(4), fresh(4), None, np.zeros(4)))
     assert path.plays(np.array([2.0]))[:, 0].tolist() == [2.0, 8.0, 2.0, 8.0]
 
 
 def test_a_load_that_went_beyond_leaves_what_remembers_on_its_other_branch() -> None:
     load, beyond = np.array([0.0, 5.0, 10.0, 4.0]), np.array([0.0, 0.0, 0.2, -1.0])
-    straight = path_of(load, fresh(4), fresh(4), None, 0 * beyond)
-    path = path_of(load, fresh(4), fresh(4), None, beyond)
+    straight = load_path(load, fresh(4), fresh(4), None, 0 * beyond)
+    path = load_path(load, fresh(4), fresh(4), None, beyond)
     radius = np.array([1.0])
     assert path.load.tolist() == [0.0, 5.0, 12.0, 10.0, 0.0, 4.0]
     assert straight.plays(radius)[:, 0].tolist() == [0.0, 4.0, 9.0, 5.0]
@@ -123,7 +123,7 @@ def test_a_load_that_went_beyond_leaves_what_remembers_on_its_other_branch() -> 
 def test_a_fresh_start_and_a_rest_come_before_the_load_goes_beyond() -> None:
     load, beyond, again = np.array([10.0, 10.0]), np.array([0.0, 0.5]), np.array([True, True])
     weight = np.array([3.0, 3.0])
-    path = path_of(load, again, again, weight, beyond)
+    path = load_path(load, again, again, weight, beyond)
     assert path.rest.tolist() == path.fresh.tolist() == [True, True, False]
     assert path.plays(np.array([1.0]))[:, 0].tolist() == [10.0, 12.0]  # of 12 and 14 as it hung
     assert path.weight is not None

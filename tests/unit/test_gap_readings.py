@@ -64,7 +64,7 @@ def test_a_gain_beside_an_effect_is_a_share_of_what_that_does_too() -> None:
     assert fresh[0].label == "gain, of all that moves"
     n, shown = engine.bench.rows.n, engine.bench.response
     column = engine.bench.columns[fresh[0].columns[0]][:n]
-    moved = engine.bench.rows.moved(np.column_stack([column, shown]))
+    moved = engine.bench.rows.about_means(np.column_stack([column, shown]))
     # what is read, but for the noise, and for what the plain column could not fit
     assert np.abs(moved[:, 0] - moved[:, 1]).max() < 0.05 * np.ptp(shown)
     assert engine.bench.moves is None

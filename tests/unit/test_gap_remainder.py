@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from identification.gap.answer.remainder import Remainder, _excess, _posterior, branches, remainder
-from identification.gap.evidence.engine import Engine, alike
+from identification.gap.evidence.alike import alike
+from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.model.base import base_columns, prediction

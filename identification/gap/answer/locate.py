@@ -74,11 +74,11 @@ def _seen(engine: Engine, word: str) -> bool | None:
 
 def _visible(engine: Engine, fit: Fit, main: Array) -> Array:
     """The main effect less what the springs would take over per setup, unless it is linear."""
-    moved = engine.bench.rows.moved(main[:, None])[:, 0]
+    moved = engine.bench.rows.about_means(main[:, None])[:, 0]
     if not fit.parts or fit.parts[0].word in LINEAR:
         return moved
     out, bench = moved.copy(), engine.bench
-    load = bench.rows.moved(bench.load[:, None])[:, 0]
+    load = bench.rows.about_means(bench.load[:, None])[:, 0]
     for s in range(len(bench.data.setups)):
         mine = bench.rows.setup == s
         weight, x = bench.rows.weight[mine], load[mine]
@@ -135,4 +135,4 @@ _COUNTS = 0.1  # of the largest effect, a hundredth of its square: there the gap
 def _size_of_each(engine: Engine, variant: Variant) -> Array:
     """(k,) rms of what unit coefficients do to the response, without the datum of each setup."""
     rows = engine.bench.rows
-    return np.array([rows.rms(v) for v in rows.moved(engine.responses(variant.columns)).T])
+    return np.array([rows.rms(v) for v in rows.about_means(engine.responses(variant.columns)).T])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -262,21 +261,13 @@ def _beside(every: _Weighed, open_: _Weighed, index: int) -> Explanation | None:
     where the data left none of them but that one: what is true lies between such shapes, and a
     shape stands for half the way to the next."""
     top = max(open_, key=lambda e: e[1])[0].parts[index].variant
-    kind, place = _NUMBER.sub("#", top.label), place_of(top)
     others = [
-        (e, w)
-        for e, w in every
-        if (v := e.parts[index].variant) is not top
-        and _NUMBER.sub("#", v.label) == kind
-        and place_of(v) == place
+        (e, w) for e, w in every if (v := e.parts[index].variant) is not top and v.grid == top.grid
     ]
     left = {id(e.parts[index].variant) for e, _ in open_}
     if not others or any(id(e.parts[index].variant) in left for e, _ in others):
         return None
     return max(others, key=lambda e: e[1])[0]
-
-
-_NUMBER = re.compile(r"\d[\d.e+-]*")
 
 
 def _open(engine: Engine, variants: Sequence[Variant], chosen: Explanation, index: int) -> _Weighed:

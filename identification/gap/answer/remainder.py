@@ -17,7 +17,8 @@ import numpy as np
 
 from identification.arrays import Array, Ints
 from identification.gap.data import LOADING, UNLOADING
-from identification.gap.evidence.engine import Engine, alike
+from identification.gap.evidence.alike import alike
+from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.fit import Fit
 from identification.gap.model.bench import Bench
 

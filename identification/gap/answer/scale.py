@@ -23,7 +23,7 @@ def times_as_far(bench: Bench, predicted: Array) -> Array:
     """By how much the response goes further than predicted (n,) m, least squares over the rows less
     their mean, of every setup in which the two are alike; negative if the other way."""
     rows, out = bench.rows, []
-    both = rows.moved(np.column_stack([predicted, bench.response]))
+    both = rows.about_means(np.column_stack([predicted, bench.response]))
     for s in range(len(bench.data.setups)):
         mine = both[rows.setup == s]
         (square, product), (_, own) = mine.T @ (rows.weight[rows.setup == s, None] * mine)

@@ -16,7 +16,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.laws.curves import hinge
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.gains import BENDS, SCALES, bent, factor, law_of_gain, scales
+from identification.gap.laws.gains import BENDS, SCALES, factor, law_of_gain, scales, weighed
 from identification.gap.laws.law import Law, Laws
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
@@ -40,7 +40,7 @@ def variants(bench: Bench) -> list[Variant]:
                 "gain that bends",
                 [straight, bend],
                 SCALES,
-                BENDS,
+                root=BENDS,
                 positive=False,
                 prior=0.5,
                 full=top,
@@ -72,7 +72,7 @@ def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
 
 def _columns(bench: Bench, law: Law) -> list[Array]:
     """A share of the response to the load."""
-    return [bench.outside_column(bent(bench.line, t, "at_response")) for t in law.terms]
+    return [bench.outside_column(weighed(bench.line, t, "at_response")) for t in law.terms]
 
 
 EFFECT = Effect(

@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.gains import BENDS, SCALES, bent, factor, law_of_gain, scales
+from identification.gap.laws.gains import BENDS, SCALES, factor, law_of_gain, scales, weighed
 from identification.gap.laws.law import Law, Laws
 from identification.gap.model.base import component, shown
 from identification.gap.model.bench import Bench
@@ -38,7 +38,7 @@ def variants(bench: Bench) -> list[Variant]:
                 "gain that bends",
                 [straight, bend],
                 SCALES,
-                BENDS,
+                root=BENDS,
                 positive=False,
                 prior=0.5,
                 full=top,
@@ -77,7 +77,7 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     return [
         component(bench, "xyz".index(t.shape["axis"]))
         if "axis" in t.shape
-        else shown(bench, bent(bench.load, t, "at_load"))
+        else shown(bench, weighed(bench.load, t, "at_load"))
         for t in law.terms
     ]
 

@@ -33,6 +33,7 @@ from identification.arrays import Array, Flags
 from identification.gap.laws import lost_motion_law
 from identification.gap.laws.closer import Word, closing_in, nearly_leads, places, seen
 from identification.gap.laws.effect import Effect
+from identification.gap.laws.flanks import Flanks, placed, shapes
 from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Laws
 from identification.gap.laws.lost_motion import (
@@ -50,7 +51,6 @@ from identification.gap.laws.lost_motion import (
     within_play,
 )
 from identification.gap.model.bench import TOOL_KG, Bench
-from identification.gap.model.flanks import Flanks, placed, shapes
 from identification.gap.model.variants import Variant, variant
 
 WORD = "joint_backlash"
@@ -156,6 +156,7 @@ def _preloaded(bench: Bench, j: int, span: float, places: dict[bytes, list[int]]
                 "crossing": "weight",
                 "tool_kg": TOOL_KG,
                 "preload_Nm": float(preload),
+                "against": bool(way * preload < 0),
                 "step_Nm": step,
             }
             label = f"joint {j + 1} preload {way * preload / (high - low):.2g}"
@@ -261,11 +262,12 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
             f"joint {j + 1} {flanks.kind}{name}",
             columns[:k],
             scales,
-            root[:k, :k],
-            np.eye(k)[0] if flanks.kind == "gap" else less_rub(k),
-            _PLACED_PRIOR,
-            _least(bench, j, flanks.zone),
+            root=root[:k, :k],
+            positive=np.eye(k)[0] if flanks.kind == "gap" else less_rub(k),
+            prior=_PLACED_PRIOR,
+            least=_least(bench, j, flanks.zone),
             each=(True, True),
+            form=name,
             **info,
         )
         for k, name in ((2, ""), (3, ", other springs"))
@@ -309,10 +311,10 @@ def _zone(
                 f"{label} {kind} zone {zone}",
                 columns,
                 scales,
-                root,
-                less_rub(len(columns)),
-                prior,
-                _least(bench, j, width),
+                root=root,
+                positive=less_rub(len(columns)),
+                prior=prior,
+                least=_least(bench, j, width),
                 each=(True,),
                 within=within_play(len(columns)),
                 **(info | {"kind": kind, "rests": rests}),

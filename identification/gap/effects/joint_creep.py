@@ -111,7 +111,7 @@ def _elements(
 ) -> list[int]:
     """Column of an element of every time (k,)."""
     load = np.tile(bench.true_torque[:, joint][:, None], (1, len(times_s)))
-    z = retarded(bent(load) if is_bent else load, times_s, bench.rows, bench.rest, fresh)
+    z = retarded(signed_squares(load) if is_bent else load, times_s, bench.rows, bench.rest, fresh)
     unit = bench.sense * bench.compliance[joint] * in_a_run(bench, times_s)
     return [bench.add_joint(joint, y) for y in (unit * z).T]
 
@@ -132,9 +132,10 @@ def _family(
             f"{name} spectrum",
             columns,
             sizes,
-            smooth_root(len(columns), 0.5),
+            root=smooth_root(len(columns), 0.5),
             prior=spectrum,
             each=True,
+            form="spectrum",
             times_s=times_s,
             **info,
         )
@@ -158,7 +159,7 @@ def _family(
 BENT = " more than in proportion"
 
 
-def bent(load: Array) -> Array:
+def signed_squares(load: Array) -> Array:
     """Loads (n, k) by their squares, with their signs, alike at the largest."""
     return np.asarray(load * np.abs(load) / (float(np.abs(load).max()) or 1.0))
 

@@ -41,7 +41,7 @@ from identification.gap.laws.friction_law import (
 from identification.gap.laws.law import Laws
 from identification.gap.laws.specimens import with_other_springs
 from identification.gap.model.bench import Bench
-from identification.gap.model.path import Path, bent, worked_in
+from identification.gap.model.path import Path, with_loads, worked_in
 from identification.gap.model.variants import (
     LASTING,
     SET_UP_ANEW,
@@ -154,7 +154,7 @@ def closer(bench: Bench, found: Variant) -> list[Variant]:
         finer = _spectra(bench, joint, name, span, path, BETWEEN)
     else:
         return []
-    out = [replace(v, label=f"{v.label} fine", info={**v.info, "memory": memory}) for v in finer]
+    out = [v.known_by(" fine", memory=memory, closely=True) for v in finer]
     return out + _with_other_springs(bench, out)
 
 
@@ -264,10 +264,11 @@ def _spectra(
                 label,
                 columns,
                 SCALES,
-                smooth_root(len(columns), 0.6, 0.3),
+                root=smooth_root(len(columns), 0.6, 0.3),
                 prior=0.25,
                 each=True,
                 within=friction_law.no_knee(bench, torque, reach * radii),
+                form="spectrum",
                 joint=joint,
                 radius=radii,
                 law=law,
@@ -289,7 +290,7 @@ def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) 
                 f"{name} r {radius[k] / span:.3g}",
                 columns[k : k + 2],
                 SCALES,
-                smooth_root(2, 0.7),
+                root=smooth_root(2, 0.7),
                 each=True,
                 within=spectrum.within[:, k : k + 2],
                 prior=0.25 / alone,
@@ -309,7 +310,7 @@ def _exponential(bench: Bench, joint: int, name: str, reaches: Array, path: Path
     for law in friction_law.exponential_laws(bench):
         by_load, elastic = law in BY_LOAD, law.startswith("Bouc-Wen")
         reach = span * reaches * (NEARER if by_load else 1.0)
-        way = bent(path, by_ratio(path.load, span)) if by_load else path
+        way = with_loads(path, by_ratio(path.load, span)) if by_load else path
         held = way.bristles(reach, elastic) * (np.abs(torque)[:, None] if by_load else reach)
         held -= torque[:, None] if law in SLIPPING else 0.0
         columns = [bench.add_joint(joint, -bench.sense * c * h) for h in held.T]
@@ -320,7 +321,7 @@ def _exponential(bench: Bench, joint: int, name: str, reaches: Array, path: Path
                     f"{name} {law} {reaches[k]:.3g}",
                     columns[k : k + 2],
                     SCALES,
-                    smooth_root(2, 0.5),
+                    root=smooth_root(2, 0.5),
                     prior=prior,
                     each=True,
                     joint=joint,

@@ -28,6 +28,7 @@ from identification.gap.model.bench import TOOL_KG, Bench
 from identification.gap.model.variants import Variant, smooth_root, variant
 
 WORD = "joint_nonlinear_stiffness"
+BEND = "bend"  # a form: one bend, between neighbouring places
 # Closer at the start: contacts are soft where they begin to bear, as `|tau|^(2/3)` (Hertz 1882).
 HINGES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 PLACES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of corners; of all of the net torque
@@ -77,7 +78,7 @@ def _alike_both_ways(bench: Bench, j: int, line: int, top: float) -> list[Varian
     kinds = ("line", *hinges)
     free, root = [line, *columns], _root(len(hinges))
     label = f"joint {j + 1} curve"
-    out = [variant(WORD, label, free, SCALES, root, prior=0.5, kinds=kinds, **info)]
+    out = [variant(WORD, label, free, SCALES, root=root, prior=0.5, kinds=kinds, **info)]
     for name, shape in (("quadratic", x * np.abs(x)), ("cubic", x**3), ("even", x**2)):
         column = bench.add_joint(j, c * shape)
         label = f"joint {j + 1} {name}"
@@ -86,10 +87,9 @@ def _alike_both_ways(bench: Bench, j: int, line: int, top: float) -> list[Varian
     for k in range(hinges.index(PLACES[0]), len(hinges) - 1):  # below that it is lost motion
         pair = hinges[k : k + 2]
         if np.mean(pair) >= seen:
-            label, both = f"joint {j + 1} bend {pair[0]}", [line, *columns[k : k + 2]]
-            out.append(
-                variant(WORD, label, both, SCALES, prior=prior, kinds=("line", *pair), **info)
-            )
+            label, both = f"joint {j + 1} {BEND} {pair[0]}", [line, *columns[k : k + 2]]
+            exact = {"kinds": ("line", *pair), "form": BEND, **info}
+            out.append(variant(WORD, label, both, SCALES, prior=prior, **exact))
     return out
 
 
@@ -111,7 +111,7 @@ def _net(bench: Bench, j: int, line: int) -> list[Variant]:
                 f"joint {j + 1} curve of the net torque",
                 [line, *columns],
                 SCALES,
-                _root(len(places)),
+                root=_root(len(places)),
                 positive=False,
                 prior=0.4,
                 kinds=kinds,
@@ -132,7 +132,7 @@ def _odd(bench: Bench, j: int, line: int, kg: float, prior: float) -> Variant:
         f"joint {j + 1} odd curve, tool {kg:.3g} kg",
         [line, *columns],
         SCALES,
-        _root(),
+        root=_root(),
         positive=False,
         prior=prior,
         kinds=kinds,
@@ -173,7 +173,7 @@ def corners(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
                 f"joint {j + 1} corner {b:.3g}",
                 columns,
                 SCALES,
-                np.eye(2),
+                root=np.eye(2),
                 positive=False,
                 prior=share,
                 kinds=("line", b),
@@ -257,7 +257,7 @@ def _level_by_level(bench: Bench, j: int, line: int, top: float) -> list[Variant
             f"joint {j + 1} curve from level to level",
             [line, *columns],
             SCALES,
-            from_level_to_level(places),
+            root=from_level_to_level(places),
             positive=False,
             prior=0.5,
             kinds=("line", *places[1:-1].tolist()),
@@ -279,7 +279,7 @@ def _uneven(bench: Bench, j: int, line: int, top: float) -> Variant:
         f"joint {j + 1} uneven curve",
         [line, *columns],
         scales,
-        _root(len(places)),
+        root=_root(len(places)),
         positive=False,
         prior=0.4,
         kinds=kinds,
@@ -297,10 +297,11 @@ def _fine(bench: Bench, j: int, line: int, top: float) -> Variant:
         f"joint {j + 1} fine curve",
         [line, *columns],
         FINE_SCALES,
-        _root(len(places)),
+        root=_root(len(places)),
         positive=False,
         prior=0.5,
         kinds=("line", *places),
+        form="fine",
         joint=j,
         torque=top,
         hinges=places,
@@ -330,7 +331,7 @@ def _locks(bench: Bench, j: int, line: int, top: float) -> list[Variant]:
                 f"joint {j + 1} {name}",
                 [line, *columns],
                 FINE_SCALES,
-                root,
+                root=root,
                 positive=powers.sum(axis=0),
                 within=powers,
                 prior=(0.25 if "stops" in name else 0.5) / (len(STEEPER) - 1),
@@ -368,7 +369,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
 
 def _look_closer(word: Word) -> list[Variant]:
     odd = [s for s in word.alone if "line" in s.variant.info]
-    bends = [s for s in word.alone if " bend " in s.variant.label]
+    bends = [s for s in word.alone if s.variant.form == BEND]
     return [*closing_in(word, corners, bends[:1]), *closing_in(word, refined, odd[:1])]
 
 

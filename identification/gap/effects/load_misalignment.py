@@ -75,6 +75,7 @@ def variants(bench: Bench) -> list[Variant]:
             prior=prior * each[0].share,
             directions=names,
             shapes=[k.shapes for k in each],
+            drags=any(shape.drags_N > 0 for shape in each[0].shapes),
             read=[k.read for k in each],
             shown=max(slants[name] for name in names) / MOST_CROSSTALK,
         )
@@ -137,7 +138,7 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
             "each run",
             [*common, *own, *given],
             SCALES,
-            np.diag(sd),
+            root=np.diag(sd),
             positive=False,
             prior=_ALL * _EACH_RUN_SHARE,
             directions=list(straight),

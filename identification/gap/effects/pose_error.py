@@ -206,7 +206,7 @@ def _variant(
         label,
         columns,
         (1.0,),
-        np.diag(sizes),
+        root=np.diag(sizes),
         positive=False,
         prior=prior,
         kind=kind,
@@ -294,7 +294,7 @@ def _look_closer(word: Word) -> list[Variant]:
         other = closest(found[name])
         there = partial(estimate, engine, beside=(Part(other.variant, other.scale),))
         again = refined(engine.bench, kinds[_kind(best.variant)].variant, there)
-        finer += [replace(v, label=f"{v.label} beside {name}") for v in again]
+        finer += [v.known_by(f" beside {name}", beside=name) for v in again]
     same = [v for v in finer if _kind(v) == _kind(best.variant)]
     share = best.variant.prior / len(same)  # they are one place, looked at more than once
     return [replace(v, prior=share) if v in same else v for v in finer]

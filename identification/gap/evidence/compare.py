@@ -120,7 +120,9 @@ def _stack(engine: Engine, family: tuple[Variant, ...], k: int) -> Stack:
             scales[i, : len(v.scales)] = v.scales
         plain = np.swapaxes(root, 1, 2) @ mean_squares(engine, columns, share) @ root
         limits = Limits.of(family, k)
-        engine.stacks[family] = Stack(columns, root, scales, plain, limits, engine.alike(columns))
+        engine.stacks[family] = Stack(
+            columns, root, scales, plain, limits, engine.unweighed(columns)
+        )
     found: Stack = engine.stacks[family]
     return found
 
@@ -131,7 +133,7 @@ def mean_squares(engine: Engine, columns: Ints, share: Array) -> Array:
     imperfect, share (v, k)."""
     weight = engine.bench.rows.weight
     used, place = np.unique(columns, return_inverse=True)
-    moved = engine.bench.rows.moved(engine.responses(used))
+    moved = engine.bench.rows.about_means(engine.responses(used))
     moved *= np.sqrt(weight / weight.sum())[:, None]
     squares = squares_of(moved.T, place.reshape(columns.shape))
     return np.asarray(squares * share[:, :, None] * share[:, None, :])

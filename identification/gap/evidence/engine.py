@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.arrays import Array, Flags, Ints
-from identification.gap.data import UNLOADING
+from identification.arrays import Array
+from identification.gap.evidence.alike import level_columns, level_covariance, run_columns
 from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.imperfection import LOG_STEP, STEP
 from identification.gap.evidence.products import Gathered, Some, Weights, White
@@ -32,12 +32,10 @@ from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
 from identification.gap.model.growing import Growing
 from identification.gap.recording.rows import Rows
-from identification.gap.recording.turns import rises
 from identification.running import first_rows
 
 RUN_PART, HOLD_PART, ROW_PART = 0.6, 0.3, 0.3
 _CONTINUOUS_HOLD_PART = 0.6  # no runs that repeat
-NEIGHBOUR = 0.25  # share of the force range over which the imperfection stays alike
 _AT_ONCE = 500_000  # numbers: what they take stays near the processor
 LEVER_M = 0.3  # an imperfection of the arm's joints sits at about this lever
 
@@ -150,13 +148,13 @@ class Engine:
         n, wanted = self.bench.rows.n, [self.bench.columns[i] for i in numbers]
         return np.array([column[:n] for column in wanted]).reshape(len(wanted), n).T
 
-    def alike(self, columns: NDArray[np.intp]) -> Array:
+    def unweighed(self, columns: NDArray[np.intp]) -> Array:
         """(g, v, k, k): what `squares` of the columns (v, k) has in common at all levels."""
-        return self._gathered.white.alike(columns)
+        return self._gathered.white.unweighed(columns)
 
-    def squares(self, columns: NDArray[np.intp], number: int, alike: Array) -> Array:
+    def squares(self, columns: NDArray[np.intp], number: int, unweighed: Array) -> Array:
         """(v, k, k): parts of a level's Gram matrix of the columns (v, k) of every variant."""
-        made = self._gathered.white.squares(columns, self._weights[number], alike)
+        made = self._gathered.white.squares(columns, self._weights[number], unweighed)
         shared = self._bases[number].pool.values[columns]
         return np.asarray(made - shared @ np.swapaxes(shared, 1, 2))
 
@@ -363,54 +361,4 @@ def structural_rms(bench: Bench, base: Base, target: Array) -> float:
 def _variance(bench: Bench) -> float:
     """Mean square (m^2) of the response about its mean per setup: a law that does more, as what
     yields far beyond its threshold on an imposed path, is no further off for that."""
-    return bench.rows.rms(bench.rows.moved(bench.response[:, None])[:, 0]) ** 2
-
-
-def level_columns(bench: Bench) -> Array:
-    """Indicator of every level, response only, (size, levels)."""
-    rows = bench.rows
-    out = np.zeros((bench.layout.size, int(rows.level.max()) + 1))
-    out[np.arange(rows.n), rows.level] = 1.0
-    return out
-
-
-_HATS = 4  # of a run's own imperfection, over its range of load
-
-
-def run_columns(bench: Bench) -> Array:
-    """Hat functions of the load for every run and sense of loading, response only, (size, k);
-    none where no run is there twice, or the rig runs on and on."""
-    rows = bench.rows
-    runs = np.unique(rows.run)
-    if rows.continuous or len(runs) <= len(bench.data.setups):
-        return np.zeros((bench.layout.size, 0))
-    out = []
-    for run in runs:
-        mine = rows.run == run
-        low, high = float(bench.load[mine].min()), float(bench.load[mine].max())
-        at = (bench.load - low) / ((high - low) or 1.0) * (_HATS - 1)
-        for back in (False, True):
-            here = mine & ((rows.branch == UNLOADING) == back)
-            for k in range(_HATS) if here.any() else ():
-                out.append(bench.stacked(np.where(here, np.maximum(0.0, 1 - np.abs(at - k)), 0.0)))
-    return np.column_stack(out)
-
-
-def level_covariance(bench: Bench) -> Array:
-    """(levels, levels) of the imperfection at the levels of a bench, of unit variance."""
-    rows = bench.rows
-    count = int(rows.level.max()) + 1
-    sums = np.bincount(rows.level, minlength=count)
-    load = np.bincount(rows.level, weights=bench.load, minlength=count) / sums
-    first = np.unique(rows.level, return_index=True)[1]
-    setup = rows.setup[first]
-    branch = (rises(bench.load) if rows.continuous else rows.branch)[first]
-    return alike(setup, branch, load, float(np.ptp(bench.load)))
-
-
-def alike(setup: Ints, branch: Ints | Flags, load: Array, span: float) -> Array:
-    """(k, k) covariance of what goes wrong at levels: unit variance, `exp(-|dF| / a quarter of the
-    range)`, a path that may have corners; half so between branches, none between setups."""
-    near = np.exp(-np.abs(load[:, None] - load) / (NEIGHBOUR * (span or 1.0)))
-    branches = np.where(branch[:, None] == branch, 1.0, 0.5)
-    return np.asarray(near * branches * (setup[:, None] == setup) + 1e-9 * np.eye(len(load)))
+    return bench.rows.rms(bench.rows.about_means(bench.response[:, None])[:, 0]) ** 2

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, Ints
 
 IMPERFECTION = 0.04  # of an effect's size: how well a family of shapes meets a real mechanism
 # Elasticity, gains and leverage are laws, not families, and as exact as the springs of the base,
@@ -31,19 +31,20 @@ def level_prior(etas: Array, i: int, energy: float) -> float:
 
 def level_priors(etas: Array, energy: Array) -> Array:
     """log prior (l,) of every level; energy (l,): mean square (m^2) of the explanation at each."""
-    return np.array([level_prior(etas, i, float(e)) for i, e in enumerate(energy)])
+    return log_level(etas, np.arange(len(etas)), energy)
 
 
-def log_level(etas: Array, i: int, energy: Array) -> Array:
-    """log prior (...) of level i of the sizes `etas` (l,) m, for explanations of mean squares
-    (...) m^2. Levels are bins of log eta; the lowest takes all below."""
+def log_level(etas: Array, i: int | Ints, energy: Array) -> Array:
+    """log prior (...) of level i of the sizes `etas` (l,) m, or of levels (...), for explanations
+    of mean squares (...) m^2. Levels are bins of log eta; the lowest takes all below."""
     from scipy.special import ndtr
 
     centre = _centre(energy)
-    lower, upper = _edge(etas, i - 1), _edge(etas, i)
+    edges = _edges(etas)
+    lower, upper = edges[i], edges[i + 1]
     p = ndtr((upper - centre) / _SPREAD) - ndtr((lower - centre) / _SPREAD)
     # no mechanism of a real rig follows a formula closer than that
-    short = centre + _FLOOR - (upper if upper < np.inf else 1e9)
+    short = centre + _FLOOR - np.minimum(upper, 1e9)
     return np.asarray(np.log(np.maximum(p, _LEAST_SHARE)) - 300.0 * np.maximum(short, 0.0))
 
 
@@ -61,7 +62,8 @@ def least_size(etas: Array, energy: float) -> float:
     """log of the least size that counts: the lower edge of the level that has the least
     imperfection in it. Explanations of about the same size are held to the same."""
     floor = float(_centre(np.array(energy))) + _FLOOR
-    return next(_edge(etas, i - 1) for i in range(len(etas)) if floor <= _edge(etas, i))
+    edges = _edges(etas)
+    return float(edges[np.searchsorted(edges[1:], floor)])
 
 
 def _centre(energy: Array) -> Array:
@@ -72,10 +74,9 @@ _LEAST_SHARE = 1e-12
 _FLOOR = float(np.log(LEAST_IMPERFECTION / IMPERFECTION))
 
 
-def _edge(etas: Array, i: int) -> float:
-    """log of the edge between level i and the next: midway. Below the least size, which follows 0,
-    half a step of the grid, which may be of every other level only."""
-    if i < 0 or i >= len(etas) - 1:
-        return -np.inf if i < 0 else np.inf
+def _edges(etas: Array) -> Array:
+    """log of the edges (l + 1,) of levels (l,): midway between two. Below the least size, which
+    follows 0, half a step of the grid, which may be of every other level only."""
     step = etas[2] / etas[1] if len(etas) > 2 else STEP
-    return float(0.5 * np.log((etas[i] if i else etas[1] / step) * etas[i + 1]))
+    below = np.append(etas[1:2] / step, etas[1:-1])
+    return np.concatenate([[-np.inf], 0.5 * np.log(below * etas[1:]), [np.inf]])

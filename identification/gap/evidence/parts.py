@@ -66,7 +66,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
         does = engine.responses(c) @ np.column_stack([part, imperfect(p.variant) * part])
-        moved, faulty = rows.moved(does).T
+        moved, faulty = rows.about_means(does).T
         moves.append(rows.rms(moved))
         if p.word in LINEAR:
             linear += moved
@@ -110,7 +110,11 @@ def _beyond_springs(engine: Engine, moved: Array) -> float:
     root = np.sqrt(engine.bench.rows.weight / engine.bench.rows.weight.sum())
     if "springs" not in engine.cache:
         springs = base.index("spring")
-        A = engine.bench.rows.moved(base.columns[:n, springs]) * base.sd[springs] * root[:, None]
+        A = (
+            engine.bench.rows.about_means(base.columns[:n, springs])
+            * base.sd[springs]
+            * root[:, None]
+        )
         engine.cache["springs"], engine.cache["to springs"] = A, np.linalg.pinv(A, rcond=1e-6)
     t = engine.cache["to springs"] @ (moved * root)
     left = float(np.linalg.norm(moved * root - engine.cache["springs"] @ t))

@@ -169,7 +169,7 @@ class White:
         q = tuple(s.picked(columns) for s in self.q)
         return White(self.even[columns], q, self.contrast.picked(columns), self.holds, self.groups)
 
-    def alike(self, columns: NDArray[np.intp]) -> Array:
+    def unweighed(self, columns: NDArray[np.intp]) -> Array:
         """(1 + groups, v, k, k): what `squares` is made of that no weight is needed for."""
         out = np.zeros((1 + len(self.groups), *columns.shape, columns.shape[1]))
         out[0] = squares_of(self.even[:, self.holds :], columns)
@@ -177,9 +177,9 @@ class White:
             _add_squares(out[i], self.contrast, columns, group)
         return out
 
-    def squares(self, columns: NDArray[np.intp], w: Weights, alike: Array) -> Array:
+    def squares(self, columns: NDArray[np.intp], w: Weights, unweighed: Array) -> Array:
         """(v, k, k): products of the columns (v, k) of every variant."""
-        out = np.tensordot(np.append(1.0, self._of_groups(w)), alike, axes=1)
+        out = np.tensordot(np.append(1.0, self._of_groups(w)), unweighed, axes=1)
         out += squares_of(self.even[:, : self.holds], columns, w.hold)
         for some, weight in zip(self.q, self._q(w), strict=True):
             _add_squares(out, some, columns, weight=weight)

@@ -39,13 +39,13 @@ class Stack:
     scales: Array
     plain: Array
     limits: Limits
-    alike: Array
+    unweighed: Array
     squares: dict[int, Array] = field(default_factory=dict)
 
     def at(self, level: NoiseLevel) -> Array:
         """Products (v, k, k) of the columns at a level, but for what effects take there."""
         if level.number not in self.squares:
-            made = level.engine.squares(self.columns, level.number, self.alike)
+            made = level.engine.squares(self.columns, level.number, self.unweighed)
             self.squares[level.number] = made
         return self.squares[level.number]
 

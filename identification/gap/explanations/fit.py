@@ -7,15 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.evidence.engine import (
-    LEVER_M,
-    ROW_PART,
-    RUN_PART,
-    Engine,
-    hold_part,
-    level_columns,
-    run_columns,
-)
+from identification.gap.evidence.alike import level_columns, run_columns
+from identification.gap.evidence.engine import LEVER_M, ROW_PART, RUN_PART, Engine, hold_part
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.model.variants import block
@@ -115,7 +108,7 @@ def _imperfection_columns(engine: Engine, parts: tuple[Part, ...], w: Array, eta
         engine.cache["imperfection"] = np.column_stack([levels, runs, *begin])
     rows = engine.bench.rows
     columns = engine.columns(c for p in parts for c in p.variant.columns)
-    moved = rows.moved((columns[: rows.n] @ w)[:, None])[:, 0]
+    moved = rows.about_means((columns[: rows.n] @ w)[:, None])[:, 0]
     size = rows.rms(moved)
     own = [engine.bench.stacked(moved * m / size) for m in _phases(engine) if size > 0]
     return eta * np.column_stack([engine.cache["imperfection"], *own])

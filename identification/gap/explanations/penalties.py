@@ -141,7 +141,7 @@ def _rms_of_line(engine: Engine, part: Part) -> float:
     """rms (m) by which a gain of one, or a spring twice as soft, moves."""
     rows = engine.bench.rows
     line = engine.columns(part.variant.columns)[: rows.n, :1]
-    return max(rows.rms(rows.moved(line)[:, 0]), 1e-300)
+    return max(rows.rms(rows.about_means(line)[:, 0]), 1e-300)
 
 
 _WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
@@ -279,7 +279,7 @@ def _by_direction(engine: Engine, part: Part) -> Array:
     names = [s.direction for s in engine.bench.data.setups]
     number = np.array([names.index(n) for n in names])[engine.bench.rows.setup]
     does = engine.columns(part.variant.columns)[: engine.bench.rows.n] @ part.root
-    square = np.sum(engine.bench.rows.moved(does) ** 2, axis=1)
+    square = np.sum(engine.bench.rows.about_means(does) ** 2, axis=1)
     sums = np.bincount(number, weights=square, minlength=len(names))
     return np.asarray(sums / max(float(sums.sum()), 1e-300))
 

@@ -153,7 +153,7 @@ def _moved(engine: Engine, fitted: Fit) -> float:
     bent = [i for i, p in enumerate(fitted.parts) if p.word not in LINEAR]
     moved = sum((fitted.contribution(engine, i)[:n] for i in bent), np.zeros(n))
     rows = engine.bench.rows
-    return max(engine.structural, rows.rms(rows.moved(moved[:, None])[:, 0]))
+    return max(engine.structural, rows.rms(rows.about_means(moved[:, None])[:, 0]))
 
 
 def noise_of(bench: Bench) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.evidence.engine import NEIGHBOUR
+from identification.gap.evidence.alike import NEIGHBOUR
 
 BENT_SLOPE = 0.75  # of the straight line of least squares through zero of x |x|, 0 to 1
 
@@ -29,7 +29,7 @@ def above(torque: Array, weight: Array, bend: float) -> Array:
 
 def from_level_to_level(places: Array) -> Array:
     """Root of the prior of a line and hinges between places (k + 1,), so that the curve at these
-    is as rough as the imperfection of laws is (`engine.alike`), none at the first of them."""
+    is as rough as the imperfection of laws is (`evidence.alike`), none at the first of them."""
     near = np.exp(-np.abs(places[:, None] - places) / NEIGHBOUR)
     from_first = near - near[:1] - near[:, :1] + 1.0
     covariance = from_first[1:, 1:] + 1e-9 * np.eye(len(places) - 1)

@@ -10,7 +10,7 @@ from identification.arrays import Array, Flags
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import followed
-from identification.gap.model.variants import Variant, variant
+from identification.gap.model.variants import WARMS_UP, Variant, variant
 from identification.gap.recording.turns import way_back
 from identification.gap.recording.white import white_sd
 from identification.turns import turning_points
@@ -31,7 +31,7 @@ def warm_ups(bench: Bench) -> dict[str, Array]:
     t = _clock(bench)
     out = {"linear": t, "root": np.sqrt(t)}
     for share in RATES:
-        out[f"T {share:g}"] = (1 - np.exp(-t / share)) / (1 - np.exp(-1 / share))
+        out[f"{WARMS_UP}{share:g}"] = (1 - np.exp(-t / share)) / (1 - np.exp(-1 / share))
     return out
 
 
@@ -131,7 +131,7 @@ def paths(bench: Bench, *, shown: bool = False) -> dict[str, Array]:
     the channel itself shows it without load. What is over
     before it was read a few times is no path, but a reading that is off."""
     t = _clock(bench)
-    over = {f"T {share:g}" for share in RATES if np.sum(t < share) < _SEEN}
+    over = {f"{WARMS_UP}{share:g}" for share in RATES if np.sum(t < share) < _SEEN}
     every = {label: path for label, path in warm_ups(bench).items() if label not in over}
     if own_clock(bench) or shown:
         return every
@@ -226,10 +226,11 @@ def free_variant(
         label,
         columns,
         scales,
-        path.root(len(names)),
+        root=path.root(len(names)),
         positive=False,
         prior=prior,
         path="free",
+        form=label,
         names=names,
         pieces=path.pieces,
         steady=path.steady,

@@ -9,7 +9,7 @@ from identification.gap.laws.drift import RATES, TEMPERATURE, temperature_of
 from identification.gap.laws.law import Law, Term
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import followed
-from identification.gap.model.variants import Variant
+from identification.gap.model.variants import WARMS_UP, Variant
 
 OF_SESSION = ("drift_knot", "drift_per_kelvin")  # coefficients of paths without a law
 
@@ -22,8 +22,8 @@ def law_of_path(bench: Bench, v: Variant) -> tuple[dict[str, object], tuple[Term
         return {"path": "linear"}, (Term("drift_rate"),), np.array([1 / span])
     if label == "root":
         return {"path": "root"}, (Term("drift_per_root"),), np.array([span**-0.5])
-    if label.startswith("T "):
-        share = float(label[2:])
+    if label.startswith(WARMS_UP):
+        share = float(label.removeprefix(WARMS_UP))
         rise = 1 / (1 - np.exp(-1 / share))
         term = Term("drift", {"time_constant": share * span})
         return {"path": "exponential"}, (term,), np.array([rise])

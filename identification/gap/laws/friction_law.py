@@ -20,7 +20,7 @@ from identification.gap.laws.law import (
     fresh_after,
 )
 from identification.gap.model.bench import TOOL_KG, Bench
-from identification.gap.model.path import bent, worked_in
+from identification.gap.model.path import with_loads, worked_in
 from identification.gap.model.variants import LASTING, SET_UP_ANEW, UNDER_WEIGHT, Variant
 
 SLIP_AT_A_STRENGTH = ("Iwan", "Prandtl")
@@ -80,7 +80,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     else:
         by_load = c["law"] in BY_LOAD
         span = c.get("measured_to", bench.reach_of(torque))  # a file may lack it
-        way = bent(path, by_ratio(path.load, span)) if by_load else path
+        way = with_loads(path, by_ratio(path.load, span)) if by_load else path
         z = way.bristles(size, c["law"].startswith("Bouc-Wen"))
         held = z * (np.abs(torque)[:, None] if by_load else size)
         grown = np.array([_grown(bench, law, t) for t in law.terms if t.shape])

@@ -49,7 +49,7 @@ def law_of_gain(v: Variant, of: str) -> tuple[Law, Array]:
     return Law({}, (Term("gain"), Term("gain", {of: float(v.info["full"])}))), np.ones(2)
 
 
-def bent(read: Array, term: Term, of: str) -> Array:
+def weighed(read: Array, term: Term, of: str) -> Array:
     """(n,) readings (n,) as a term weighs them."""
     if "above" in term.shape:
         return hinge(read, term.shape["above"])

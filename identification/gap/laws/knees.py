@@ -3,7 +3,6 @@ moment about an axis. `knees_closer` looks closer at those that are found."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -17,6 +16,7 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.history import beginnings
 from identification.gap.model.variants import (
     BACK_UNDER_WEIGHT,
+    CALLED,
     LASTING,
     SET_UP_ANEW,
     TAKEN_BACK,
@@ -91,12 +91,14 @@ def _range(bench: Bench, load: Array) -> float:
 
 
 def knees(
-    bench: Bench, word: str, label: str, columns: list[int], radius: Array, info: dict[str, Any]
+    bench: Bench, word: str, name: str, columns: list[int], radius: Array, info: dict[str, Any]
 ) -> list[Variant]:
-    """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them. What
-    begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`; what
-    holds small loads firmly, and then more and more gives way, is not (Ramberg and Osgood 1943).
-    What is pulled once, without an arm, may soften."""
+    """Sharp and rounded knees at the radii of THRESHOLDS; further radii belong to all of them.
+    What begins to give way bit by bit and flows back is friction, of an arm: `joint_hysteresis`;
+    what holds small loads firmly, and then more and more gives way, is not (Ramberg and Osgood
+    1943). What is pulled once, without an arm, may soften. name: joint or axis, and memory, with
+    which labels begin."""
+    info = {**info, CALLED: name}
     arm, share = bench.data.arm, 0.7 / len(radius) * _LIKELY[info["memory"]]
     softens = not arm and not bench.course.unloads
     extra, out = list(range(len(THRESHOLDS), len(radius))), []
@@ -113,7 +115,7 @@ def knees(
                 "knee": knee,
                 "softens": softens,
             }
-            at, chosen = f"{label} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
+            at, chosen = f"{name} at {THRESHOLDS[k]:g} {knee}", [columns[i] for i in place]
             out += with_back(word, at, chosen, np.diag(kept), share / 4, exact)
     if arm and bench.course.unloads:
         exact = {
@@ -124,7 +126,7 @@ def knees(
             "knee": "slow",
             "softens": False,
         }
-        at, likely = f"{label} at {THRESHOLDS[0]:g} and on", _SLOW * _LIKELY[info["memory"]]
+        at, likely = f"{name} at {THRESHOLDS[0]:g} and on", _SLOW * _LIKELY[info["memory"]]
         root = smooth_root(len(radius), 0.6, 0.3)
         out += with_back(word, at, columns, root, likely, exact)
     return out
@@ -181,10 +183,10 @@ def _hardened(
                 label,
                 columns[k:],
                 SCALES,
-                root,
-                np.ones(len(root)),
-                0.7 / len(radius),
-                LEAST,
+                root=root,
+                positive=np.ones(len(root)),
+                prior=0.7 / len(radius),
+                least=LEAST,
                 **exact,
             )
         )
@@ -210,8 +212,9 @@ def with_back(
     """A knee as it is, and with Bauschinger's effect: once it has yielded, metal flows back early
     when unloaded."""
     out, share = [], yielded_from(info)
-    back, info = info["back"].get(share, []), {**info, "back_from": share}
-    for more, name in ([], ""), *([(back, ", flows back")] if back else []):
+    back = info["back"].get(share, [])
+    info = {key: info[key] for key in info if key != "flows_back"} | {"back_from": share}
+    for more, name in ([], ""), *([(back, FLOWS_BACK)] if back else []):
         k, n = len(columns), len(columns) + len(more)
         each, within = softening(np.asarray(info["radius"]), n) if info["softens"] else (True, None)
         out.append(
@@ -220,18 +223,20 @@ def with_back(
                 label + name,
                 [*columns, *more],
                 SCALES,
-                block([root, _RETURNS * np.eye(len(more))]),
-                np.repeat([1.0, 0.0], [k, n - k]),
-                prior,
-                LEAST,
-                each,
-                within,
+                root=block([root, _RETURNS * np.eye(len(more))]),
+                positive=np.repeat([1.0, 0.0], [k, n - k]),
+                prior=prior,
+                least=LEAST,
+                each=each,
+                within=within,
+                flows_back=bool(more),
                 **info,
             )
         )
     return out
 
 
+FLOWS_BACK = ", flows back"
 LEAST = 0.15  # of the elastic compliance: what bends less does not give way
 _RETURNS = 0.4  # coefficients of what flows back, against those of the knee
 
@@ -239,11 +244,6 @@ _RETURNS = 0.4  # coefficients of what flows back, against those of the knee
 def is_sharp(v: Variant) -> bool:
     """Whether the threshold is one of the grid, without rounding: about such it is refined."""
     return bool(v.info["knee"] == "sharp")
-
-
-def place_in(label: str) -> str:
-    """Joint or axis, and memory, with which a knee's label begins."""
-    return re.split(" at | flow", label, maxsplit=1)[0]
 
 
 def memories(bench: Bench) -> dict[str, Flags]:

@@ -19,14 +19,21 @@ from identification.gap.laws.closer import (
     shows,
 )
 from identification.gap.laws.flows import Flow
-from identification.gap.laws.knees import SCALES, fresh_of, is_sharp, place_in, with_back
+from identification.gap.laws.knees import FLOWS_BACK, SCALES, fresh_of, is_sharp, with_back
 from identification.gap.laws.specimens import OWN, plateaus, with_other_springs
 from identification.gap.model.bench import Bench
-from identification.gap.model.variants import BACK_UNDER_WEIGHT, TAKEN_BACK, Variant, place_of
+from identification.gap.model.variants import (
+    BACK_UNDER_WEIGHT,
+    CALLED,
+    TAKEN_BACK,
+    Variant,
+    place_of,
+)
 
 FINE = 13  # radii about a threshold that was found on the grid, from 0.84 to 1.2 of it
 FLOWS_S = (1.2, 2.5, 5.0, 10.0, 25.0)  # in proportion to the overstress,
 SQUARE_S = (2.5, 6.0, 15.0)  # or with its square
+ROUNDED = "fine rounded"
 CLOSE = (0.4,)  # of a closer look
 _BETWEEN = (-0.5, -0.25, 0.25, 0.5)  # powers of two of a flow time
 
@@ -56,23 +63,27 @@ def refined(bench: Bench, found: Variant, close: float = 1.0) -> list[Variant]:
     alone = 0.0 if weight is None else float(np.abs(weight).max())
     radius = alone + (float(info["centre"]) - alone) * (1 + close * np.linspace(-0.16, 0.2, FINE))
     fresh = fresh_of(bench, info["memory"])
-    name, out = place_in(found.label), []
+    out = []
     at = Flow(info["load"], radius, 0.0, fresh, weight)
     for (flow, square), states in flows.each_way(bench, ways, at):
         columns = [info["column"](s) for s in states.T]
         share = 0.25 / FINE / (1 if flow == 0 else len(FLOWS_S) + len(SQUARE_S))
-        how = f" flow {flow:.3g} s{' squared' if square else ''}" if flow else ""
         for k in range(FINE):
             exact = {**info, "centre": radius[k], "flow_s": flow, "square": square}
-            label = f"{name}{how} at {radius[k]:.4g} fine"
-            kinds = {"": slice(k, k + 1), " rounded": slice(max(k - 2, 0), k + 3)}
-            for kind, place in kinds.items():
-                exact["radius"] = radius[place]
-                root = np.eye(len(radius[place]))
-                out += with_back(found.word, label + kind, columns[place], root, share, exact)
+            for form, place in (("fine", slice(k, k + 1)), (ROUNDED, slice(max(k - 2, 0), k + 3))):
+                exact |= {"radius": radius[place], "form": form}
+                root, label = np.eye(len(radius[place])), _label(exact)
+                out += with_back(found.word, label, columns[place], root, share, exact)
     if info.get("other_springs"):
         return with_other_springs(bench, int(info["joint"]), out, SCALES, OWN)
     return out
+
+
+def _label(info: Mapping[str, Any]) -> str:
+    """Of a finely spaced knee: where, how it flows, threshold and form."""
+    squared = " squared" if info["square"] else ""
+    flow = f" flow {info['flow_s']:.3g} s{squared}" if info["flow_s"] else ""
+    return f"{info[CALLED]}{flow} at {info['centre']:.4g} {info['form']}"
 
 
 def _elsewhere(word: Word, closer: list[Variant], between: Between | None) -> list[Variant]:
@@ -90,7 +101,7 @@ def _elsewhere(word: Word, closer: list[Variant], between: Between | None) -> li
     moved = []
     for v in (s.variant for s in found[-_ELSEWHERE:]):
         there = [
-            (place_in(other.label), other.info)
+            (str(other.info[CALLED]), other.info)
             for (memory, place), other in others.items()
             if memory == v.info["memory"] and place != _axle(v)
         ]
@@ -142,16 +153,17 @@ def _moved(bench: Bench, found: Variant, place: Place, factor: float) -> Variant
         return None
     exact = {
         **other,
+        CALLED: name,
+        "form": info["form"],
         "back_from": info["back_from"],
+        "flows_back": info["flows_back"],
         "radius": flow.radius,
         "flow_s": flow.time,
         "centre": factor * float(info["centre"]),
         "square": flow.square,
         "knee": info["knee"],
     }
-    start, end = found.label.rsplit(" at ", 1)
-    how = start.removeprefix(place_in(found.label)) + f" at {exact['centre']:.4g}"
-    label = " ".join([name + how, *end.split(" ")[1:]])
+    label = _label(exact) + (FLOWS_BACK if info["flows_back"] else "")
     return replace(found, label=label, columns=tuple(columns), info=exact)
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from identification.arrays import Array, Flags
+from identification.gap.laws.flanks import Flanks, shapes
 from identification.gap.laws.law import Law, Term
 from identification.gap.laws.lost_motion import HELD, PLACED, Play, net, resting_columns
 from identification.gap.model.bench import TOOL_KG, Bench
-from identification.gap.model.flanks import Flanks, shapes
 from identification.gap.model.variants import Variant
 
 

@@ -99,12 +99,12 @@ def plateaus(bench: Bench, found: Variant) -> list[Variant]:
                 f"joint {info['joint'] + 1} at {knee:.4g}{PLATEAU} {end:.4g}",
                 columns,
                 _SCALES,
-                None,
-                True,
-                0.25 / _ENDS,
-                found.least,
-                each,
-                within,
+                root=None,
+                positive=True,
+                prior=0.25 / _ENDS,
+                least=found.least,
+                each=each,
+                within=within,
                 **exact,
             )
         )

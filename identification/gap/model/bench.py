@@ -22,7 +22,7 @@ from identification.gap.model.history import moves, rests
 from identification.gap.model.layout import Layout, layout_of
 from identification.gap.model.noise import Noise, estimate_noise
 from identification.gap.model.other_springs import springs_behind
-from identification.gap.model.path import Path, path_of
+from identification.gap.model.path import Path, load_path
 from identification.gap.model.pool import Pool
 from identification.gap.recording.course import Course
 from identification.gap.recording.imposed import displacement_imposed
@@ -310,7 +310,7 @@ class Bench:
         """Of a load (n,), with what no row shows of it; fresh: where the memory is lost, by default
         where the arm goes to another pose. weight (n,): that acts beside the load."""
         lost = self.moved if fresh is None else fresh
-        return path_of(load, self.rest, lost, weight, self.rows.overshoot, self.rows.onward)
+        return load_path(load, self.rest, lost, weight, self.rows.overshoot, self.rows.onward)
 
     def along(self, overshoot: Array) -> Bench:
         """The bench with loads (n,) that no row shows (`Rows.overshoot`); what is known of it else

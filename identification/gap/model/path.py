@@ -38,7 +38,7 @@ class Path:
         return states if self.kept.all() else states[self.kept]
 
 
-def path_of(
+def load_path(
     load: Array,
     rest: Flags,
     fresh: Flags,
@@ -78,6 +78,6 @@ def worked_in(path: Path) -> Path:
     return Path(np.concatenate(parts), fresh, fresh, np.concatenate(kept), worked_in=True)
 
 
-def bent(path: Path, by: Array) -> Path:
+def with_loads(path: Path, by: Array) -> Path:
     """The path of what loads become, by (m,)."""
     return replace(path, load=by)

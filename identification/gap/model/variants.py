@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,9 @@ BACK_UNDER_WEIGHT = " under weight, taken back"  # one that is lost between runs
 LASTING = " lasting"  # one that outlasts the arm's way to another pose
 TAKEN_BACK = " taken back"  # one that is lost between runs
 SET_UP_ANEW = " set up anew"  # one that is lost when the rig is turned to another direction
+
+CALLED = "called"  # in `info`: what a place and a memory are called, with which labels begin
+WARMS_UP = "T "  # a path in time of one rate is called so, and by its share of the session
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +138,23 @@ class Variant:
         """Joint, axis of the base and memory, by which shapes differ most in other designs."""
         return tuple(self.info.get(key) for key in ("joint", "axis", "memory"))
 
+    @property
+    def form(self) -> str | None:
+        """Which of the families of its word's shapes it is of, where no other fact tells that."""
+        return self.info.get("form")
+
+    def known_by(self, more: str, **facts: Any) -> Variant:
+        """The same with more in its label, and the facts that this says."""
+        return replace(self, label=f"{self.label}{more}", info={**self.info, **facts})
+
+    @cached_property
+    def grid(self) -> tuple[object, ...]:
+        """What all shapes of one grid (of times, zones, thresholds) have in common: the place where
+        they act, and the facts of their law but for the numbers."""
+        keys = sorted(self.info.keys() - {CALLED})
+        facts = ((key, _but_for_numbers(self.info[key])) for key in keys)
+        return self.word, place_of(self), self.flows, *facts
+
     @cached_property
     def shape(self) -> tuple[object, ...]:
         """What its evidence follows from, but for the prior: of a word, variants of the same shape
@@ -158,6 +178,7 @@ def variant(
     label: str,
     columns: list[int],
     scales: tuple[float, ...],
+    *,
     root: Array | None = None,
     positive: bool | Array = True,
     prior: float = 1.0,
@@ -194,6 +215,15 @@ def place_of(variant: Variant) -> tuple[str, ...]:
     """Where a variant acts."""
     info = variant.info
     return tuple(str(info.get(key)) for key in ("joint", "joints", "axis", "axes"))
+
+
+def _but_for_numbers(fact: object) -> object:
+    """A fact of a law without its numbers, also those of a sensor or of a path, and its arrays."""
+    if isinstance(fact, list | tuple):
+        return tuple(part for one in fact if (part := _but_for_numbers(one)) is not None)
+    if isinstance(fact, str):
+        return WARMS_UP if fact.startswith(WARMS_UP) else None if fact.isdigit() else fact
+    return fact if isinstance(fact, bool) else None
 
 
 def smooth_root(k: int, alike: float = 0.7, common: float = 0.0) -> Array:

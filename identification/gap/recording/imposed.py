@@ -11,22 +11,19 @@ both are alike; force is the answer then, and it does not matter.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
-
 import numpy as np
 
 from identification.arrays import Array, Ints
 from identification.gap.data import ZERO, GapData
 from identification.gap.recording.bins import even_path
 from identification.gap.recording.holds import hold_ids, is_continuous
+from identification.gap.recording.pieces import MISJUDGED, TOP, TURNS, Channel, cost, zigzag
 from identification.gap.recording.turns import turns, way_back
 from identification.gap.recording.white import white_sd
 from identification.running import first_rows
 
 _POINTS = 1000  # bins of a recording: more do not tell the path better
 _CLOSEST = 3e-7  # of the squared range: a piece that leaves less is as good as exact
-_PER_PIECE = 0.1  # nats that one more piece costs
 _MARGIN = 0.05  # nats by which the displacement has to be simpler: half a piece
 _SLIDING = -2.5  # nats, where it slides to and fro: so much simpler the force may look by chance
 _FLAT = 0.33  # of the displacement's change, each in its range: what the force changes on a plateau
@@ -34,22 +31,9 @@ _SPENT, _MOST = 0.15, 0.45  # of the time, and of the way, in each sense
 _BEYOND = 3.0  # standard deviations of a point: so far it goes from one mean of points to the next
 _STILL = 2.0  # stated standard uncertainties: a channel that spreads by no more stands still
 _FOLLOWS = 0.5  # of its variance that the other channel explains
-_MISJUDGED = 3.0  # factor by which a stated uncertainty may be too small
 _PASS, _OFTEN = 0.5, 4  # of the range; turns
 _ELSEWHERE, _ALIKE = 0.04, 0.2  # of the range; of what the other channel does
-_TURNS = (0.5, 0.2, 0.08)  # of the range: what counts as going back
-_TOP = 0.03  # of a leg: a level next to its turning point
-_MOST_PIECES, _PIECES_PER_LEG, _SPARE = 200, 4, 9
 _FEWEST = 20  # samples: fewer show no path
-
-
-@dataclass(frozen=True, eq=False)
-class _Channel:
-    """values (n,) over time (n,) in units of their range; noise: standard deviation of a point."""
-
-    time: Array
-    values: Array
-    noise: float
 
 
 def displacement_imposed(data: GapData) -> bool:
@@ -91,7 +75,7 @@ def displacement_simpler(data: GapData) -> bool:
         _clock(data, mine), (force, moved), (instruments.force, instruments.displacement)
     )
     floor = max(_CLOSEST, *(c.noise**2 / np.sqrt(len(c.time)) for c in channels))
-    by_force, by_moved = (_cost(c, floor) for c in channels)
+    by_force, by_moved = (cost(c, floor) for c in channels)
     return by_force - by_moved > (_SLIDING if _slides(*channels) else _MARGIN)
 
 
@@ -135,7 +119,7 @@ def _goes_on(force: Array, moved: Array, sd: float) -> bool:
     last = first + int(size[first:].argmin())
     noise = max(white_sd(np.diff(force, 2)), sd)
     fell = size[first] - size[last] > max(_FALLS * size[first], _CLEARLY * noise)
-    return bool(fell and way[last] - way[first] > _FURTHER and way_back(way) < _TOP)
+    return bool(fell and way[last] - way[first] > _FURTHER and way_back(way) < TOP)
 
 
 _FALLS, _FURTHER = 0.08, 0.05  # of the largest force; of the way
@@ -192,7 +176,7 @@ def turned_alike(values: Array, other: Array, least: float = _ELSEWHERE) -> bool
     return steady and wanders > least and spread < min(_SAME_PLACE, _ALIKE * wanders)
 
 
-def _slides(force: _Channel, moved: _Channel) -> bool:
+def _slides(force: Channel, moved: Channel) -> bool:
     """Whether the displacement goes to and fro while the force hardly changes: a force that was
     driven would hold such a plateau in one sense only, as under a weight, or run through it."""
     length = float(_senses(moved) @ np.diff(moved.values))  # of all legs
@@ -211,18 +195,18 @@ def _slides(force: _Channel, moved: _Channel) -> bool:
     return True
 
 
-def _coarser(channel: _Channel, step: int) -> _Channel:
+def _coarser(channel: Channel, step: int) -> Channel:
     """Means of so many points each."""
     edges = np.arange(0, len(channel.values), step)
     count = np.diff(np.append(edges, len(channel.values)))
     mean = [np.add.reduceat(y, edges) / count for y in (channel.time, channel.values)]
-    return _Channel(mean[0], mean[1], channel.noise / step**0.5)
+    return Channel(mean[0], mean[1], channel.noise / step**0.5)
 
 
-def _senses(channel: _Channel) -> Array:
+def _senses(channel: Channel) -> Array:
     """(n - 1,) sense of the leg that every step from point to point belongs to."""
     y = channel.values
-    edges = np.minimum(_zigzag(y, max(_TURNS[-1], 6 * channel.noise)), len(y) - 1)
+    edges = np.minimum(zigzag(y, max(TURNS[-1], 6 * channel.noise)), len(y) - 1)
     return np.repeat(np.sign(np.diff(y[edges])), np.diff(edges))
 
 
@@ -250,7 +234,7 @@ def _clock(data: GapData, mine: Ints) -> Array:
 
 def _channels(
     time: Array, values: tuple[Array, Array], sds: tuple[float, float]
-) -> tuple[_Channel, _Channel]:
+) -> tuple[Channel, Channel]:
     """Both channels in the same bins. The noise is what second differences show (their median, so
     that jumps do not count), and no more than a stated uncertainty that was misjudged: a coarse
     recording shows its bends there."""
@@ -260,11 +244,11 @@ def _channels(
     def mean(y: Array) -> Array:
         return np.asarray(np.add.reduceat(y, edges) / count)
 
-    def one(y: Array, sd: float) -> _Channel:
+    def one(y: Array, sd: float) -> Channel:
         points = mean(y)
         span = float(np.ptp(points)) or 1.0
-        shown = min(white_sd(np.diff(points, 2)), _MISJUDGED * sd)
-        return _Channel(mean(time), points / span, shown / span)
+        shown = min(white_sd(np.diff(points, 2)), MISJUDGED * sd)
+        return Channel(mean(time), points / span, shown / span)
 
     return one(values[0], sds[0]), one(values[1], sds[1])
 
@@ -275,143 +259,3 @@ def _edges(values: tuple[Array, Array]) -> Ints:
     if n <= _POINTS:
         return np.arange(n)
     return first_rows(even_path(*values, _POINTS))
-
-
-def _cost(channel: _Channel, floor: float) -> float:
-    """Nats: half the logarithm of what the best number of pieces leaves, and what they cost."""
-    costs, known = [], set()
-    for share in (np.inf, *_TURNS):
-        edges, times = _turns(channel, max(share, 6 * channel.noise))
-        if len(edges) > _MOST_PIECES or edges.tobytes() in known:
-            continue
-        known.add(edges.tobytes())
-        costs += [
-            0.5 * float(np.log(left + floor)) + _PER_PIECE * pieces
-            for pieces, left in _refined(channel, edges, times, 0.1 * floor)
-        ]
-    return min(costs)
-
-
-def _turns(channel: _Channel, back: float) -> tuple[Ints, Array]:
-    """Ends of the legs (from 0 to n), and when the channel turned there: where it goes back by
-    `back`, between passing a level next to it on the way there and back. Line and cosine alike
-    pass it at a distance in proportion to the length of their leg."""
-    t, y, edges = channel.time, channel.values, _zigzag(channel.values, back)
-    places, times = [0], [float(t[0])]
-    for before, here, after in zip(edges, edges[1:], edges[2:], strict=False):
-        low, high = here - (here - before) // 4, here + (after - here) // 4
-        depth = np.abs(y[low : high + 1] - y[here])
-        leg = min(abs(y[here] - y[before]), abs(y[here] - y[after - 1]))
-        start, end = _passes(t[low : high + 1], depth, max(3 * channel.noise, _TOP * float(leg)))
-        came, goes = t[here] - t[before], t[after - 1] - t[here]
-        times.append(start + (end - start) * float(came / max(came + goes, 1e-300)))
-        places.append(int(np.searchsorted(t, times[-1])))
-    kept, first = np.unique([*places, len(y)], return_index=True)
-    return kept.astype(np.int64), np.array([*times, float(t[-1])])[first]
-
-
-def _passes(t: Array, depth: Array, level: float) -> tuple[float, float]:
-    """When the depth under a turning point first is less than the level, and last."""
-    near = np.flatnonzero(depth <= level)
-    first, last = int(near[0]), int(near[-1])
-    start, end = float(t[first]), float(t[last])
-    if first > 0:
-        start = float(np.interp(-level, -depth[first - 1 : first + 1], t[first - 1 : first + 1]))
-    if last + 1 < len(t):
-        end = float(np.interp(level, depth[last : last + 2], t[last : last + 2]))
-    return start, end
-
-
-def _zigzag(y: Array, back: float) -> list[int]:
-    turns, low, high, rising = [0], 0, 0, None
-    values = y.tolist()
-    for i, x in enumerate(values):
-        low = i if x < values[low] else low
-        high = i if x > values[high] else high
-        if rising is not False and values[high] - x > back:
-            turns.append(high)
-            low, rising = i, False
-        elif rising is not True and x - values[low] > back:
-            turns.append(low)
-            high, rising = i, True
-    return sorted({*turns, len(values)})
-
-
-def _refined(
-    channel: _Channel, edges: Ints, times: Array, enough: float
-) -> list[tuple[int, float]]:
-    """(pieces, squared share that they leave), the worst piece cut in two again and again."""
-    when = {int(i): float(t) for i, t in zip(edges, times, strict=True)}
-    broken = _broken_off(edges, times)
-
-    def misfit(start: int, end: int) -> Array:
-        spans = [(when[start], when[end]), *broken.get((start, end), [])]
-        return _misfit(channel.time[start:end], channel.values[start:end], spans)
-
-    pieces = {(int(a), int(b)): misfit(int(a), int(b)) for a, b in pairwise(edges)}
-    most, out = min(_MOST_PIECES, _PIECES_PER_LEG * len(pieces) + _SPARE), []
-    while True:
-        left = _structure(channel, np.concatenate([pieces[p] for p in sorted(pieces)]))
-        out.append((len(pieces), left))
-        start, end = max(pieces, key=lambda p: float(pieces[p] @ pieces[p]))
-        if left < enough or len(pieces) >= most or end - start < 3:
-            return out
-        cut = start + _best_cut(channel.time[start:end], channel.values[start:end])
-        when[cut] = float(channel.time[cut])
-        del pieces[start, end]
-        for a, b in ((start, cut), (cut, end)):
-            pieces[a, b] = misfit(a, b)
-
-
-def _broken_off(edges: Ints, times: Array) -> dict[tuple[int, int], list[tuple[float, float]]]:
-    """Of the first and the last leg, of which the recording may hold a part: from when to when
-    they last if they are as long as their neighbours."""
-    if len(edges) < 3:
-        return {}
-    e, t = edges.tolist(), times.tolist()
-    return {
-        (e[0], e[1]): [(t[1] - (t[2] - t[1]), t[1])],
-        (e[-2], e[-1]): [(t[-2], t[-2] + (t[-2] - t[-3]))],
-    }
-
-
-def _misfit(t: Array, y: Array, spans: list[tuple[float, float]]) -> Array:
-    """What a line leaves of the points, or half a cosine over one of the spans of time, whichever
-    is least."""
-    if len(t) < 3:
-        return np.zeros(len(t))
-    y = y - y.mean()
-    left = [_beside(t, y)]
-    left += [_beside(np.cos(np.pi * (t - a) / max(b - a, 1e-300)), y) for a, b in spans]
-    return min(left, key=lambda e: float(e @ e))
-
-
-def _beside(shape: Array, y: Array) -> Array:
-    """What of y (n,) of mean 0 the shape does not explain."""
-    x = shape - shape.mean()
-    return np.asarray(y - x * float(x @ y) / max(float(x @ x), 1e-300))
-
-
-def _structure(channel: _Channel, misfit: Array) -> float:
-    """Mean square of what is no noise: it repeats in the next point, or goes beyond the noise."""
-    repeats = float(misfit[1:] @ misfit[:-1]) / len(misfit)
-    beyond = float(misfit @ misfit) / len(misfit) - (_MISJUDGED * channel.noise) ** 2
-    return max(repeats, beyond, 0.0)
-
-
-def _best_cut(t: Array, y: Array) -> int:
-    """Where two lines, one after the other, leave least of the points (at least three)."""
-    t, y = t - t[0], y - y.mean()
-    sums = np.cumsum([np.ones_like(t), t, t * t, y, t * y, y * y], axis=1)
-    at = np.arange(1, len(t))
-    first = sums[:, at - 1]
-    return int(at[np.argmin(_left_of(first) + _left_of(sums[:, -1:] - first))])
-
-
-def _left_of(sums: Array) -> Array:
-    """Square sums (k,) that lines leave, of the sums (6, k) of 1, t, t^2, y, t y, y^2."""
-    n, t, tt, y, ty, yy = sums
-    across, spread = ty - t * y / n, tt - t * t / n
-    flat = yy - y * y / n
-    line = np.divide(across**2, spread, out=np.zeros_like(flat), where=spread > 0)
-    return np.asarray(flat - line)

@@ -133,7 +133,7 @@ class Rows:
             out = before * ratio ** np.where(ratio > 1, np.clip(way, 0.0, 1.0), way)
         return np.where(np.isfinite(out), out, 0.0)  # no power of what is below zero
 
-    def moved(self, values: Array) -> Array:
+    def about_means(self, values: Array) -> Array:
         """Values (n, k) less their mean per setup: the datum says nothing."""
         means = values.T @ self._share_of_setup
         return np.asarray(values - means[:, self.setup].T)

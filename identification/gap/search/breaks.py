@@ -65,7 +65,7 @@ def with_plain_trouble(found: SearchResult) -> SearchResult:
     if ahead < PLAIN:
         return found
     first = best.parts[0]
-    kind = "slopes" if first.variant.label == EACH_RUN else first.word
+    kind = "slopes" if first.variant.form == EACH_RUN else first.word
     return replace(found, looks_like=Likeness(kind, None, best.log_weight))
 
 
@@ -103,7 +103,7 @@ def _wanders(bench: Bench) -> list[Variant]:
         return []
     spring, hats = bench.slope * bench.load, free_path(bench, pieces)
     columns = [bench.add(bench.outside_column(spring * hat)) for hat in hats.T]
-    return [variant(WANDERS, "in time", columns, LOSSES, path_root(pieces), positive=False)]
+    return [variant(WANDERS, "in time", columns, LOSSES, root=path_root(pieces), positive=False)]
 
 
 def _of_runs(bench: Bench) -> list[Variant]:
@@ -114,7 +114,7 @@ def _of_runs(bench: Bench) -> list[Variant]:
         return []
     spring = bench.slope * bench.load
     columns = [bench.add(bench.outside_column(spring * (bench.rows.run == r))) for r in runs]
-    return [variant(WANDERS, EACH_RUN, columns, LOSSES, positive=False)]
+    return [variant(WANDERS, EACH_RUN, columns, LOSSES, positive=False, form=EACH_RUN)]
 
 
 EACH_RUN = "each run"

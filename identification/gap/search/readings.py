@@ -36,7 +36,7 @@ def reading_all(engine: Engine, explanation: Explanation) -> list[Variant]:
         if found.word == time_lag.WORD:  # acts on what there was, a gain is a share of what it read
             moves = shown - fitted.contribution(engine, i)[:n]
         out += [
-            replace(v, label=f"{v.label}, of all that moves")
+            v.known_by(", of all that moves", of_all=True)
             for v in _about(replace(bench, moves=moves), found)
         ]
     return out

@@ -141,7 +141,7 @@ def _slopes(bench: Bench) -> list[Variant]:
             "wander",
             path,
             scales,
-            path_root(_PIECES),
+            root=path_root(_PIECES),
             positive=False,
             prior=0.5,
             wanders=True,
@@ -251,7 +251,9 @@ def _settles(bench: Bench) -> list[Variant]:
     columns = [bench.add(bench.outside_column(m * c)) for m in masks for c in z.T]
     root = np.asarray(np.kron(np.eye(len(masks)), smooth_root(len(times), 0.5)), dtype=float)
     return [
-        variant(SETTLES, "each setup", columns, _scales(bench), root, positive=False, prior=SELDOM)
+        variant(
+            SETTLES, "each setup", columns, _scales(bench), root=root, positive=False, prior=SELDOM
+        )
     ]
 
 

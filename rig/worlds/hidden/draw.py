@@ -21,7 +21,7 @@ from rig.worlds.hidden.gap import rms, structural_gap
 from rig.worlds.hidden.noise import draw_noise, noise_rms_mm
 from rig.worlds.hidden.scene import Scene, make_scene
 from rig.worlds.hidden.table import columns_of, meta_of
-from rig.worlds.hidden.words import EFFECTS, WORDS
+from rig.worlds.hidden.words import EFFECTS, ON_THE_CLOCK, WORDS
 
 __all__ = ["WORDS", "HiddenCase", "draw_case"]
 
@@ -114,7 +114,7 @@ def _plan_for(random: Generator, design: str | None, words: tuple[str, ...]) -> 
     from dataclasses import replace
 
     plan = draw_plan(random, design)
-    if any(w.endswith("_drift") for w in words):  # drifts live on the session clock
+    if ON_THE_CLOCK.intersection(words):
         plan = replace(plan, recorded=replace(plan.recorded, session=True))
     return plan
 

@@ -46,3 +46,5 @@ OUTSIDE_JOINTS = frozenset(
         "zero_shift",
     }
 )
+# Paths in time: the session's clock is recorded where they are drawn.
+ON_THE_CLOCK = frozenset({"force_drift", "thermal_drift"})
