@@ -211,8 +211,10 @@ def test_a_bug_is_status_1_and_a_file_for_the_report(tmp_path: Path) -> None:
     ],
 )
 def test_ctrl_c_at_an_odd_moment_kills_nothing(code: str, status: int) -> None:
+    # a shell has what it runs in the background ignore SIGINT, tests and all that these start
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     result = subprocess.run(
-        [sys.executable, "-c", code], cwd=HOME, capture_output=True, text=True, check=False
+        [sys.executable, "-c", heard + code], cwd=HOME, capture_output=True, text=True, check=False
     )
     assert (result.returncode, "Traceback" in result.stderr) == (status, False), result.stderr
 
