@@ -179,6 +179,19 @@ def test_a_threshold_is_the_net_torque_and_knows_no_more_of_it_than_of_the_tool(
     assert net.high - net.value == pytest.approx(wide, rel=1e-6)
 
 
+def test_weights_that_bear_more_than_the_push_cut_no_threshold() -> None:
+    """The net torque falls while the push grows, and is the largest without it."""
+    bench = hanging(UP, gravity=-75.0)  # the tool takes 7.5 Nm more: 82.5 the other way
+    sharp = next(v for v in library(bench, ["joint_yield"]) if "at 0.5 sharp" in v.label)
+    info = {**sharp.info, "radius": np.array([38.0, 42.0])}
+    knee = replace(sharp, columns=sharp.columns[:1] * 2, root=np.eye(2), info=info)
+    found = parameters(bench, Part(knee, 1.0), np.array([0.9, 0.1]), 1e-4 * np.eye(2))
+    push, net = found["threshold_of_load"], found["threshold"]
+    assert net.value == pytest.approx(82.5 - push.value)
+    assert net.possible(0.0).value == net.value
+    assert net.most > 82.5
+
+
 def test_thresholds_answer_to_the_load_without_the_drift_of_its_reading() -> None:
     """3 N of drift over the run, plain at zero load before and after."""
     levels = np.array([0, 20, 40, 60, 80, 60, 40, 20, 0.0])
