@@ -53,9 +53,9 @@ def settled(
 
     Of parameters: value: that of the explanation itself, whose terms a model file takes; 95 %
     intervals of the mixture of the effect's likeliest shapes, wherever they sit, under every size
-    of imperfection. By how much a value moves with the shapes of the
-    effects beside it, and with which effects these are (rivals: other explanations, by their
-    weights), adds to its variance. No interval reaches beyond what is possible, or was seen."""
+    of imperfection. By how much a value moves with the shapes of the effects beside it, and with
+    which effects these are (rivals: other explanations, by their weights), adds to its variance. No
+    interval reaches beyond what is possible, or was seen."""
     each = _all_shapes(engine, variants, chosen)
     for shapes in each:
         better = shapes.elsewhere()

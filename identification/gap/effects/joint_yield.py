@@ -134,11 +134,11 @@ def _named(bench: Bench, v: Variant, found: Parameter) -> dict[str, Parameter]:
     if "weight" in info:  # both are near: what of the tool is wrong in one is wrong in the other
         push = moved(found, -sense * hangs, 0.0)
         return {"threshold": moved(found, 0.0, half), "threshold_of_load": push}
-    net_value, below, above = found.value + sense * hangs, found.value - found.low, found.high
-    above -= found.value
-    if net_value < 0:  # the weights still carry the push: the less of them the larger it is
+    carried = found.value + sense * hangs
+    below, above = found.value - found.low, found.high - found.value
+    if carried < 0:  # the weights still carry the push: the less of them the larger it is
         below, above = above, below
-    value = abs(net_value)
+    value = abs(carried)
     low, high = value - below, value + above
     most = max(abs(hangs), abs(found.most + sense * hangs))  # without the push, or at the largest
     net_of = moved(Parameter(value, low, high, found.unit, most=most), 0.0, half)
