@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.gap.effects import library
+from identification.gap.evidence.compare import mean_square
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation
@@ -98,3 +100,15 @@ def test_only_sets_that_matter_are_measured_and_the_largest_comes_first() -> Non
     bench = replace(engine.bench.data, arm=False)
     alone = Engine(make_bench(bench), engine.base, engine.target, np.array([0.0, 3e-6]))
     assert measured(alone, [said]) == [said]
+
+
+@pytest.mark.parametrize("label", ["joint 1 r 0.2{}", "joint 1 Dahl{} 0.08"])
+def test_what_slips_on_a_spring_is_as_imperfect_as_what_it_holds_back(label: str) -> None:
+    """Friction softens a spring in one convention, stiffens a softer one in the other: two names of
+    one mechanism, whose laws err by a share of the loop and not of the line."""
+    engine = engine_with()
+    found = {v.label: v for v in library(engine.bench, ["joint_hysteresis"])}
+    named = (found[label.format(on_top)] for on_top in ("", " that slips"))
+    holds, slips = (mean_square(engine, v) for v in named)
+    assert slips == pytest.approx(holds)
+    assert np.diag(holds).min() > 0

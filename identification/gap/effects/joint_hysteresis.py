@@ -35,6 +35,7 @@ from identification.gap.laws.effect import Effect
 from identification.gap.laws.friction_law import (
     BY_LOAD,
     LAWS,
+    ON_TOP,
     SLIPPING,
     by_ratio,
 )
@@ -105,6 +106,7 @@ def _memories(bench: Bench, joint: int) -> dict[str, Path]:
 
 
 WORKED_IN = " worked in"
+THAT_SLIPS = " that slips"  # and deflects so much more than stated
 
 
 def _with_other_springs(bench: Bench, found: list[Variant]) -> list[Variant]:
@@ -212,6 +214,7 @@ def growing(bench: Bench, found: Variant) -> list[Variant]:
                     joint=joint,
                     radius=np.array([r, r]),
                     law=law,
+                    slips=law in ON_TOP,
                     memory=memory,
                     grows_to=top,
                 )
@@ -225,8 +228,8 @@ _GROWING = 6  # reaches
 def _laws(bench: Bench, joint: int, span: float, memory: str, path: Path) -> list[Variant]:
     """All laws of one joint and memory."""
     name = f"joint {joint + 1}{memory}"
-    found = _spectra(bench, joint, name, span, path)
-    found += _pairs(bench, joint, name, span, found[0])
+    spectra = _spectra(bench, joint, name, span, path)
+    found = spectra + [v for s in spectra for v in _pairs(bench, name, span, s, len(spectra))]
     if not bench.course.once:  # a curve that saturates would be taken for friction
         reaches = np.array(REACHES if bench.course.unloads else REACHES[:2])
         found += _exponential(bench, joint, name, reaches, path)
@@ -257,7 +260,7 @@ def _spectra(
     out = []
     for law, radii, states in laws:
         columns = [bench.add_joint(joint, unit * state) for state in states.T]
-        label = f"{name} spectrum{' that slips' if law == 'Prandtl' else ''}"
+        label = f"{name} spectrum{THAT_SLIPS if law == 'Prandtl' else ''}"
         out.append(
             variant(
                 WORD,
@@ -272,31 +275,36 @@ def _spectra(
                 joint=joint,
                 radius=radii,
                 law=law,
+                slips=law in ON_TOP,
             )
         )
     return out
 
 
-def _pairs(bench: Bench, joint: int, name: str, span: float, spectrum: Variant) -> list[Variant]:
-    """Each strength with its neighbour. Friction acts from the first load on: one strength alone
-    is a small one."""
+def _pairs(
+    bench: Bench, name: str, span: float, spectrum: Variant, conventions: int
+) -> list[Variant]:
+    """Each strength of a spectrum with its neighbour, by the law of the spectrum. Friction acts
+    from the first load on: one strength alone is a small one."""
     radius, columns, out = np.asarray(spectrum.info["radius"]), list(spectrum.columns), []
-    most = len(columns) - 2
+    law = spectrum.info["law"]
+    most = int(np.sum(radius < NEVER * span)) - 1
     alone = most if bench.imposed else min(_SMALL + bench.course.unloads, most)
     for k in range(alone):
         out.append(
             variant(
                 WORD,
-                f"{name} r {radius[k] / span:.3g}",
+                f"{name} r {radius[k] / span:.3g}{THAT_SLIPS if law == 'Prandtl' else ''}",
                 columns[k : k + 2],
                 SCALES,
                 root=smooth_root(2, 0.7),
                 each=True,
                 within=spectrum.within[:, k : k + 2],
-                prior=0.25 / alone,
-                joint=joint,
+                prior=0.25 / alone / conventions,
+                joint=int(spectrum.info["joint"]),
                 radius=radius[k : k + 2],
-                law="Iwan",
+                law=law,
+                slips=law in ON_TOP,
             )
         )
     return out
@@ -327,6 +335,7 @@ def _exponential(bench: Bench, joint: int, name: str, reaches: Array, path: Path
                     joint=joint,
                     radius=reach[k : k + 2],
                     law=law,
+                    slips=law in ON_TOP,
                 )
             )
     return out

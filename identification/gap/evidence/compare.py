@@ -112,13 +112,14 @@ def _stack(engine: Engine, family: tuple[Variant, ...], k: int) -> Stack:
     effect that is added."""
     if family not in engine.stacks:
         columns = np.array([v.columns + v.columns[:1] * (k - len(v.columns)) for v in family])
+        joints = np.array([_slips_on(v) for v in family])
         root, share = np.zeros((*columns.shape, k)), np.zeros(columns.shape)
         scales = np.zeros((len(family), max(len(v.scales) for v in family)))
         for i, v in enumerate(family):
             own = len(v.columns)
             root[i, :own, :own], share[i, :own] = v.root, imperfect(v)
             scales[i, : len(v.scales)] = v.scales
-        plain = np.swapaxes(root, 1, 2) @ mean_squares(engine, columns, share) @ root
+        plain = np.swapaxes(root, 1, 2) @ mean_squares(engine, columns, joints, share) @ root
         limits = Limits.of(family, k)
         engine.stacks[family] = Stack(
             columns, root, scales, plain, limits, engine.unweighed(columns)
@@ -127,16 +128,41 @@ def _stack(engine: Engine, family: tuple[Variant, ...], k: int) -> Stack:
     return found
 
 
-def mean_squares(engine: Engine, columns: Ints, share: Array) -> Array:
+def mean_squares(engine: Engine, columns: Ints, joints: Ints, share: Array) -> Array:
     """(v, k, k): mean square response (m^2) of the coefficients of variants with the columns
-    (v, k), without the datum of each setup; of what is linear only the part that counts as
-    imperfect, share (v, k)."""
+    (v, k), without the datum of each setup; without what of it is exact: of what is linear the
+    part that share (v, k) leaves, of what slips the lines of the springs (v,) that it slips on."""
     weight = engine.bench.rows.weight
-    used, place = np.unique(columns, return_inverse=True)
-    moved = engine.bench.rows.about_means(engine.responses(used))
+    used, place = np.unique(columns * _JOINTS + joints[:, None], return_inverse=True)
+    number, joint = np.divmod(used, _JOINTS)
+    moved = engine.responses(number)
+    for j in set(joint.tolist()) - {_NONE}:
+        moved[:, joint == j] -= _line(engine, j)[:, None]
+    moved = engine.bench.rows.about_means(moved)
     moved *= np.sqrt(weight / weight.sum())[:, None]
     squares = squares_of(moved.T, place.reshape(columns.shape))
     return np.asarray(squares * share[:, :, None] * share[:, None, :])
+
+
+_JOINTS = 64  # more than any arm has
+_NONE = _JOINTS - 1
+
+
+def _slips_on(variant: Variant) -> int:
+    return _NONE if variant.slips_on is None else variant.slips_on
+
+
+def _line(engine: Engine, joint: int) -> Array:
+    """(n,) response of a joint's stated spring."""
+    bench = engine.bench
+    deflects = bench.sense * bench.compliance[joint] * bench.true_torque[:, joint]
+    return np.asarray(bench.lever[:, joint] * deflects)
+
+
+def mean_square(engine: Engine, v: Variant) -> Array:
+    """(k, k): the same of one variant."""
+    columns, joints = np.array([v.columns]), np.array([_slips_on(v)])
+    return np.asarray(mean_squares(engine, columns, joints, imperfect(v)[None])[0])
 
 
 def imperfect(variant: Variant) -> Array:

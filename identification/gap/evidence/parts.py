@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.evidence.compare import imperfect, logsumexp, mean_squares
+from identification.gap.evidence.compare import logsumexp, mean_square
 from identification.gap.evidence.engine import Engine, NoiseLevel
 from identification.gap.evidence.factor import factor_of
 from identification.gap.evidence.imperfection import level_priors
@@ -65,8 +65,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
-        does = engine.responses(c) @ np.column_stack([part, imperfect(p.variant) * part])
-        moved, faulty = rows.about_means(does).T
+        moved = rows.about_means((engine.responses(c) @ part)[:, None])[:, 0]
         moves.append(rows.rms(moved))
         if p.word in LINEAR:
             linear += moved
@@ -78,7 +77,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
             if p.word in BETWEEN_RUNS and between == 1:
                 size = max(size, _beyond_scatter(engine, moved))
             sizes.append(min(size, moves[-1]))
-        energy += rows.rms(faulty) ** 2
+        energy += float(part @ mean_square(engine, p.variant) @ part)
         start += k
         limit = p.variant.positive
         signed.append(limit is None or float(limit @ part) >= p.variant.least)
@@ -200,7 +199,7 @@ def _energies_each(engine: Engine, parts: tuple[Part, ...]) -> Array:
     gram, moment = _asked(engine, parts)
     inner = np.eye(len(root)) + root.T @ gram @ root
     w = np.linalg.solve(inner, (moment @ root)[..., None])[..., 0] @ root.T
-    squares = w @ block([_mean_square(engine, p.variant) for p in parts]) * w
+    squares = w @ block([mean_square(engine, p.variant) for p in parts]) * w
     starts = np.cumsum([0, *(len(p.variant.columns) for p in parts[:-1])])
     return np.asarray(np.add.reduceat(squares, starts, axis=1))
 
@@ -219,10 +218,6 @@ def evidence_correction(
         for energy in (together, alone)
     )
     return now - before
-
-
-def _mean_square(engine: Engine, v: Variant) -> Array:
-    return np.asarray(mean_squares(engine, np.array([v.columns]), imperfect(v)[None])[0])
 
 
 def _asked(engine: Engine, parts: tuple[Part, ...]) -> tuple[Array, Array]:

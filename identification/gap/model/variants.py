@@ -64,6 +64,12 @@ class Variant:
         return bool(self.info.get("other_springs"))
 
     @property
+    def slips_on(self) -> int | None:
+        """The joint on whose stated spring it slips: where all of it does that, it is a line, and
+        no less exact than the spring."""
+        return self.joint if self.info.get("slips") else None
+
+    @property
     def has_line(self) -> bool:
         """Whether a straight line is one of its curves."""
         return "line" in self.info.get("kinds", ())
@@ -170,6 +176,7 @@ class Variant:
             self.each,
             self.within.tobytes(),
             self.other_springs,
+            self.slips_on,
         )
 
 
