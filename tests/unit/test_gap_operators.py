@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.gap.data import GapData, Instruments, Setup
+from identification.gap.model.flowing import flowing_play
 from identification.gap.model.history import (
     PEAK,
     averaged,
     bristles,
     delayed,
-    flowing_play,
     play,
     rests,
     retarded,

@@ -23,7 +23,8 @@ from identification.gap.laws.interval import TWO_SIDED, Softer
 from identification.gap.laws.knees import is_sharp
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import TOOL_KG, TOOL_SD_KG, Bench, make_bench
-from identification.gap.model.history import bristles, flowing_play, play
+from identification.gap.model.flowing import flowing_play
+from identification.gap.model.history import bristles, play
 from identification.gap.model.variants import variant
 from identification.gap.recording.rows import reduce_rows
 from identification.gap.search.refine import refine

@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import flowing_play
+from identification.gap.model.flowing import flowing_play
 
 Way = tuple[float, bool]  # flow time s, 0 for none; whether it flows with the square
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from math import exp
 
@@ -49,23 +48,23 @@ def play(
     # Every row clips the state before it to [x - r, x + r]; clips of clips are clips, so that all
     # prefixes are found in log2(n) passes over the rows.
     least, most = weight - radius, weight + radius
-    hung = _clipped(0.0, least, most)
+    hung = clipped(0.0, least, most)
     low, high = load + least, load + most
-    back = (_clipped(least, low, high), _clipped(most, low, high))  # from anywhere without load
-    still = _clipped(hung, low, high)
+    back = (clipped(least, low, high), clipped(most, low, high))  # from anywhere without load
+    still = clipped(hung, low, high)
     low = np.where(fresh[:, None], still, np.where(rest[:, None], back[0], low))
     high = np.where(fresh[:, None], still, np.where(rest[:, None], back[1], high))
     step = 1
     while step < len(load):
-        lower = _clipped(low[:-step], low[step:], high[step:])
-        upper = _clipped(high[:-step], low[step:], high[step:])
+        lower = clipped(low[:-step], low[step:], high[step:])
+        upper = clipped(high[:-step], low[step:], high[step:])
         low[step:], high[step:] = lower, upper
         step *= 2
-    return np.asarray(_clipped(np.atleast_2d(hung)[:1], low, high) - hung)
+    return np.asarray(clipped(np.atleast_2d(hung)[:1], low, high) - hung)
 
 
-def _clipped(values: Array | float, low: Array, high: Array) -> Array:
-    """np.clip, which takes three times as long for arrays as small as these."""
+def clipped(values: Array | float, low: Array, high: Array) -> Array:
+    """As np.clip, which takes three times as long for arrays as small as these."""
     return np.asarray(np.minimum(np.maximum(values, low), high))
 
 
@@ -117,7 +116,7 @@ def _let_go(
 
 
 @dataclass(frozen=True, eq=False)
-class _Phases:
+class Phases:
     """Seconds (n,) since the row before, in all, and of these: nothing is loaded, the old load
     stands on, the load ramps, it stands. After a rest only the last of it is ramp."""
 
@@ -128,12 +127,13 @@ class _Phases:
     stands: Array
 
 
-def _phases(rows: Rows, rest: Flags) -> _Phases:
+def phases_of(rows: Rows, rest: Flags) -> Phases:
+    """Of every row; rest (n,): before which the load went back to zero."""
     step = np.maximum(np.diff(rows.session, prepend=rows.session[0]), 0.0)
     ease = np.where(rest, np.minimum(step, _REST_RAMP_S), step)
     stands = np.minimum(settling_share(rows), ease)
     pause = np.where(rest, 0.0, np.minimum(standing_on(rows), ease - stands))
-    return _Phases(step, step - ease, pause, np.maximum(ease - stands - pause, 0.0), stands)
+    return Phases(step, step - ease, pause, np.maximum(ease - stands - pause, 0.0), stands)
 
 
 def retarded(
@@ -144,7 +144,7 @@ def retarded(
     between rows and then stands. fresh: rows (n,), after a rest, before which it is forgotten."""
     before = np.vstack([np.zeros((1, load.shape[1])), load[:-1]])
     before[rest] = 0.0
-    phases = _phases(rows, rest)
+    phases = phases_of(rows, rest)
     # z_i = keep_i z_{i-1} + gain_i: a rest, or the old load standing on; a ramp to the new load,
     # then standing there. What there was goes back all the while.
     paused = np.exp(-phases.pause[:, None] / times)
@@ -202,94 +202,6 @@ def _prefix(keep: Array, gain: Array) -> Array:
         gain[step:] = further
         step *= 2
     return gain
-
-
-def flowing_play(
-    load: Array,
-    radius: Array,
-    times: Array,
-    rows: Rows,
-    fresh: Flags,
-    weight: Array | None = None,
-    square: Flags | bool = False,
-) -> Array:
-    """Plays (n, k) of radii (k,) that follow with time constants (k,) s (Bingham, Perzyna 1966).
-
-    `T p' = clip(p, x - r, x + r) - p`: what is beyond the radius flows off, and stops when the load
-    falls below it, wherever it has come to; it flows back in a rest. load (n,), or (n, k): of each.
-    square (k,): it flows with the square of the overstress, `T p' = o |o| / r`, and slows down as
-    it comes near.
-    Ramps between holds in _PARTS parts, then standing; within a hold the load hardly moves, and one
-    part will do. weight (n,): as in `play`.
-    """
-    load = load.reshape(len(load), -1)
-    out = np.empty((len(load), len(radius)))
-    centre = np.zeros((len(load), 1)) if weight is None else weight[:, None]
-    below, above = centre - radius, centre + radius
-    hung = _clipped(0.0, below, above)
-    low, high = load + below, load + above
-    rest = rests(rows)
-    phases = _phases(rows, rest)
-    parts = np.where(rows.hold_starts | rest | rows.continuous, _PARTS, 1)
-    share = {m: ((np.arange(m) + 0.5) / m)[:, None] for m in (1, _PARTS)}
-    # (n, k): in a rest, before the load moves, in every part of its way, after it
-    rested, paused, during, stood = (
-        _flowing(seconds[:, None] / times, square)
-        for seconds in (phases.unloaded, phases.pause, phases.ramp / parts, phases.stands)
-    )
-    flown = partial(_flown, radius=radius, square=square, some=bool(np.any(square)))
-    state, before = hung[0], np.zeros(load.shape[1])
-    for i, x in enumerate(load):
-        if fresh[i]:
-            state, before = hung[i], 0.0 * x
-        elif rest[i]:
-            state, before = flown(state, rested[i], below[i], above[i]), 0.0 * x
-        if phases.pause[i] > 0:
-            state = flown(state, paused[i], before + below[i], before + above[i])
-        if phases.ramp[i] > 0:
-            at = _on_the_way(before, x, share[parts[i]], rows.overshoot[i])
-            for least, most in zip(at + below[i], at + above[i], strict=True):
-                state = flown(state, during[i], least, most)
-        if phases.stands[i] > 0:
-            state = flown(state, stood[i], low[i], high[i])
-        out[i], before = state, x
-    return out - hung
-
-
-def _on_the_way(before: Array, after: Array, share: Array, beyond: float) -> Array:
-    """(p, k) loads at shares (p, 1) of the time in which it goes from before to after (k,)."""
-    if beyond == 0:
-        return np.asarray(before + share * (after - before))
-    peak = after * (1 + beyond)
-    there, back = share / PEAK, (share - PEAK) / (1 - PEAK)
-    return np.where(back < 0, before + there * (peak - before), peak + back * (after - peak))
-
-
-def _flowing(over: Array, square: Flags | bool) -> Array:
-    """Share of what is beyond that flows off in times over its time constant (n, k); of what flows
-    with the square, that ratio itself."""
-    return np.where(square, over, -np.expm1(-over))
-
-
-def _flown(
-    state: Array,
-    share: Array,
-    least: Array,
-    most: Array,
-    radius: Array,
-    square: Flags | bool,
-    some: bool,
-) -> Array:
-    """States (k,) after a while in which [least, most] held still. some: any flows with the
-    square."""
-    over = _clipped(state, least, most) - state
-    if not some:
-        return state + share * over
-    way = share * np.abs(over) / radius
-    return state + np.where(square, way / (1 + way), share) * over
-
-
-_PARTS = 4
 
 
 def settling_share(rows: Rows) -> Array:
