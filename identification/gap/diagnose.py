@@ -18,7 +18,8 @@ from identification.gap.evidence.engine import Engine, eta_levels
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import fit
 from identification.gap.judging.choice import chosen_of
-from identification.gap.judging.earned import earned, learned, left_of
+from identification.gap.judging.earned import earned, foretells, learned, left_of
+from identification.gap.judging.heldout import first_repetitions
 from identification.gap.judging.leftover import looked_up
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
@@ -123,15 +124,26 @@ def _with_unseen(
     found: SearchResult, known: Sequence[Form], withheld: Collection[str]
 ) -> SearchResult:
     """The search once more with loads between readings, where these explain more than it costs to
-    say which they are."""
-    more = unseen(found)
-    if more is None:
-        return found
-    bench = found.engine.bench
-    rows = replace(bench.rows, overshoot=more.overshoot)
-    again = _searched(*_prepared(make_bench(bench.data, rows=rows), known, withheld))
-    gain = again.explanations[0].log_weight - found.explanations[0].log_weight
-    return again if gain > more.cost else found
+    say which they are, or make foretold what was not."""
+    cost = 0.0
+    for _ in range(_ROUNDS):
+        foretold, bench = foretells(found), found.engine.bench
+        more = unseen(found, None if foretold else first_repetitions(found.engine))
+        if more is None:
+            break
+        rows = replace(bench.rows, overshoot=more.overshoot)
+        again = _searched(*_prepared(make_bench(bench.data, rows=rows), known, withheld))
+        gain = again.explanations[0].log_weight - found.explanations[0].log_weight
+        mended = not foretold and gain > 0 and foretells(again)
+        if not mended and gain <= more.cost - cost:
+            break
+        found, cost = again, more.cost
+        if foretold:
+            break
+    return found
+
+
+_ROUNDS = 3  # at most, and one where withheld repetitions are foretold
 
 
 class NotShown(ValueError):

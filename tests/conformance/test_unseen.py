@@ -18,6 +18,7 @@ from tests.conformance.gap_designs import (
     TOP_N,
     TRUE,
     Array,
+    Design,
     Law,
     imported,
     levers,
@@ -66,6 +67,25 @@ def too_late(rows: pd.DataFrame, lever: Array, chance: float) -> tuple[Array, Ar
     return np.sum(lever**2 / TRUE, axis=1) * behind, np.zeros((len(rows), 6))
 
 
+def pushed_on(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
+    """A joint that gives way just below the largest load, and stays there; in the second
+    repetition the hand goes beyond that load."""
+    force, joint = rows["force_N"].to_numpy(float), int(np.abs(lever).sum(axis=0).argmax())
+    top = (rows["branch"] == "loading") & (rows["step"] == TWICE.steps)
+    first = top & (np.diff(rows["time_s"], prepend=0.0) > 1.5)
+    further = np.where(first, np.where(rows["repetition"] == 2, FURTHER, 0.0), 0.0)
+    load, out = lever[:, joint] * force, np.zeros((len(rows), 6))
+    threshold, slip = 0.8 * np.abs(load).max(), 0.0
+    for i, x in enumerate(load):
+        for at in ([x * (1 + further[i])] if further[i] else []) + [x]:
+            slip = float(np.clip(slip, at - threshold, at + threshold))
+        out[i, joint] = 0.4 * slip / TRUE[joint]
+    return np.zeros(len(rows)), out
+
+
+FURTHER = 0.3  # of the load
+
+
 def scattering(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
     """Beside that friction every level stands off by chance, which no hand does."""
     hold = (rows["force_N"].diff().fillna(1.0) != 0).cumsum().to_numpy()
@@ -73,9 +93,11 @@ def scattering(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
     return off[hold] * (rows["step"] > 0), slipped(rows, lever, 0.0)[1]
 
 
+TWICE = Design(repetitions=2, readings=False)
+
+
 @cache
-def diagnosed(law: Law) -> GapResult:
-    design = DESIGNS["medium"]
+def diagnosed(law: Law, design: Design = DESIGNS["medium"]) -> GapResult:
     return explained(gap_data(imported(noisy(design, law), meta(design))))
 
 
@@ -121,6 +143,16 @@ def test_levels_that_scatter_are_no_hand() -> None:
     assert diagnosed(scattering).verdict == "unknown"
 
 
+def test_a_load_that_only_one_repetition_went_to_is_none_of_the_law_s() -> None:
+    """Fitted to all, a rounded knee bends once more at the largest load, and foretells nothing."""
+    found = diagnosed(pushed_on, TWICE)
+    assert found.verdict == "joint_yield"
+    rows = found.bench.rows
+    (at,) = np.flatnonzero(rows.overshoot)
+    assert (rows.repetition[at], rows.step[at]) == (2, TWICE.steps)
+    assert rows.overshoot[at] == pytest.approx(FURTHER, rel=0.2)
+
+
 def test_the_gap_of_withheld_levels_counts_no_level_that_told_itself() -> None:
     found = diagnosed(FRICTION)
     (name, fold), *_ = folds(found.engine).items()
@@ -142,6 +174,6 @@ def test_more_places_and_more_of_them_cost_more() -> None:
         return Unseen(np.zeros(1), count, of).cost
 
     assert cost(0, 40) == pytest.approx(np.log(41))
-    assert cost(1, 40) == pytest.approx(np.log(41 * 40 * 4))
+    assert cost(1, 40) == pytest.approx(np.log(41 * 40 * 16))
     assert cost(5, 40) > cost(4, 40)
     assert cost(5, 80) > cost(5, 40)

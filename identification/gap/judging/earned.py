@@ -20,7 +20,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult, kept_within
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.priors import before_data
-from identification.gap.explanations.verdict import foresaw, with_posterior
+from identification.gap.explanations.verdict import FORESAW, foresaw, with_posterior
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.heldout import folds, held_out
 from identification.gap.model.bench import Bench
@@ -56,6 +56,12 @@ def earned(found: SearchResult) -> SearchResult:
             break
         kept[todo[0].words] = _kept(found, todo[0], fold)
     return with_posterior(found, kept)
+
+
+def foretells(found: SearchResult) -> bool:
+    """Whether the best explanation foretells withheld repetitions, or nobody can look."""
+    fold, best = folds(found.engine).get("repetition"), found.explanations[0]
+    return fold is None or not best.parts or _kept(found, best, fold) > FORESAW
 
 
 def learned(found: SearchResult, withheld: Collection[str]) -> SearchResult:

@@ -145,14 +145,14 @@ def stated_prediction(engine: Engine) -> Array:
 def _stacked_keep(engine: Engine, out: Flags) -> Flags:
     """Stacked rows to fit on: not the fold, but its zero-load rows, and the forces across that it
     was loaded with: like the load itself they are given, the motion is foretold."""
-    bench, n = engine.bench, engine.bench.rows.n
-    row = ~out | bench.rows.zero
-    keep = np.ones(bench.layout.size, dtype=bool)
-    keep[:n] = row
-    held = row[bench.rows.edges]
-    q = bench.layout.q
-    keep[q] = np.tile(held, (q.stop - q.start) // max(len(held), 1))
-    return keep
+    row = ~out | engine.bench.rows.zero
+    return engine.bench.layout.read_in(row, row[engine.bench.rows.edges])
+
+
+def first_repetitions(engine: Engine) -> Flags | None:
+    """(n,) rows that no fold of repetitions withholds; None where no setup was measured twice."""
+    fold = folds(engine).get("repetition")
+    return None if fold is None else np.asarray(fold == ALWAYS_IN)
 
 
 def _within(bench: Bench) -> Flags:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from identification.arrays import Flags
 from identification.gap.data import GapData
 from identification.gap.recording.rows import Rows
 
@@ -18,6 +21,14 @@ class Layout:
     tangential: slice
     zero_force: slice
     size: int
+
+    def read_in(self, row: Flags, held: Flags) -> Flags:
+        """(size,) what moved, as read in rows (n,) and their holds (h,); of all rows what they were
+        loaded with: like the load itself that is given."""
+        out = np.ones(self.size, dtype=bool)
+        out[: self.n] = row
+        out[self.q] = np.tile(held, (self.q.stop - self.q.start) // max(len(held), 1))
+        return out
 
 
 def layout_of(data: GapData, rows: Rows, imposed: bool) -> Layout:

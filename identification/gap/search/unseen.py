@@ -4,17 +4,22 @@ No row shows it, and all that remembers does: friction, plays and knees stand on
 then, and what lags shows it at the first readings of the hold. Where the best explanations remember
 and leave more than noise, such loads are looked for, one hold after the other, and put in where the
 data gain more by them than it costs to say where they are.
+
+A law may take such a load over: a knee that was pushed further in one repetition bends once more at
+the largest load, for all that the fit can tell. No other repetition foretells that; there the first
+ones alone say what the law does, and the others where a hand went.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 from math import lgamma, log
 from typing import NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array, Ints
+from identification.arrays import Array, Flags, Ints
 from identification.gap.effects import EFFECTS
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import IMPERFECTION
@@ -25,9 +30,14 @@ from identification.gap.model.variants import block
 from identification.gap.recording.rows import Rows
 
 SIZES = (0.03, 0.06, 0.12, 0.24)  # of the largest load, by which it goes beyond a level
+_CLOSER = (2**-0.5, 2**-0.25)  # steps between these, from the best of them on
+_COUNT = 4 * len(SIZES)  # in all
 _FEWEST = 8  # holds that a load was brought to: of fewer nobody tells chance from habit
 _MOST = 1_000_000  # holds times rows: of more it would last longer than all the rest
-_LOOKED_AT = 12  # explanations
+_LOOKED_AT, _SEVERAL = 12, 6  # explanations; that remember, where none foretells the others
+_SELDOM = 0.5  # of the holds at most: whose law needs more is no law with a hand beside it
+_PARTS = 3  # of an explanation at most, where none foretells the others: more say nothing of loads
+_FEW = 200_000  # holds times rows: of more only the first of those is looked at
 _SWEEPS = 3
 _LOADED = 0.02  # of the largest load: less is none, and nobody pulls at a contact
 _OFF = 2.0  # standard deviations: holds that are nearer to what is expected are left alone
@@ -47,12 +57,14 @@ class Unseen:
     def cost(self) -> float:
         """Any of the holds, by any of the sizes, equally likely."""
         places = lgamma(self.of + 1) - lgamma(self.count + 1) - lgamma(self.of - self.count + 1)
-        return places + log(self.of + 1) + self.count * log(len(SIZES))
+        return places + log(self.of + 1) + self.count * log(_COUNT)
 
 
-def unseen(found: SearchResult) -> Unseen | None:
+def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     """What the best explanation that remembers says of the loads between the readings of levels;
-    None where that gains no more than a few nats and what better explanations are ahead."""
+    None where that gains no more than a few nats and what better explanations are ahead. told_by:
+    rows (n,) that alone tell what its law does, where it does not foretell the others: then any
+    load that these ask for counts."""
     engine = found.engine
     rows = engine.bench.rows
     if rows.continuous or engine.bench.imposed:
@@ -60,14 +72,22 @@ def unseen(found: SearchResult) -> Unseen | None:
     at = _brought_to(rows)
     if len(at) < _FEWEST or len(at) * rows.n > _MOST:
         return None
-    for explanation in found.explanations[:_LOOKED_AT]:
-        path = _Paths(engine, explanation, at)
-        if path.remembers:
-            out, gain = path.found()
-            more = Unseen(out, int(np.count_nonzero(out)), len(at))
-            behind = found.explanations[0].log_weight - explanation.log_weight
-            return more if gain > behind + _PLAIN else None
-    return None
+    first = found.explanations[0].log_weight
+    able = (e for e in found.explanations if told_by is None or len(e.parts) <= _PARTS)
+    each = ((e, _Paths(engine, e, at, told_by)) for e in islice(able, _LOOKED_AT))
+    remember = ((first - e.log_weight, path) for e, path in each if path.remembers)
+    many = 1 if told_by is None or len(at) * rows.n > _FEW else _SEVERAL
+    tried = [(behind, *path.found()) for behind, path in islice(remember, many)]
+    if told_by is None:
+        return next((more for behind, more, gain in tried if gain > behind + _PLAIN), None)
+    tried = [
+        one
+        for one in tried
+        if one[1].count <= _SELDOM * len(at) and np.any(one[1].overshoot != rows.overshoot)
+    ]
+    ahead = [gain - behind - more.cost for behind, more, gain in tried]
+    best = int(np.argmax(ahead)) if max(ahead, default=0.0) > 0 else 0
+    return tried[best][1] if tried else None
 
 
 def _brought_to(rows: Rows) -> Ints:
@@ -91,8 +111,11 @@ class _Fitted(NamedTuple):
 class _Paths:
     """An explanation along paths that are tried, with the coefficients it has along them."""
 
-    def __init__(self, engine: Engine, explanation: Explanation, at: Ints) -> None:
-        """at: first rows of the holds that the load may have gone beyond."""
+    def __init__(
+        self, engine: Engine, explanation: Explanation, at: Ints, told_by: Flags | None
+    ) -> None:
+        """at: first rows of the holds that the load may have gone beyond; told_by as in
+        `unseen`."""
         bench = engine.bench
         self._engine, self._at = engine, at
         load, top = bench.load[at], float(np.abs(bench.load).max())
@@ -108,58 +131,78 @@ class _Paths:
         likely = engine.etas[engine.etas <= explanation.eta].tolist()
         self._likely = [_White(engine, eta) for eta in likely]
         self._root = block([np.diag(engine.base.sd), *(p.root for p in explanation.parts)])
+        self._told_by = None if told_by is None else _white_rows(engine, told_by)
 
-    def found(self) -> tuple[Array, float]:
-        """(n,) overshoot that the data gain by, and nats gained."""
-        out = np.zeros(self._engine.bench.rows.n)
+    def found(self) -> tuple[Unseen, float]:
+        """What the data gain by, and nats gained; from what is known of it on. The last sweeps are
+        told by all rows."""
+        out = self._engine.bench.rows.overshoot.copy()
         none = self._log_evidence(out)
-        for _ in range(_SWEEPS):
+        for i in range(_SWEEPS):
             before = out.copy()
-            self._sweep(out)
+            self._sweep(out, self._told_by if i + 1 < _SWEEPS else None)
             if np.array_equal(out, before):
                 break
-        return out, self._log_evidence(out) - none if out.any() else 0.0
+        self._sweep(out, None, _CLOSER)
+        more = Unseen(out, int(np.count_nonzero(out)), len(self._at))
+        return more, self._log_evidence(out) - none
 
     def _log_evidence(self, overshoot: Array) -> float:
         """At what the law likeliest misses along a path: no more than along the straight one."""
         effect = self._effect(overshoot)
         return max(self._fit(effect, white).log_evidence for white in self._likely)
 
-    def _fit(self, effect: Array, whitened: _White) -> _Fitted:
+    def _fit(self, effect: Array, whitened: _White, told_by: Flags | None = None) -> _Fitted:
+        """told_by: of the white values, those that tell the coefficients; left out: all do."""
         white = whitened(np.hstack([self._engine.base.columns, effect]) @ self._root)
         target = whitened(self._engine.target[:, None])[:, 0]
-        precision = white.T @ white + np.eye(white.shape[1])
-        inner = np.linalg.solve(precision, white.T @ target)
+        tell = np.ones(len(target)) if told_by is None else told_by.astype(float)
+        precision = white.T @ (tell[:, None] * white) + np.eye(white.shape[1])
+        inner = np.linalg.solve(precision, white.T @ (tell * target))
         w = (self._root @ inner)[self._engine.base.columns.shape[1] :]
         left = target - white @ inner
         square = float(left @ left + inner @ inner)
         freedom = float(np.linalg.slogdet(precision)[1])
         return _Fitted(w, effect @ w, left, -(square + freedom + whitened.log_variance) / 2)
 
-    def _sweep(self, out: Array) -> None:
+    def _sweep(self, out: Array, told_by: Flags | None, closer: tuple[float, ...] = ()) -> None:
         """Puts in, takes out or changes what gains, hold after hold, with coefficients as they
-        fit in the beginning."""
-        cost = 2 * log(len(self._at) * len(SIZES))  # twice the nats: of a sum of squares
-        first = self._fit(self._effect(out), self._white)
+        fit in the beginning; told_by as in `_fit`."""
+        cost = 2 * log(len(self._at) * _COUNT)  # twice the nats: of a sum of squares
+        first = self._fit(self._effect(out), self._white, told_by)
         now, left = first.effect, first.left
         off = self._white.off(left, self._at)
         for i, k in enumerate(self._at.tolist()):
             if off[i] < _OFF and out[k] == 0:
                 continue
-            best = (0.0, float(out[k]), left, now)
-            for beyond in sorted({0.0, *self._beyond[:, i].tolist()} - {float(out[k])}):
-                trial = out.copy()
-                trial[k] = beyond
-                then = self._effect(trial) @ first.coefficients
-                rest = left - self._white((then - now)[:, None])[:, 0]
-                paid = cost * (int(beyond != 0) - int(out[k] != 0))
-                gain = float(left @ left - rest @ rest) - paid
-                if gain > best[0]:
-                    best = (gain, beyond, rest, then)
+            best, trial = (0.0, float(out[k]), left, now), out.copy()
+            for step in (0.0, *closer):
+                near = {best[1] * step, max(best[1] / step, -1.0)} if step else self._sizes(i)
+                for beyond in sorted(near - {best[1]}):
+                    trial[k] = beyond
+                    then = self._effect(trial) @ first.coefficients
+                    rest = left - self._white((then - now)[:, None])[:, 0]
+                    paid = cost * (int(beyond != 0) - int(out[k] != 0))
+                    gain = float(left @ left - rest @ rest) - paid
+                    if gain > best[0]:
+                        best = (gain, beyond, rest, then)
+                if best[1] == 0:
+                    break
             _, out[k], left, now = best
+
+    def _sizes(self, i: int) -> set[float]:
+        return {0.0, *self._beyond[:, i].tolist()}
 
     def _effect(self, overshoot: Array) -> Array:
         return np.hstack([p.along(overshoot) for p in self._parts])
+
+
+def _white_rows(engine: Engine, rows: Flags) -> Flags:
+    """Of the values of `_White`, those of rows (n,) and of all without a load."""
+    bench = engine.bench
+    read = rows | bench.rows.zero
+    held = read[bench.rows.edges]
+    return np.concatenate([read, held, bench.layout.read_in(read, held)[bench.rows.n :]])
 
 
 class _Columns:
@@ -175,7 +218,8 @@ class _Columns:
 
     def along(self, overshoot: Array) -> Array:
         """Along a path (n,)."""
-        if not self.remembers or not overshoot.any():
+        known = self._bench.rows.overshoot
+        if not self.remembers or np.array_equal(overshoot, known):
             return self._straight
         return self._made(self._bench.along(overshoot))
 
