@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.gap.data import GapData
+from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
-from identification.gap.explanations.fit import fit
+from identification.gap.explanations.fit import Fit, fit
 from identification.gap.judging.strain import what_is_strained
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import NOISY, SWINGS
@@ -132,6 +133,35 @@ def across(bench: Bench, chosen: Explanation) -> tuple[Note, ...]:
 
 
 _MOVES = 0.2  # of the noise of a sample
+
+
+def readings_missed(engine: Engine, fitted: Fit) -> tuple[Note, ...]:
+    """Of joints that turn otherwise than an explanation has it: where the displacement's gap is
+    large, its law may be so far off, and a joint that bends a little is a spring for all it
+    knows."""
+    bench, q = engine.bench, engine.bench.layout.q
+    if not bench.has_q:
+        return ()
+    columns = engine.columns(c for p in fitted.parts for c in p.variant.columns)
+    left = engine.target - engine.base.columns @ fitted.base - columns @ fitted.coefficients
+    missed, turned = (v[q].reshape(bench.data.joints, -1) for v in (left, bench.observed))
+    noise = np.hypot(engine.sigma[q].reshape(missed.shape), bench.noise.q_run)
+    beyond = np.sqrt(np.mean((missed / noise) ** 2, axis=1))
+    most = np.abs(missed).max(axis=1)
+    off = (beyond > _MISSED) & (most > _OF_WAY * np.ptp(turned, axis=1))
+    return tuple(
+        Note(
+            REMARK,
+            f"Joint {j + 1} turns otherwise than the effects found have it, by up to "
+            f"{1e3 * most[j]:.2g} mrad, "
+            f"{beyond[j]:.0f} times (rms) what its readings scatter: its stiffness is a mean over "
+            "these loads, and less certain than is said.",
+        )
+        for j in np.flatnonzero(off)
+    )
+
+
+_MISSED, _OF_WAY = 5.0, 0.05  # times the noise; of the way that the joint turns
 
 
 def disbelieved(found: SearchResult, verdict: str) -> tuple[Note, ...]:

@@ -11,7 +11,14 @@ import numpy as np
 from identification.arrays import Ints
 from identification.gap.answer.discriminate import NextMeasurement
 from identification.gap.answer.locate import NOWHERE, Where, locate
-from identification.gap.answer.notes import Note, across, disbelieved, notes_of, ordered
+from identification.gap.answer.notes import (
+    Note,
+    across,
+    disbelieved,
+    notes_of,
+    ordered,
+    readings_missed,
+)
 from identification.gap.answer.posterior import Known
 from identification.gap.answer.scale import off_scale
 from identification.gap.answer.twins import twin_of
@@ -108,6 +115,7 @@ def result_of(
     scale = off_scale(bench, simulated)
     notes = [*scale, *notes_of(bench, verdict)]
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
+    notes += readings_missed(engine, fitted) if chosen.parts else ()
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,
