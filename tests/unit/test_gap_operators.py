@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.gap.data import GapData, Instruments, Setup
+from identification.gap.model import flowing
 from identification.gap.model.flowing import flowing_play
 from identification.gap.model.history import (
     PEAK,
@@ -243,6 +244,22 @@ def test_what_flowed_flows_back_for_the_seconds_of_a_rest(square: bool) -> None:
     found = flowing_play(rows.force, radius, time, rows, fresh(rows.n), square=square)[:, 0]
     alone = rows.weight == 1
     assert found[alone] == pytest.approx(np.interp(rows.time, grid, y)[alone], abs=0.35)
+
+
+def test_plays_that_flow_are_the_same_few_or_many_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows, _, _ = two_runs()
+    radius, time = np.linspace(5.0, 60.0, 40), np.geomspace(0.5, 200.0, 40)
+    square, memory = np.arange(40) % 2 == 1, rows.starts
+    many = flowing_play(rows.force, radius, time, rows, memory, square=square)
+    monkeypatch.setattr(flowing, "_AT_ONCE", 40 * 7)  # pieces of a few steps
+    assert flowing_play(rows.force, radius, time, rows, memory, square=square) == pytest.approx(
+        many, abs=1e-9
+    )
+    for k in (0, 17, 39):
+        one = (radius[[k]], time[[k]], rows, memory)
+        alone = flowing_play(rows.force, *one, square=square[[k]])
+        assert alone[:, 0] == pytest.approx(many[:, k], abs=1e-9)
+        assert np.ptp(alone) > 1.0
 
 
 @HANDS
