@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from math import inf
 
+from identification.arrays import Flags
 from identification.gap.answer.discriminate import NextMeasurement, Others, next_measurement
 from identification.gap.answer.forms import Form
 from identification.gap.answer.known import knowing
@@ -32,7 +33,7 @@ from identification.gap.search.breaks import troubles_of, with_plain_trouble
 from identification.gap.search.refine import refine
 from identification.gap.search.search import force, search
 from identification.gap.search.strange import with_strangers
-from identification.gap.search.unseen import unseen
+from identification.gap.search.unseen import Unseen, unseen
 from identification.gap.words import WORDS
 
 Progress = Callable[[str, float], None]
@@ -126,21 +127,38 @@ def _with_unseen(
     """The search once more with loads between readings, where these explain more than it costs to
     say which they are, or make foretold what was not."""
     cost = 0.0
-    for _ in range(_ROUNDS):
-        foretold, bench = foretells(found), found.engine.bench
-        more = unseen(found, None if foretold else first_repetitions(found.engine))
-        if more is None:
+    for i in range(_ROUNDS):
+        foretold = foretells(found)
+        tellers: list[Flags | None] = [] if foretold else [first_repetitions(found.engine)]
+        if foretold or i == 0:
+            tellers.append(None)  # all rows
+        further = (unseen(found, told_by) for told_by in tellers)
+        tried = (_along(found, more, known, withheld) for more in further if more is not None)
+        better = (one for one in tried if _explains_more(*one, found, cost, foretold))
+        again = next(better, None)
+        if again is None:
             break
-        rows = replace(bench.rows, overshoot=more.overshoot)
-        again = _searched(*_prepared(make_bench(bench.data, rows=rows), known, withheld))
-        gain = again.explanations[0].log_weight - found.explanations[0].log_weight
-        mended = not foretold and gain > 0 and foretells(again)
-        if not mended and gain <= more.cost - cost:
-            break
-        found, cost = again, more.cost
+        found, cost = again
         if foretold:
             break
     return found
+
+
+def _explains_more(
+    again: SearchResult, cost: float, found: SearchResult, paid: float, foretold: bool
+) -> bool:
+    """More than it costs beyond what was paid, nats; or at all, and foretells what was not."""
+    gain = again.explanations[0].log_weight - found.explanations[0].log_weight
+    return gain > cost - paid or (not foretold and gain > 0 and foretells(again))
+
+
+def _along(
+    found: SearchResult, more: Unseen, known: Sequence[Form], withheld: Collection[str]
+) -> tuple[SearchResult, float]:
+    """The search once more with those loads, and what it costs to say which they are, nats."""
+    data = found.engine.bench.data
+    rows = replace(found.engine.bench.rows, overshoot=more.overshoot)
+    return _searched(*_prepared(make_bench(data, rows=rows), known, withheld)), more.cost
 
 
 _ROUNDS = 3  # at most, and one where withheld repetitions are foretold
