@@ -104,8 +104,11 @@ class Listing:
         begun = ", ".join(e.file for e in self.entries if e.open and not e.running)
         if begun:
             yield f"With a journal: {begun}; `rig measure --resume FILE` goes on there."
-        if any(e.stiffness is None for e in self.entries):
-            yield "k -: not analysed yet; `rig list --analyze` or `rig analyze FILE` does it."
+        unknown = [e for e in self.entries if e.stiffness is None]
+        if unknown:
+            # What `rig analyze` finds beside a journal is not kept: it is not the last word.
+            other = "" if any(e.open for e in unknown) else " or `rig analyze FILE`"
+            yield f"k -: not analysed yet; `rig list --analyze`{other} does it."
 
 
 def list_folder(

@@ -13,7 +13,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from drivers.interfaces import LiveView, Phase, Prompt
+from drivers.interfaces import LimitLevel, LiveView, Phase, Prompt
+from drivers.operator.fitted import Fitted, Part, Rank
 
 GLYPHS = {
     "0": ("█▀█", "█ █", "█▄█"),
@@ -140,21 +141,24 @@ def screen(
     complaint: str = "",
     emulated: bool = False,
 ) -> RenderableType:
-    """The whole screen. `age_s`: of the view; `stale_s`: how long devices have been stale."""
-    parts: list[RenderableType] = []
-    if view is None:
-        parts.append(Text("waiting for the first values", style="dim"))
-    else:
+    """The whole screen. `age_s`: of the view; `stale_s`: how long devices have been stale.
+
+    Fits the terminal: the question, where its answer is typed, and what this is not stay longest.
+    """
+
+    def parts(width: int) -> list[Part]:
         asked = prompt.key if prompt is not None else None
-        parts += _live(view, pitch_mm, age_s, stale_s, asked)
-    parts += [_notice(level, text) for level, text in notices]
-    if prompt is not None:
-        parts.append(_question(prompt, typed, complaint))
-    else:
-        parts.append(Text(KEYS, style="dim"))
-    parts.append(Text(NO_SAFETY, style="dim"))
+        return [
+            *_live(view, pitch_mm, age_s, stale_s, asked, width),
+            *_notices(notices),
+            Part(Text(KEYS, style="dim"), Rank.KEYS)
+            if prompt is None
+            else _question(prompt, typed, complaint),
+            Part(Text(NO_SAFETY, style="dim")),
+        ]
+
     mark = Text(EMULATED, style="bold black on yellow") if emulated else None
-    return Panel(Group(*parts), title=_title(view), subtitle=mark, border_style="grey50")
+    return Fitted(parts, _title(view), mark)
 
 
 def _title(view: LiveView | None) -> str:
@@ -168,12 +172,15 @@ def _title(view: LiveView | None) -> str:
 
 
 def _live(
-    view: LiveView,
+    view: LiveView | None,
     pitch_mm: float,
     age_s: float,
     stale_s: Mapping[str, float],
     asked: str | None,
-) -> list[RenderableType]:
+    width: int,
+) -> list[Part]:
+    if view is None:
+        return [Part(Text("waiting for the first values", style="dim"))]
     age_s += max(view.force_age_s, view.displacement_age_s)
     old = age_s > 1.0 or bool(stale_s)
     style = "grey42" if old else "bold white"
@@ -195,25 +202,29 @@ def _live(
     target = f"target {number(view.target_N, '.1f', 'N')}"
     if view.band_N > 0:
         target += f" ± {number(view.band_N, '.2g', 'N')}"
-    parts: list[RenderableType] = [Text()]
-    parts += [Align.center(Text(line, style=style)) for line in large(force)]
-    parts += [
-        Text(),
-        Align.center(bar(view)),
-        Align.center(Text(target)),
-        Text(),
-        Align.center(Text(f"{arrow}{word}", style="bold red" if old and not idle else colour)),
-        Align.center(Text(far or " ")),
-        Text(),
-        _facts(view, style),
+    digits = Group(*(Align.center(Text(line, style=style)) for line in large(force)))
+    blank = Part(Text(), Rank.BLANK)
+    parts = [
+        blank,
+        Part(digits, Rank.DIGITS, instead=Align.center(Text(force, style=style))),
+        blank,
+        Part(Align.center(bar(view, min(BAR_WIDTH, width))), Rank.BAR),
+        Part(Align.center(Text(target)), Rank.TARGET),
+        blank,
+        Part(
+            Align.center(Text(f"{arrow}{word}", style="bold red" if old and not idle else colour))
+        ),
+        Part(Align.center(Text(far))) if far else blank,
+        blank,
+        Part(_facts(view, style), Rank.FACTS),
         *_limits(view),
     ]
     for device, seconds in stale_s.items():
-        parts.append(Text(f"{device}: no fresh value for {seconds:.1f} s", style="bold red"))
+        parts.append(Part(Text(f"{device}: no fresh value for {seconds:.1f} s", style="bold red")))
     if age_s > 1.0 and not idle:
-        parts.append(Text(f"the values are {age_s:.0f} s old", style="bold red"))
+        parts.append(Part(Text(f"the values are {age_s:.0f} s old", style="bold red")))
     if view.message:
-        parts.append(Text(view.message, style="yellow"))
+        parts.append(Part(Text(view.message, style="yellow")))
     return parts
 
 
@@ -233,25 +244,32 @@ def _facts(view: LiveView, style: str) -> Table:
     return table
 
 
-def _limits(view: LiveView) -> list[RenderableType]:
+def _limits(view: LiveView) -> list[Part]:
     """How much is left of each limit, the closest first; none while nothing is watched."""
     watched = [v for v in view.limits if v.limit > 0 and math.isfinite(v.value)]
     if not watched:
         return []
     line = Text("left of the limits: ", style="dim")
-    for level in sorted(watched, key=lambda level: level.value / level.limit, reverse=True):
+    # By what is shown: else equal ones would change places all the time.
+    for level in sorted(watched, key=_percent_left):
         left = 1.0 - level.value / level.limit
         style = "bold red" if left < 0.1 else "yellow" if left < 0.25 else "dim"
-        line.append(f"{level.quantity} {100 * left:.0f} %   ", style=style)
-    return [line]
+        line.append(f"{level.quantity} {_percent_left(level)} %   ", style=style)
+    return [Part(line, Rank.LIMITS)]
 
 
-def _notice(level: str, text: str) -> Text:
-    colour = {"warning": "yellow", "error": "bold red"}.get(level, "dim")
-    return Text(text, style=colour)
+def _percent_left(level: LimitLevel) -> int:
+    return round(100 * (1.0 - level.value / level.limit))
 
 
-def _question(prompt: Prompt, typed: str, complaint: str) -> Panel:
+def _notices(notices: Sequence[tuple[str, str]]) -> list[Part]:
+    colours = {"warning": "yellow", "error": "bold red"}
+    texts = [Text(text, style=colours.get(level, "dim")) for level, text in notices]
+    older = [Part(text, Rank.OLDER_NOTICE) for text in texts[:-1]]
+    return older + [Part(text, Rank.NEWEST_NOTICE) for text in texts[-1:]]
+
+
+def _question(prompt: Prompt, typed: str, complaint: str) -> Part:
     text = Text(prompt.text + "\n", style="bold")
     if len(prompt.answers) == 1:
         text.append("Press Enter: ", style="cyan")  # alone it confirms where nothing is to choose
@@ -263,7 +281,7 @@ def _question(prompt: Prompt, typed: str, complaint: str) -> Panel:
     text.append(typed + "▏")
     if complaint:
         text.append(f"\n{complaint}", style="red")
-    return Panel(text, border_style="cyan")
+    return Part(Panel(text, border_style="cyan"), Rank.FRAME, instead=text)
 
 
 def plain(view: LiveView, pitch_mm: float) -> str:

@@ -14,13 +14,17 @@ from numpy.typing import NDArray
 from identification.arm import Arm
 from identification.when import Schedule, schedule
 from rig.arrays import Array
-from rig.errors import InputError, did_you_mean
+from rig.errors import InputError
 from rig.models.model import ArmModel, CouplingSpec
 from rig.units import N_PER_MM
 
 _Q = tuple(f"q{i}_rad" for i in range(1, 7))
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
 _COLUMNS = ("time_s", *_Q, *_DIRECTION, "required_N_per_mm")
+_WANTED = (
+    "time_s, direction_x, direction_y, direction_z, required_N_per_mm; q1_rad ... q6_rad, all or "
+    "none of them"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +62,12 @@ def read_path(path: Path) -> Path6:
     wanted = [name for name in _COLUMNS if with_q or name not in _Q]
     missing = [name for name in wanted if name not in header]
     if missing:
-        hint = did_you_mean(missing[0], header)
-        raise InputError(f"{path}:{lines[0][0]}: no column {missing[0]}.{hint}")
+        many = len(missing) > 1
+        raise InputError(
+            f"{path}:{lines[0][0]}: the column{'s' * many} {', '.join(missing)} "
+            f"{'are' if many else 'is'} missing; the header has {', '.join(header)}. "
+            f"Wanted: {_WANTED}."
+        )
     places = {name: header.index(name) for name in wanted}
     rows = np.array(
         [[_number(path, i, line, n, places[n]) for n in wanted] for i, line in lines[1:]]

@@ -24,7 +24,7 @@ PAUSE_ANSWERS = ("continue", "redo_step", "redo_repetition", "skip", "abort")
 OF_A_STEP = ("redo_step", "skip")  # without a step under way there is nothing that they could mean
 ONLY_ABORT = "Meanwhile nothing is heard but an abort"
 TO_STOP = "Stop the measurement? --resume then measures a repetition under way anew, as a whole."
-HEARD = "Ctrl-C was heard; the open question comes first. Ctrl-C again stops at once."
+HEARD = "Ctrl-C was heard; whether to stop is the next question. Ctrl-C again stops at once."
 
 
 class Changes(TypedDict, total=False):
@@ -170,8 +170,15 @@ class Supervision:
         """Asks without looking away: limits and devices are watched until the answer comes.
 
         watching False is for work on the unloaded rig, which looks like any fault: the arm is led
-        to its pose, cables are touched, the amplifier is in Reset.
+        to its pose, cables are touched, the amplifier is in Reset. After a Ctrl-C meanwhile,
+        whether to stop is asked before anything else; a motion of the arm is called off unasked.
         """
+        answer = self._ask(prompt, watching)
+        if answer not in ("abort", "move"):
+            self._hear_interrupt(watching)
+        return answer
+
+    def _ask(self, prompt: Prompt, watching: bool) -> str:
         answer: Future[str] = Future()
 
         def wait_for_answer() -> None:
@@ -213,10 +220,10 @@ class Supervision:
         if answer == "skip":
             raise Wish("skip")
 
-    def _hear_interrupt(self) -> None:
+    def _hear_interrupt(self, watching: bool = True) -> None:
         if self._interrupts:
             prompt = Prompt("interrupt", TO_STOP, ("abort", "continue"))
-            answer = self.ask(prompt)
+            answer = self._ask(prompt, watching)
             self._interrupts = 0
             self.obey(answer)
 

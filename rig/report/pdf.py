@@ -10,6 +10,7 @@ import json
 import re
 from importlib.resources import files
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from rig.banners import marks
@@ -36,8 +37,8 @@ _SIZE = re.compile(r'viewBox="[\d.+-]+ [\d.+-]+ ([\d.]+) ([\d.]+)"')
 _PAGE_HEIGHT_SHARE = 1.15  # of the width, above which a figure would not leave room for its caption
 
 
-def pdf(document: Document) -> bytes:
-    """The report as A4 pages. InputError where typst is not installed."""
+def typesetter() -> ModuleType:
+    """typst; InputError where it is not installed."""
     try:
         import typst
     except ImportError as error:
@@ -45,6 +46,12 @@ def pdf(document: Document) -> bytes:
             "--pdf needs the package typst, which is not installed. Install it with "
             "`pip install typst`, or print the HTML page from a browser."
         ) from error
+    return typst
+
+
+def pdf(document: Document) -> bytes:
+    """The report as A4 pages. InputError where typst is not installed."""
+    typst = typesetter()
     content = json.dumps(_document(document)).encode()
     sources = {
         "main.typ": files("rig.report").joinpath("report.typ").read_bytes(),

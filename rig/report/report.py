@@ -111,12 +111,16 @@ def default_output(paths: Sequence[Path]) -> Path:
 
 def checked(page: Path, pdf: Path | None) -> Path:
     """The page's path, before long work begins; InputError where a name says another kind of file
-    (a data set must not be overwritten by its report)."""
+    (a data set must not be overwritten by its report), or where there is no typst for the PDF."""
+    from rig.report.pdf import typesetter
+
     for path, kinds, option in ((page, (".html", ".htm"), "-o"), (pdf, (".pdf",), "--pdf")):
         if path is not None and path.suffix.lower() not in kinds:
             raise InputError(f"{option} {path}: a name that ends in {kinds[0]} is wanted.")
         if path is not None:
             check_folder(path)
+    if pdf is not None:
+        typesetter()
     return page
 
 

@@ -97,7 +97,8 @@ class CsvFile:
                 raise InputError(f"{self.path}: {what}.")
         self._file.seek(3 if head[:3] == b"\xef\xbb\xbf" else 0)
         while raw := self._read(self._first_line):
-            text = self._text(raw, self._line + 1).rstrip("\r\n")
+            self._check_text(raw)
+            text = raw.decode("utf-8").rstrip("\r\n")
             self._line += 1
             if text.lstrip().startswith("#"):
                 self._comment(text)
@@ -248,14 +249,12 @@ class CsvFile:
         if b"\0" in raw:
             line = self._line + 1 + raw.count(b"\n", 0, raw.index(b"\0"))
             raise self.error(line, "binary data; a text file is wanted.")
-        if not raw.isascii():
-            self._text(raw, self._line + 1)
-
-    def _text(self, raw: bytes, first_line: int) -> str:
+        if raw.isascii():
+            return
         try:
-            return raw.decode("utf-8")
+            raw.decode("utf-8")
         except UnicodeDecodeError as error:
-            line = first_line + raw.count(b"\n", 0, error.start)
+            line = self._line + 1 + raw.count(b"\n", 0, error.start)
             raise self.error(
                 line, f"the byte 0x{raw[error.start]:02X} is no UTF-8 text; save the file as UTF-8."
             ) from error

@@ -101,17 +101,18 @@ def read_text(path: Path) -> str:
 def _decode(raw: bytes, name: str) -> str:
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise InputError(f"{name}: UTF-16 text; save the file as UTF-8.")
+    if raw.startswith(b"\x89HDF"):
+        raise InputError(f"{name}: an HDF5 file; a YAML file is wanted.")
+    if b"\0" in raw:
+        raise InputError(f"{name}: binary data; a YAML text file is wanted.")
     try:
-        text = raw.decode("utf-8-sig")
+        return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         byte = raw[error.start]
         raise InputError(
             f"{name}:{line}: the byte 0x{byte:02X} is no UTF-8 text; save the file as UTF-8."
         ) from error
-    if "\0" in text:
-        raise InputError(f"{name}: binary data; a YAML text file is wanted.")
-    return text
 
 
 def read_document_text(

@@ -78,5 +78,17 @@ def test_a_path_beyond_the_joints(tmp_path: Path) -> None:
     ):
         couple(MODELS / "F1.yaml", samples=0, path=path)
     path.write_text(path.read_text().replace("q3_rad", "q33_rad"))
-    with pytest.raises(InputError, match=r"path\.csv:1: no column q3_rad"):
+    with pytest.raises(InputError, match=r"path\.csv:1: the column q3_rad is missing; the header"):
         couple(MODELS / "F1.yaml", samples=0, path=path)
+
+
+def test_all_missing_columns_of_a_path_are_named_and_all_that_are_wanted(tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text("time_s,x,y,z,stiffness_N_per_mm\n0,1,0,0,50\n")
+    with pytest.raises(InputError) as caught:
+        couple(MODELS / "F1.yaml", samples=0, path=path)
+    assert str(caught.value) == (
+        f"{path}:1: the columns direction_x, direction_y, direction_z, required_N_per_mm are "
+        "missing; the header has time_s, x, y, z, stiffness_N_per_mm. Wanted: time_s, direction_x, "
+        "direction_y, direction_z, required_N_per_mm; q1_rad ... q6_rad, all or none of them."
+    )

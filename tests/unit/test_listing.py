@@ -241,6 +241,14 @@ def test_no_resuming_is_offered_of_a_run_that_is_still_measured(folder: Path) ->
     assert "cut.h5; `rig measure --resume FILE` goes on there." in list_folder(folder).to_text()
 
 
+def test_what_is_said_to_fill_in_k_fills_it_in(folder: Path) -> None:
+    assert "k -: not analysed yet; `rig list --analyze` does it." in list_folder(folder).to_text()
+    journal_path(folder / "cut.h5").unlink()
+    text = list_folder(folder).to_text()
+    assert "k -: not analysed yet; `rig list --analyze` or `rig analyze FILE` does it." in text
+    assert "k -" not in list_folder(folder, analyze=True).to_text()
+
+
 def test_a_damaged_journal_is_left_out(folder: Path) -> None:
     journal = journal_path(folder / "cut.h5")
     lines = journal.read_bytes().splitlines(keepends=True)

@@ -25,15 +25,22 @@ from drivers.operator.settings import OperatorSettings
 from tests.unit.test_operator_hand import view
 
 PITCH_MM = 0.5
+LEVELS = (
+    LimitLevel("force", 60.0, 240.0, "N", "stop"),
+    LimitLevel("displacement", 8.1, 9.0, "mm", "stop"),
+    LimitLevel("unlimited", 1.0, 0.0, "mm", "warn"),
+    LimitLevel("not read yet", float("nan"), 9.0, "mm", "warn"),
+)
 
 
 def known(force_N: float, target_N: float, **changes: object) -> LiveView:
     return replace(view(force_N, target_N), stiffness_N_per_mm=57.0, **changes)  # type: ignore[arg-type]
 
 
-def shown(live: LiveView | None, **changes: object) -> str:
+def shown(live: LiveView | None, size: tuple[int, int] = (100, 40), **changes: object) -> str:
+    """The screen on a terminal of so many columns and lines."""
     options = {"pitch_mm": PITCH_MM, "age_s": 0.0, "stale_s": {}, "notices": [], **changes}
-    console = Console(file=StringIO(), width=100, force_terminal=False)
+    console = Console(file=StringIO(), width=size[0], height=size[1], force_terminal=False)
     console.print(screen(live, **options))  # type: ignore[arg-type]
     assert isinstance(console.file, StringIO)
     return console.file.getvalue()
@@ -106,22 +113,62 @@ def test_while_the_rig_is_set_up_no_value_is_missed() -> None:
 
 
 def test_limits_show_how_much_is_left_the_closest_first() -> None:
-    levels = (
-        LimitLevel("force", 60.0, 240.0, "N", "stop"),
-        LimitLevel("displacement", 8.1, 9.0, "mm", "stop"),
-        LimitLevel("unlimited", 1.0, 0.0, "mm", "warn"),
-        LimitLevel("not read yet", float("nan"), 9.0, "mm", "warn"),
-    )
-    text = shown(known(40.0, 60.0, limits=levels))
+    text = shown(known(40.0, 60.0, limits=LEVELS))
     assert "left of the limits: displacement 10 %   force 75 %" in text
     assert "nan" not in text
     assert "left of the limits" not in shown(known(40.0, 60.0))
+
+
+def test_limits_of_which_as_much_is_left_stay_in_their_order() -> None:
+    for force in (60.0, 60.1, 59.9):
+        levels = tuple(
+            LimitLevel(name, value, 240.0, "N", "stop")
+            for name, value in (("force", force), ("force rate", 60.0))
+        )
+        assert "force 75 %   force rate 75 %" in shown(known(40.0, 60.0, limits=levels))
 
 
 def test_the_screen_says_what_it_is_not() -> None:
     assert "Software monitoring is no safety function." in shown(known(40.0, 60.0))
     assert "EMULATED: no real arm" in shown(known(40.0, 60.0), emulated=True)
     assert "EMULATED" not in shown(known(40.0, 60.0))
+
+
+@pytest.mark.parametrize("size", [(60, 20), (80, 24), (40, 8)])
+def test_on_a_small_terminal_what_must_be_answered_stays(size: tuple[int, int]) -> None:
+    text = shown(
+        known(40.0, 60.0, limits=LEVELS),
+        size,
+        prompt=Prompt("interrupt", "Stop the measurement?", ("abort", "continue")),
+        typed="ab",
+        complaint="'pc' is no answer",
+        notices=[("warning", "step 3 has not settled " * 4), ("warning", "Ctrl-C was heard " * 4)],
+        emulated=True,
+    )
+    lines = text.splitlines()
+    assert len(lines) <= size[1]
+    assert max(map(len, lines)) <= size[0]
+    for words in ("Stop the measurement?", "ab▏", "'pc' is no answer"):
+        assert words in text
+    assert "Software monitoring is" in text
+    assert "EMULATED" in lines[-1]
+    if size[1] >= 20:
+        for words in ("HANDS OFF", "Ctrl-C was heard"):
+            assert words in text
+
+
+def test_on_a_small_terminal_the_older_notices_give_way_first() -> None:
+    notices = [("warning", f"notice {i}") for i in range(4)]
+    assert "notice 0" in shown(known(40.0, 60.0), notices=notices)
+    text = shown(known(40.0, 60.0, limits=LEVELS), (60, 14), notices=notices)
+    assert [i for i in range(4) if f"notice {i}" in text] == [2, 3]
+    assert "left of the limits" not in text
+
+
+def test_the_bar_is_as_wide_as_the_terminal_lets_it() -> None:
+    for columns in (40, 60, 100):
+        lines = shown(known(40.0, 60.0), (columns, 40)).splitlines()
+        assert len([line for line in lines if "·" in line or "─█" in line]) == 1
 
 
 def test_an_answer_from_elsewhere_ends_the_question(

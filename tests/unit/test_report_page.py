@@ -502,3 +502,6 @@ def test_without_typst_there_is_a_hint(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setitem(sys.modules, "typst", None)
     with pytest.raises(InputError, match=r"--pdf needs the package typst, which is not installed"):
         sketch([bench(tmp_path / "a.h5")], QUIET).to_pdf()
+    with pytest.raises(InputError, match=r"--pdf needs the package typst"):
+        checked(tmp_path / "a.html", tmp_path / "a.pdf")  # before long work begins
+    assert checked(tmp_path / "a.html", None)

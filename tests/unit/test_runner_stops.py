@@ -96,7 +96,29 @@ def test_a_ctrl_c_under_a_question_is_answered(
     bench.loader.answers["interrupt"] = ["continue"]
     bench.run()
     assert bench.loader.said.count(HEARD) == 1
+    asked = [p.key for p in bench.loader.asked]
+    assert asked[asked.index("mount") + 1] == "interrupt", "straight after the open question"
+    assert asked.count("interrupt") == 1
     assert bench.steps() == ALL
+
+
+def test_who_aborts_after_a_ctrl_c_is_not_asked_again(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ask = bench.loader.ask
+
+    def interrupted(prompt: Prompt) -> str:
+        if prompt.key == "paused":
+            assert bench.runner is not None
+            bench.runner.interrupt()
+        return ask(prompt)
+
+    monkeypatch.setattr(bench.loader, "ask", interrupted)
+    at(bench, 2, lambda: bench.loader.commands.append("pause"))
+    bench.loader.answers["paused"] = ["abort"]
+    with pytest.raises(MeasurementStopped, match="the operator ended the measurement"):
+        bench.run()
+    assert bench.loader.asked[-1].key == "paused"
 
 
 def test_the_arm_moves_only_if_protocol_and_operator_say_so(tmp_path: Path) -> None:

@@ -415,6 +415,7 @@ REFUSED: list[tuple[str | bytes, str]] = [
         ":4: the byte 0xE4 is no UTF-8 text; save the file as UTF-8.",
     ),
     (HEAD.encode() + b"0,x,1,zero,0,0,0\n0,x,\x00,", ":3: binary data; a text file is wanted."),
+    (bytes(range(256)), ":1: binary data; a text file is wanted."),
     (HEAD.encode("utf-16"), ": UTF-16 text; save it as CSV UTF-8."),
     (b"PK\x03\x04\x14\x00", ": an Excel or zip file; save the sheet as CSV (UTF-8)."),
     (

@@ -310,6 +310,10 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     assert said(file) == ": UTF-16 text; save the file as UTF-8."
     file.write_bytes(b"a: 1\0")
     assert said(file) == ": binary data; a YAML text file is wanted."
+    file.write_bytes(bytes(range(256)))
+    assert said(file) == ": binary data; a YAML text file is wanted."
+    file.write_bytes(b"\x89HDF\r\n\x1a\n\0")
+    assert said(file) == ": an HDF5 file; a YAML file is wanted."
 
 
 def test_a_byte_order_mark_is_accepted(tmp_path: Path) -> None:
