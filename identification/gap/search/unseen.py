@@ -63,8 +63,8 @@ class Unseen:
 def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     """What the best explanation that remembers says of the loads between the readings of levels;
     None where that gains no more than a few nats and what better explanations are ahead. told_by:
-    rows (n,) that alone tell what its law does, where it does not foretell the others: then any
-    load that these ask for counts."""
+    rows (n,) that alone tell what a law does, where it does not foretell the others: then it is
+    what the one says that is ahead with its loads, and none has to gain more."""
     engine = found.engine
     rows = engine.bench.rows
     if rows.continuous or engine.bench.imposed:
