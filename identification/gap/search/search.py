@@ -126,14 +126,13 @@ def force(
     start: Explanation,
     words: frozenset[str],
 ) -> Explanation:
-    """`start` with all `words` beside its own effects: the best that the search found, else with
-    one after the other fitted to what the others leave. None of them takes another's place."""
+    """`start` with all `words` beside its own effects: the best that the search found, or with one
+    after the other fitted to what the others leave, whichever is likelier. None of them takes
+    another's place."""
     left = set(words - start.words)
     if not left:
         return start
     with_all = [e for e in pool if words | start.words <= e.words]
-    if with_all:
-        return with_all[0]
     parts, evidence, energy = start.parts, 0.0, 0.0
     while left:
         levels, energy = up_to_likeliest(engine, parts)
@@ -143,7 +142,8 @@ def force(
         left.discard(top.variant.word)
         evidence = marginal([s for s in scored if s.variant.word == top.variant.word])
     taken = energy if len(parts) > 1 else None
-    return polished(engine, variants, explain(engine, parts, evidence, taken))
+    built = polished(engine, variants, explain(engine, parts, evidence, taken))
+    return max([*with_all[:1], built], key=lambda e: e.log_weight)
 
 
 def _seeds(pool: dict[frozenset[str], Explanation], most: int) -> list[Explanation]:
