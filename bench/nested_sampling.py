@@ -89,7 +89,8 @@ def forms(bench: Bench, word: str, variants: list[Variant]) -> list[Form]:
         if word == "joint_yield" and v.label.startswith("joint 1 at") and v.label.endswith("sharp"):
             parts = [joint(c * played(torque, rows.starts, r)) for r in v.info["radius"]]
         elif word == "joint_hysteresis" and (
-            v.label == "joint 1 spectrum" or v.label.startswith("joint 1 r ")
+            v.label == "joint 1 spectrum"
+            or (v.label.startswith("joint 1 r ") and v.info["law"] == "Iwan")
         ):
             stops = [torque - played(torque, rows.starts, r) for r in v.info["radius"]]
             parts = [joint(-c * s) for s in stops]

@@ -287,8 +287,9 @@ def _pairs(
     """Each strength of a spectrum with its neighbour, by the law of the spectrum. Friction acts
     from the first load on: one strength alone is a small one."""
     radius, columns, out = np.asarray(spectrum.info["radius"]), list(spectrum.columns), []
-    law = spectrum.info["law"]
-    most = int(np.sum(radius < NEVER * span)) - 1
+    law, joint = spectrum.info["law"], int(spectrum.info["joint"])
+    largest = float(np.abs(bench.true_torque[:, joint]).max())
+    most = int(np.sum(radius < (largest if law == "Prandtl" else NEVER * span))) - 1
     alone = most if bench.imposed else min(_SMALL + bench.course.unloads, most)
     for k in range(alone):
         out.append(
@@ -301,7 +302,7 @@ def _pairs(
                 each=True,
                 within=spectrum.within[:, k : k + 2],
                 prior=0.25 / alone / conventions,
-                joint=int(spectrum.info["joint"]),
+                joint=joint,
                 radius=radius[k : k + 2],
                 law=law,
                 slips=law in ON_TOP,
