@@ -34,6 +34,7 @@ _CLOSER = (2**-0.5, 2**-0.25)  # steps between these, from the best of them on
 _COUNT = 4 * len(SIZES)  # in all
 _FEWEST = 8  # holds that a load was brought to: of fewer nobody tells chance from habit
 _MOST = 1_000_000  # holds times rows: of more it would last longer than all the rest
+_MOST_TOLD = 600_000  # likewise, where the search may go on for more than one round
 _LOOKED_AT, _SEVERAL = 12, 6  # explanations; that remember, where none foretells the others
 _SELDOM = 0.5  # of the holds at most: whose law needs more is no law with a hand beside it
 _PARTS = 3  # of an explanation at most, where none foretells the others: more say nothing of loads
@@ -70,7 +71,8 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     if rows.continuous or engine.bench.imposed:
         return None
     at = _brought_to(rows)
-    if len(at) < _FEWEST or len(at) * rows.n > _MOST:
+    most = _MOST if told_by is None else _MOST_TOLD
+    if len(at) < _FEWEST or len(at) * rows.n > most:
         return None
     first = found.explanations[0].log_weight
     able = (e for e in found.explanations if told_by is None or len(e.parts) <= _PARTS)
