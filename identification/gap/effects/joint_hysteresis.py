@@ -37,6 +37,7 @@ from identification.gap.laws.friction_law import (
     LAWS,
     ON_TOP,
     SLIPPING,
+    THAT_SLIPS,
     by_ratio,
 )
 from identification.gap.laws.law import Laws
@@ -106,7 +107,6 @@ def _memories(bench: Bench, joint: int) -> dict[str, Path]:
 
 
 WORKED_IN = " worked in"
-THAT_SLIPS = " that slips"  # and deflects so much more than stated
 
 
 def _with_other_springs(bench: Bench, found: list[Variant]) -> list[Variant]:

@@ -28,7 +28,8 @@ EXPONENTIAL = ("Dahl", "Bouc-Wen")
 # Leaves, belts, cables and wedges are pressed by what they carry: friction in proportion to that.
 BY_LOAD = tuple(f"{law} by load" for law in EXPONENTIAL)
 # Where the stated spring is that of small loads, what slips comes on top.
-SLIPPING = tuple(f"{law} that slips" for law in EXPONENTIAL)
+THAT_SLIPS = " that slips"
+SLIPPING = tuple(law + THAT_SLIPS for law in EXPONENTIAL)
 LAWS = (*EXPONENTIAL, *BY_LOAD, *SLIPPING)
 ON_TOP = ("Prandtl", *SLIPPING)
 FRICTION_LAWS = (*SLIP_AT_A_STRENGTH, *LAWS)

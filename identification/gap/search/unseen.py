@@ -12,6 +12,7 @@ ones alone say what the law does, and the others where a hand went.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from math import lgamma, log
@@ -78,18 +79,34 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     able = (e for e in found.explanations if told_by is None or len(e.parts) <= _PARTS)
     each = ((e, _Paths(engine, e, at, told_by)) for e in islice(able, _LOOKED_AT))
     remember = ((first - e.log_weight, path) for e, path in each if path.remembers)
-    many = 1 if told_by is None or len(at) * rows.n > _FEW else _SEVERAL
-    tried = [(behind, *path.found()) for behind, path in islice(remember, many)]
     if told_by is None:
-        return next((more for behind, more, gain in tried if gain > behind + _PLAIN), None)
-    tried = [
-        one
-        for one in tried
-        if one[1].count <= _SELDOM * len(at) and np.any(one[1].overshoot != rows.overshoot)
-    ]
-    ahead = [gain - behind - more.cost for behind, more, gain in tried]
-    best = int(np.argmax(ahead)) if max(ahead, default=0.0) > 0 else 0
-    return tried[best][1] if tried else None
+        return _of_the_first(remember)
+    several = islice(remember, 1 if len(at) * rows.n > _FEW else _SEVERAL)
+    return _of_the_one_ahead(several, rows.overshoot)
+
+
+def _of_the_first(paths: Iterator[tuple[float, _Paths]]) -> Unseen | None:
+    """What the first of paths asks for, which lie so many nats behind the best explanation; None
+    where it does not get ahead of that by a few nats."""
+    for behind, path in paths:
+        more, gain = path.found()
+        return more if gain > behind + _PLAIN else None
+    return None
+
+
+def _of_the_one_ahead(paths: Iterator[tuple[float, _Paths]], known: Array) -> Unseen | None:
+    """What the one of paths asks for beyond what is known (n,) of overshoot that is ahead after
+    it; the first that asks for any where none gains what that costs."""
+    first: Unseen | None = None
+    best, ahead = first, 0.0
+    for behind, path in paths:
+        more, gain = path.found()
+        if more.count > _SELDOM * more.of or np.array_equal(more.overshoot, known):
+            continue
+        first = first or more
+        if gain - behind - more.cost > ahead:
+            best, ahead = more, gain - behind - more.cost
+    return best or first
 
 
 def _brought_to(rows: Rows) -> Ints:
