@@ -124,6 +124,10 @@ def test_friction_is_found_and_so_is_where_the_hand_went_too_far() -> None:
     shows = true & (np.abs((lever[:, JOINT] * (far - calm))[first]) > 5e-6)
     assert np.sum(seen & shows) > 0.8 * np.sum(shows) > 0
     assert told(found)
+    top = np.array([TOP_N[s.direction] for s in found.bench.data.setups])[rows.setup]
+    size = np.abs(rows.overshoot * found.bench.load / top)[rows.overshoot != 0]
+    assert np.median(size) == pytest.approx(TOO_FAR, rel=0.2)
+    assert np.isclose(size, TOO_FAR, rtol=0.1).any()  # between the sizes that are looked at first
 
 
 def test_a_calm_hand_is_not_said_to_have_gone_too_far() -> None:
