@@ -126,9 +126,11 @@ def _with_unseen(
 ) -> SearchResult:
     """The search once more with loads between readings, where these explain more than it costs to
     say which they are, or make foretold what was not."""
-    cost = 0.0
+    cost, paid_off = 0.0, True
     for i in range(_ROUNDS):
         foretold = foretells(found)
+        if _hopeless(found, foretold, paid_off):
+            break
         tellers: list[Flags | None] = [] if foretold else [first_repetitions(found.engine)]
         if foretold or i == 0:
             tellers.append(None)  # all rows
@@ -138,10 +140,27 @@ def _with_unseen(
         again = next(better, None)
         if again is None:
             break
+        gain = again[0].explanations[0].log_weight - found.explanations[0].log_weight
         found, cost = again
+        paid_off = gain > _PAYS * cost
         if foretold:
             break
     return found
+
+
+def _hopeless(found: SearchResult, foretold: bool, paid_off: bool) -> bool:
+    """Whether no load between readings is looked for: nothing is left that one could explain, or it
+    is the law that is wrong, by how likely a gap without a law is, or as it leaves more than noise
+    with loads that hardly pay what they cost."""
+    first = found.explanations[0]
+    if foretold:
+        return first.eta == 0
+    left = first.eta > found.engine.bench.noise.stated
+    return found.unknown > first.log_weight + _WRONG or (left and not paid_off)
+
+
+_WRONG = 500.0  # nats by which a gap without a law is likelier than the best one
+_PAYS = 2.0  # times their cost
 
 
 def _explains_more(

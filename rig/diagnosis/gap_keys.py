@@ -125,6 +125,7 @@ _COEFFICIENTS: dict[str, Key] = {
     "over_nominal": Key("compliance_over_nominal"),
     "depth": Key("depth_mm", factor=MM_PER_M),
     "tangent": Key("tangent"),
+    "as_read": Key("share_of_force_across_as_read"),
     "gives": Key("compliance_across_over_nominal_times_tangent"),
     "offset": Key("offset_mm", factor=MM_PER_M),
     "angle": Key("angle_rad"),
@@ -252,7 +253,8 @@ GRAMMAR: dict[str, Grammar] = {
         ("about",),
         tuple(("tangent", ("along", "across", *more)) for more in (*_GOES, ("run",)))
         + tuple(("tangent", ("along", "across", *more, "pose")) for more in _GOES[:3])
-        + tuple(("gives", ("along", *more)) for more in (*_GOES, ("across",))),
+        + tuple(("gives", ("along", *more)) for more in (*_GOES, ("across",)))
+        + (("as_read", ()),),
     ),
     "pose_error": Grammar(
         ("about", "about_offset", "about_angles", "about_turn", "reads", "only_in", "unread"),

@@ -187,6 +187,7 @@ class _Walk:
 _CHANCE = {
     "place": "where the joint lies in its play while unloaded",
     "rest": "where it lies in its play when it is sent to a pose",
+    "as_read": "the force across as it was read",
 }
 _OF_RUNS = "what single runs had to themselves"
 _OF_SESSIONS = {

@@ -10,12 +10,18 @@ import pytest
 from identification.gap import diagnose
 
 FIRST = "first repetitions"
+NOISE = 2e-6  # m
 
 
-def result(log_weight: float, foretells: bool) -> Any:
-    """What a search found, as far as rounds look at it."""
-    best = SimpleNamespace(log_weight=log_weight)
-    return SimpleNamespace(explanations=[best], engine=None, foretells=foretells)
+def result(
+    log_weight: float, foretells: bool, left: float = 0.5 * NOISE, lawless: float = -100.0
+) -> Any:
+    """What a search found, as far as rounds look at it; left: m, by the best explanation; lawless:
+    log weight of a gap without a law."""
+    best = SimpleNamespace(log_weight=log_weight, eta=left)
+    bench = SimpleNamespace(noise=SimpleNamespace(stated=NOISE))
+    engine = SimpleNamespace(bench=bench)
+    return SimpleNamespace(explanations=[best], engine=engine, foretells=foretells, unknown=lawless)
 
 
 class Rounds:
@@ -68,3 +74,35 @@ def test_rounds_end(monkeypatch: pytest.MonkeyPatch) -> None:
     rounds = Rounds(monkeypatch, *ever_better)
     assert diagnose._with_unseen(result(0.0, False), (), ()) is ever_better[2]
     assert rounds.asked == [FIRST] * 3
+
+
+def test_what_leaves_nothing_and_is_foretold_asks_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    rounds = Rounds(monkeypatch)
+    start = result(0.0, True, left=0.0)
+    assert diagnose._with_unseen(start, (), ()) is start
+    assert rounds.asked == []
+    rounds = Rounds(monkeypatch, result(-1.0, False), result(-1.0, False))
+    start = result(0.0, False, left=0.0)  # it foretells nothing: a hand may be why
+    assert diagnose._with_unseen(start, (), ()) is start
+    assert rounds.asked == [FIRST, None]
+
+
+def test_no_hand_is_looked_for_where_the_law_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    rounds = Rounds(monkeypatch, result(300.0, True), result(300.0, True))
+    far = result(0.0, False, lawless=600.0)
+    assert diagnose._with_unseen(far, (), ()) is far
+    assert rounds.asked == []
+    near = result(0.0, False, lawless=200.0)
+    assert diagnose._with_unseen(near, (), ()).explanations[0].log_weight == 300.0
+    assert rounds.asked[0] == FIRST
+
+
+@pytest.mark.parametrize(
+    ("gain", "left", "rounds"), [(15.0, NOISE / 2, 2), (15.0, 3 * NOISE, 1), (25.0, 3 * NOISE, 2)]
+)
+def test_loads_that_hardly_pay_beside_more_than_noise_ask_for_no_more(
+    monkeypatch: pytest.MonkeyPatch, gain: float, left: float, rounds: int
+) -> None:
+    made = Rounds(monkeypatch, result(gain, False, left), result(gain, False, left))
+    assert diagnose._with_unseen(result(0.0, False), (), ()).explanations[0].log_weight == gain
+    assert made.asked == [FIRST] * rounds

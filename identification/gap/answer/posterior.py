@@ -284,7 +284,7 @@ def _open(engine: Engine, variants: Sequence[Variant], chosen: Explanation, inde
     out = []
     for shape, more in shapes:
         parts = (*chosen.parts[:index], shape, *chosen.parts[index + 1 :])
-        each = _levels(engine, replace(chosen, parts=parts), np.log(shape.variant.prior) + more)
+        each = _levels(engine, replace(chosen, parts=parts), shape.variant.log_prior + more)
         level = max(range(len(each)), key=lambda i: each[i][1])
         charge = max(SAME_JOINT * _crowds(shape, rest), _petty(engine, parts, level))
         out += sorted(((e, weight - charge) for e, weight in each), key=lambda e: -e[1])

@@ -3,7 +3,9 @@
 The target then moves along the direction by `F n' C t`; recorded force components grow with the
 load by t F. Screws on floors and stands are set up within 1 to 15 degrees, and in every pose anew;
 what is askew may be the tool, which turns with the pose. A tip that drags on its
-pad pulls the other way when the load goes back; one that is let go between runs finds another seat.
+pad pulls the other way when the load goes back; one that is let go between runs finds another seat;
+an eccentric one pulls another way with every part of a turn. Where the force across was recorded,
+it needs no law on an arm: it is taken as it was read, at the price of so many free loads.
 Nothing is known of how a rig without an arm gives way across: it is spoken of only where the force
 across was recorded, and what was moves the target by about as much as the same force along.
 
@@ -21,11 +23,12 @@ import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.data import Setup
+from identification.gap.evidence.compare import log_mean
 from identification.gap.laws.closer import best_about_springs
 from identification.gap.laws.effect import Effect
-from identification.gap.laws.interval import Coefficients, Parameter
+from identification.gap.laws.interval import Coefficients, Parameter, normal
 from identification.gap.laws.law import Law, Laws, Term, along, in_pose, triple
-from identification.gap.model.base import MOST_CROSSTALK
+from identification.gap.model.base import CROSSTALK, MOST_CROSSTALK
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
 
@@ -35,7 +38,7 @@ SCALES = (0.03, 0.1, 0.25)
 DRAGS = (0.05, 0.12, 0.25)
 _BETWEEN_RUNS = 0.5  # of the sd of the mean: by how much tips of single runs differ
 _ALL = 0.6  # prior of all directions
-_DRAGS_SHARE = _EACH_RUN_SHARE = _EACH_POSE_SHARE = 0.2  # of the prior
+_DRAGS_SHARE = _EACH_RUN_SHARE = _EACH_POSE_SHARE = _AS_READ_SHARE = 0.2  # of the prior
 
 
 class Shape(NamedTuple):
@@ -82,7 +85,7 @@ def variants(bench: Bench) -> list[Variant]:
         for names, label, prior in groups
         for each in zip(*(known[name] for name in names), strict=True)
     ]
-    out += _each_pose(bench)
+    out += [*_each_pose(bench), *_as_it_was_read(bench)]
     return out + _each_run(bench, {name: kinds[0] for name, kinds in known.items()})
 
 
@@ -147,6 +150,31 @@ def _each_run(bench: Bench, straight: dict[str, _Known]) -> list[Variant]:
             tips=runs.tolist(),
         )
     ]
+
+
+def _as_it_was_read(bench: Bench) -> list[Variant]:
+    """The force across as the dynamometer read it, whatever law it may go by: on an arm, of which
+    it is known how it gives way to that. That it took the readings for the loads costs what a load
+    of its own for every hold and tangent would, as large as misalignments are."""
+    read = bench.rows.tangential
+    if not bench.data.arm or read is None:
+        return []
+    held = bench.rows.hold_means(read).T.reshape(-1)
+    usual = np.tile(np.abs(bench.rows.hold_means(bench.load)), 2)
+    noise = bench.sigma[bench.layout.tangential]
+    spread = 1 + np.multiply.outer(np.array(SCALES), usual / noise) ** 2
+    each = -(np.log(spread) + (held / noise) ** 2 / spread).sum(axis=1) / 2
+    column = bench.add(_pulled_as_read(bench))
+    cost, share = -log_mean(each.tolist()), _ALL * _AS_READ_SHARE
+    return [variant(WORD, "as it was read", [column], (1.0,), prior=share, cost=cost, as_read=True)]
+
+
+def _pulled_as_read(bench: Bench) -> Array:
+    """Stacked column of the force across as it was read; of none where it was not."""
+    out, read = np.zeros(bench.layout.size), bench.rows.tangential
+    for load, share in zip(() if read is None else read.T, np.eye(2), strict=False):
+        out += pulled(bench, load, np.tile(share, (len(bench.data.setups), 1)))
+    return out
 
 
 def _as_read(bench: Bench, direction: str) -> list[Array]:
@@ -256,9 +284,12 @@ def gives(bench: Bench, load: Array) -> Array:
     return bench.outside_column(bench.stated_slope * load)
 
 
-def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
-    """Tangents at the largest load, as it was come to; of single runs their mean."""
+def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Parameter]:
+    """Tangents at the largest load, as it was come to; of single runs their mean; of the force
+    across as it was read that of the readings themselves."""
     info = v.info
+    if v.info.get("as_read"):
+        return _tangents_read(bench)
     names, count = list(info["directions"]), len(info["shapes"][0])
     if "poses" in info:
         names = [f"{name}_{pose}" for name, pose in zip(names, info["poses"], strict=True)]
@@ -271,11 +302,33 @@ def _parameters(_: Bench, v: Variant, found: Coefficients) -> dict[str, Paramete
     }
 
 
+def _tangents_read(bench: Bench) -> dict[str, Parameter]:
+    """Of every direction, in the mean over the holds of its largest load; with the noise of these,
+    and what the sensors pass from one axis to another."""
+    out, rows = {}, bench.rows
+    for name in dict.fromkeys(s.direction for s in bench.data.setups):
+        mine = _pushed(bench, name)
+        top = mine & (np.abs(bench.load) > _NEAR_TOP * np.abs(bench.load[mine]).max())
+        if rows.tangential is None or not top.any():
+            continue
+        shares = rows.tangential[top] / bench.load[top, None]
+        noise = bench.noise.force / float(np.abs(bench.load[top]).mean())
+        square = noise**2 / float(rows.weight[top].sum()) + CROSSTALK**2
+        for k, tangent in enumerate(np.average(shares, axis=0, weights=rows.weight[top])):
+            out[f"tangent_{name}_{k + 1}"] = normal(float(tangent), square, "1")
+    return out
+
+
+_NEAR_TOP = 0.9  # of the largest load
+
+
 def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: shares of the load across the nominal direction, as vectors in the base frame; and
     shares reached at a load, in proportion to it or to a power of it; shares that drag; what a rig
     without an arm gives way under these; shares of single runs (numbers from 0) beyond these, with
     what it gives way under the force across as it was read."""
+    if v.info.get("as_read"):
+        return Law({}, (Term("as_read"),)), np.ones(1)
     names = v.info["directions"]
     of_pose = v.info.get("poses", [""] * len(names))
     setups = [
@@ -307,6 +360,9 @@ def _columns(bench: Bench, law: Law) -> list[Array]:
     """Deflections under the load across, for setups of the same direction and sense."""
     out = []
     for t in law.terms:
+        if t.coefficient == "as_read":
+            out.append(_pulled_as_read(bench))
+            continue
         drags, at = t.shape.get("drags_over", 0.0), t.shape.get("at_load")
         power = 1.0 if at is None else 0.0 if drags else 1 + t.shape.get("power", 1.0)
         how = Shape(power, at or 1.0, drags)
@@ -351,7 +407,7 @@ def _sideways(setup: Setup, k: int) -> dict[str, Any]:
     return {"along": triple(setup.unit_vector), "across": triple(setup.tangents[k])}
 
 
-_LAWS = Laws(_describe, _columns, through_springs=True)
+_LAWS = Laws(_describe, _columns, through_springs=True, of_session=("as_read",))
 EFFECT = Effect(
     WORD,
     variants=variants,

@@ -77,7 +77,7 @@ def _arranged(engine: Engine, variants: tuple[Variant, ...]) -> _Arranged:
             batches.append((places, [_stack(engine, tuple(f), k) for f in words.values()]))
         engine.arranged[variants] = _Arranged(
             np.array([number[v] for v in like], dtype=np.intp),
-            np.array([log(v.prior) for v in variants]),
+            np.array([v.log_prior for v in variants]),
             np.log([len(v.scales) for v in number]),
             batches,
         )

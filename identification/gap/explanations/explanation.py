@@ -140,8 +140,8 @@ def explain(
     engine: Engine, parts: tuple[Part, ...], log_evidence: float, taken: float | None = None
 ) -> Explanation:
     """The explanation with its prior; too small a part is charged as what it is: freedom of the
-    larger one's law. taken: mean square (m^2) that the evidence of the last part took all others to
-    have; left out: there are none."""
+    larger one's law. log_evidence: of the last part beside the others. taken: mean square (m^2)
+    that this took all others to have; left out: there are none."""
     levels = engine.levels
     bases = log_joints(engine, parts)
     likeliest = int(bases.argmax())
@@ -165,6 +165,7 @@ def explain(
     weight -= below_noise(engine, parts, sizes) + unbent_curves(engine, parts, sizes)
     weight -= within_stated(engine, parts, sizes)
     if len(parts) > 1:
+        weight -= sum(p.variant.cost for p in parts[:-1])
         weight -= minor_parts(engine, parts, sizes) + cancelling(engine, parts, sizes, each)
         weight += signs_kept(levels[best], parts)
     return Explanation(

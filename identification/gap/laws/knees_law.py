@@ -71,9 +71,7 @@ def states_of(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
     out = dict(zip(_with(law, "threshold")[0], states(bench, flow).T, strict=True))
     growing, beyond = _with(law, "grows_beyond")
     out |= zip(growing, grown(load, beyond, flow.fresh).T, strict=True)
-    for i in _with(law, "after")[0]:
-        out[i] = _back(bench, law.terms[i], load, flow.fresh)
-    return out
+    return out | _back(bench, law, load, flow.fresh)
 
 
 def flow_of(bench: Bench, law: Law, load: Array) -> Flow:
@@ -97,12 +95,17 @@ def _with(law: Law, shape: str) -> tuple[list[int], Array]:
     return mine, np.array([law.terms[i].shape[shape] for i in mine])
 
 
-def _back(bench: Bench, term: Term, load: Array, fresh: Flags) -> Array:
-    """(n,) state of what flows back, or ratchets, once `after` was passed."""
-    peak = flow_back.peaks(load, term.shape["after"], fresh)
-    if "ratchets_beyond" in term.shape:
-        state = flow_back.RATCHETS * flow_back.ratchet(load, term.shape["ratchets_beyond"], fresh)
-    else:
-        state = bench.plays(load, np.array([term.shape["returns_beyond"]]), fresh)[:, 0]
-        state = state - state[peak]
-    return np.where(peak >= 0, state, 0.0)
+def _back(bench: Bench, law: Law, load: Array, fresh: Flags) -> dict[int, Array]:
+    """Number of the term -> state (n,) of what flows back, or ratchets, once `after` was passed."""
+    number, after = _with(law, "after")
+    if not number:
+        return {}
+    returning, returns = _with(law, "returns_beyond")
+    out = dict(zip(returning, bench.plays(load, returns, fresh).T, strict=True))
+    for i, beyond in zip(*_with(law, "ratchets_beyond"), strict=True):
+        out[i] = flow_back.RATCHETS * flow_back.ratchet(load, beyond, fresh)
+    peaks = {a: flow_back.peaks(load, a, fresh) for a in set(after.tolist())}
+    for i, a in zip(number, after.tolist(), strict=True):
+        start = out[i][peaks[a]] if i in returning else 0.0
+        out[i] = np.where(peaks[a] >= 0, out[i] - start, 0.0)
+    return out

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import log
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,8 @@ class Variant:
     """columns: k indices of the pool. root (k, k): prior covariance of the coefficients is
     `s^2 root root^T` for s out of `scales`, all equally likely. positive (k,): weights of a sum of
     coefficients that physics wants above `least` (None: either sign). each (k,): coefficients that
-    may not be negative either. within (m, k): weights of further sums above zero. info: the facts
+    may not be negative either. within (m, k): weights of further sums above zero. cost: nats less
+    of evidence, for what its columns took from the data themselves. info: the facts
     of its law, by names that its own effect gives them and reports from; what others may ask of a
     variant are the properties below.
     """
@@ -42,6 +44,12 @@ class Variant:
     within: Array = field(default_factory=lambda: np.zeros((0, 0)))
     info: Mapping[str, Any] = field(default_factory=dict)
     prior: float = 1.0
+    cost: float = 0.0
+
+    @property
+    def log_prior(self) -> float:
+        """Of its shape, less the cost."""
+        return log(self.prior) - self.cost
 
     @property
     def joint(self) -> int | None:
@@ -177,6 +185,7 @@ class Variant:
             self.within.tobytes(),
             self.other_springs,
             self.slips_on,
+            self.cost,
         )
 
 
@@ -192,6 +201,7 @@ def variant(
     least: float = 0.0,
     each: bool | tuple[bool, ...] = False,
     within: Array | None = None,
+    cost: float = 0.0,
     **info: Any,
 ) -> Variant:
     """A variant with independent unit priors unless `root` says otherwise. each: all coefficients,
@@ -209,6 +219,7 @@ def variant(
         np.zeros((0, k)) if within is None else within,
         info,
         prior,
+        cost,
     )
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from identification.gap.effects import EFFECTS
-from identification.gap.evidence.compare import Scored, by_word, marginal
+from identification.gap.evidence.compare import Scored, by_word, closest, marginal
 from identification.gap.evidence.engine import Engine
-from identification.gap.laws.closer import WINDOW, Word, scored_beside
+from identification.gap.laws.closer import WINDOW, Word, scored_beside, shows
 from identification.gap.model.variants import Variant
 
 _LEADING = 6  # words that are refined
@@ -18,6 +18,7 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
     least = engine.levels[0].log_base + WINDOW
     ranked = sorted(families, key=lambda w: -marginal(families[w]))[:_LEADING]
     beside = _beside_first(engine, families, ranked)
+    clean = closest(families[ranked[0]]).level == 0  # the leading word leaves nothing but noise
     out: list[Variant] = []
     for name in ranked:
         finer = EFFECTS[name].finer
@@ -26,7 +27,9 @@ def refine(engine: Engine, singles: list[Scored]) -> list[Variant]:
         alone, others = (
             sorted(s, key=lambda s: -s.log_evidence) for s in (families[name], beside.get(name, []))
         )
-        out += finer(Word(engine, families, ranked, alone, others))
+        word = Word(engine, families, ranked, alone, others)
+        if not clean or name == ranked[0] or shows(word):
+            out += finer(word)
     return out
 
 

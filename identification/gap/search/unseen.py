@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from math import lgamma, log
+from math import inf, lgamma, log
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +44,7 @@ _SWEEPS = 3
 _LOADED = 0.02  # of the largest load: less is none, and nobody pulls at a contact
 _OFF = 2.0  # standard deviations: holds that are nearer to what is expected are left alone
 _PLAIN = 10.0  # nats that are gained at least, for all to be searched once more
+_PAYS, _LEAST = 0.7, -inf  # of their cost, beside what leaves more than noise; and beside noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,32 +81,35 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     each = ((e, _Paths(engine, e, at, told_by)) for e in islice(able, _LOOKED_AT))
     remember = ((first - e.log_weight, path) for e, path in each if path.remembers)
     if told_by is None:
-        return _of_the_first(remember)
-    several = islice(remember, 1 if len(at) * rows.n > _FEW else _SEVERAL)
-    return _of_the_one_ahead(several, rows.overshoot)
+        paths = islice(remember, 1)
+    else:
+        paths = islice(remember, 1 if len(at) * rows.n > _FEW else _SEVERAL)
+    noise = found.explanations[0].eta <= engine.bench.noise.stated  # no more is left
+    asked = ((behind, *path.found()) for behind, path in paths)
+    pays = _LEAST if noise else _PAYS
+    worth = ((gain - behind, more) for behind, more, gain in asked if _worth(more, gain, pays))
+    if told_by is None:
+        return next((more for ahead, more in worth if ahead > _PLAIN), None)
+    return _of_the_one_ahead(worth, rows.overshoot)
 
 
-def _of_the_first(paths: Iterator[tuple[float, _Paths]]) -> Unseen | None:
-    """What the first of paths asks for, which lie so many nats behind the best explanation; None
-    where it does not get ahead of that by a few nats."""
-    for behind, path in paths:
-        more, gain = path.found()
-        return more if gain > behind + _PLAIN else None
-    return None
+def _worth(more: Unseen, gain: float, pays: float) -> bool:
+    """Whether a path may be one: not with loads before most of the holds, which is a law that is
+    wrong, nor where they gain (nats) too small a share of what they cost."""
+    return more.count <= _SELDOM * more.of and gain > pays * more.cost
 
 
-def _of_the_one_ahead(paths: Iterator[tuple[float, _Paths]], known: Array) -> Unseen | None:
-    """What the one of paths asks for beyond what is known (n,) of overshoot that is ahead after
-    it; the first that asks for any where none gains what that costs."""
+def _of_the_one_ahead(paths: Iterator[tuple[float, Unseen]], known: Array) -> Unseen | None:
+    """Of what paths ask for beyond what is known (n,) of overshoot, that which gains most (nats)
+    beyond what it costs; the first where none gains that."""
     first: Unseen | None = None
-    best, ahead = first, 0.0
-    for behind, path in paths:
-        more, gain = path.found()
-        if more.count > _SELDOM * more.of or np.array_equal(more.overshoot, known):
+    best, most = first, 0.0
+    for ahead, more in paths:
+        if np.array_equal(more.overshoot, known):
             continue
         first = first or more
-        if gain - behind - more.cost > ahead:
-            best, ahead = more, gain - behind - more.cost
+        if ahead - more.cost > most:
+            best, most = more, ahead - more.cost
     return best or first
 
 
