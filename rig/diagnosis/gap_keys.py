@@ -72,7 +72,6 @@ CONSTANTS: dict[str, Key] = {
     "about_offset": Key("about_offset_m", "vector"),
     "about_angles": Key("about_angles_rad", "six"),
     "about_turn": Key("about_turn_rad", "vector"),
-    "reads": Key("displacement_read_over_true", "positive"),
     "only_in": Key("only_in_pose", "text"),
     "unread": Key("joint_readings_do_not_show_it", "flag"),
     "quantity": Key("quantity", "text", options=("force", "displacement")),
@@ -257,7 +256,7 @@ GRAMMAR: dict[str, Grammar] = {
         + (("as_read", ()),),
     ),
     "pose_error": Grammar(
-        ("about", "about_offset", "about_angles", "about_turn", "reads", "only_in", "unread"),
+        ("about", "about_offset", "about_angles", "about_turn", "only_in", "unread"),
         (("offset", ("axis",)), ("angle", ("joint",)), ("turn", ("axis",))),
     ),
     "force_scale": Grammar(("about",), (("gain", ()), ("gain", ("at_load",)), ("gain", ("axis",)))),

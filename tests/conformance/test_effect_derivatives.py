@@ -111,14 +111,6 @@ def test_derivative_of_where_a_joint_stands(joint: int) -> None:
     agree(bench, columns[:, v.columns[joint]], derivative(bench, "turn", np.eye(6)[joint]))
 
 
-def test_a_displacement_that_reads_high_reads_all_of_a_wrong_pose_high() -> None:
-    bench, _, _ = pick("pose_error", "tool 10 mm")
-    at, n = (np.zeros(3), np.zeros(6), bench.compliance), bench.rows.n
-    plainly, high = (np.array(secants(bench, *at, reads=r)) for r in (1.0, 1.02))
-    np.testing.assert_allclose(high[:, :n], 1.02 * plainly[:, :n])
-    np.testing.assert_array_equal(high[:, n:], plainly[:, n:])
-
-
 def flange() -> Array:
     """Axes of the flange in the base frame, as columns: the tool's offset counts along them."""
     pose = load_robot("ur10e").fk(np.array(Q["P1"]), tool_offset(np.array(TCP_MM) * 1e-3))

@@ -16,23 +16,23 @@ Source: wrong tool frames, zero positions of joints, bases and rigs lined up by 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.evidence.compare import by_word, closest, marginal, score
+from identification.gap.evidence.compare import Scored, by_word, closest, marginal, score
+from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import conditioned
-from identification.gap.laws.closer import Estimate, Word, estimate, evidence
+from identification.gap.laws.closer import Word, estimate, evidence
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term, triple
+from identification.gap.laws.leverage import Leverage, Place, changes, changes_turned
 from identification.gap.model.bench import Bench
-from identification.gap.model.variants import Variant, variant
+from identification.gap.model.variants import CALLED, Variant, variant
 from identification.gap.words import LINEAR
 
 WORD = "pose_error"
@@ -89,42 +89,47 @@ def _in_one_pose(bench: Bench) -> list[Variant]:
 
 
 BOTH = ((0.04, 0.02), (0.15, 0.05))
-_STEPS = 5
+_PLACED = 3.0  # prior of what is where it was found
+_LEVELS = 3  # of imperfection, at most, that a place is fitted with
 
 
-def refined(bench: Bench, found: Variant, estimate: Callable[[Variant], Estimate]) -> list[Variant]:
-    """The same with secants through where arm and tool are found to be, and with the springs and
-    the gain of the displacement that go with it, in a few steps. estimate: what is most probable
-    with a variant."""
-    kind, out = str(found.info["kind"]), found
-    offset, angles, turn = np.zeros(3), np.zeros(bench.data.joints), np.zeros(3)
-    for _ in range(_STEPS):
-        w, softer, reads = estimate(out)
-        offset = w[:3] if kind in ("tool", "both") else offset
-        angles = w[-len(angles) :] if kind in ("joints", "both") else angles
-        turn = w if kind == "base" else turn
-        compliance = bench.compliance * np.maximum(1 + softer, 0.1)
-        if kind == "base":
-            used = turned(bench, turn, compliance, reads)
-        else:
-            pose, read = str(found.info["pose"]), bool(found.info["read"])
-            columns = secants(bench, offset, angles, compliance, reads, pose, read)
-            used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
-        out = replace(
-            found,
-            label=f"{found.label}, as they are",
-            prior=3.0,
-            columns=tuple(bench.add(c) for c in used),
-            info={
-                **found.info,
-                "offset_m": offset,
-                "angles_rad": angles,
-                "turn_rad": turn,
-                "compliance": compliance,
-                "reads": reads,
-            },
-        )
-    return [out]
+def refined(engine: Engine, found: Variant, beside: tuple[Part, ...] = ()) -> Variant:
+    """The same with secants through where arm and tool are found to be beside other parts, and with
+    the springs that go with it."""
+    kind, pose, read = _kind(found)
+    leverage, out, done = Leverage(engine, kind, found.root, pose, read), found, list[float]()
+    for _ in range(_LEVELS):
+        at = estimate(engine, out, beside)
+        if at.eta in done:
+            break
+        done.append(at.eta)
+        place = leverage.place(at.eta, beside, at.coefficients)
+        out = _through(engine.bench, found, place)
+    return out
+
+
+def _through(bench: Bench, found: Variant, at: Place) -> Variant:
+    """The variant with secants through a place."""
+    kind, pose, read = _kind(found)
+    compliance = bench.compliance * np.maximum(1 + at.softer, 0.1)
+    if kind == "base":
+        used = turned(bench, at.turn, compliance)
+    else:
+        columns = secants(bench, at.offset, at.angles, compliance, pose, read)
+        used = {"tool": columns[:3], "joints": columns[3:], "both": columns}[kind]
+    return replace(
+        found,
+        label=f"{found.info[CALLED]}, as they are",
+        prior=_PLACED if found.label == found.info[CALLED] else found.prior,
+        columns=tuple(bench.add(c) for c in used),
+        info={
+            **found.info,
+            "offset_m": at.offset,
+            "angles_rad": at.angles,
+            "turn_rad": at.turn,
+            "compliance": compliance,
+        },
+    )
 
 
 def secants(
@@ -132,7 +137,6 @@ def secants(
     offset: Array,
     angles: Array,
     compliance: Array,
-    reads: float = 1.0,
     pose: str = "",
     read: bool = True,
 ) -> list[Array]:
@@ -144,18 +148,13 @@ def secants(
     readings see c dl F, and, if they are read so, where the joints stand.
     """
     setups, m = bench.data.setups, bench.data.joints
-    shifts, turns = [], []  # per setup: change of the levers per metre (m, 3) and radian (m, m)
-    for s in setups:
-        across = np.broadcast_to(s.turned_offset, (m, m, 3))
-        bent = np.broadcast_to(s.bent_lever, (m, m, m))
-        shifts.append(s.offset_lever + 0.5 * np.einsum("ijk,j->ik", across, angles))
-        turns.append(s.turned_lever + 0.5 * (bent @ angles + across @ offset))
+    shifts, turns = zip(*(changes(s, offset, angles) for s in setups), strict=True)
     there = np.array([pose in ("", s.pose) for s in setups], dtype=float)[bench.rows.setup]
     moved, swung = (
         np.stack(each)[bench.rows.setup] * there[:, None, None] for each in (shifts, turns)
     )
-    middle = reads * (bench.lever + 0.5 * (moved @ offset + swung @ angles))
-    out = _through(bench, np.concatenate([moved, swung], axis=2), middle, compliance)
+    middle = bench.lever + 0.5 * (moved @ offset + swung @ angles)
+    out = _moved(bench, np.concatenate([moved, swung], axis=2), middle, compliance)
     for j in range(m):
         q = np.zeros((bench.rows.n, m))
         q[:, j] = there * read
@@ -163,25 +162,15 @@ def secants(
     return out
 
 
-def turned(bench: Bench, turn: Array, compliance: Array, reads: float = 1.0) -> list[Array]:
+def turned(bench: Bench, turn: Array, compliance: Array) -> list[Array]:
     """Stacked columns per radian by which the base stands turned about x, y, z (3), exact where it
-    is: turn (3,) rad, `exp(-E) - 1 = -(1 - a E + b E^2) E` (Rodrigues); compliance, reads: as
-    there."""
-    E = np.cross(turn, np.eye(3)).T  # E v = turn x v
-    angle = max(float(np.linalg.norm(turn)), 1e-4)
-    a, b = (1 - np.cos(angle)) / angle**2, (1 - np.sin(angle) / angle) / angle**2
-    series = np.eye(3) - a * E + b * E @ E
-    changes = []
-    for s in bench.data.setups:
-        axes = np.vstack([s.unit_vector, s.tangents])
-        seen = -axes @ series @ np.cross(np.eye(3), s.unit_vector).T
-        changes.append(np.vstack([s.lever, s.tangent_lever]).T @ seen)  # (m, 3)
-    swung = np.stack(changes)[bench.rows.setup]
-    middle = reads * (bench.lever + 0.5 * swung @ turn)
-    return _through(bench, swung, middle, compliance)
+    is: turn (3,) rad; compliance: as there."""
+    swung = np.stack([changes_turned(s, turn) for s in bench.data.setups])[bench.rows.setup]
+    middle = bench.lever + 0.5 * swung @ turn
+    return _moved(bench, swung, middle, compliance)
 
 
-def _through(bench: Bench, change: Array, middle: Array, compliance: Array) -> list[Array]:
+def _moved(bench: Bench, change: Array, middle: Array, compliance: Array) -> list[Array]:
     """Stacked columns of changes (n, m, k) of the levers, about levers (n, m) in the middle."""
     elastic = compliance * bench.load[:, None]
     return [
@@ -210,10 +199,10 @@ def _variant(
         positive=False,
         prior=prior,
         kind=kind,
+        called=label,
         offset_m=np.zeros(3),
         angles_rad=np.zeros(6),
         turn_rad=np.zeros(3),
-        reads=1.0,
         pose=pose,
         read=read,
     )
@@ -249,7 +238,6 @@ def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
         "about_offset": triple(v.info["offset_m"]),
         "about_angles": tuple(float(a) for a in v.info["angles_rad"]),
         "about_turn": triple(v.info["turn_rad"]),
-        "reads": float(v.info["reads"]),
     }
     if v.info["pose"]:
         about["only_in"] = str(v.info["pose"])
@@ -261,12 +249,11 @@ def _describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
 def _columns(bench: Bench, law: Law) -> list[Array]:
     """Change of the levers, by the secants of the library."""
     at = np.array(law.constants["about_offset"]), np.array(law.constants["about_angles"])
-    reads = float(law.constants["reads"])
     pose = str(law.constants.get("only_in", ""))
     read = not law.constants.get("unread", False)
-    moved = secants(bench, *at, bench.compliance, reads, pose, read)
+    moved = secants(bench, *at, bench.compliance, pose, read)
     about = np.array(law.constants.get("about_turn", (0.0, 0.0, 0.0)))
-    turns = turned(bench, about, bench.compliance, reads)
+    turns = turned(bench, about, bench.compliance)
     columns = {"offset": moved[:3], "angle": moved[3:], "turn": turns}
     return [
         columns[t.coefficient][
@@ -280,24 +267,37 @@ def _look_closer(word: Word) -> list[Variant]:
     """Where arm and tool are, by what is found alone and beside the words that explain most of
     what that leaves: a second effect must not decide it."""
     engine, kinds = word.engine, {_kind(s.variant): s for s in reversed(word.alone)}
-    finer = [
-        f
-        for s in kinds.values()
-        for f in refined(engine.bench, s.variant, partial(estimate, engine))
-    ]
+    finer = [refined(engine, s.variant) for s in kinds.values()]
     best = max(score(engine, engine.levels, finer), key=evidence)
     levels, energy = conditioned(engine, (Part(best.variant, best.scale),))
     names = ({*word.ranked} | LINEAR) & word.families.keys() - {best.variant.word}
     others = [s.variant for w in sorted(names) for s in word.families[w]]
     found = by_word(score(engine, levels, others, energy))
+    start = kinds[_kind(best.variant)].variant
     for name in sorted(found, key=lambda w: -marginal(found[w]))[:_BESIDE]:
-        other = closest(found[name])
-        there = partial(estimate, engine, beside=(Part(other.variant, other.scale),))
-        again = refined(engine.bench, kinds[_kind(best.variant)].variant, there)
-        finer += [v.known_by(f" beside {name}", beside=name) for v in again]
+        again = _beside(engine, start, word.families[name], found[name])
+        finer.append(again.known_by(f" beside {name}", beside=name))
     same = [v for v in finer if _kind(v) == _kind(best.variant)]
     share = best.variant.prior / len(same)  # they are one place, looked at more than once
     return [replace(v, prior=share) if v in same else v for v in finer]
+
+
+def _beside(engine: Engine, start: Variant, family: list[Scored], first: list[Scored]) -> Variant:
+    """Where it is beside the shapes of a word, the closest of which is another one beside that
+    than beside the place (first) that was found alone."""
+    out, last, scored = start, None, first
+    for _ in range(_TURNS):
+        top = closest(scored)
+        if top.variant is last:
+            break
+        last = top.variant
+        out = refined(engine, start, (Part(top.variant, top.scale),))
+        levels, energy = conditioned(engine, (Part(out, out.scales[0]),))
+        scored = score(engine, levels, [s.variant for s in family], energy)
+    return out
+
+
+_TURNS = 3
 
 
 def _kind(variant: Variant) -> tuple[str, str, bool]:

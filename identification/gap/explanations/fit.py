@@ -71,9 +71,9 @@ def fit(
     effects = block([p.root for p in explanation.parts])
     root = block([np.diag(engine.base.sd), effects])
     X = np.hstack([engine.base.columns * engine.base.sd, E @ effects])
-    weighed = _weighed(engine, X, explanation.eta, keep)
-    moment = weighed.T @ engine.target
-    both = np.linalg.solve(weighed.T @ X + np.eye(len(root)), np.column_stack([root.T, moment]))
+    precise = weighed(engine, X, explanation.eta, keep)
+    moment = precise.T @ engine.target
+    both = np.linalg.solve(precise.T @ X + np.eye(len(root)), np.column_stack([root.T, moment]))
     solved, pulls = both[:, :-1], both[:, -1]  # H^-1 root'
     covariance = root @ solved
     beta = root @ pulls
@@ -81,7 +81,7 @@ def fit(
     w = beta[kb:]
     if alike and explanation.eta > 0:
         errs = _imperfection_columns(engine, explanation.parts, w, explanation.eta)
-        moves = solved.T @ (weighed.T @ errs)
+        moves = solved.T @ (precise.T @ errs)
         covariance = covariance + moves @ moves.T
     effect = (E @ w)[:n]
     return Fit(
@@ -127,8 +127,10 @@ def _phases(engine: Engine) -> list[Flags]:
     return [m for m in masks if m.any()]
 
 
-def _weighed(engine: Engine, X: Array, eta: float, keep: Flags) -> Array:
-    """`V^-1 X` (size, k), zero in rows that are not kept; V: noise of rows, and common to holds."""
+def weighed(engine: Engine, X: Array, eta: float, keep: Flags | None = None) -> Array:
+    """`V^-1 X` (size, k), zero in rows that are not kept (size,), by default none; V: noise of
+    rows, and common to holds, with an imperfection of eta m."""
+    keep = np.ones(engine.bench.layout.size, dtype=bool) if keep is None else keep
     key, common = _holds(engine, eta)
     sigma2 = engine.sigma**2
     n = engine.bench.rows.n

@@ -75,9 +75,8 @@ def _in_one_more(
 def polished(engine: Engine, variants: Sequence[Variant], start: Explanation) -> Explanation:
     """Lets every part choose its variant anew, the others given."""
     best = start
-    for index in range(len(start.parts)):
-        rest = tuple(p for i, p in enumerate(best.parts) if i != index)
-        word = best.parts[index].word
+    for part in start.parts:  # by itself: what is better may stand in another order
+        rest, word = tuple(p for p in best.parts if p is not part), part.word
         levels, energy = up_to_likeliest(engine, rest)
         scored = score(engine, levels, family_of(variants, word, rest), energy)
         top = closest(scored)

@@ -112,11 +112,11 @@ def evidence(scored: Scored) -> float:
 
 class Estimate(NamedTuple):
     """Most probable coefficients (k,) of a variant, relative changes (m,) of the springs'
-    compliance, and what the displacement reads, over what it is."""
+    compliance, and the imperfection (m) they are likeliest with."""
 
     coefficients: Array
     softer: Array
-    reads: float
+    eta: float
 
 
 def estimate(engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()) -> Estimate:
@@ -127,8 +127,7 @@ def estimate(engine: Engine, variant: Variant, beside: tuple[Part, ...] = ()) ->
     fitted = fit(engine, Explanation((Part(variant, 1.0), *beside), 0.0, eta, (0.0,), 0.0))
     found = dict(zip(engine.base.names, fitted.base.tolist(), strict=True))
     softer = np.array([found.get(f"spring{j + 1}", 0.0) for j in range(engine.bench.data.joints)])
-    reads = 1 + found.get("gain displacement", 0.0)
-    return Estimate(fitted.of(0)[0], softer, reads)
+    return Estimate(fitted.of(0)[0], softer, float(eta))
 
 
 def places(

@@ -25,6 +25,7 @@ from identification.gap.model.noise import UNSURE
 from identification.gap.model.variants import Variant
 from identification.gap.search.readings import reading_all
 from identification.gap.search.shares import measured
+from identification.gap.search.standing import standing_anew
 from identification.gap.words import MECHANISMS, NAMELESS, SPRINGS
 
 # Share of the prior of `none` on more noise than was stated: of instruments that are known, or to a
@@ -186,8 +187,8 @@ def _deepen(
         if words not in pool or pool[words].log_weight < explanation.log_weight:
             pool[words] = explanation
     ranked = sorted(grown.values(), key=lambda e: -e.log_weight)
-    first = [_reading_all(engine, variants, polished(engine, variants, e)) for e in ranked[:kept]]
-    others = [_reading_all(engine, variants, e) for e in ranked[kept:_READING]]
+    first = [_anew(engine, variants, polished(engine, variants, e)) for e in ranked[:kept]]
+    others = [_anew(engine, variants, e) for e in ranked[kept:_READING]]
     for explanation in [*first, *others]:
         if pool[explanation.words].log_weight < explanation.log_weight:
             pool[explanation.words] = explanation
@@ -247,10 +248,10 @@ def _elsewhere(start: Explanation, scored: list[Scored]) -> list[Scored]:
     return apart if len(apart) < len(scored) else []
 
 
-def _reading_all(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
-    """With instruments that read what its other effects do, if that is better; the variants then
-    hold these as well."""
-    fresh = reading_all(engine, start)
+def _anew(engine: Engine, variants: list[Variant], start: Explanation) -> Explanation:
+    """With instruments that read what its other effects do, and a pose that is looked at beside
+    them, if that is better; the variants then hold these as well."""
+    fresh = reading_all(engine, start) + standing_anew(engine, start)
     if not fresh:
         return start
     variants += fresh

@@ -1,0 +1,36 @@
+"""Where arm and tool stand, looked at anew beside the other effects of an explanation: these must
+not decide it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.effects import pose_error
+from identification.gap.evidence.engine import Engine
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.model.variants import Variant
+
+_MOVED = 1e-4  # m or rad: by less it stands where it stood
+
+
+def standing_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
+    """Variants of a wrong pose in an explanation, through where it is found to be beside the other
+    effects; the pool of the bench holds their columns afterwards. None where it is alone, or stands
+    there already."""
+    out = []
+    for part in explanation.parts:
+        rest = tuple(p for p in explanation.parts if p is not part)
+        if part.word != pose_error.WORD or not rest:
+            continue
+        found = pose_error.refined(engine, part.variant, rest)
+        if _moved(part.variant, found):
+            names = " and ".join(sorted({p.word for p in rest}))
+            out.append(found.known_by(f" beside {names}", beside=names))
+    return out
+
+
+def _moved(before: Variant, now: Variant) -> bool:
+    return any(
+        np.abs(np.subtract(before.info[key], now.info[key])).max() > _MOVED
+        for key in ("offset_m", "angles_rad", "turn_rad")
+    )
