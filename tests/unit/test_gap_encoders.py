@@ -13,7 +13,7 @@ from bench.nested_cases import case_data
 from identification.arrays import Array
 from identification.gap.data import GapData
 from identification.gap.evidence.engine import Engine
-from identification.gap.explanations.fit import _weighed
+from identification.gap.explanations.fit import weighed
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.encoders import Readings, _beyond, readings_of
@@ -162,5 +162,5 @@ def test_fits_weigh_them_with_the_same_covariance(eta: float) -> None:
     joint = np.repeat(np.arange(6), len(bench.rows.edges))
     alike = (run[:, None] == run) & (joint[:, None] == joint)
     V = RUN**2 * alike + np.diag(bench.sigma[q] ** 2 + (eta / 0.3) ** 2)
-    found = _weighed(engine, X, eta, np.ones(size, dtype=bool))
+    found = weighed(engine, X, eta, np.ones(size, dtype=bool))
     np.testing.assert_allclose(found[q], np.linalg.solve(V, X[q]), rtol=1e-9)

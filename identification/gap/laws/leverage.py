@@ -25,7 +25,7 @@ from identification.gap.explanations.fit import weighed
 from identification.gap.model.variants import block
 
 _SOFTEST = 0.1  # of the simulated compliance, at least
-_EVALUATIONS = 2000
+_EVALUATIONS = 50  # at most: what is not found by then is not the place of anything
 
 
 @dataclass(frozen=True, eq=False)
