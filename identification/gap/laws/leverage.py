@@ -68,7 +68,7 @@ class Leverage:
     def __init__(self, engine: Engine, kind: str, root: Array, pose: str, read: bool) -> None:
         """root (k, k), diagonal: standard deviations of offset, angles or turn; pose: the only one
         in which it is so, "" all; read: whether readings show where joints stand."""
-        self._engine, self._kind, self._sizes, self._read = engine, kind, np.diag(root), read
+        self._engine, self._kind, self._sizes = engine, kind, np.diag(root)
         bench = self._bench = engine.bench
         self._there = [pose in ("", s.pose) for s in bench.data.setups]
         rows = bench.rows
