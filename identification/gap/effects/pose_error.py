@@ -132,6 +132,17 @@ def _through(bench: Bench, found: Variant, at: Place) -> Variant:
     )
 
 
+def elsewhere(before: Variant, now: Variant) -> bool:
+    """Whether two variants of this word stand at different places."""
+    return any(
+        np.abs(np.subtract(before.info[key], now.info[key])).max() > _ELSEWHERE
+        for key in ("offset_m", "angles_rad", "turn_rad")
+    )
+
+
+_ELSEWHERE = 1e-4  # m or rad
+
+
 def secants(
     bench: Bench,
     offset: Array,

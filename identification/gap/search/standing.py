@@ -3,14 +3,10 @@ not decide it."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from identification.gap.effects import pose_error
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.model.variants import Variant
-
-_MOVED = 1e-4  # m or rad: by less it stands where it stood
 
 
 def standing_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
@@ -23,14 +19,7 @@ def standing_anew(engine: Engine, explanation: Explanation) -> list[Variant]:
         if part.word != pose_error.WORD or not rest:
             continue
         found = pose_error.refined(engine, part.variant, rest)
-        if _moved(part.variant, found):
+        if pose_error.elsewhere(part.variant, found):
             names = " and ".join(sorted({p.word for p in rest}))
             out.append(found.known_by(f" beside {names}", beside=names))
     return out
-
-
-def _moved(before: Variant, now: Variant) -> bool:
-    return any(
-        np.abs(np.subtract(before.info[key], now.info[key])).max() > _MOVED
-        for key in ("offset_m", "angles_rad", "turn_rad")
-    )
