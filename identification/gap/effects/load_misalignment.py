@@ -288,7 +288,7 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
     """Tangents at the largest load, as it was come to; of single runs their mean; of the force
     across as it was read that of the readings themselves."""
     info = v.info
-    if v.info.get("as_read"):
+    if info.get("as_read"):
         return _tangents_read(bench)
     names, count = list(info["directions"]), len(info["shapes"][0])
     if "poses" in info:

@@ -30,7 +30,7 @@ from identification.gap.laws.closer import Word, estimate, evidence
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.law import Law, Laws, Term, triple
-from identification.gap.laws.leverage import Leverage, Place, changes, changes_turned
+from identification.gap.laws.leverage import SOFTEST, Leverage, Place, changes, changes_turned
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import CALLED, Variant, variant
 from identification.gap.words import LINEAR
@@ -111,7 +111,7 @@ def refined(engine: Engine, found: Variant, beside: tuple[Part, ...] = ()) -> Va
 def _through(bench: Bench, found: Variant, at: Place) -> Variant:
     """The variant with secants through a place."""
     kind, pose, read = _kind(found)
-    compliance = bench.compliance * np.maximum(1 + at.softer, 0.1)
+    compliance = bench.compliance * np.maximum(1 + at.softer, SOFTEST)
     if kind == "base":
         used = turned(bench, at.turn, compliance)
     else:

@@ -24,7 +24,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.fit import weighed
 from identification.gap.model.variants import block
 
-_SOFTEST = 0.1  # of the simulated compliance, at least
+SOFTEST = 0.1  # of the simulated compliance, at least
 _EVALUATIONS = 50  # at most: what is not found by then is not the place of anything
 
 
@@ -135,7 +135,7 @@ class Leverage:
         """Coefficients of the columns: motion of the target per newton and setup; turn of every
         joint per newton, and where it stands."""
         at = self._at(x)
-        compliance = self._bench.compliance * np.maximum(1 + at.softer, _SOFTEST)
+        compliance = self._bench.compliance * np.maximum(1 + at.softer, SOFTEST)
         moves, turns = [], []
         for setup, there in zip(self._bench.data.setups, self._there, strict=True):
             if self._kind == "base":

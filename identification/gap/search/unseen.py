@@ -80,13 +80,9 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     able = (e for e in found.explanations if told_by is None or len(e.parts) <= _PARTS)
     each = ((e, _Paths(engine, e, at, told_by)) for e in islice(able, _LOOKED_AT))
     remember = ((first - e.log_weight, path) for e, path in each if path.remembers)
-    if told_by is None:
-        paths = islice(remember, 1)
-    else:
-        paths = islice(remember, 1 if len(at) * rows.n > _FEW else _SEVERAL)
-    noise = found.explanations[0].eta <= engine.bench.noise.stated  # no more is left
-    asked = ((behind, *path.found()) for behind, path in paths)
-    pays = _LEAST if noise else _PAYS
+    many = 1 if told_by is None or len(at) * rows.n > _FEW else _SEVERAL
+    asked = ((behind, *path.found()) for behind, path in islice(remember, many))
+    pays = _LEAST if found.explanations[0].eta <= engine.bench.noise.stated else _PAYS
     worth = ((gain - behind, more) for behind, more, gain in asked if _worth(more, gain, pays))
     if told_by is None:
         return next((more for ahead, more in worth if ahead > _PLAIN), None)
