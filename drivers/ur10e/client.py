@@ -128,9 +128,7 @@ class Ur10e:
         self._process = ReceiveProcess(options, self._on_message, self._on_end)
 
     def _await_first(self, deadline: float) -> None:
-        while not self._last:
-            if self._stream.failure is not None:
-                raise self._stream.failure
+        while self._stream.latest() is None:
             if time.monotonic() > deadline:
                 fault = (
                     f"the client library delivered no values from {self._settings.host} "

@@ -20,6 +20,7 @@ import pytest
 from drivers.clock import Clock
 from drivers.errors import BadReply, CannotConnect, NotWanted, SafetyStop
 from drivers.interfaces import Robot
+from drivers.stream import Block, Stream
 from drivers.ur10e.client import Ur10e
 from drivers.ur10e.dashboard import Dashboard
 from drivers.ur10e.emulator import Ur10eEmulator
@@ -65,6 +66,22 @@ def rig() -> Iterator[Rig]:
 
         yield make
     assert children_running("drivers.ur10e.child") == []
+
+
+def test_a_first_block_that_is_handed_over_late_is_waited_for(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # a busy machine may stop the thread between taking the values in and handing the block over
+    def late(
+        stream: Stream, block: Block, put: Callable[[Stream, Block], None] = Stream.put
+    ) -> None:
+        time.sleep(0.3)
+        put(stream, block)
+
+    monkeypatch.setattr(Stream, "put", late)
+    _, _, robot = rig()
+    robot.open()
+    assert robot.latest().count > 0
 
 
 def test_every_column_arrives_in_its_place(rig: Rig) -> None:
