@@ -183,6 +183,7 @@ def test_where_no_component_tells_it_no_run_has_an_angle_of_its_own(components: 
     assert ("each run" in labels) == components
 
 
+@pytest.mark.slow
 def test_a_vibration_that_the_samples_follow_is_no_noise_of_the_instruments() -> None:
     """Once in 6.3 samples, twice what is stated; white noise of the same size is none."""
     swinging = noisy(RICH)
@@ -250,6 +251,7 @@ def about_base(rows: pd.DataFrame, axis: Array, turns: Callable[[Array], Array])
     return out
 
 
+@pytest.mark.slow
 def test_a_plate_that_its_bolts_let_go_of() -> None:
     """Three times as soft about y once the moment has lifted it off, at 30 Nm."""
 
@@ -265,6 +267,7 @@ def test_a_plate_that_its_bolts_let_go_of() -> None:
     assert found.after < 1.1 * found.noise
 
 
+@pytest.mark.slow
 def test_a_base_that_slips_about_an_axis_between_those_of_the_base() -> None:
     """Of x and y, at 18 Nm, and comes back over a play of as much."""
     between = np.array([1.0, 1.0, 0.0]) / 2**0.5

@@ -77,6 +77,7 @@ def test_the_same_trouble_in_every_direction_is_one_word(part: Part, word: str) 
     assert found.after < 1.2 * found.noise
 
 
+@pytest.mark.slow
 def test_two_troubles_in_two_directions_are_two() -> None:
     found = diagnosed(x=softens, y=creeps)
     assert {e.name: set(e.places) for e in found.effects} == {

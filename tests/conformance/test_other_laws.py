@@ -40,6 +40,7 @@ def jumps(rows: pd.DataFrame, lever: Array) -> tuple[Array, Array]:
     return np.zeros(len(rows)), deflection
 
 
+@pytest.mark.slow
 def test_a_play_in_which_friction_holds_the_joint() -> None:
     found = explained(measured(jumps, "rich"))
     assert [e.name for e in found.effects] == ["joint_backlash"]

@@ -65,6 +65,7 @@ def test_width_of_a_play_whatever_its_ends_are(shape: Place) -> None:
     assert found.after < 1.1 * found.noise
 
 
+@pytest.mark.slow
 def test_a_play_that_only_a_wrong_laser_saw() -> None:
     found = diagnosed(lambda x: np.tanh(x / 0.5) / 2, replace(RICH, readings=False), gain=0.8)
     gained = {"joint_backlash", "force_scale"}, {"joint_backlash", "displacement_scale"}

@@ -59,6 +59,7 @@ def measured(tilt: float) -> GapData:
     return gap_data(imported(noisy(design, law), meta(design)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [0.0, pytest.param(TILT, marks=pytest.mark.slow)])
 def test_a_tool_elsewhere_is_found_beside_what_else_is_off(tilt: float) -> None:
     result = explained(measured(tilt))

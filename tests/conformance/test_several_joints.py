@@ -55,6 +55,7 @@ def result(*joints: int) -> GapResult:
     return explained(rubbing(*joints))
 
 
+@pytest.mark.slow
 def test_friction_in_two_joints_is_one_word_in_both() -> None:
     found = result(0, 2)
     assert found.verdict == "joint_hysteresis"

@@ -114,6 +114,7 @@ def shown_late(rows: pd.DataFrame) -> pd.DataFrame:
     return out
 
 
+@pytest.mark.slow
 def test_a_force_that_lags_on_springs_that_are_off_has_one_lag_in_all_directions() -> None:
     """Each direction shows as much of it as its own springs give way."""
     design = DESIGNS["medium"]

@@ -156,6 +156,7 @@ def askew() -> GapData:
     return with_effect("rich", v, columns[:, list(v.columns)] @ w, bench)
 
 
+@pytest.mark.slow
 def test_what_no_word_may_name_is_not_put_down_to_the_instruments() -> None:
     """A force across that only cross-talk of many standard deviations would make."""
     found = explained(askew())

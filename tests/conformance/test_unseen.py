@@ -147,6 +147,7 @@ def test_levels_that_scatter_are_no_hand() -> None:
     assert diagnosed(scattering).verdict == "unknown"
 
 
+@pytest.mark.slow
 def test_a_load_that_only_one_repetition_went_to_is_none_of_the_law_s() -> None:
     """Fitted to all, a rounded knee bends once more at the largest load, and foretells nothing."""
     found = diagnosed(pushed_on, TWICE)

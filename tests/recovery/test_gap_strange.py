@@ -131,6 +131,7 @@ FINE = Design(repetitions=2, steps=16, hold=1, readings=False)
 LONG_HOLDS = Design(repetitions=2, steps=7, hold=6, readings=False)
 
 
+@pytest.mark.slow
 def test_a_wave_over_the_stroke_is_found_with_its_length() -> None:
     result = explained(measured(wave(0.31e-3), design=FINE))
     assert result.verdict == "unknown"
@@ -141,6 +142,7 @@ def test_a_wave_over_the_stroke_is_found_with_its_length() -> None:
     assert "mm long" in looks_like(like)
 
 
+@pytest.mark.slow
 def test_a_hum_that_is_read_once_a_second_is_a_fast_swing() -> None:
     """Hardly slower than the readings of a hold, which scatter by it."""
     like = explained(measured(swing(5.26), 8e-6, LONG_HOLDS)).looks_like
@@ -195,6 +197,7 @@ def test_nothing_strange_is_seen_in_noise(name: str) -> None:
     assert result.looks_like is None
 
 
+@pytest.mark.slow
 def test_slow_swings_are_left_to_the_drifts() -> None:
     """One and a half periods over the session are a warm-up and what follows."""
     span = float(np.ptp(measured(slopes).session))

@@ -39,11 +39,14 @@ def _sh(folder: Path, words: str, **environment: str) -> tuple[int, str, str]:
             {"m", "p", "j", "u"},
         ),
         ("simulate F1.yaml p.yaml --csv n/c --json n/j", {"c", "j"}),
-        (
+        pytest.param(
             "analyze a.h5 --figures n --json n/j",
             {"j", "curve.png", "curve.svg", "pointwise.png", "pointwise.svg"},
+            marks=pytest.mark.slow,
         ),
-        ("report a.h5 --no-gap -o n/r.html --json n/j", {"r.html", "j"}),
+        pytest.param(
+            "report a.h5 --no-gap -o n/r.html --json n/j", {"r.html", "j"}, marks=pytest.mark.slow
+        ),
         pytest.param(
             "diagnose a.h5 --write-model n/m --next n/p --json n/j",
             {"m", "p", "j"},

@@ -110,6 +110,7 @@ def test_a_hook_that_is_hung_anew_for_every_run_moves_the_target_as_it_pulls_acr
     assert not np.any(rows_of(plain, hung.word, law)[:, given])
 
 
+@pytest.mark.slow
 def test_without_components_nobody_speaks_of_a_slant() -> None:
     mute = replace(pressed(0.15), tangential=None)
     assert library(make_bench(mute), ["load_misalignment"]) == []

@@ -33,6 +33,7 @@ def askew() -> GapData:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "recorded",
     slow_ones(("both", "force across", "joint readings"), ("force across", "joint readings")),

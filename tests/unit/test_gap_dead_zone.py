@@ -114,6 +114,7 @@ def test_a_part_that_rubs_in_its_play_meets_the_same_ends_there_and_back() -> No
     assert has_dead_zone(u, rubbing, PLAINLY)
 
 
+@pytest.mark.slow
 def test_stages_of_a_gear_that_rubs_are_a_curve_beside_friction() -> None:
     """The friction's other way back is no part of what the curve is judged by."""
     swings = [s * top for top in (0.4, 0.7, 1.0) for s in (1, -1, 1, -1)]
@@ -125,6 +126,7 @@ def test_stages_of_a_gear_that_rubs_are_a_curve_beside_friction() -> None:
     assert {e.name for e in found.effects} == {CURVE, FRICTION}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["contact", pytest.param("cubic", marks=pytest.mark.slow)])
 def test_a_curve_that_a_soft_play_beside_a_curve_meets_better_is_a_curve(name: str) -> None:
     u = to_and_fro(cycles=8)
@@ -147,6 +149,7 @@ def test_a_step_with_no_reading_inside_is_a_play_however_steep_it_looks() -> Non
     assert found.verdict == PLAY
 
 
+@pytest.mark.slow
 def test_a_play_that_friction_holds_is_no_curve_however_soft_its_mean_looks() -> None:
     """Its two ways lie apart by the friction, and no curve goes either of them."""
     force = to_and_fro()

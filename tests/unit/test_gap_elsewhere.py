@@ -87,6 +87,7 @@ def test_the_axis_of_a_slip_is_looked_for_between_the_depths_of_the_grid() -> No
     assert_lawful(bench, [best.variant])
 
 
+@pytest.mark.slow
 def test_a_stand_that_slides_is_told_by_the_force_across() -> None:
     """Beyond 0.6 of the largest push along x, in both poses; until the arm goes to another one."""
     data = linear("rich")

@@ -123,6 +123,7 @@ def test_of_few_elements_nothing_is_said() -> None:
     assert _beyond(9 * rng.normal(size=(8, 3)), np.zeros(8, int), np.ones(8), np.ones(3)) == 0
 
 
+@pytest.mark.slow
 def test_readings_that_are_off_together_are_no_effect() -> None:
     """Thousands of readings tell that to many standard deviations, in every joint."""
     found = explained(off(plain(1), RUN, SETUP, 1))

@@ -238,6 +238,7 @@ def test_emulated_data_are_marked_in_every_figure_and_table(drawn: list[Path]) -
             assert path.read_text().startswith(f"# {BANNER}\n"), path.name
 
 
+@pytest.mark.slow
 def test_imposed_displacement_is_told_in_newtons(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, cycles(), IMPOSED)
     p = points(found.result)

@@ -313,6 +313,7 @@ def test_what_is_held_at_no_displacement_may_still_be_pulled() -> None:
     assert "force_drift" not in [e.name for e in found.effects]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("times", "verdict"), [(1.0, "none"), (6.0, "unknown")])
 def test_an_arm_whose_readings_scatter_more_than_stated_is_not_explained(
     times: float, verdict: str

@@ -85,6 +85,7 @@ def test_what_is_far_off_is_found_where_it_is(label: str, at: tuple[Array, Array
     np.testing.assert_allclose(softer[:5], SOFTER[:5], atol=0.03)
 
 
+@pytest.mark.slow
 def test_a_tool_far_off_asks_nothing_of_springs_and_gains() -> None:
     found = explained(standing(TOOL, JOINT * 0, TURN * 0))
     assert found.verdict == "pose_error"

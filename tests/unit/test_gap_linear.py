@@ -216,6 +216,7 @@ def test_the_gap_lies_in_no_joint_that_does_next_to_nothing(bench: Bench) -> Non
         assert _joints(engine, fit, [1.0, size]) == tuple(v.info["joint"] + 1 for v in joints)
 
 
+@pytest.mark.slow
 def test_gains_of_a_bench_may_be_far_off_where_little_is_stated_of_them() -> None:
     """An excitation that was set wrong: the spring is known to a hundredth."""
     step = np.tile(np.concatenate([np.arange(9), np.arange(7, 0, -1)]), 3)

@@ -179,6 +179,7 @@ def strained(uncertainty_N: float) -> GapData:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("uncertainty_N", [pytest.param(30.0, marks=pytest.mark.slow), 100.0])
 def test_metal_in_growing_cycles_yields_and_does_not_creep(uncertainty_N: float) -> None:
     """Though creep beside the yield explains its changing loops, or foretells as much alone, and a
@@ -203,6 +204,7 @@ def ratcheted(
     return np.array(out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mean", [15.0, 0.0])
 def test_what_yields_walks_the_way_of_a_mean_load_and_heat_walks_without(mean: float) -> None:
     cycles, n = 10, 600

@@ -67,6 +67,7 @@ def cycling(of_force: Array | float = 0.0, of_laser: Array | float = 0.0) -> Gap
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drifts", ["force", "displacement"])
 def test_a_force_that_turns_where_it_turned_before_hardly_drifts(drifts: str) -> None:
     path = np.sin(np.linspace(0, 2.5, 1600))
@@ -99,6 +100,7 @@ def pulled(knee: bool, imposed: str = "force") -> GapData:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("imposed", ["force", pytest.param("displacement", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("knee", [True, False])
 def test_what_holds_half_the_load_before_it_gives_way_has_yielded(knee: bool, imposed: str) -> None:

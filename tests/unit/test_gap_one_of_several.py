@@ -55,6 +55,7 @@ def test_means_of_holds_count_every_sample() -> None:
     np.testing.assert_array_equal(rows.hold_means(rows.time), rows.hold_means(values)[:, 1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("poses", "read", "label"),
     [pytest.param("P2", True, "in P2", marks=pytest.mark.slow), ("P1 P2", False, "unread")],
@@ -88,6 +89,7 @@ def test_an_arm_that_stands_elsewhere_in_one_pose_or_unread(
     assert f"{label}, as they are" in found.effects[0].label
 
 
+@pytest.mark.slow
 def test_faces_that_seat_one_after_the_other() -> None:
     data = linear("rich")
     push = np.abs(data.force)
@@ -180,6 +182,7 @@ def test_a_joint_that_hardens_alike_in_both_senses_gives_way_to_new_loads_only()
     assert found.where.joints == (1,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("encoder", "seen"),
     [pytest.param("output", False, marks=pytest.mark.slow), ("motor", False), ("", None)],

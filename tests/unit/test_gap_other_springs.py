@@ -43,6 +43,7 @@ def test_curves_of_the_stated_springs_leave_these() -> None:
     np.testing.assert_allclose(found, data.compliance, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_simulator_a_little_off_is_no_gain_of_the_laser() -> None:
     """Its joints turn as its arm gives way: were they those of the stated springs, readings and
     laser would disagree by what the simulators do."""

@@ -87,6 +87,7 @@ def test_what_the_model_has_is_no_gap(folder: Path, found: Diagnosis) -> None:
     assert "`mounting`" not in without.to_text()
 
 
+@pytest.mark.slow
 def test_a_model_and_its_curves_are_one_simulation(folder: Path, found: Diagnosis) -> None:
     text = (PROTOCOLS / "paper_xy.yaml").read_text("utf-8")
     pose = text[text.index("poses:") : text.index("joint_encoder:")]

@@ -97,6 +97,7 @@ def test_procedures_that_take_too_long_to_be_worth_more_are_left_out() -> None:
     assert not _settled([quick, *poor], 1000.0)
 
 
+@pytest.mark.slow
 def test_nothing_keeps_a_diagnosis_alive() -> None:
     """A campaign makes hundreds of them in one process, of a hundred megabytes each."""
     found = diagnose_gap(arm_data())

@@ -208,6 +208,7 @@ def test_a_dent_that_stays_yields_from_the_first_load_on(left: float, under_a_ti
         assert explained(data).verdict == "joint_yield"
 
 
+@pytest.mark.slow
 def test_cracks_under_an_imposed_stroke_are_no_drift_of_it() -> None:
     """Every cycle goes further, and what has cracked stays soft: a machine that moves by its own
     reading would take a drift back."""
@@ -305,6 +306,7 @@ def test_what_is_met_after_an_approach_may_seat_itself() -> None:
     assert found.after < 1.5 * found.noise
 
 
+@pytest.mark.slow
 def test_a_tip_that_is_lifted_off_and_comes_back_meets_a_contact() -> None:
     """The stroke passes zero, the force keeps its sign: there is nothing to pull at."""
     u = 1e-4 * np.concatenate([np.linspace(0, -4, 60), np.linspace(-4, 2, 90)])

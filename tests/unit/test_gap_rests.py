@@ -41,6 +41,7 @@ def levels(scatter: float, readings: int = 3, seed: int = 0) -> GapData:
     return bench_data(given.pop("force"), moved, **given)
 
 
+@pytest.mark.slow
 def test_what_is_stated_of_a_bench_is_known_to_a_factor_of_two() -> None:
     within = [explained(levels(1.8, seed=seed)).verdict for seed in range(6)]
     beyond = [explained(levels(6.0, seed=seed)).verdict for seed in range(2)]

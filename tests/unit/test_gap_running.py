@@ -173,6 +173,7 @@ def test_one_reading_that_jumps_is_no_fall_of_the_force() -> None:
         assert (bench.course.fall > _FALL) == falls
 
 
+@pytest.mark.slow
 def test_a_curve_off_its_zero_that_comes_again_is_elastic() -> None:
     """A pin that bears at one side before it does at the other, moved to and fro."""
     t = np.arange(400.0)
@@ -521,6 +522,7 @@ def test_a_force_that_runs_through_zero_under_one_step_runs(creeps: float) -> No
     assert is_continuous(held, hold_ids(held)) is (creeps > 0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imposed", "told"), [("displacement", "it may pass 1"), ("force", "1: nothing moves before")]
 )

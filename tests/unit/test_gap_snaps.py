@@ -80,6 +80,7 @@ def test_a_force_that_is_driven_is_let_go_by_who_drives_it() -> None:
     assert let_go(few) is None
 
 
+@pytest.mark.slow
 def test_no_law_explains_what_sticks_and_slips() -> None:
     found = explained(stroke(*saw(0.4), imposed="displacement"))
     assert found.verdict == "unknown"

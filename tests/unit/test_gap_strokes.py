@@ -23,6 +23,7 @@ from tests.unit.test_gap_running import SPRING, running, triangle, words_with
 from tests.unit.test_gap_weights import hanging
 
 
+@pytest.mark.slow
 def test_friction_whose_first_slope_was_simulated_is_friction() -> None:
     """Nothing but sliders, moved to and fro: all of the stiffness is theirs."""
     u = 1e-3 * np.sin(np.arange(500) / 20)

@@ -22,6 +22,7 @@ def counted(u: Array) -> Array:
     return np.asarray((u + noise + TURN / 2) % TURN - TURN / 2)
 
 
+@pytest.mark.slow
 def test_a_counter_that_wraps_is_told_and_nothing_explains_it() -> None:
     data = running(FORCE, counted(FORCE / SPRING), imposed="force")
     assert wraps(data) == pytest.approx(TURN, rel=0.05)

@@ -399,6 +399,7 @@ def test_the_page_is_written_whole(tmp_path: Path) -> None:
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv", ".h5", ".html", ".yaml"]
 
 
+@pytest.mark.slow
 def test_one_process_beside_gives_the_same_page(tmp_path: Path) -> None:
     path = rewritten(bench(tmp_path / "a.h5", meta=META + SIMULATION), origin="emulated")
     beside, alone = (make([path], Wishes(made="now", processes=n)) for n in (1, 0))
