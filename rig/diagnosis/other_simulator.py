@@ -94,6 +94,11 @@ def _check_names(file: CsvFile) -> None:
     missing = sorted(set(NUMBERS) - set(file.names))
     if missing:
         raise InputError(f"{file.path}: lacks the column {missing[0]}; wanted: {WANTED}.")
+    if "time_s" in file.names:
+        raise InputError(
+            f"{file.path}: these are readings in time (column time_s), as of a measurement, and no "
+            f"simulated curves; wanted: {WANTED}, from a simulator."
+        )
     if "branch" in file.names:
         raise InputError(
             f"{file.path}: these curves depend on the path that they were simulated along (branch, "

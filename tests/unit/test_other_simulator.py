@@ -139,6 +139,7 @@ def test_curves_over_less_than_a_third_of_the_range_are_refused(
     [
         ("direction,force_N", "lacks the column displacement_mm; wanted: pose, direction, force_N"),
         ("branch,force_N,displacement_mm", "these curves depend on the path"),
+        ("time_s,branch,force_N,displacement_mm", "these are readings in time"),
     ],
 )
 def test_a_header_that_does_not_fit(data: GapData, tmp_path: Path, head: str, says: str) -> None:
