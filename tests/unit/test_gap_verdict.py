@@ -17,6 +17,7 @@ from identification.gap.explanations.explanation import (
     Explanation,
     up_to_likeliest,
 )
+from identification.gap.explanations.priors import LOG_NONE
 from identification.gap.explanations.verdict import (
     BENCH_DOUBT,
     DOUBT,
@@ -512,6 +513,13 @@ def test_explanations_that_matter_are_taken_between_the_levels(
     more = {"joint_creep": 20.0, "joint_yield": 26.0}  # the first one's gain shuts out nobody
     found = _sharpened(engine, [*ranked, said((), (), -60.0)])
     assert [e.log_weight for e in found] == [22.0, 20.0, -50.0, -60.0]
+    asked.clear()  # nor does what was stated, which was looked at between the levels before
+    stated = engine.levels[0].log_base + LOG_NONE
+    near, far = (
+        said((part(w, [0]),), (1e-6,), stated - n) for w, n in zip(words[:2], (1, 50), strict=True)
+    )
+    _sharpened(engine, [said((), (), stated + 20.0), near, far])
+    assert asked == ["joint_creep"]
 
 
 def test_another_effect_is_looked_for_at_sizes_that_the_first_one_may_have() -> None:
