@@ -201,6 +201,7 @@ def foreign_page_cannot_abort(driver: Chrome, feed: Feed, measurement: Measureme
     assert measurement.running
 
 
+@pytest.mark.slow
 def test_seven_tabs_of_a_measurement_and_abort(driver: Chrome, measurement: Measurement) -> None:
     """A browser has six connections to a server, and every stream holds one."""
     page = Viewer(driver, measurement.link())

@@ -223,6 +223,7 @@ def test_what_drags_turns_over_its_reach_and_begins_anew_with_every_run() -> Non
     assert pull[bench.rows.branch == 2].min() == pytest.approx(-50.0)
 
 
+@pytest.mark.slow
 def test_feet_that_stiffen_under_a_large_moment() -> None:
     """Axes through the base; half as soft at 100 Nm."""
 

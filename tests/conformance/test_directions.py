@@ -61,6 +61,7 @@ def creeps(rows: pd.DataFrame, share: Array) -> Array:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("part", "word"),
     [

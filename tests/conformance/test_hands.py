@@ -60,6 +60,7 @@ def lagging(channel: str) -> GapData:
     return gap_data(imported(table, meta(design)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channel", [pytest.param("displacement", marks=pytest.mark.slow), "force"])
 def test_a_lag_is_one_however_the_hand_went(channel: str) -> None:
     found = explained(lagging(channel))

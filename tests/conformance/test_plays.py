@@ -55,6 +55,7 @@ def diagnosed(shape: Place, design: Design = RICH, gain: float = 1.0) -> GapResu
     return explained(gap_data(imported(table, meta(design))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [pytest.param(uneven, marks=pytest.mark.slow), rubbed])
 def test_width_of_a_play_whatever_its_ends_are(shape: Place) -> None:
     found = diagnosed(shape)

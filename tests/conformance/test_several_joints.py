@@ -80,6 +80,7 @@ def alone(found: GapResult) -> Explanation:
     return replace(explain(found.engine, (part,), 0.0), eta=1e-5, log_weight=-1e6)
 
 
+@pytest.mark.slow
 def test_only_joint_readings_tell_several_joints_apart() -> None:
     found = result(0, 2)
     variants = [p.variant for p in found.fit.parts]

@@ -360,6 +360,7 @@ def test_what_a_model_has_is_no_gap_of_the_next_measurement(tmp_path: Path) -> N
     assert diagnose(measure(third, jumped, seed=2), model=model).result.verdict == "zero_shift"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drop", [("q",), pytest.param((), marks=pytest.mark.slow)])
 def test_two_joints_that_creep_are_told_without_their_readings(
     tmp_path: Path, drop: tuple[str, ...]

@@ -98,6 +98,7 @@ def test_where_a_play_is_likelier_softer_ends_are_enough() -> None:
     assert not has_dead_zone(U, stages(3.0, 0.3)(U), SOMEHOW)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cycles", [4, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["wide", "teeth pressed as by Hertz"])
 def test_a_play_that_a_free_curve_meets_as_well_is_a_play(name: str, cycles: int) -> None:
@@ -165,6 +166,7 @@ def bolted() -> Bench:
     return a_bench(force, u, "displacement")
 
 
+@pytest.mark.slow
 def test_friction_beside_it_does_not_hide_a_play() -> None:
     """What goes two ways has a middle; from one side nothing is said."""
     result = explained(bolted().data)

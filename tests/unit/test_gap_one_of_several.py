@@ -24,6 +24,7 @@ def of_each(data: GapData, values: list[Array] | list[float]) -> Array:
     return np.asarray(values)[data.setup]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_gain_of_one_component_is_no_gain_of_all(axis: int) -> None:
     data = linear("rich")
@@ -99,6 +100,7 @@ def test_faces_that_seat_one_after_the_other() -> None:
     assert found.effects[0].parameters["depth"].value == pytest.approx(70e-3, rel=0.1)  # mm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("design", "until", "label"),
     [

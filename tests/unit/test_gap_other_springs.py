@@ -54,6 +54,7 @@ def test_a_simulator_a_little_off_is_no_gain_of_the_laser() -> None:
     assert result.verdict in ("none", "force_scale", "joint_stiffness_error")  # a common factor
 
 
+@pytest.mark.slow
 def test_a_simulator_with_soft_links_needs_no_joint_that_turns_further() -> None:
     """What its curves have beyond the joints is there, and no joint reading sees it."""
     data = linear("medium")

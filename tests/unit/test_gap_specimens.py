@@ -58,6 +58,7 @@ def yield_point() -> Array:
     return np.minimum(SPRING * U, up) - 0.1 * KNEE_N * falls + 40 * (1 - np.exp(-harder / 5e-3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffer", [8.0, 0.3])
 def test_a_knee_lies_where_the_specimens_own_spring_puts_it(stiffer: float) -> None:
     """Of one that is eight times as stiff as stated, and of one a third as stiff."""

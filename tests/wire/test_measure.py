@@ -89,6 +89,7 @@ def test_a_speed_that_no_machine_keeps_is_said_to_be_too_high(tmp_path: Path) ->
     assert noted == said[1:]
 
 
+@pytest.mark.slow
 def test_an_amplifier_without_a_line_is_switched_by_the_emulated_hand(tmp_path: Path) -> None:
     words = write_files(tmp_path, repetitions=1, reset_line="null")
     outcome = run_rig(*words, cwd=tmp_path)
@@ -161,7 +162,9 @@ def test_ctrl_c_asks_and_the_answer_stops_with_status_4(tmp_path: Path) -> None:
     assert dataset.rows >= 8
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)]
+)
 def test_being_ended_writes_the_file(tmp_path: Path, number: int) -> None:
     process = started(tmp_path, write_files(tmp_path))
     process.send_signal(number)
@@ -183,6 +186,7 @@ def test_a_terminal_that_is_closed_costs_no_data(tmp_path: Path) -> None:
     assert no_process_left(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_hangup_that_was_to_be_ignored_ends_nothing(tmp_path: Path) -> None:
     process = started(tmp_path, write_files(tmp_path), hangup=signal.SIG_IGN)  # as nohup does
     process.send_signal(signal.SIGHUP)
@@ -214,6 +218,7 @@ def test_a_full_disk_ends_with_what_to_do_and_resumes(tmp_path: Path) -> None:
     assert steps_of(load(tmp_path / "run.h5")) == STEPS[:3]
 
 
+@pytest.mark.slow
 def test_a_second_one_leaves_the_devices_of_the_first_alone(tmp_path: Path) -> None:
     process = started(tmp_path, write_files(tmp_path))
     second = run_rig("measure", "--resume", "run.h5", cwd=tmp_path)

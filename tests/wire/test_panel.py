@@ -393,6 +393,7 @@ def test_abort_from_the_page_while_a_question_is_open(
     assert not load(tmp_path / "run.h5").complete
 
 
+@pytest.mark.slow
 def test_a_failing_device_is_named_with_its_remedy(tmp_path: Path) -> None:
     fault = "[{device: laser, kind: silence, after_s: 60}]"
     running = Measurement(tmp_path, faults=fault)
@@ -447,6 +448,7 @@ def test_the_usual_port_gives_way_to_a_free_one() -> None:
             assert other.getsockname()[1] not in (0, taken)
 
 
+@pytest.mark.slow
 def test_a_resumed_run_shows_what_was_measured_before(tmp_path: Path) -> None:
     running = Measurement(tmp_path)
     running.answer("mount")
