@@ -119,6 +119,24 @@ def test_plays_that_rub_within_are_found(
     assert found.friction / TOP == pytest.approx(radius, rel=0.15)
 
 
+def carried(half: float, start: float, spring: float = 1.0) -> Bench:
+    """The far side stays where it is until the play was passed: backlash at every turn."""
+    x = to_and_fro()
+    return a_bench(spring * held(x - start, half), x, "displacement")
+
+
+@pytest.mark.parametrize(("half", "start"), [(0.05, 0.0), (0.2, 0.15), (0.6, -0.4)])
+@pytest.mark.parametrize("spring", [1.0, 0.15, 6.0])
+def test_a_play_that_friction_on_the_far_side_carries_along_is_found(
+    half: float, start: float, spring: float
+) -> None:
+    bench = carried(half, start, spring)
+    found = placed(bench, bench.torque[:, 0])
+    assert found is not None
+    assert found.kind == "carried"
+    assert found.zone / TOP == pytest.approx(half, rel=0.05)
+
+
 @pytest.mark.parametrize(("kind", "ends"), [("gap", 0.2), ("held", 0.1), ("dragged", 0.3)])
 def test_a_play_ends_where_friction_lets_it(kind: str, ends: float) -> None:
     """It has to be passed by 0.03 of the range, of 2 here, at either end."""
@@ -128,6 +146,12 @@ def test_a_play_ends_where_friction_lets_it(kind: str, ends: float) -> None:
             centre = side * (1.0 - 0.06 - ends - margin) * TOP
             found = Flanks(kind, centre, 0.2 * TOP, 0.01 * TOP, 0.1 * TOP)
             assert _crossed(load, found) == seen
+
+
+def test_a_play_that_is_carried_along_is_passed_anywhere() -> None:
+    load = TOP * to_and_fro()
+    for half, seen in ((0.93, True), (0.95, False)):
+        assert _crossed(load, Flanks("carried", 0.7 * TOP, half * TOP, half * TOP, TOP)) == seen
 
 
 def test_what_snaps_back_while_it_is_pushed_on_is_no_play() -> None:
@@ -182,8 +206,13 @@ def test_no_play_is_placed_where_there_is_none(bench: Bench) -> None:
 
 @pytest.mark.parametrize(
     "bench",
-    [gap(0.2, 0.1, rub=0.02), teeth(0.05, 0.1), dragged(0.15, 0.06, 0.1, "displacement")],
-    ids=["gap", "teeth", "dragged"],
+    [
+        gap(0.2, 0.1, rub=0.02),
+        carried(0.2, 0.1),
+        teeth(0.05, 0.1),
+        dragged(0.15, 0.06, 0.1, "displacement"),
+    ],
+    ids=["gap", "carried", "teeth", "dragged"],
 )
 def test_placed_plays_are_their_laws_and_explain_the_data(bench: Bench) -> None:
     fresh = replace(bench, columns=Pool())

@@ -13,7 +13,8 @@ reading is as commanded, another zero of that reading in every pose. The tool's 
 the torque at which the weights are balanced is sought among masses of 0 to 3 kg. Hoses and cables
 may preload a joint besides, by any torque that a load overcomes.
 Without an arm the crossing lies anywhere too, and an imposed displacement passes the play without
-force: such plays are placed by the data (flanks.py), with the springs that they bring.
+force, or with the force that friction holds: such plays are placed by the data (flanks.py), with
+the springs that they bring.
 
 Size: about 1 arcmin (3e-4 rad) with gears of ratio >= 80, ten times less and more allowed.
 Prior: width positive, sd out of SCALES, equally likely; zones and crossings equally likely.
@@ -263,7 +264,7 @@ def _placed(bench: Bench, j: int, flanks: Flanks) -> list[Variant]:
             columns[:k],
             scales,
             root=root[:k, :k],
-            positive=np.eye(k)[0] if flanks.kind == "gap" else less_rub(k),
+            positive=np.eye(k)[0] if flanks.kind in ("gap", "carried") else less_rub(k),
             prior=_PLACED_PRIOR,
             least=_least(bench, j, flanks.zone),
             each=(True, True),

@@ -1,9 +1,11 @@
 """Where a joint changes flanks: centre, width and corners of its play, placed by the data.
 
 A rig without an arm has no weight that says where a joint's torque passes zero, and neither channel
-need be zeroed: the crossing lies anywhere. Two laws, by what is driven:
+need be zeroed: the crossing lies anywhere. Laws, by what is driven:
 
 - displacement: no force inside the play, then springs, `dead_zone(u - centre)`;
+- displacement: friction on the far side holds the force until the play was passed, at every turn
+  and wherever that is, `play_w/2(u - start)` (backlash as of control engineering);
 - force: friction `r` holds the flank until the load has turned, then it changes within a zone `e`
   of no more than the friction, `tanh(play_r(F - centre) / e)`;
 - either: friction inside the play alone, which springs back or holds, and an end that friction does
@@ -34,6 +36,8 @@ _BEYOND = 0.03  # of the load's range: so far it has to go past either corner
 _BACK = 0.1  # of the slope of the springs
 _CENTRES = np.linspace(-0.25, 0.25, 9)  # starts, of the range
 _HALVES = (0.03, 0.07, 0.13, 0.2)
+_WIDER = (0.3, 0.4)  # of a play that is carried along
+_SIDES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of it, on which it may be at first
 _CORNERS = (0.02, 0.2)  # of the half width
 _FRICTIONS = (0.002, 0.005, 0.01, 0.02)  # radius inside the play, of the range
 _HELD = (0.003, 0.01, 0.03)  # radius that holds a flank, of the range
@@ -44,9 +48,10 @@ _DESCENTS, _HALVINGS, _ROUNDS = 3, 6, 4  # of the search; halvings of its steps;
 
 @dataclass(frozen=True)
 class Flanks:
-    """All in units of the load (Nm; N without an arm). kind: "gap", "held" or "dragged". zone: half
-    width of a gap, or within what load a held joint changes flanks; corner: over which the gap's
-    corners are round; friction: radius of the play operator beside it, or within it if dragged."""
+    """All in units of the load (Nm; N without an arm). kind: "gap", "carried", "held" or "dragged".
+    centre: of the play; of a carried one, where it was at first. zone: half width of a gap, or
+    within what load a held joint changes flanks; corner: over which the gap's corners are round;
+    friction: radius of the play operator beside it, or within it if dragged."""
 
     kind: str
     centre: float
@@ -57,8 +62,10 @@ class Flanks:
 
 def shapes(bench: Bench, load: Array, flanks: Flanks) -> tuple[Array, Array]:
     """Of a load (n,): place within the play (-1/2 .. 1/2), and the friction beside it."""
-    state = bench.plays(load - flanks.centre, np.array([flanks.friction]))[:, 0]
-    return _place(load, state, flanks), -(load - flanks.centre - state) / (2 * flanks.friction)
+    x = load - flanks.centre
+    rubbed, carried = bench.plays(x, np.array([flanks.friction, flanks.zone])).T
+    state = carried if flanks.kind == "carried" else rubbed
+    return _place(load, state, flanks), -(x - rubbed) / (2 * flanks.friction)
 
 
 def placed(bench: Bench, load: Array) -> Flanks | None:
@@ -77,6 +84,10 @@ def placed(bench: Bench, load: Array) -> Flanks | None:
     dragged, rest = _dragged(bench, load, span, HOPEFUL * plain)
     if rest < BETTER * left and not _snaps(bench, load, dragged):
         found, left = dragged, rest
+    if bench.imposed:
+        carried, rest = _carried(bench, load, span, HOPEFUL * plain)
+        if BETTER * rest < left:  # the simplest of them
+            found, left = carried, rest
     if left < ENOUGH * plain and _crossed(load, found) and _needed(bench, load, found, left):
         return found
     return None
@@ -99,14 +110,19 @@ def _crossed(load: Array, found: Flanks) -> bool:
         found.kind, found.zone + found.friction
     )
     margin = _BEYOND * float(np.ptp(load))
+    if found.kind == "carried":  # anywhere
+        return 2 * (found.zone + margin) < float(np.ptp(load))
     low, high = float(load.min()) + margin, float(load.max()) - margin
     return low < found.centre - inside and found.centre + inside < high
 
 
 def _needed(bench: Bench, load: Array, found: Flanks, left: float) -> bool:
     """Whether neither the friction beside the play does without it, nor a smooth curve: one of
-    eight freedoms may be as good as sharp corners where both come down to the noise."""
+    eight freedoms may be as good as sharp corners where both come down to the noise. What carries
+    the play along no friction beside it does: that goes the other way at a turn."""
     y, weight = bench.response, bench.rows.weight
+    if found.kind == "carried":
+        return left < _left(_powers(load), y, weight)
     rub = shapes(bench, load, found)[1]
     if left > ENOUGH_BESIDE * _left([load, rub], y, weight):
         return False
@@ -123,6 +139,8 @@ def _powers(load: Array) -> list[Array]:
 def _place(load: Array, state: Array, flanks: Flanks) -> Array:
     if flanks.kind == "held":
         return np.asarray(np.tanh(state / flanks.zone) / 2)
+    if flanks.kind == "carried":
+        return np.asarray((load - flanks.centre - state) / (2 * flanks.zone))
     x = state if flanks.kind == "dragged" else load - flanks.centre
     return np.asarray((x - _dead_zone(x, flanks.zone, flanks.corner)) / (2 * flanks.zone))
 
@@ -162,6 +180,24 @@ def _gap(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, f
     each = [left(best, k) for k in range(len(_FRICTIONS))]
     k = int(np.argmin(each))
     return flanks(best, k), each[k]
+
+
+def _carried(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, float]:
+    def flanks(p: Array) -> Flanks:
+        half = span * float(np.exp(p[1]))
+        return Flanks("carried", span * float(p[0]), half, half, span * _FRICTIONS[1])
+
+    def left(p: Array) -> float:
+        f = flanks(p)
+        moved = bench.plays(load - f.centre, np.array([f.zone]))[:, 0]
+        return _left([moved], bench.response, bench.rows.weight)
+
+    start = float(load[0]) / span
+    starts = [
+        np.array([start + side * h, np.log(h)]) for h in (*_HALVES, *_WIDER) for side in _SIDES
+    ]
+    best, rest = _descend(left, starts, np.array([0.03, 0.3]), most)
+    return flanks(best), rest
 
 
 def _held(bench: Bench, load: Array, span: float, most: float) -> tuple[Flanks, float]:
@@ -231,7 +267,7 @@ def _descend(
     if values.min() > most:
         return starts[int(values.argmin())], float(values.min())
     ways = np.diag(step)
-    ways = np.vstack([ways, ways[1] + ways[2], ways[1] - ways[2]])
+    ways = np.vstack([ways, ways[-2] + ways[-1], ways[-2] - ways[-1]])
     found = [
         _compass(left, starts[i], float(values[i]), ways) for i in np.argsort(values)[:_DESCENTS]
     ]
