@@ -79,6 +79,8 @@ CONSTANTS: dict[str, Key] = {
 SHAPES: dict[str, Key] = {
     "threshold": Key("threshold_Nm", "positive"),
     "grows_beyond": Key("grows_beyond_Nm", "positive"),
+    "walks_beyond": Key("walks_beyond_Nm", "positive"),
+    "fading": Key("fades_with_power_of_passes", "size"),
     "returns_beyond": Key("returns_beyond_Nm", "positive"),
     "ratchets_beyond": Key("ratchets_beyond_Nm", "positive"),
     "after": Key("after_Nm", "positive"),

@@ -12,6 +12,7 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.laws.flow_back import flowing_back, yielded_from
 from identification.gap.laws.specimens import softening
+from identification.gap.laws.walks import walking
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import beginnings
 from identification.gap.model.variants import (
@@ -64,6 +65,7 @@ def knee_variants(
         return []
     radius = bench.radii(load, top * np.array(THRESHOLDS))
     out = _hardened(bench, load, radius, column, word, name, info)
+    out += walking(bench, load, top, column, word, name, info, SCALES, LEAST)
     for memory, fresh in memories(bench).items():
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
         exact = {**info, **knee_at(bench, load, column, memory, top), "flow_s": 0.0}

@@ -21,6 +21,7 @@ from identification.gap.laws.law import (
     Term,
     fresh_after,
 )
+from identification.gap.laws.walks import WALKS, walked
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import (
     BACK_UNDER_WEIGHT,
@@ -36,6 +37,7 @@ _MEMORY = {
     LASTING: ACROSS,
     TAKEN_BACK: LOST,
     HARDENED: KEPT,
+    WALKS: KEPT,
     UNDER_WEIGHT: HUNG,
     BACK_UNDER_WEIGHT: HUNG_LOST,
     SET_UP_ANEW: ANEW,
@@ -53,6 +55,9 @@ def law_of_knee(v: Variant, place: dict[str, Any], unit: float) -> tuple[Law, Ar
     radius = [float(r) for r in info["radius"]]
     begins = "grows_beyond" if info["memory"] == HARDENED else "threshold"
     terms = [Term("compliance", {begins: r}) for r in radius]
+    if info["memory"] == WALKS:
+        pairs = zip(radius, (float(p) for p in info["fading"]), strict=True)
+        terms = [Term("compliance", {"walks_beyond": r, "fading": p}) for r, p in pairs]
     own = bool(info.get("other_springs"))
     if len(v.columns) > len(radius) + own:
         top = float(info["top"])
@@ -71,6 +76,9 @@ def states_of(bench: Bench, law: Law, load: Array) -> dict[int, Array]:
     out = dict(zip(_with(law, "threshold")[0], states(bench, flow).T, strict=True))
     growing, beyond = _with(law, "grows_beyond")
     out |= zip(growing, grown(load, beyond, flow.fresh).T, strict=True)
+    walking, beyond = _with(law, "walks_beyond")
+    fading = _with(law, "fading")[1]
+    out |= zip(walking, walked(load, beyond, fading, flow.fresh).T, strict=True)
     return out | _back(bench, law, load, flow.fresh)
 
 

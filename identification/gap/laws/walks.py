@@ -1,0 +1,126 @@
+"""What gives way anew every time that its load passes a threshold: feet that walk, bolts that
+settle, clutches that slip on. By as much every time, or by less and less.
+
+In every pass it follows the load beyond the threshold, and stays: `w sum_n n^-p max(L_n - r, 0)`,
+L_n the largest load of the n-th pass so far, p its fading: 0 where it gives way by as much every
+time, and 1 where what is left grows with the logarithm of their number, as foundations and ballast
+settle under repeated loads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+
+from identification.arrays import Array, Flags
+from identification.gap.model.bench import Bench
+from identification.gap.model.history import beginnings
+from identification.gap.model.variants import Variant, variant
+
+WALKS = " that walks"
+BEYOND = (0.18, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the range
+FADING = (0.0, 0.5, 1.0, 2.0)
+_LET_GO = 0.5  # of the threshold: a load below it ends a pass
+_GOES_ON = 2.0  # times the noise of a sample, from one run to the next
+_LIKELY = 0.5  # against knees that give way once
+
+
+def walking(
+    bench: Bench,
+    load: Array,
+    top: float,
+    column: Callable[[Array], int],
+    word: str,
+    name: str,
+    info: dict[str, Any],
+    scales: tuple[float, ...],
+    least: float,
+) -> list[Variant]:
+    """Variants of neighbouring thresholds on a load (n,) and of neighbouring fadings, between which
+    the knee and its own fading lie; none where the response does not go on from run to run. top:
+    what the thresholds are shares of."""
+    if not bench.data.arm or not _goes_on(bench):
+        return []
+    radius = bench.radii(load, top * np.array(BEYOND))
+    shape = len(radius), len(FADING)
+    r, p = (a.ravel() for a in np.meshgrid(radius, FADING, indexing="ij"))
+    states = walked(load, r, p, bench.moved)
+    if not states.any():
+        return []
+    columns, out = np.reshape([column(s) for s in states.T], shape), list[Variant]()
+    places = product(range(shape[0] - 1), range(shape[1] - 1))
+    for k, fades in places:
+        here = np.ix_((k, k + 1), (fades, fades + 1))
+        exact = {
+            **info,
+            "memory": WALKS,
+            "flow_s": 0.0,
+            "radius": r.reshape(shape)[here].ravel(),
+            "fading": p.reshape(shape)[here].ravel(),
+            "centre": radius[k],
+            "load": load,
+            "column": column,
+            "back": {},
+            "knee": "walks",
+        }
+        out.append(
+            variant(
+                word,
+                f"{name}{WALKS} beyond {radius[k]:.3g}, fading {FADING[fades]:g}",
+                columns[here].ravel().tolist(),
+                scales,
+                root=np.eye(4),
+                positive=np.ones(4),
+                prior=_LIKELY / ((shape[0] - 1) * (shape[1] - 1)),
+                least=least,
+                each=True,
+                **exact,
+            )
+        )
+    return out
+
+
+def walked(load: Array, radius: Array, fading: Array, fresh: Flags) -> Array:
+    """(n, k) way beyond the thresholds radius (k,) that a load (n,) has gone, pass by pass; the
+    passes, counted since the memory was fresh, by n^-fading."""
+    out = np.zeros((len(load), len(radius)))
+    edges = np.append(np.flatnonzero(beginnings(fresh)), len(load))
+    for r in np.unique(radius):
+        mine = np.flatnonzero(radius == r)
+        for a, b in pairwise(edges):
+            for number, start, end in _passes(np.abs(load[a:b]), r):
+                part = load[a + start : a + end]
+                beyond = np.maximum(np.maximum.accumulate(np.abs(part)) - r, 0.0)
+                way = np.sign(part) * np.diff(beyond, prepend=0.0)
+                out[a + start : a + end, mine] = way[:, None] * float(number) ** -fading[mine]
+            out[a:b, mine] = np.cumsum(out[a:b, mine], axis=0)
+    return out
+
+
+def _passes(size: Array, radius: float) -> Iterator[tuple[int, int, int]]:
+    """Number from 1, first row and end of every pass of a load of that size (n,)."""
+    told = np.where(size > radius, 1, np.where(size < _LET_GO * radius, -1, 0))
+    last = np.maximum.accumulate(np.where(told != 0, np.arange(len(told)), 0))
+    within = np.concatenate([[False], told[last] == 1, [False]])
+    turns = np.flatnonzero(within[1:] != within[:-1])
+    for number, (start, end) in enumerate(turns.reshape(-1, 2).tolist(), start=1):
+        yield number, start, end
+
+
+def _goes_on(bench: Bench) -> bool:
+    """Whether the mean of the response, but for what goes with the load, is another one from one
+    run of a setup to the next."""
+    rows = bench.rows
+    for s in range(len(bench.data.setups)):
+        mine = rows.setup == s
+        load, response, run = bench.load[mine], bench.response[mine], rows.run[mine]
+        if len(np.unique(run)) < 2 or not np.ptp(load) > 0:
+            continue
+        left = response - np.polyval(np.polyfit(load, response, 1), load)
+        means = np.array([left[run == r].mean() for r in np.unique(run)])
+        if np.abs(np.diff(means)).max() > _GOES_ON * bench.noise.stated:
+            return True
+    return False
