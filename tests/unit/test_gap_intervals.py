@@ -26,6 +26,7 @@ from identification.gap.explanations.explanation import Explanation
 from identification.gap.laws.interval import NOMINAL, Parameter, factors
 from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import Variant
+from identification.uncertainty import TWO_SIDED
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_parameters import known_of, sd
 
@@ -265,8 +266,22 @@ def test_a_shape_beside_which_a_parameter_is_none_says_nothing_of_it() -> None:
     each = [{"onset_y": Parameter(value, value - 1, value + 1, "N")} for value in (80.0, 86.0)]
     read = [[each[0], {}], [{}, {}], [each[1], {}]]
     beside = SimpleNamespace(index=1, read=read, share=np.array([1.0, 0.5, 0.5]))
-    moves = posterior._moves("onset_y", 80.0, 0, [cast("posterior._Shapes", beside)], [])
+    mine = each[0]["onset_y"]
+    moves = posterior._moves("onset_y", mine, 0, [cast("posterior._Shapes", beside)], [])
     assert moves == pytest.approx(0.5 / 1.5 * 6.0**2)
+
+
+def test_what_is_known_to_a_factor_moves_by_factors() -> None:
+    """Beside another effect half as stiff, or as good as rigid."""
+    mine = factors(2.0, 3.0, "1")
+    for other, nats in ((1.0, np.log(2.0)), (1e6, 3.0), (1e-9, 3.0)):
+        moves = posterior._moves(
+            "factor_joint1", mine, 0, [], [({"factor_joint1": factors(other, 2.0, "1")}, 1.0)]
+        )
+        assert moves == pytest.approx(nats**2 / 2)
+    wide = _wider(mine, 0.5)
+    spread = np.exp(np.hypot(np.log(3.0), TWO_SIDED * 0.5**0.5))
+    assert (wide.low, wide.high) == pytest.approx((2.0 / spread, 2.0 * spread))
 
 
 def test_intervals_of_effects_that_share_a_gap_are_wider() -> None:

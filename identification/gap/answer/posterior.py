@@ -80,7 +80,7 @@ def _known(
         word, own = chosen.parts[i].word, shapes.own(said[i])
         beside = [e for e in each if e.index != i]
         of_rivals = [(r[word], w) for r, w in others if word in r]
-        wide = {n: _wider(p, _moves(n, p.value, i, beside, of_rivals)) for n, p in own.items()}
+        wide = {n: _wider(p, _moves(n, p, i, beside, of_rivals)) for n, p in own.items()}
         found = {n: _stretched(p) for n, p in wide.items()} if beside else wide
         found = {n: p.possible(_least(word, n)) for n, p in found.items()}
         out.append(Known(found, shapes.places()))
@@ -136,9 +136,10 @@ class _Shapes:
             alike = [f[name] for f, m in zip(found, mine, strict=True) if m]
             value = said[name].value
             mixed = _mixture(alike, self.share[mine]) if alike else said[name]
-            grid = abs(step[name].value - value) / 12**0.5 if name in step else 0.0
-            meant = 0.0 if word in LINEAR else self._defined * abs(value)
-            out[name] = _wider(replace(mixed, value=value), grid**2 + meant**2)
+            about = replace(mixed, value=value)
+            grid = _apart(about, step[name].value) / 12**0.5 if name in step else 0.0
+            meant = 0.0 if word in LINEAR else _apart(about, value * (1 + self._defined))
+            out[name] = _wider(about, grid**2 + meant**2)
         return out
 
     def places(self) -> dict[str, float]:
@@ -183,21 +184,21 @@ def _named(variant: Variant) -> str:
 
 def _moves(
     name: str,
-    value: float,
+    found: Parameter,
     index: int,
     beside: list[_Shapes],
     rivals: list[tuple[Parameters, float]],
 ) -> float:
     """Mean square by which a parameter of an effect moves with what stands beside it; shapes beside
-    which there is none say nothing of it."""
+    which there is none say nothing of it. Of what is known to a factor: nats^2."""
     total = 0.0
     for other in beside:
         with_it = [i for i, r in enumerate(other.read) if name in r[index]]
-        values = np.array([other.read[i][index][name].value for i in with_it])
+        values = np.array([_apart(found, other.read[i][index][name].value) for i in with_it])
         share = other.share[with_it]
         if values.size:
             total += float(share @ (values - values[0]) ** 2) / float(share.sum())
-    have = [(r[name].value - value, weight) for r, weight in rivals if name in r]
+    have = [(_apart(found, r[name].value), weight) for r, weight in rivals if name in r]
     whole = 1.0 + sum(weight for _, weight in have)
     return total + sum(weight * off**2 for off, weight in have) / whole
 
@@ -216,15 +217,27 @@ def _by_word(explanation: Explanation, read: list[Parameters]) -> dict[str, Para
     return dict(zip((p.word for p in explanation.parts), read, strict=True))
 
 
+def _apart(p: Parameter, value: float) -> float:
+    """By how much another value is more; nats where it is known to a factor, beyond _FAR no more: a
+    spring twenty times as stiff is as good as rigid, and beside it another million is no number."""
+    if not p.by_factors:
+        return value - p.value
+    return float(np.clip(np.log(value / p.value), -_FAR, _FAR))
+
+
+_FAR = 3.0  # nats
+
+
 def _wider(p: Parameter, variance: float) -> Parameter:
-    """With so much more variance, where it has an interval at all."""
+    """With so much more variance, where it has an interval at all; where it is known to a factor,
+    of its logarithm."""
     if not p.low < p.high:
         return p
     sd = variance**0.5
 
     def ends(low: float, high: float, deviations: float) -> tuple[float, float]:
         if p.by_factors:
-            off, more = np.log([p.value / low, high / p.value]), deviations * sd / p.value
+            off, more = np.log([p.value / low, high / p.value]), deviations * sd
             below, above = np.exp(np.hypot(np.maximum(off, 0.0), more))
             return p.value / float(below), p.value * float(above)
         below, above = np.hypot(np.maximum([p.value - low, high - p.value], 0.0), deviations * sd)
