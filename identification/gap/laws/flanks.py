@@ -63,9 +63,9 @@ class Flanks:
 def shapes(bench: Bench, load: Array, flanks: Flanks) -> tuple[Array, Array]:
     """Of a load (n,): place within the play (-1/2 .. 1/2), and the friction beside it."""
     x = load - flanks.centre
-    rubbed, carried = bench.plays(x, np.array([flanks.friction, flanks.zone])).T
-    state = carried if flanks.kind == "carried" else rubbed
-    return _place(load, state, flanks), -(x - rubbed) / (2 * flanks.friction)
+    radii = [flanks.friction, *([flanks.zone] if flanks.kind == "carried" else [])]
+    states = bench.plays(x, np.array(radii)).T
+    return _place(load, states[-1], flanks), -(x - states[0]) / (2 * flanks.friction)
 
 
 def placed(bench: Bench, load: Array) -> Flanks | None:
