@@ -176,6 +176,7 @@ class Grammar:
 _PLAYS = (
     ("compliance", ("threshold",)),
     ("compliance", ("grows_beyond",)),
+    ("compliance", ("walks_beyond", "fading")),
     ("compliance", ("returns_beyond", "after")),
     ("compliance", ("ratchets_beyond", "after")),
 )

@@ -16,6 +16,7 @@ from identification.gap.model.pool import Pool
 from identification.gap.model.variants import Variant
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import DESIGNS, imported, meta, noisy
+from tests.unit.test_gap_model import survive
 
 LOAD = np.array([0.0, 3, 10, 10, 5, 0, 0, 8, 3, 12, 0, -7, 0])
 FRESH = np.zeros(len(LOAD), dtype=bool)
@@ -83,3 +84,8 @@ def test_what_walks_is_its_law() -> None:
         np.testing.assert_allclose(
             rows_of(bench, v.word, law) * scale, pool[:, list(v.columns)], rtol=1e-12, atol=1e-18
         )
+
+
+def test_what_walks_survives_the_file() -> None:
+    bench = of_jumps(0.05)
+    survive(bench, walking(bench)[:: len(FADING)])
