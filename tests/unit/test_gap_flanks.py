@@ -154,6 +154,13 @@ def test_a_play_that_is_carried_along_is_passed_anywhere() -> None:
         assert _crossed(load, Flanks("carried", 0.7 * TOP, half * TOP, half * TOP, TOP)) == seen
 
 
+def test_a_contact_that_is_met_once_is_no_play() -> None:
+    """Let go at first, then met: a play that is carried along goes either way."""
+    x = np.interp(np.linspace(0, 3, N), [0, 2, 3], [0.0, -1.0, 0.5])
+    found = placed(a_bench(np.maximum(x, 0.0), x, "displacement"), TOP * x)
+    assert found is None or found.kind != "carried"
+
+
 def test_what_snaps_back_while_it_is_pushed_on_is_no_play() -> None:
     """The force falls as the stroke goes on: a magnet lets go, a shell snaps through."""
     x = to_and_fro()

@@ -36,7 +36,7 @@ from identification.gap.explanations.verdict import (
 from identification.gap.judging.choice import chosen_of, foresees
 from identification.gap.judging.leftover import looked_up
 from identification.gap.model.base import base_columns, prediction
-from identification.gap.model.bench import Bench
+from identification.gap.model.bench import Bench, KnownEffects
 from identification.gap.model.variants import Variant, variant
 from identification.gap.search.search import (
     SPRINGS,
@@ -520,6 +520,11 @@ def test_explanations_that_matter_are_taken_between_the_levels(
     )
     _sharpened(engine, [said((), (), stated + 20.0), near, far])
     assert asked == ["joint_creep"]
+    asked.clear()  # but for what the laws of the simulation's own effects may leave
+    none = np.zeros(engine.bench.layout.size)
+    engine.bench = replace(engine.bench, known=KnownEffects(none, none[:, None], ("",), 1e-6))
+    _sharpened(engine, [said((), (), stated + 20.0), near, far])
+    assert asked == []
 
 
 def test_another_effect_is_looked_for_at_sizes_that_the_first_one_may_have() -> None:

@@ -119,10 +119,13 @@ def _crossed(load: Array, found: Flanks) -> bool:
 def _needed(bench: Bench, load: Array, found: Flanks, left: float) -> bool:
     """Whether neither the friction beside the play does without it, nor a smooth curve: one of
     eight freedoms may be as good as sharp corners where both come down to the noise. What carries
-    the play along no friction beside it does: that goes the other way at a turn."""
+    the play along no friction beside it does: that goes the other way at a turn; but it has to be
+    seen to go either way, or a contact does."""
     y, weight = bench.response, bench.rows.weight
     if found.kind == "carried":
-        return left < _left(_powers(load), y, weight)
+        moves = np.diff(bench.plays(load - found.centre, np.array([found.zone]))[:, 0])
+        either = min(moves[moves > 0].sum(), -moves[moves < 0].sum())
+        return bool(either > _BEYOND * np.ptp(load) and left < _left(_powers(load), y, weight))
     rub = shapes(bench, load, found)[1]
     if left > ENOUGH_BESIDE * _left([load, rub], y, weight):
         return False

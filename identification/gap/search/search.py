@@ -260,9 +260,10 @@ def _anew(engine: Engine, variants: list[Variant], start: Explanation) -> Explan
 
 def _sharpened(engine: Engine, ranked: list[Explanation]) -> list[Explanation]:
     """With the evidence of those that matter between the levels of imperfection, best first. What
-    was stated was looked at between them before, and shuts out nobody by what it gained there."""
+    was stated was looked at between them before, and shuts out nobody by what it gained there; but
+    for what laws of the simulation's own effects may leave."""
     done: dict[frozenset[str], Explanation] = {}
-    stated = engine.levels[0].log_base + LOG_NONE
+    stated = engine.levels[0].log_base + LOG_NONE if engine.bench.known is None else np.inf
     first = max(e.log_weight if e.parts else min(e.log_weight, stated) for e in ranked)
     for _ in range(_SHARPENED):
         ranked = sorted((done.get(e.words, e) for e in ranked), key=lambda e: -e.log_weight)
