@@ -53,11 +53,12 @@ def law_of_knee(v: Variant, place: dict[str, Any], unit: float) -> tuple[Law, Ar
     if info.get("square"):
         constants["flow_exponent"] = _SQUARE
     radius = [float(r) for r in info["radius"]]
-    begins = "grows_beyond" if info["memory"] == HARDENED else "threshold"
-    terms = [Term("compliance", {begins: r}) for r in radius]
     if info["memory"] == WALKS:
-        pairs = zip(radius, (float(p) for p in info["fading"]), strict=True)
+        pairs = zip(radius, map(float, info["fading"]), strict=True)
         terms = [Term("compliance", {"walks_beyond": r, "fading": p}) for r, p in pairs]
+    else:
+        begins = "grows_beyond" if info["memory"] == HARDENED else "threshold"
+        terms = [Term("compliance", {begins: r}) for r in radius]
     own = bool(info.get("other_springs"))
     if len(v.columns) > len(radius) + own:
         top = float(info["top"])

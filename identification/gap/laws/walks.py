@@ -24,7 +24,6 @@ WALKS = " that walks"
 BEYOND = (0.18, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the range
 FADING = (0.0, 0.5, 1.0, 2.0)
 _LET_GO = 0.5  # of the threshold: a load below it ends a pass
-_GOES_ON = 2.0  # times the noise of a sample, from one run to the next
 _LIKELY = 0.5  # against knees that give way once
 
 
@@ -42,24 +41,23 @@ def walking(
     """Variants of neighbouring thresholds on a load (n,) and of neighbouring fadings, between which
     the knee and its own fading lie; none where the response does not go on from run to run. top:
     what the thresholds are shares of."""
-    if not bench.data.arm or not _goes_on(bench):
+    if not bench.data.arm or not bench.moves_on:
         return []
     radius = bench.radii(load, top * np.array(BEYOND))
-    shape = len(radius), len(FADING)
-    r, p = (a.ravel() for a in np.meshgrid(radius, FADING, indexing="ij"))
-    states = walked(load, r, p, bench.moved)
+    r, p = np.meshgrid(radius, FADING, indexing="ij")
+    states = walked(load, r.ravel(), p.ravel(), bench.moved)
     if not states.any():
         return []
-    columns, out = np.reshape([column(s) for s in states.T], shape), list[Variant]()
-    places = product(range(shape[0] - 1), range(shape[1] - 1))
+    columns, out = np.reshape([column(s) for s in states.T], r.shape), list[Variant]()
+    places = list(product(range(len(radius) - 1), range(len(FADING) - 1)))
     for k, fades in places:
         here = np.ix_((k, k + 1), (fades, fades + 1))
         exact = {
             **info,
             "memory": WALKS,
             "flow_s": 0.0,
-            "radius": r.reshape(shape)[here].ravel(),
-            "fading": p.reshape(shape)[here].ravel(),
+            "radius": r[here].ravel(),
+            "fading": p[here].ravel(),
             "centre": radius[k],
             "load": load,
             "column": column,
@@ -74,7 +72,7 @@ def walking(
                 scales,
                 root=np.eye(4),
                 positive=np.ones(4),
-                prior=_LIKELY / ((shape[0] - 1) * (shape[1] - 1)),
+                prior=_LIKELY / len(places),
                 least=least,
                 each=True,
                 **exact,
@@ -108,19 +106,3 @@ def _passes(size: Array, radius: float) -> Iterator[tuple[int, int, int]]:
     turns = np.flatnonzero(within[1:] != within[:-1])
     for number, (start, end) in enumerate(turns.reshape(-1, 2).tolist(), start=1):
         yield number, start, end
-
-
-def _goes_on(bench: Bench) -> bool:
-    """Whether the mean of the response, but for what goes with the load, is another one from one
-    run of a setup to the next."""
-    rows = bench.rows
-    for s in range(len(bench.data.setups)):
-        mine = rows.setup == s
-        load, response, run = bench.load[mine], bench.response[mine], rows.run[mine]
-        if len(np.unique(run)) < 2 or not np.ptp(load) > 0:
-            continue
-        left = response - np.polyval(np.polyfit(load, response, 1), load)
-        means = np.array([left[run == r].mean() for r in np.unique(run)])
-        if np.abs(np.diff(means)).max() > _GOES_ON * bench.noise.stated:
-            return True
-    return False

@@ -28,6 +28,8 @@ from identification.gap.recording.course import Course
 from identification.gap.recording.imposed import displacement_imposed
 from identification.gap.recording.rows import Rows, reduce_rows
 
+_MOVES_ON = 2.0  # times the noise of a sample
+
 
 @dataclass(frozen=True, eq=False)
 class KnownEffects:
@@ -142,6 +144,19 @@ class Bench:
         """(n,) response that the slope measured in each setup gives for the load, m; or what is
         known of it."""
         return self.line_slope * self.load if self.moves is None else self.moves
+
+    @cached_property
+    def moves_on(self) -> bool:
+        """Whether the mean of the response, but for what goes with the load, is another one from
+        one run of a setup to the next, by more than noise is."""
+        left, rows = self.response - self.line, self.rows
+        for s in range(len(self.data.setups)):
+            mine = rows.setup == s
+            if np.ptp(self.load[mine]) > 0:
+                means = [left[mine & (rows.run == r)].mean() for r in np.unique(rows.run[mine])]
+                if np.abs(np.diff(means)).max(initial=0.0) > _MOVES_ON * self.noise.stated:
+                    return True
+        return False
 
     @cached_property
     def zero_line(self) -> Array:
