@@ -15,9 +15,11 @@ import bootstrap
 HOME = Path(__file__).parents[2]
 COMMAND = """
 import signal, sys, time
+time.sleep(0.5)  # until whoever started this waits for it
 try:
     print("ready", flush=True)
-    time.sleep(30)
+    for _ in range(600):  # a signal in the instant before a sleep doesn't cut that sleep short
+        time.sleep(0.05)
 except KeyboardInterrupt:
     time.sleep(1)  # as long as it takes to close a file
     print("kept", flush=True)
