@@ -17,7 +17,7 @@ from identification.gap.evidence.parts import Part
 from identification.gap.explanations.priors import prior_of
 from identification.gap.judging.leftover import _FALL
 from identification.gap.laws.drift import free_paths, shares
-from identification.gap.laws.knees import grown
+from identification.gap.laws.hardened import grown
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.recording.holds import hold_ids, is_continuous
 from identification.gap.recording.rows import reduce_rows

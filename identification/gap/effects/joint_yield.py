@@ -29,7 +29,6 @@ from identification.gap.laws.flow_back import flowing_back
 from identification.gap.laws.flows import Flow
 from identification.gap.laws.interval import Coefficients, Parameter
 from identification.gap.laws.knees import (
-    SCALES,
     THRESHOLDS,
     fresh_of,
     knee_variants,
@@ -37,6 +36,7 @@ from identification.gap.laws.knees import (
     memories,
 )
 from identification.gap.laws.knees_law import flow_of, law_of_knee, states_of
+from identification.gap.laws.lasting import SCALES
 from identification.gap.laws.law import Law, Laws
 from identification.gap.laws.specimens import OWN, off, own_stiffness, with_other_springs
 from identification.gap.laws.thresholds import moved, of_knee

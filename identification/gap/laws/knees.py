@@ -4,17 +4,17 @@ moment about an axis. `knees_closer` looks closer at those that are found."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.laws.flow_back import flowing_back, yielded_from
+from identification.gap.laws.hardened import HARDENS, hardened
+from identification.gap.laws.lasting import LEAST, SCALES
 from identification.gap.laws.specimens import softening
 from identification.gap.laws.walks import walking
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import beginnings
 from identification.gap.model.variants import (
     BACK_UNDER_WEIGHT,
     CALLED,
@@ -27,7 +27,6 @@ from identification.gap.model.variants import (
     smooth_root,
     variant,
 )
-from identification.gap.recording.turns import way_back
 
 THRESHOLDS = (0.18, 0.24, 0.3, 0.4, 0.5, 0.6, 0.68, 0.75, 0.81, 0.86, 0.9, 0.94, 0.97)
 # A joint that is taken back leaves nothing behind: then a curved spring is the simpler reading.
@@ -39,14 +38,12 @@ _LIKELY = {
     UNDER_WEIGHT: 1.0,
     BACK_UNDER_WEIGHT: 0.3,
 }
-_HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 _FIRST = 2  # lower ones only round off the knees above them
 # Prior weights of a rounded knee: radii by the steps they lie from its centre. The lower ones are
 # Bauschinger's effect: after a reversal metal yields earlier than at first.
 _SHARP = {0: 1.0, 1: 0.5}
 _ROUND = {-6: 0.1, -4: 0.15, -2: 0.25, -1: 0.5, 0: 1.0, 1: 0.5, 2: 0.25}
 _SLOW = 0.25  # prior of what gives way more and more, of no one knee
-SCALES = (0.07, 0.25, 0.9, 3.5, 14.0, 56.0)
 
 
 def knee_variants(
@@ -64,8 +61,8 @@ def knee_variants(
     if not top > 0:
         return []
     radius = bench.radii(load, top * np.array(THRESHOLDS))
-    out = _hardened(bench, load, radius, column, word, name, info)
-    out += walking(bench, load, top, column, word, name, info, SCALES, LEAST)
+    out = hardened(bench, load, radius, column, word, name, info)
+    out += walking(bench, load, top, column, word, name, info)
     for memory, fresh in memories(bench).items():
         columns = [column(s) for s in bench.plays(load, radius, fresh).T]
         exact = {**info, **knee_at(bench, load, column, memory, top), "flow_s": 0.0}
@@ -108,7 +105,7 @@ def knees(
         for knee, steps in (("sharp", _SHARP), ("round", _ROUND)):
             inside = {k + d: w for d, w in steps.items() if 0 <= k + d < len(THRESHOLDS)}
             place = [*inside, *extra]
-            kept = [*inside.values(), *[_HARDENS] * len(extra)]
+            kept = [*inside.values(), *[HARDENS] * len(extra)]
             exact = {
                 **info,
                 "radius": radius[place],
@@ -131,80 +128,6 @@ def knees(
         at, likely = f"{name} at {THRESHOLDS[0]:g} and on", _SLOW * _LIKELY[info["memory"]]
         root = smooth_root(len(radius), 0.6, 0.3)
         out += with_back(word, at, columns, root, likely, exact)
-    return out
-
-
-HARDENED = " hardened"
-UNDER_A_TIP, _CAME_BACK = (0.01, 0.04, 0.1), 0.2  # of the range
-_LEFT = 0.2  # of the largest response: as much as friction seldom holds
-
-
-def _hardened(
-    bench: Bench,
-    load: Array,
-    radius: Array,
-    column: Callable[[Array], int],
-    word: str,
-    name: str,
-    info: dict[str, Any],
-) -> list[Variant]:
-    """What hardens alike in both senses (Voce 1948) and is loaded again and again: it yields on
-    only beyond the largest load it has borne. Specimens from one side, under a tip from the first
-    load on (said of loads that come back before they grow, and of what is not taken back by a long
-    way: a single loop may be friction); joints of an arm, whichever way they are pushed next."""
-    top = float(np.abs(load).max())
-    course, arm = bench.course, bench.data.arm
-    told = "joint" in info and course.unloads if arm else course.lets_go and course.one_sided
-    if not told:
-        return []
-    size = np.abs(load)
-    if not arm and (
-        way_back(size[: int(size.argmax()) + 1]) > _CAME_BACK * top
-        or bench.course.left_behind > _LEFT
-    ):
-        radius = np.concatenate([top * np.array(UNDER_A_TIP), radius])
-    columns = [column(s) for s in grown(load, radius, bench.moved).T]
-    out = []
-    for k in range(len(radius)):
-        root = np.diag([1.0, *[_HARDENS] * (len(radius) - k - 1)])
-        exact = {
-            **info,
-            "memory": HARDENED,
-            "flow_s": 0.0,
-            "radius": radius[k:],
-            "centre": radius[k],
-            "load": load,
-            "column": column,
-            "back": {},
-            "knee": "hardened",
-        }
-        label = f"{name}{HARDENED} beyond {radius[k] / top:.3g}"
-        out.append(
-            variant(
-                word,
-                label,
-                columns[k:],
-                SCALES,
-                root=root,
-                positive=np.ones(len(root)),
-                prior=0.7 / len(radius),
-                least=LEAST,
-                **exact,
-            )
-        )
-    return out
-
-
-def grown(load: Array, radius: Array, fresh: Flags) -> Array:
-    """(n, k): by how much the size of the load (n,) has ever been beyond the radii (k,) since the
-    memory was fresh; each time with the sign that the load then had."""
-    out = np.empty((len(load), len(radius)))
-    edges = np.append(np.flatnonzero(beginnings(fresh)), len(load))
-    for a, b in pairwise(edges):
-        largest = np.maximum.accumulate(np.abs(load[a:b]))
-        beyond = np.maximum(largest[:, None] - radius, 0.0)
-        grows = np.diff(beyond, axis=0, prepend=0.0)
-        out[a:b] = np.cumsum(np.sign(load[a:b])[:, None] * grows, axis=0)
     return out
 
 
@@ -239,7 +162,6 @@ def with_back(
 
 
 FLOWS_BACK = ", flows back"
-LEAST = 0.15  # of the elastic compliance: what bends less does not give way
 _RETURNS = 0.4  # coefficients of what flows back, against those of the knee
 
 

@@ -19,7 +19,8 @@ from identification.gap.laws.closer import (
     shows,
 )
 from identification.gap.laws.flows import Flow
-from identification.gap.laws.knees import FLOWS_BACK, SCALES, fresh_of, is_sharp, with_back
+from identification.gap.laws.knees import FLOWS_BACK, fresh_of, is_sharp, with_back
+from identification.gap.laws.lasting import SCALES
 from identification.gap.laws.specimens import OWN, plateaus, with_other_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import (

@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array, Flags
 from identification.gap.laws import flow_back
 from identification.gap.laws.flows import Flow, states
-from identification.gap.laws.knees import HARDENED, grown
+from identification.gap.laws.hardened import HARDENED, grown
 from identification.gap.laws.law import (
     ACROSS,
     ANEW,

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array, Flags
+from identification.gap.laws.lasting import lasting
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import beginnings
-from identification.gap.model.variants import Variant, variant
+from identification.gap.model.variants import Variant
 
 WALKS = " that walks"
 BEYOND = (0.18, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the range
@@ -35,8 +36,6 @@ def walking(
     word: str,
     name: str,
     info: dict[str, Any],
-    scales: tuple[float, ...],
-    least: float,
 ) -> list[Variant]:
     """Variants of neighbouring thresholds on a load (n,) and of neighbouring fadings, between which
     the knee and its own fading lie; none where the response does not go on from run to run. top:
@@ -52,30 +51,20 @@ def walking(
     places = list(product(range(len(radius) - 1), range(len(FADING) - 1)))
     for k, fades in places:
         here = np.ix_((k, k + 1), (fades, fades + 1))
-        exact = {
-            **info,
-            "memory": WALKS,
-            "flow_s": 0.0,
-            "radius": r[here].ravel(),
-            "fading": p[here].ravel(),
-            "centre": radius[k],
-            "load": load,
-            "column": column,
-            "back": {},
-            "knee": "walks",
-        }
         out.append(
-            variant(
+            lasting(
                 word,
                 f"{name}{WALKS} beyond {radius[k]:.3g}, fading {FADING[fades]:g}",
                 columns[here].ravel().tolist(),
-                scales,
-                root=np.eye(4),
-                positive=np.ones(4),
-                prior=_LIKELY / len(places),
-                least=least,
+                np.eye(4),
+                _LIKELY / len(places),
+                {**info, "fading": p[here].ravel()},
+                memory=WALKS,
+                radius=r[here].ravel(),
+                load=load,
+                column=column,
+                knee="walks",
                 each=True,
-                **exact,
             )
         )
     return out

@@ -1,0 +1,45 @@
+"""Shapes of what gives way and neither flows back nor slowly: what `hardened` and `walks` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from identification.arrays import Array
+from identification.gap.model.variants import Variant, variant
+
+SCALES = (0.07, 0.25, 0.9, 3.5, 14.0, 56.0)
+LEAST = 0.15  # of the elastic compliance: what bends less does not give way
+
+
+def lasting(
+    word: str,
+    label: str,
+    columns: list[int],
+    root: Array,
+    prior: float,
+    info: dict[str, Any],
+    *,
+    memory: str,
+    radius: Array,
+    load: Array,
+    column: Callable[[Array], int],
+    knee: str,
+    each: bool = False,
+) -> Variant:
+    """One such shape: its columns of the pool begin at radii of a load (n,), the first one's is
+    that of the knee. info: what else its law is written from."""
+    exact = {
+        **info,
+        "memory": memory,
+        "flow_s": 0.0,
+        "radius": radius,
+        "centre": radius[0],
+        "load": load,
+        "column": column,
+        "back": {},
+        "knee": knee,
+    }
+    return variant(
+        word, label, columns, SCALES, root=root, prior=prior, least=LEAST, each=each, **exact
+    )
