@@ -16,7 +16,7 @@ from identification.gap.explanations.explanation import Explanation, SearchResul
 from identification.gap.explanations.fit import fit
 from identification.gap.explanations.penalties import below_noise, cancelling, minor_parts
 from identification.gap.explanations.verdict import with_posterior
-from identification.gap.judging.choice import WORTH_OF_THIRD, chosen_of
+from identification.gap.judging.choice import chosen_of
 from identification.gap.judging.earned import _foretold, earned
 from identification.gap.judging.heldout import (
     ALWAYS_IN,
@@ -230,21 +230,6 @@ def test_before_is_the_simulation_as_given_whatever_datum_nobody_can_know() -> N
     assert not held_out(e, law, "block", np.arange(rows.n) // 4).own_datum
 
 
-@pytest.mark.parametrize(("worth", "named"), [(2.0, 1), (5.0, 2)])
-def test_a_second_effect_is_named_only_if_it_brings_something(worth: float, named: int) -> None:
-    e = engine(np.full(REPETITIONS, BUMP))
-    one = explained([0], "joint_nonlinear_stiffness", 0.0)
-    spring = explained([1], "joint_stiffness_error", 0.0)
-    two = replace(
-        one, parts=one.parts + spring.parts, sizes=(BUMP / 3, 0.0), log_weight=worth, log_good=worth
-    )
-    both = found(e, one, two)
-    assert len(chosen_of(both, "joint_nonlinear_stiffness").parts) == named
-    # one that withheld data refuse is no simpler choice
-    refused = replace(both, kept={one.words: 0.1, two.words: 1.0})
-    assert len(chosen_of(refused, "joint_nonlinear_stiffness").parts) == 2
-
-
 def test_a_drift_and_a_jump_of_the_datum_foresee_nothing_either() -> None:
     e = engine(np.full(REPETITIONS, BUMP))
     drift = explained([1, 2], "thermal_drift", 0.0)
@@ -308,35 +293,6 @@ def test_of_two_that_foretell_alike_the_one_that_explains_more_speaks(
     )
     told = _foretold(found(e, both, *one.values()), "repetition", np.zeros(e.bench.rows.n, int))
     assert told[both.words] is one[speaks]
-
-
-@pytest.mark.parametrize(("share", "named"), [(0.05, 2), (0.3, 3)])
-def test_a_third_effect_that_hardly_moves_anything_is_not_named(share: float, named: int) -> None:
-    e = engine(np.full(REPETITIONS, BUMP))
-    one = explained([0], "joint_nonlinear_stiffness", 0.0)
-    two = replace(
-        one,
-        parts=one.parts + explained([1], "time_lag", 0.0).parts,
-        sizes=(1e-6, 8e-7),
-        log_weight=10.0,
-        log_good=10.0,
-    )
-    three = replace(
-        two,
-        parts=two.parts + explained([2], "load_misalignment", 0.0).parts,
-        sizes=(*two.sizes, share * 1e-6),
-        log_weight=500.0,
-        log_good=500.0,
-    )
-    assert len(chosen_of(found(e, one, two, three), "joint_nonlinear_stiffness").parts) == named
-    # it has to bring more than a second one, however large it is
-    for worth, kept in ((WORTH_OF_THIRD - 1, min(2, named)), (WORTH_OF_THIRD + 1, named)):
-        weak = replace(three, log_weight=10.0 + worth, log_good=10.0 + worth)
-        assert len(chosen_of(found(e, one, two, weak), "joint_nonlinear_stiffness").parts) == kept
-    # a drift shows where nothing is loaded
-    drift = explained([2], "force_drift", 0.0).parts
-    drifting = replace(three, parts=two.parts + drift)
-    assert len(chosen_of(found(e, one, two, drifting), "joint_nonlinear_stiffness").parts) == 3
 
 
 @pytest.mark.parametrize(("height", "spells"), [(0.0, False), (3e-6, True)])

@@ -23,7 +23,7 @@ def located(bench: Bench, gap: Array, word: str = "") -> object:
     """Where a gap (n,) lies; word: of the effect that made it, none where empty."""
     part = SimpleNamespace(word=word, variant=SimpleNamespace(joint=None))
     fit = SimpleNamespace(parts=(part,) if word else (), contribution=lambda engine, i: gap)
-    return locate(SimpleNamespace(bench=bench), fit, [1.0], gap)
+    return locate(SimpleNamespace(bench=bench), word or "unknown", fit, [1.0], gap)
 
 
 def balanced(bench: Bench, values: Array) -> Array:

@@ -34,13 +34,18 @@ class Where:
 NOWHERE = Where((), (), {}, (), (), (), None, 0.0)
 
 
-def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Where:
-    """From what the main effect does, in all joints and directions in which it sits; without one,
-    from the gap (n,) that springs leave. sizes: of the effects, rms m."""
+def locate(engine: Engine, verdict: str, fit: Fit, sizes: Sequence[float], gap: Array) -> Where:
+    """From what the verdict's effect does, in all joints and directions in which it sits; of what
+    no effect explains, from the gap (n,) that springs leave. sizes: of the effects, rms m."""
+    if verdict == "none":
+        return NOWHERE
     bench, n = engine.bench, engine.bench.rows.n
-    same = [i for i, p in enumerate(fit.parts) if p.word == fit.parts[0].word]
+    same = [i for i, p in enumerate(fit.parts) if p.word == verdict]
     main = sum((fit.contribution(engine, i)[:n] for i in same), np.zeros(n)) if same else gap
-    per_setup = _size_per_setup(engine, _visible(engine, fit, main))
+    moved = bench.rows.about_means(main[:, None])[:, 0]
+    if same and verdict not in LINEAR:
+        moved = _beyond_springs(engine, moved)
+    per_setup = _size_per_setup(engine, moved)
     top = per_setup.max()
     if not top > 0:
         return NOWHERE
@@ -49,7 +54,6 @@ def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Wher
     rows = shows[bench.rows.setup] & (np.abs(main) >= _SHOWS * np.abs(main).max())
     square = bench.rows.weight * gap**2  # every sample counts, not every row
     total, inside = float(square.sum()), float(square[shows[bench.rows.setup]].sum())
-    word = fit.parts[0].word if fit.parts else ""
     return Where(
         directions=tuple(dict.fromkeys(s.direction for s in setups)),
         poses=tuple(dict.fromkeys(s.pose for s in setups if s.pose)),
@@ -57,7 +61,7 @@ def locate(engine: Engine, fit: Fit, sizes: Sequence[float], gap: Array) -> Wher
         branches=tuple(BRANCH_NAMES[b] for b in np.unique(bench.rows.branch[rows])),
         repetitions=tuple(int(r) for r in np.unique(bench.rows.repetition[rows])),
         joints=_joints(engine, fit, sizes),
-        seen_by_encoders=_seen(engine, word),
+        seen_by_encoders=_seen(engine, verdict if same else ""),
         share=inside / total if total > 0 else 0.0,
     )
 
@@ -72,11 +76,8 @@ def _seen(engine: Engine, word: str) -> bool | None:
     return True if engine.bench.has_q else None
 
 
-def _visible(engine: Engine, fit: Fit, main: Array) -> Array:
-    """The main effect less what the springs would take over per setup, unless it is linear."""
-    moved = engine.bench.rows.about_means(main[:, None])[:, 0]
-    if not fit.parts or fit.parts[0].word in LINEAR:
-        return moved
+def _beyond_springs(engine: Engine, moved: Array) -> Array:
+    """What an effect moves (n,) less what the springs would take over per setup."""
     out, bench = moved.copy(), engine.bench
     load = bench.rows.about_means(bench.load[:, None])[:, 0]
     for s in range(len(bench.data.setups)):

@@ -10,11 +10,12 @@ import numpy as np
 
 from identification.arrays import Ints
 from identification.gap.answer.discriminate import NextMeasurement
-from identification.gap.answer.locate import NOWHERE, Where, locate
+from identification.gap.answer.locate import Where, locate
 from identification.gap.answer.notes import (
     Note,
     across,
     disbelieved,
+    left_out,
     notes_of,
     ordered,
     readings_missed,
@@ -116,11 +117,12 @@ def result_of(
     notes = [*scale, *notes_of(bench, verdict)]
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
     notes += readings_missed(engine, fitted) if chosen.parts else ()
+    notes += left_out(found, chosen)
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,
         effects=_effects(found, chosen, known),
-        where=NOWHERE if verdict == "none" else locate(engine, fitted, chosen.sizes, structural),
+        where=locate(engine, verdict, fitted, chosen.sizes, structural),
         noise=noise_of(bench),
         before=sample_rms(bench, simulated),
         after=left_of(engine, fitted),

@@ -200,16 +200,6 @@ def _tells_of_three(explanation: Explanation) -> bool:
 FLANKS = frozenset({"joint_backlash", "joint_nonlinear_stiffness"})
 
 
-def spokesman(found: SearchResult, explanation: Explanation) -> Explanation | None:
-    """The explanation with fewer of the same effects to whose main one an explanation gives its
-    weight: it explains nearly as much, or is the heir of one that leaves too much; None: itself."""
-    e, ranked, bench = explanation, found.explanations, found.engine.bench
-    fewer = _simpler(e, ranked, found.kept, bench.data.arm)
-    if fewer is not None or e.good:
-        return fewer
-    return _heir(e, ranked, found.kept, bench.noise.stated)
-
-
 def _of(explanation: Explanation, words: frozenset[str]) -> Explanation:
     """With the effects of these words alone, as large as they are beside the others."""
     kept = [

@@ -1,0 +1,107 @@
+"""Which explanation is shown for a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+import pytest
+
+from identification.gap.answer.notes import left_out
+from identification.gap.evidence.engine import Engine
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import Explanation, SearchResult
+from identification.gap.judging.choice import WORTH, WORTH_OF_THIRD, chosen_of, foresees
+from identification.gap.model.variants import variant
+
+CURVE, LAG, ASKEW = "joint_nonlinear_stiffness", "time_lag", "load_misalignment"
+LARGE = 1e-5  # m
+
+
+def said(sizes: dict[str, float], weight: float, good: float = 0.0) -> Explanation:
+    """An explanation by words of sizes (as shares of LARGE), the largest first."""
+    parts = tuple(Part(variant(word, word, [0], (1.0,)), 1.0) for word in sizes)
+    return Explanation(parts, weight, 0.0, tuple(LARGE * s for s in sizes.values()), weight + good)
+
+
+def found(*explanations: Explanation) -> SearchResult:
+    ranked = tuple(sorted(explanations, key=lambda e: -e.log_weight))
+    return SearchResult(cast(Engine, None), (*ranked, said({}, -500.0)), {}, {}, -400.0, 1e-6)
+
+
+@pytest.mark.parametrize("verdict", ["none", "unknown"])
+def test_what_no_effect_explains_is_shown_without_one(verdict: str) -> None:
+    assert chosen_of(found(said({CURVE: 1.0}, 0.0)), verdict).parts == ()
+
+
+@pytest.mark.parametrize(
+    ("worth", "size", "named"), [(WORTH - 1, 0.5, 1), (WORTH + 2, 0.5, 2), (400.0, 0.1, 1)]
+)
+def test_a_second_effect_is_named_only_if_it_brings_and_does_something(
+    worth: float, size: float, named: int
+) -> None:
+    one, two = said({CURVE: 1.0}, 0.0), said({CURVE: 1.0, LAG: size}, worth)
+    both = found(one, two)
+    assert len(chosen_of(both, CURVE).parts) == named
+    # one that withheld data refuse, or that leaves too much, is no simpler choice
+    refused = replace(both, kept={one.words: 0.1, two.words: 1.0})
+    assert chosen_of(refused, CURVE) is two
+    assert chosen_of(found(said({CURVE: 1.0}, 0.0, good=-5.0), two), CURVE) is two
+
+
+@pytest.mark.parametrize(("size", "named"), [(0.05, 2), (0.15, 2), (0.3, 3)])
+def test_a_third_effect_has_to_do_and_to_bring_more(size: float, named: int) -> None:
+    one, two = said({CURVE: 1.0}, 0.0), said({CURVE: 1.0, LAG: 0.8}, 10.0)
+    for worth, shown in (
+        (500.0, named),
+        (WORTH_OF_THIRD - 1, 2),
+        (WORTH_OF_THIRD + 1, named),
+    ):
+        three = said({CURVE: 1.0, LAG: 0.8, ASKEW: size}, 10.0 + worth)
+        assert len(chosen_of(found(one, two, three), CURVE).parts) == shown
+
+
+@pytest.mark.parametrize(
+    ("large", "small", "named"),
+    [
+        ("force_scale", CURVE, 2),  # no line bends
+        ("force_scale", ASKEW, 1),
+        (CURVE, "zero_shift", 2),  # a datum jumps without load
+        ("thermal_drift", "zero_shift", 1),
+        (CURVE, "thermal_drift", 1),
+    ],
+)
+def test_little_is_named_that_no_other_law_can_do(large: str, small: str, named: int) -> None:
+    one, two = said({large: 1.0}, 0.0), said({large: 1.0, small: 0.05}, 400.0)
+    assert len(chosen_of(found(one, two), large).parts) == named
+
+
+def test_a_larger_effect_that_is_one_of_several_alike_is_shown_beside_the_verdict() -> None:
+    """Which of them it is nobody can tell; what splits it between them is no better."""
+    beside = [said({large: 2.0, LAG: 1.0}, 0.0) for large in ("force_scale", "pose_error")]
+    split = said({LAG: 1.0, "force_scale": 0.9, "pose_error": 0.9}, -3.0)
+    for weight in (-40.0, -5.0):
+        assert chosen_of(found(*beside, split, said({LAG: 1.0}, weight)), LAG) is beside[0]
+    alone = said({LAG: 1.0}, 1 - WORTH)
+    assert chosen_of(found(*beside, split, alone), LAG) is alone
+
+
+def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
+    two, three, other = (
+        said(dict.fromkeys(words, 1.0), 0.0)
+        for words in ((CURVE, LAG), (CURVE, LAG, ASKEW), (CURVE, ASKEW))
+    )
+    told = replace(found(two), kept={two.words: 0.1, frozenset({"joint_creep"}): 0.9})
+    assert [foresees(told, e) for e in (two, three, other)] == [False, False, True]
+
+
+def test_what_is_left_out_though_it_explains_more_is_told() -> None:
+    one = said({CURVE: 1.0}, 0.0)
+    two = said({CURVE: 1.0, LAG: 0.1}, 400.0)
+    (note,) = left_out(found(one, two), one)
+    assert "time_lag (0.001 mm rms)" in note.text
+    assert "by 400 nats" in note.text
+    assert "--add time_lag." in note.text
+    assert not left_out(found(one, two), two)
+    assert not left_out(found(one, said({CURVE: 1.0, LAG: 0.1}, WORTH_OF_THIRD)), one)
+    assert not left_out(found(one, two), found(one).explanations[-1])  # no effect: unknown
