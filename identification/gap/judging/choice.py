@@ -5,7 +5,7 @@ from __future__ import annotations
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
 from identification.gap.explanations.verdict import FORESAW
-from identification.gap.words import BETWEEN_RUNS, DRIFTS, LINEAR
+from identification.gap.words import BETWEEN_RUNS, DATUM_JUMPS, DRIFTS, LINEAR
 
 WORTH = 3.0  # nats that one effect more has to bring before it is named;
 # a third one more: what it does to some channel may be how far the other two's laws are off.
@@ -41,7 +41,7 @@ def _petty(explanation: Explanation) -> set[str]:
     share, out = LEAST_SHARE if len(sizes) < _THREE else LEAST_OF_THIRD, set()
     for word, size in sizes.items():
         laws = {w: s for w, s in sizes.items() if w not in LINEAR or word in LINEAR}
-        if word in BETWEEN_RUNS - DRIFTS:
+        if word in DATUM_JUMPS:
             laws = {w: s for w, s in sizes.items() if w in DRIFTS}
         if size < share * max(laws.values(), default=0.0):
             out.add(word)

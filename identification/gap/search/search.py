@@ -188,12 +188,29 @@ def _deepen(
             pool[words] = explanation
     ranked = sorted(grown.values(), key=lambda e: -e.log_weight)
     first = [_anew(engine, variants, polished(engine, variants, e)) for e in ranked[:kept]]
-    others = [_anew(engine, variants, e) for e in ranked[kept:_READING]]
+    lent = (_with_lent_shapes(engine, variants, e, first) for e in ranked[kept:_READING])
+    others = [_anew(engine, variants, e) for e in lent]
     for explanation in [*first, *others]:
         if pool[explanation.words].log_weight < explanation.log_weight:
             pool[explanation.words] = explanation
     good = _in_more_joints(engine, variants, pool, first)
     return [e for e in good if e.log_weight > best - 2.0]
+
+
+def _with_lent_shapes(
+    engine: Engine, variants: list[Variant], start: Explanation, found: list[Explanation]
+) -> Explanation:
+    """Polished, if one of its parts does better in a shape that others found for that word: beside
+    what it does not explain itself, its own shape was chosen to explain that too."""
+    for part in start.parts:
+        shapes = [p.variant for e in found for p in e.parts if p.word == part.word]
+        lent = [v for v in dict.fromkeys(shapes) if v is not part.variant]
+        if not lent:
+            continue
+        levels, energy = up_to_likeliest(engine, tuple(p for p in start.parts if p is not part))
+        if closest(score(engine, levels, [part.variant, *lent], energy)).variant in lent:
+            return polished(engine, variants, start)
+    return start
 
 
 def _in_more_joints(
