@@ -322,18 +322,6 @@ def test_readings_that_scatter_in_spells_are_explained_by_no_law(
     assert (p["none"] > 0.5) is not spells
 
 
-def test_a_small_jump_of_the_datum_is_no_freedom_of_a_law_but_of_a_drift() -> None:
-    e = engine(np.full(REPETITIONS, BUMP))
-    small = Sizes(np.array([1e-5, 5e-7]), np.array([1e-5, 5e-7]), 0.0)
-    for word, beside, charged in (
-        ("joint_creep", "zero_shift", False),
-        ("thermal_drift", "zero_shift", True),
-        ("joint_creep", "thermal_drift", True),
-    ):
-        parts = explained([0], word, 0.0).parts + explained([1], beside, 0.0).parts
-        assert (minor_parts(e, parts, small) > 0) == charged
-
-
 def test_what_is_linear_counts_as_it_moves_and_not_by_what_springs_leave_of_it() -> None:
     """A slant of the load: the springs take all of it back, the joint readings show it."""
     e = engine(np.full(REPETITIONS, BUMP))

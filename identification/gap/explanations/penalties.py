@@ -11,7 +11,6 @@ from identification.gap.evidence.parts import Part, Sizes
 from identification.gap.model.bench import Bench
 from identification.gap.words import (
     CURVES,
-    DATUM_JUMPS,
     DRIFTS,
     FRICTION,
     JERKS,
@@ -44,8 +43,6 @@ def minor_parts(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
             # a small knee beside a large error of the springs is no freedom of the latter
             if i == k or sizes[i] > sizes[k] or (other.word in LINEAR and p.word not in LINEAR):
                 continue
-            if p.word in DATUM_JUMPS and other.word not in DRIFTS:
-                continue  # where nothing is loaded no law is off but a drift's
             akin = p.word != other.word and {p.word, other.word} <= MECHANISMS
             if akin and set(p.variant.joints) & set(other.variant.joints):
                 penalty += SAME_JOINT

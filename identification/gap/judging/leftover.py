@@ -7,13 +7,11 @@ that matter that is looked up in the data.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from math import log
 
 import numpy as np
 
-from identification.arrays import Array
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import STEP
 from identification.gap.explanations.explanation import (
@@ -27,9 +25,10 @@ from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import with_posterior
 from identification.gap.judging.dead_zone import spoken_for
 from identification.gap.judging.hands import open_to_hands
+from identification.gap.judging.paths import goes_as_no_drift
 from identification.gap.judging.strain import LIMIT, strain
 from identification.gap.model.noise import UNSURE
-from identification.gap.words import CURVES, DRIFTS, FRICTION, LINEAR
+from identification.gap.words import CURVES, FRICTION, LINEAR
 
 # An elastic curve that falls while it is pushed on, or a force that is nearly lost, as none is that
 # has made something yield or slide: a snap, a slip, a crack are likelier.
@@ -38,8 +37,7 @@ LET_GO = 1e-8  # share that is kept where forces let go at once: no law does tha
 COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whenever it is let go
 _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
-SWINGS = 0.03  # share that is kept by a drift that comes and goes, or hurries,
-_SLOW, _MOSTLY = 5, 0.6  # degree of what is slow; share of what is not: three times to and fro
+NO_DRIFT = 0.03  # share that is kept by a drift that goes as none does
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at
 
 
@@ -88,8 +86,8 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.words))
     fitted = fit(engine, explanation)
     share = kept_within(_left(engine, fitted), allowed)
-    if _swings(fitted) or _hurries(engine, fitted):
-        share *= SWINGS
+    if goes_as_no_drift(engine, fitted):
+        share *= NO_DRIFT
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
     hands = engine.bench.rows.rms(open_to_hands(engine, fitted))
     if explanation.eta > STEP * float(np.hypot(allowed, hands)):  # so much the grid may be off
@@ -135,41 +133,6 @@ AS_STATED = 3.0  # standard deviations
 # gains alone were wrong there, which have bounds of their own (`penalties.within_stated`).
 FOR_NOTHING = 10.0
 STATED = LINEAR - {"force_scale", "displacement_scale"}
-
-
-def _swings(fitted: Fit) -> bool:
-    """Whether a drift comes and goes again and again: warming rigs and leaking charges do not,
-    however they wander; air conditioning does, machines next door, and what a law leaves of every
-    run."""
-    for path in _free_paths(fitted, DRIFTS):
-        about = path - path.mean(axis=0)
-        slow = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, len(path)), _SLOW)
-        rest = about - slow @ np.linalg.lstsq(slow, about, rcond=None)[0]
-        if np.sum(rest**2) > _MOSTLY * np.sum(about**2):
-            return True
-    return False
-
-
-def _hurries(engine: Engine, fitted: Fit) -> bool:
-    """Whether a displacement is said to drift faster than anything warms up: somebody leans on the
-    stand, something is moved."""
-    span = engine.bench.course.session_span
-    return engine.bench.rows.clock and any(
-        np.abs(np.diff(path, axis=0)).max() > FASTEST * span / (len(path) - 1)
-        for path in _free_paths(fitted, frozenset({"thermal_drift"}))
-    )
-
-
-# Warm robots move by up to 400 um over hours, lasers by 1 um/K: some hundred times as fast is
-# no heat.
-FASTEST = 400e-6 / 60  # m/s
-
-
-def _free_paths(fitted: Fit, words: frozenset[str]) -> Iterator[Array]:
-    """(pieces, paths) of every part of these words that takes any path."""
-    for i, part in enumerate(fitted.parts):
-        if part.word in words and part.variant.free_pieces:
-            yield fitted.of(i)[0].reshape(-1, part.variant.free_pieces).T
 
 
 def _left(engine: Engine, fitted: Fit) -> float:
