@@ -11,8 +11,8 @@ WORTH = 3.0  # nats that one effect more has to bring before it is named;
 # a third one more: what it does to some channel may be how far the other two's laws are off.
 WORTH_OF_THIRD = 10.0
 # Nor is one named that moves less than such a share of what another does, however plainly it shows:
-# as far laws are off. Of 73 second and third effects below these shares in ten runs of the blind
-# check 9 were there.
+# as far laws are off. In ten runs of the blind check 55 of 57 second effects below that share were
+# wrong, and of 69 third ones below this one 42; 24 more stood for what another one stood for.
 LEAST_OF_THIRD = 0.2
 
 
