@@ -81,10 +81,10 @@ def explain_gap(
     tell("withheld data", 0.7)
     found = learned(earned(found), withheld)
     verdict = max(found.probabilities, key=lambda w: found.probabilities[w])
-    plain = chosen_of(found, verdict)
+    plain, fuller = chosen_of(found, verdict)
     chosen = force(found.engine, found.variants, found.explanations, plain, forced)
     chosen, each = settled(found.engine, found.variants, chosen, found.explanations)
-    result = with_twins(result_of(found, verdict, chosen, each), chosen, withheld)
+    result = with_twins(result_of(found, verdict, chosen, each, fuller), chosen, withheld)
     if not forced <= plain.words:
         result = replace(result, without_added=left_of(found.engine, fit(found.engine, plain)))
 

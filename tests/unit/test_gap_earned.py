@@ -257,7 +257,8 @@ def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: b
     after = earned(found(e, both, bump, more))
     spoken = after.speakers.get(both.words)
     assert spoken is (None if needed or second == "thermal_drift" else bump)
-    assert chosen_of(after, "joint_nonlinear_stiffness" if spoken else second) is (spoken or both)
+    choice = chosen_of(after, "joint_nonlinear_stiffness" if spoken else second)
+    assert choice.shown is (spoken or both)
     spoken_for = with_posterior(replace(after, speakers={both.words: bump}), {})
     for result, word in (
         (with_posterior(replace(after, speakers={}), {}), second),

@@ -52,8 +52,9 @@ def test_a_shape_that_does_better_here_too_is_taken() -> None:
     assert taken.log_weight > start.log_weight + 10
 
 
-def test_a_shape_that_does_not_is_not() -> None:
+def test_nothing_is_polished_for_a_shape_that_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
     e, v = setting()
+    monkeypatch.setattr(search, "polished", lambda *_: pytest.fail("there was no need"))
     start = pair(e, v["true"], v["wave"])
     for found in (pair(e, v["off"], v["nearly"]), pair(e, v["true"], v["nearly"])):
         assert search._with_lent_shapes(e, list(v.values()), start, [found]) is start

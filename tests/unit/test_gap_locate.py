@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.gap.answer.locate import locate
+from identification.gap.answer.locate import NOWHERE, Where, locate
 from identification.gap.model.bench import Bench, make_bench
 from tests.unit.test_gap_forms import arm_data
 
@@ -19,7 +19,7 @@ def bench() -> Bench:
     return make_bench(arm_data())
 
 
-def located(bench: Bench, gap: Array, word: str = "") -> object:
+def located(bench: Bench, gap: Array, word: str = "") -> Where:
     """Where a gap (n,) lies; word: of the effect that made it, none where empty."""
     part = SimpleNamespace(word=word, variant=SimpleNamespace(joint=None))
     fit = SimpleNamespace(parts=(part,) if word else (), contribution=lambda engine, i: gap)
@@ -71,3 +71,32 @@ def test_what_springs_take_over_is_fitted_to_samples(bench: Bench) -> None:
     straight = 2e-8 * bench.load * np.where(rows.hold_starts, 3.0, 1.0)
     gap = np.where(y, straight, bent)
     assert located(longer, balanced(longer, gap), "joint_yield").directions == ("x",)
+
+
+def two_effects(bench: Bench, verdict: str, sizes: list[float]) -> Where:
+    """Of a gain that moves x and a creep of joint 3 that moves y, with these sizes (m)."""
+    wave, y = np.where(np.arange(bench.rows.n) % 2, 1e-6, -1e-6), in_y(bench)
+    moved = [wave * ~y, wave * y]
+    parts = tuple(
+        SimpleNamespace(word=word, variant=SimpleNamespace(joint=joint))
+        for word, joint in (("force_scale", None), ("joint_creep", 2))
+    )
+    fit = SimpleNamespace(parts=parts, contribution=lambda engine, i: moved[i])
+    return locate(SimpleNamespace(bench=bench), verdict, fit, sizes, wave)
+
+
+def test_where_speaks_of_the_verdict_though_it_is_not_the_largest(bench: Bench) -> None:
+    """And of its joint, however small it is beside the other one."""
+    for sizes in ([2e-5, 1e-5], [2e-5, 1e-6]):
+        found = two_effects(bench, "joint_creep", sizes)
+        assert (found.directions, found.joints) == (("y",), (3,))
+    beside = two_effects(bench, "force_scale", [2e-5, 1e-5])
+    assert (beside.directions, beside.joints) == (("x",), (3,))
+    assert two_effects(bench, "force_scale", [2e-5, 1e-6]).joints == ()
+
+
+def test_where_of_none_and_of_unknown_with_an_effect_that_was_asked_for(bench: Bench) -> None:
+    assert two_effects(bench, "none", [2e-5, 1e-5]) == NOWHERE
+    found = two_effects(bench, "unknown", [2e-5, 1e-5])
+    assert (found.directions, found.joints) == (("x", "y"), ())
+    assert found.seen_by_encoders is None

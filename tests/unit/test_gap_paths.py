@@ -19,20 +19,27 @@ MEDIUM = DESIGNS["medium"]
 
 
 @pytest.mark.parametrize(
-    ("way", "within", "far"),
+    ("way", "step_s", "far"),
     [
-        ([0, 0, 3, 0, 0], 2, 3.0),
-        ([0, 0, -3, -1, 0], 2, 2.0),
-        ([0, 0, -3, -1, 0], 3, 3.0),
-        ([0, 1, 2, 3, 2, 1, 0], 2, 1.0),
-        ([0, 1, 2, 3, 2, 1, 0], 6, 3.0),
-        ([0, 1, 2, 3, 4, 5], 5, 0.0),
-        ([0, 2, 0], 1, 0.0),
-        ([1.0], 5, 0.0),
+        ([0, 0, 3, 0, 0], 100, 3.0),
+        ([0, 0, -3, -1, 0], 100, 2.0),
+        ([0, 0, -3, -1, 0], 60, 3.0),
+        ([0, 1, 2, 3, 2, 1, 0], 100, 1.0),
+        ([0, 1, 2, 3, 2, 1, 0], 30, 3.0),
+        ([0, 1, 2, 3, 4, 5], 10, 0.0),
+        ([0, 2, 0], 101, 0.0),
+        ([1.0], 10, 0.0),
+        ([], 10, 0.0),
     ],
 )
-def test_there_and_back(way: list[float], within: int, far: float) -> None:
-    assert there_and_back(np.array(way, float), within) == far
+def test_there_and_back(way: list[float], step_s: float, far: float) -> None:
+    assert there_and_back(np.array(way, float), step_s * np.arange(len(way))) == far
+
+
+def test_time_goes_on_while_nobody_looks() -> None:
+    way, time = np.array([0.0, 3.0, 0.0]), np.array([0.0, 60.0, 120.0])
+    assert there_and_back(way, time) == 3.0
+    assert there_and_back(way, np.array([0.0, 60.0, 420.0])) == 0.0
 
 
 @pytest.mark.parametrize(

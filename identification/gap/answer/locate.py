@@ -60,7 +60,7 @@ def locate(engine: Engine, verdict: str, fit: Fit, sizes: Sequence[float], gap: 
         force=_ranges(engine, rows),
         branches=tuple(BRANCH_NAMES[b] for b in np.unique(bench.rows.branch[rows])),
         repetitions=tuple(int(r) for r in np.unique(bench.rows.repetition[rows])),
-        joints=_joints(engine, fit, sizes),
+        joints=_joints(engine, verdict, fit, sizes) if same else (),
         seen_by_encoders=_seen(engine, verdict if same else ""),
         share=inside / total if total > 0 else 0.0,
     )
@@ -111,14 +111,14 @@ def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
     return out
 
 
-def _joints(engine: Engine, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]:
-    """Joints (from 1) in which those joint effects of the explanation sit that matter beside its
-    largest effect, by their sizes (rms m); of a bench, none."""
+def _joints(engine: Engine, verdict: str, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]:
+    """Joints (from 1) in which the verdict's effect sits, and those that matter beside the largest
+    one, by their sizes (rms m); of a bench, none."""
     if not engine.bench.data.arm:
         return ()
     out: list[int] = []
     for i, p in enumerate(fit.parts):
-        if sizes[i] < _COUNTS * max(sizes):
+        if p.word != verdict and sizes[i] < _COUNTS * max(sizes):
             continue
         if p.variant.joint is not None:
             out.append(p.variant.joint + 1)

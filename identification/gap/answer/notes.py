@@ -11,7 +11,6 @@ from identification.gap.data import GapData
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
-from identification.gap.judging.choice import WORTH_OF_THIRD
 from identification.gap.judging.strain import what_is_strained
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import NOISY, SWINGS
@@ -136,23 +135,16 @@ def across(bench: Bench, chosen: Explanation) -> tuple[Note, ...]:
 _MOVES = 0.2  # of the noise of a sample
 
 
-def left_out(found: SearchResult, chosen: Explanation) -> tuple[Note, ...]:
-    """Of effects that explain the gap plainly better still, and are not named: they move so little
-    that they may be how far the laws of those named are off."""
-    more = [e for e in found.explanations if chosen.parts and e.words > chosen.words and e.good]
-    best = max(more, key=lambda e: e.log_weight, default=chosen)
-    if not best.log_weight > chosen.log_weight + WORTH_OF_THIRD:
+def left_out(chosen: Explanation, fuller: Explanation | None) -> tuple[Note, ...]:
+    """Of effects that do too little to be named, though with them (fuller) more is explained."""
+    if fuller is None or fuller.words <= chosen.words:
         return ()
-    each = [
-        f"{w} ({1e3 * s:.2g} mm rms)" for w, s in best.troubles.items() if w not in chosen.words
-    ]
-    words = [w for w in best.troubles if w not in chosen.words]
+    small = {w: s for w, s in fuller.troubles.items() if w not in chosen.words}
     text = (
-        f"With {' and '.join(each)} beside it the gap would be explained better still, by "
-        f"{best.log_weight - chosen.log_weight:.0f} nats; so little may as well be how far the law "
-        f"of {' and '.join(chosen.troubles)} is off, and is not named. To see it: "
-        + " ".join(f"--add {w}" for w in words)
-        + "."
+        f"{' and '.join(f'{w} ({1e3 * s:.2g} mm rms)' for w, s in small.items())} beside it would "
+        f"explain {fuller.log_weight - chosen.log_weight:.0f} nats more. So little may as well be "
+        f"how far the law of {' and '.join(chosen.troubles)} is off: it is not named. To see it: "
+        f"{' '.join(f'--add {w}' for w in small)}."
     )
     return (Note(REMARK, text),)
 

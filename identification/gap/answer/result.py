@@ -101,10 +101,14 @@ class GapResult:
 
 
 def result_of(
-    found: SearchResult, verdict: str, chosen: Explanation, known: list[Known]
+    found: SearchResult,
+    verdict: str,
+    chosen: Explanation,
+    known: list[Known],
+    fuller: Explanation | None,
 ) -> GapResult:
     """The result but for what to measure next. known: of every effect of the chosen explanation
-    what is known."""
+    what is known; fuller: as in `Choice`."""
     engine, bench = found.engine, found.engine.bench
     n = bench.rows.n
     fitted = fit(engine, chosen)
@@ -117,7 +121,7 @@ def result_of(
     notes = [*scale, *notes_of(bench, verdict)]
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
     notes += readings_missed(engine, fitted) if chosen.parts else ()
-    notes += left_out(found, chosen)
+    notes += left_out(chosen, fuller)
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,

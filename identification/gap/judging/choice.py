@@ -2,53 +2,75 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
 from identification.gap.explanations.verdict import FORESAW
 from identification.gap.words import BETWEEN_RUNS, DATUM_JUMPS, DRIFTS, LINEAR
 
-WORTH = 3.0  # nats that one effect more has to bring before it is named;
-# a third one more: what it does to some channel may be how far the other two's laws are off.
-WORTH_OF_THIRD = 10.0
-# Nor is one named that moves less than such a share of what another does, however plainly it shows:
-# as far laws are off. In ten runs of the blind check 55 of 57 second effects below that share were
-# wrong, and of 69 third ones below this one 42; 24 more stood for what another one stood for.
+# Nats that a second effect has to bring before it is named, and a third one: what that does to some
+# channel may be how far the other two's laws are off.
+WORTH, WORTH_OF_THIRD = 3.0, 10.0
+# Nor is a second one named that does less to the gap than LEAST_SHARE of what another does, or a
+# third one less than this, however plainly it shows: as far laws are off. In ten runs of the blind
+# check 55 of 57 such second effects were not there; of 69 such third ones 42 were not, and 24 stood
+# for what another one stood for.
 LEAST_OF_THIRD = 0.2
+_TWO = 2
 
 
-def chosen_of(found: SearchResult, verdict: str) -> Explanation:
-    """The best explanation with the verdict among its effects, but for those that are petty. A
-    larger one may stand beside it that is one of several alike: none of these is the likeliest main
-    cause, and together they are there."""
+class Choice(NamedTuple):
+    """shown: the explanation that is shown; fuller: that with the effects beside it that do too
+    little to be named, if any."""
+
+    shown: Explanation
+    fuller: Explanation | None = None
+
+
+def chosen_of(found: SearchResult, verdict: str) -> Choice:
+    """The best explanation that has the verdict among its effects, without effects that bring or do
+    too little. The verdict need not be the largest of them: where several words would do for a
+    larger one, none of these is likely, but one of them is there."""
     if verdict in ("none", "unknown"):
-        return next(e for e in found.explanations if not e.parts)
+        return Choice(next(e for e in found.explanations if not e.parts))
     mine = [e for e in found.explanations if verdict in e.words]
     mine = [e for e in mine if not _needless(found, e)] or mine
     held = [e for e in mine if foresees(found, e)]
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]
     best = _worthwhile(best, simpler)
-    petty = _petty(best)
-    return next(
-        (e for e in simpler if e.words < best.words and best.words - e.words <= petty), best
-    )
+    shown = _without_small(best, simpler)
+    return Choice(shown, best if shown is not best else None)
 
 
-def _petty(explanation: Explanation) -> set[str]:
-    """Effects that may be how far another one's law is off. No law bends that is linear; and a jump
-    of the datum shows without load, where only a drift's law is off."""
+def _without_small(best: Explanation, simpler: list[Explanation]) -> Explanation:
+    """Without the effects that do too little, the smallest first: what is little beside two may be
+    enough beside one."""
+    while True:
+        small = _too_small(best)
+        fewer = (e for w in small for e in simpler if e.words == best.words - {w})
+        without = next(fewer, None)
+        if without is None:
+            return best
+        best = without
+
+
+def _too_small(explanation: Explanation) -> list[str]:
+    """Effects that may be how far the law of another one is off, the smallest first. Only linear
+    ones may be what other linear ones lack: no such law bends. A jump of the datum shows without
+    load, where no law but a drift's is off; and it has no law that could be off under load."""
     sizes = explanation.troubles
-    share, out = LEAST_SHARE if len(sizes) < _THREE else LEAST_OF_THIRD, set()
-    for word, size in sizes.items():
-        laws = {w: s for w, s in sizes.items() if w not in LINEAR or word in LINEAR}
+    share = LEAST_SHARE if len(sizes) <= _TWO else LEAST_OF_THIRD
+    out = []
+    for word, size in sorted(sizes.items(), key=lambda i: i[1]):
         if word in DATUM_JUMPS:
-            laws = {w: s for w, s in sizes.items() if w in DRIFTS}
-        if size < share * max(laws.values(), default=0.0):
-            out.add(word)
+            laws = DRIFTS
+        else:
+            laws = frozenset(sizes) - DATUM_JUMPS - (frozenset() if word in LINEAR else LINEAR)
+        if size < share * max((s for w, s in sizes.items() if w in laws), default=0.0):
+            out.append(word)
     return out
-
-
-_THREE = 3
 
 
 def _needless(found: SearchResult, explanation: Explanation) -> bool:
@@ -60,7 +82,7 @@ def _needless(found: SearchResult, explanation: Explanation) -> bool:
 def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:
     """With no effect that brings less than it has to."""
     while True:
-        worth = WORTH if len(best.words) < 3 else WORTH_OF_THIRD
+        worth = WORTH if len(best.words) <= _TWO else WORTH_OF_THIRD
         fewer = [e for e in simpler if e.words < best.words and len(e.words) == len(best.words) - 1]
         near = [e for e in fewer if e.log_weight > best.log_weight - worth]
         if not near:

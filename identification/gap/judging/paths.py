@@ -19,7 +19,8 @@ FASTEST = 400e-6 / 60  # m/s
 # A kilogram of aluminium (900 J/kg/K) in still air (10 W/m^2/K on 0.05 m^2) follows it in half an
 # hour, a light stand in some minutes: heat does not come and leave again, most of it, within this.
 # Of paths of the blind check those of who leaned on the stand did by two thirds of their range and
-# more, others by a quarter at most.
+# more, others by a quarter at most. (Of sessions beyond some fifty minutes the pieces of a path lie
+# too far apart to tell.)
 BACK_WITHIN_S, BACK = 200.0, 0.6
 
 
@@ -56,9 +57,12 @@ def _turns_back(engine: Engine, fitted: Fit) -> bool:
     if not engine.bench.rows.clock:
         return False
     for path, seen in zip(_free_paths(fitted, HEAT), _seen(engine, fitted), strict=True):
-        within = int(BACK_WITHIN_S / _step(engine, path))
-        for way in (w[s] for w, s in zip(path.T, seen.T, strict=True)):
-            if there_and_back(way, within) > BACK * (way.max(initial=0.0) - way.min(initial=0.0)):
+        time = np.arange(len(path)) * _step(engine, path)
+        for way, there in zip(path.T, seen.T, strict=True):
+            shown = way[there]
+            if there_and_back(shown, time[there]) > BACK * float(
+                np.ptp(shown) if there.any() else 0
+            ):
                 return True
     return False
 
@@ -72,14 +76,15 @@ def _seen(engine: Engine, fitted: Fit) -> Iterator[Flags]:
             yield shown.reshape(-1, part.variant.free_pieces).T
 
 
-def there_and_back(way: Array, within: int) -> float:
-    """How far a path (n,) goes, and comes back, within so many steps at most."""
+def there_and_back(way: Array, time: Array) -> float:
+    """How far a path (n,) goes, and comes back, within BACK_WITHIN_S at most; time (n,) s."""
     most = 0.0
-    for turn in range(1, len(way) - 1):
-        for before in range(1, min(within - 1, turn) + 1):
-            back = way[turn + 1 : turn + 1 + within - before]
-            out = way[turn] - way[turn - before]
-            most = max(most, float(np.minimum(abs(out), np.sign(out) * (way[turn] - back)).max()))
+    for start in range(len(way)):
+        here = way[start : np.searchsorted(time, time[start] + BACK_WITHIN_S, side="right")]
+        for turn in range(1, len(here) - 1):
+            out = here[turn] - here[0]
+            back = np.sign(out) * (here[turn] - here[turn + 1 :])
+            most = max(most, float(np.minimum(abs(out), back).max()))
     return most
 
 

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array, Flags
-from identification.gap.laws.lasting import lasting
+from identification.gap.laws.lasting import HARDENS, lasting
 from identification.gap.model.bench import Bench
 from identification.gap.model.history import beginnings
 from identification.gap.model.variants import Variant
 from identification.gap.recording.turns import way_back
 
-HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 HARDENED = " hardened"
 UNDER_A_TIP, _CAME_BACK = (0.01, 0.04, 0.1), 0.2  # of the range
 _LEFT = 0.2  # of the largest response: as much as friction seldom holds

@@ -10,8 +10,8 @@ import numpy as np
 
 from identification.arrays import Array, Flags
 from identification.gap.laws.flow_back import flowing_back, yielded_from
-from identification.gap.laws.hardened import HARDENS, hardened
-from identification.gap.laws.lasting import LEAST, SCALES
+from identification.gap.laws.hardened import hardened
+from identification.gap.laws.lasting import HARDENS, LEAST, SCALES
 from identification.gap.laws.specimens import softening
 from identification.gap.laws.walks import walking
 from identification.gap.model.bench import Bench

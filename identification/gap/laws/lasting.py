@@ -1,4 +1,5 @@
-"""Shapes of what gives way and neither flows back nor slowly: what `hardened` and `walks` share."""
+"""What all knees have in common, and shapes of those that flow neither back nor slowly (`hardened`,
+`walks`)."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from identification.arrays import Array
 from identification.gap.model.variants import Variant, variant
 
 SCALES = (0.07, 0.25, 0.9, 3.5, 14.0, 56.0)
+HARDENS = 0.3  # plastic paths far beyond the knee harden or soften on
 LEAST = 0.15  # of the elastic compliance: what bends less does not give way
 
 

@@ -200,8 +200,8 @@ def _deepen(
 def _with_lent_shapes(
     engine: Engine, variants: list[Variant], start: Explanation, found: list[Explanation]
 ) -> Explanation:
-    """Polished, if one of its parts does better in a shape that others found for that word: beside
-    what it does not explain itself, its own shape was chosen to explain that too."""
+    """Polished, if one of its parts does better in a shape that others found for that word. Its own
+    one was chosen before the other part stood beside it, and makes up for what that explains."""
     for part in start.parts:
         shapes = [p.variant for e in found for p in e.parts if p.word == part.word]
         lent = [v for v in dict.fromkeys(shapes) if v is not part.variant]
