@@ -55,6 +55,16 @@ def test_a_force_that_ripples_while_it_stands_does_not_lag(lags: bool) -> None:
     assert channels == ({"displacement", "force"} if lags else {"displacement"})
 
 
+def test_what_a_hand_did_on_the_way_to_a_level_is_no_ripple() -> None:
+    """A force that is a second and a half late shows at the first readings how far it went."""
+    beyond = np.array([0.0, 6, -9, 4, -7, 8, -5, 9, -6])
+    first = np.arange(len(LEVELS)) % HOLD == 0
+    second = np.arange(len(LEVELS)) % HOLD == 1
+    read = LEVELS + np.repeat(beyond, HOLD) * (first + 0.5 * second)
+    bench = make_bench(held(read, LEVELS))
+    assert {v.info["channel"] for v in time_lag.variants(bench)} == {"displacement", "force"}
+
+
 def cycling(of_force: Array | float = 0.0, of_laser: Array | float = 0.0) -> GapData:
     """Sixteen cycles of 50 N to and fro; what force and displacement read beside that."""
     t = np.arange(1600)

@@ -156,16 +156,28 @@ def late(bench: Bench, channel: str, kind: str, lag: float) -> Array:
 
 
 def _ripples(bench: Bench) -> bool:
-    """Whether the force changes in its holds as no lag makes of a load that stands still there."""
+    """Whether the force changes in its holds as no lag makes of a load that stands still there. The
+    first readings of a hold may show, late, what a hand did on the way there: ripples go on."""
     rows, meter = bench.rows, bench.data.instruments
     if bench.imposed or _way_shown(bench):
         return False
-    moves = rows.rms(bench.load - rows.hold_means(bench.load)[rows.hold])
-    if moves <= _MOVES * rows.rms(meter.force / np.sqrt(rows.weight)):
+    begins = rows.hold_starts.copy()
+    begins[1:] |= rows.hold_starts[:-1]
+    moves = _moves(bench, rows.weight)
+    goes_on = _moves(bench, np.where(begins, 0.0, rows.weight))
+    if min(moves, goes_on) <= _MOVES * rows.rms(meter.force / np.sqrt(rows.weight)):
         return False
     lags = np.array(LAGS) * sampling_time(rows)
     missed = (_still(bench, kind, lag)[1] for kind in KINDS[:2] for lag in lags)
     return min(map(rows.rms, missed)) > _UNLIKE * moves
+
+
+def _moves(bench: Bench, weight: Array) -> float:
+    """rms (N) by which the force changes within holds; weight (n,) of the rows."""
+    hold = bench.rows.hold
+    total = np.maximum(np.bincount(hold, weights=weight), 1e-300)
+    about = bench.load - (np.bincount(hold, weights=weight * bench.load) / total)[hold]
+    return float(np.sqrt(weight @ about**2 / max(weight.sum(), 1e-300)))
 
 
 _MOVES, _UNLIKE = 5.0, 0.8  # times its noise; share of what it does within holds
