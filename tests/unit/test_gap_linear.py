@@ -203,7 +203,9 @@ def test_of_many_wrong_springs_those_that_show_are_where_the_gap_lies(bench: Ben
     sd = np.array([0.1, 0.1, 0.01, 0.2, 1.0])[: len(size)] / size
     fit = SimpleNamespace(parts=(Part(v, 1.0),), of=lambda i: (w, np.diag(sd**2)))
     # the third is clear but small, the fourth may be none
-    assert _joints(engine, fit, [1.0]) == tuple(j + 1 for j in v.info["joints"][:2])
+    assert _joints(engine, "joint_stiffness_error", fit, [1.0]) == tuple(
+        j + 1 for j in v.info["joints"][:2]
+    )
 
 
 def test_the_gap_lies_in_no_joint_that_does_next_to_nothing(bench: Bench) -> None:
@@ -213,7 +215,9 @@ def test_the_gap_lies_in_no_joint_that_does_next_to_nothing(bench: Bench) -> Non
     fit = SimpleNamespace(parts=(Part(first, 1.0), Part(other, 1.0)))
     engine = SimpleNamespace(bench=fresh)
     for size, joints in ((0.3, (first, other)), (0.05, (first,))):
-        assert _joints(engine, fit, [1.0, size]) == tuple(v.info["joint"] + 1 for v in joints)
+        assert _joints(engine, "joint_creep", fit, [1.0, size]) == tuple(
+            v.info["joint"] + 1 for v in joints
+        )
 
 
 @pytest.mark.slow

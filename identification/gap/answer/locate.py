@@ -112,13 +112,15 @@ def _ranges(engine: Engine, rows: Flags) -> dict[str, tuple[float, float]]:
 
 
 def _joints(engine: Engine, verdict: str, fit: Fit, sizes: Sequence[float]) -> tuple[int, ...]:
-    """Joints (from 1) in which the verdict's effect sits, and those that matter beside the largest
-    one, by their sizes (rms m); of a bench, none."""
+    """Joints (from 1) in which those joint effects of the explanation sit that matter, by their
+    sizes (rms m): the verdict's beside its largest, others beside the largest of all; of a bench,
+    none."""
     if not engine.bench.data.arm:
         return ()
+    own = max(s for p, s in zip(fit.parts, sizes, strict=True) if p.word == verdict)
     out: list[int] = []
     for i, p in enumerate(fit.parts):
-        if p.word != verdict and sizes[i] < _COUNTS * max(sizes):
+        if sizes[i] < _COUNTS * (own if p.word == verdict else max(sizes)):
             continue
         if p.variant.joint is not None:
             out.append(p.variant.joint + 1)
