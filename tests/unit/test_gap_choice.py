@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import cast
 
 import pytest
@@ -18,15 +19,22 @@ CURVE, LAG, ASKEW = "joint_nonlinear_stiffness", "time_lag", "load_misalignment"
 LARGE = 1e-5  # m
 
 
-def said(sizes: dict[str, float], weight: float, good: float = 0.0) -> Explanation:
+NOISE = 1e-6
+
+
+def said(
+    sizes: dict[str, float], weight: float, good: float = 0.0, eta: float = 0.0
+) -> Explanation:
     """An explanation by words of sizes (as shares of LARGE), the largest first."""
     parts = tuple(Part(variant(word, word, [0], (1.0,)), 1.0) for word in sizes)
-    return Explanation(parts, weight, 0.0, tuple(LARGE * s for s in sizes.values()), weight + good)
+    each = tuple(LARGE * s for s in sizes.values())
+    return Explanation(parts, weight, eta, each, weight + good)
 
 
 def found(*explanations: Explanation) -> SearchResult:
     ranked = tuple(sorted(explanations, key=lambda e: -e.log_weight))
-    return SearchResult(cast(Engine, None), (*ranked, said({}, -500.0)), {}, {}, -400.0, 1e-6)
+    engine = SimpleNamespace(bench=SimpleNamespace(noise=SimpleNamespace(stated=NOISE)))
+    return SearchResult(cast(Engine, engine), (*ranked, said({}, -500.0)), {}, {}, -400.0, 1e-6)
 
 
 def shown_of(result: SearchResult, verdict: str) -> Explanation:
@@ -100,6 +108,17 @@ def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:
     )
     told = replace(found(two), kept={two.words: 0.1, frozenset({"joint_creep"}): 0.9})
     assert [foresees(told, e) for e in (two, three, other)] == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("left", "had", "named"), [(1.9, 0.0, 1), (2.1, 0.0, 2), (2.1, 2.1, 1), (3.0, 2.5, 2)]
+)
+def test_little_is_named_without_which_too_much_is_left(
+    left: float, had: float, named: int
+) -> None:
+    one = said({CURVE: 1.0}, 0.0, eta=left * NOISE)
+    two = said({CURVE: 1.0, LAG: 0.05}, 400.0, eta=had * NOISE)
+    assert len(shown_of(found(one, two), CURVE).parts) == named
 
 
 @pytest.mark.parametrize(("size", "named"), [(0.05, {CURVE}), (0.15, {CURVE, LAG})])

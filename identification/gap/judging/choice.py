@@ -17,6 +17,10 @@ WORTH, WORTH_OF_THIRD = 3.0, 10.0
 # check 55 of 57 such second effects were not there; of 69 such third ones 42 were not, and 24 stood
 # for what another one stood for.
 LEAST_OF_THIRD = 0.2
+# But it is named where without it the laws would miss more than this, of the stated noise of a
+# sample: a curve that does a twentieth of what a yield does, in another direction, is no matter of
+# the yield's law.
+CLOSELY = 2.0
 _TWO = 2
 
 
@@ -40,16 +44,17 @@ def chosen_of(found: SearchResult, verdict: str) -> Choice:
     best = next((e for e in [*held, *mine] if e.good), [*held, *mine][0])
     simpler = [e for e in held if e.good and e.words < best.words]
     best = _worthwhile(best, simpler)
-    shown = _without_small(best, simpler)
+    shown = _without_small(best, simpler, CLOSELY * found.engine.bench.noise.stated)
     return Choice(shown, best if shown is not best else None)
 
 
-def _without_small(best: Explanation, simpler: list[Explanation]) -> Explanation:
+def _without_small(best: Explanation, simpler: list[Explanation], most: float) -> Explanation:
     """Without the effects that do too little, the smallest first: what is little beside two may be
-    enough beside one."""
+    enough beside one. most: imperfection (m) that their leaving may need."""
+    close = [e for e in simpler if e.eta <= max(best.eta, most)]
     while True:
         small = _too_small(best)
-        fewer = (e for w in small for e in simpler if e.words == best.words - {w})
+        fewer = (e for w in small for e in close if e.words == best.words - {w})
         without = next(fewer, None)
         if without is None:
             return best
