@@ -60,9 +60,7 @@ def _turns_back(engine: Engine, fitted: Fit) -> bool:
         time = np.arange(len(path)) * _step(engine, path)
         for way, there in zip(path.T, seen.T, strict=True):
             shown = way[there]
-            if there_and_back(shown, time[there]) > BACK * float(
-                np.ptp(shown) if there.any() else 0
-            ):
+            if there.any() and there_and_back(shown, time[there]) > BACK * float(np.ptp(shown)):
                 return True
     return False
 
