@@ -61,6 +61,7 @@ CONSTANTS: dict[str, Key] = {
     "preload": Key("preload_Nm"),
     "way": Key("kind", "text", options=(*time_lag.KINDS, "window")),
     "measured_to": Key("measured_to_Nm", "positive"),
+    "saturates": Key("saturates_at_Nm", "positive"),
     "channel": Key("channel", "text", options=("displacement", "force")),
     "lag": Key("lag_s", "positive"),
     "path": Key(
@@ -98,6 +99,7 @@ SHAPES: dict[str, Key] = {
     "axis": Key("axis", "text", options=_SIDES),
     "law": Key("law", "text", options=tuple(contact_seating.LAWS)),
     "force_scale": Key("force_scale_N", "positive"),
+    "rubs": Key("friction_N", "positive"),
     "along": Key("along", "vector"),
     "across": Key("across", "vector"),
     "at_load": Key("at_N", "positive"),
@@ -150,6 +152,7 @@ for _name, _unit in _DRIFTS.items():
 
 MAY_BE_MISSING = (
     "measured_to",
+    "saturates",
     "about",
     "tool",
     "flow_exponent",
@@ -208,7 +211,7 @@ GRAMMAR: dict[str, Grammar] = {
     ),
     "base_slip": Grammar(("axis", "depth", "memory", "flow_time", "flow_exponent"), _PLAYS),
     "joint_hysteresis": Grammar(
-        ("joint", "law", "memory", "measured_to", "tool"),
+        ("joint", "law", "memory", "measured_to", "saturates", "tool"),
         (
             _STRENGTH,
             *_REACHES,
@@ -250,7 +253,9 @@ GRAMMAR: dict[str, Grammar] = {
         ("depth",),
         (("compliance", ("axis",)), ("compliance_xy", ()), ("compliance", ("axis", "beyond"))),
     ),
-    "contact_seating": Grammar((), (("depth", ("law", "force_scale")),)),
+    "contact_seating": Grammar(
+        (), (("depth", ("law", "force_scale")), ("depth", ("law", "force_scale", "rubs")))
+    ),
     "load_misalignment": Grammar(
         ("about",),
         tuple(("tangent", ("along", "across", *more)) for more in (*_GOES, ("run",)))

@@ -11,7 +11,7 @@ import pytest
 from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.effects import EFFECTS, joint_backlash, joint_hysteresis, library
-from identification.gap.effects.joint_hysteresis import REACHES
+from identification.gap.effects.joint_hysteresis import REACHES, SATURATES
 from identification.gap.evidence.compare import by_word, closest, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.laws import knees_closer
@@ -22,6 +22,7 @@ from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant, variant
 from identification.gap.search.refine import refine
 from tests.unit.test_gap_forms import arm_data, bench_without_arm
+from tests.unit.test_gap_model import survive
 
 
 def assert_lawful(bench: Bench, variants: list[Variant]) -> None:
@@ -127,6 +128,35 @@ def test_friction_that_grows_is_looked_at_where_a_joint_rubs() -> None:
     engine = engine_with(bench, bench.columns[truth.columns[1]])
     finer = refine(engine, score(engine, engine.levels, grid))
     assert any("grows_to" in v.info and v.info["joint"] == 1 for v in finer)
+
+
+@pytest.mark.parametrize("memory", ["", "worked in", "rested"])
+def test_loops_may_close_towards_large_loads(memory: str) -> None:
+    """As far as a load comes through it is rubbed on; at the ends the loops of a load that comes
+    and goes are narrower than in the middle."""
+    bench = make_bench(arm_data())
+    grid = library(bench, ["joint_hysteresis"])
+    found = next(v for v in grid if v.info["memory"] == memory and v.info["joint"] == 1)
+    finer = joint_hysteresis.saturating(bench, found)
+    assert len({v.label for v in finer}) == len(SATURATES)
+    assert_lawful(bench, finer)
+    survive(bench, finer)
+    n, torque = bench.rows.n, bench.true_torque[:, 1]
+    unit = bench.joint_column(1, bench.elastic[:, 1])[:n] / torque
+    for v, share in zip(finer, SATURATES, strict=True):
+        most = share * float(np.abs(torque).max())
+        through = bench.columns[v.columns[0]][:n] / unit
+        assert float(np.abs(through).max()) <= most * np.tanh(1 / share)
+        off = np.abs(through - most * np.tanh(torque / most))
+        assert float(off[np.abs(torque) > 0].max()) <= 1.01 * float(v.info["radius"][0])
+
+
+def test_loops_close_about_no_load_and_where_it_comes_back() -> None:
+    bench = make_bench(arm_data())
+    grid = library(bench, ["joint_hysteresis"])
+    hung = next(v for v in grid if joint_hysteresis.hangs(v))
+    assert joint_hysteresis.saturating(bench, hung) == []
+    assert joint_hysteresis.saturating(bench_without_arm(), grid[0]) == []
 
 
 def test_creep_may_be_forgotten_where_the_rig_is_set_up_anew() -> None:

@@ -155,6 +155,56 @@ def test_amplifiers_that_drift_alike_show_it_across_the_push_as_well() -> None:
     assert rows_of(bench, "force_drift", law) * scale == pytest.approx(exact, abs=1e-12)
 
 
+@pytest.mark.parametrize("tare", ["session", "run"])
+def test_amplifiers_that_one_cause_drives_show_at_rest_how(tare: str) -> None:
+    data = replace(arm_data(), tare=tare)
+    t = (data.session - data.session[0]) / np.ptp(data.session)
+    drift = 8.0 * np.sin(5.0 * t) + 5.0 * np.sin(14.0 * t)
+    if tare == "run":
+        first = np.flatnonzero(np.diff(data.run, prepend=-1))
+        drift = drift - drift[first][np.cumsum(np.diff(data.run, prepend=-1) != 0) - 1]
+    axis = np.array([0.35, -1.0, 0.6])
+    across, along = (
+        np.stack(each)[data.setup]
+        for each in (
+            [s.tangents @ axis for s in data.setups],
+            [s.unit_vector @ axis for s in data.setups],
+        )
+    )
+    assert data.tangential is not None
+    seen = data.tangential + across * drift[:, None]
+    bench = make_bench(replace(data, force=data.force + along * drift, tangential=seen))
+    variants = library(bench, ["force_drift"])
+    target = bench.observed - prediction(bench)
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 4e-6, 2e-5]))
+    best, *others = sorted(score(engine, engine.levels, variants), key=lambda s: -s.log_evidence)
+    assert best.variant.label == "winding path, as read at rest"
+    assert best.log_evidence > others[0].log_evidence + 20
+    assert np.array(best.variant.info["along"]) == pytest.approx(axis * -1, abs=0.05) or np.array(
+        best.variant.info["along"]
+    ) == pytest.approx(axis, abs=0.05)
+    law, scale = law_of(bench, best.variant)
+    exact = np.stack([bench.columns[c] for c in best.variant.columns], axis=1)
+    assert rows_of(bench, "force_drift", law) * scale == pytest.approx(exact, abs=1e-12)
+
+
+def test_amplifiers_that_drift_each_on_its_own_have_no_axis_in_common() -> None:
+    data = arm_data()
+    t = (data.session - data.session[0]) / np.ptp(data.session)
+    each = np.stack([8.0 * np.sin(w * t + w) for w in (5.0, 9.0, 14.0)], axis=1)
+    across, along = (
+        np.einsum("nk,n...k->n...", each, np.stack(vectors)[data.setup])
+        for vectors in (
+            [s.tangents for s in data.setups],
+            [s.unit_vector for s in data.setups],
+        )
+    )
+    assert data.tangential is not None
+    seen = replace(data, force=data.force + along, tangential=data.tangential + across)
+    labels = [v.label for v in library(make_bench(seen), ["force_drift"])]
+    assert not any(label.endswith("as read at rest") for label in labels)
+
+
 @pytest.mark.parametrize("times", [200.0, 1 / 200])
 def test_a_rig_in_another_unit_is_told_by_its_factor(times: float) -> None:
     """Stiffness 200 times what is simulated, or a 200th of it: no factor ends at a bound."""

@@ -14,7 +14,10 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part, log_joints
 from identification.gap.explanations.explanation import (
     LAW_REMAINDER,
+    OF_A_BENCH,
+    REMAINDER,
     Explanation,
+    may_remain,
     up_to_likeliest,
 )
 from identification.gap.explanations.priors import LOG_NONE
@@ -85,13 +88,13 @@ def test_the_main_cause_of_two_is_the_larger_one_as_far_as_their_sizes_are_known
         (linear, 3.0, 0.985 * 0.95 + 0.025),
         (mechanisms, 1e12, 0.975),
     ):
-        found = _main(said(parts, (ratio * 1e-5, 1e-5)), True)
+        found = _main(said(parts, (ratio * 1e-5, 1e-5)), (), True)
         assert found[parts[0].word] == pytest.approx(share, abs=2e-3)
         assert sum(found.values()) == pytest.approx(1.0)
-    assert _main(said(mechanisms, (2e-5, 1e-5)), False) == {"joint_yield": 1.0}
-    assert _main(said(mechanisms, (0.0, 0.0)), True)["joint_yield"] == pytest.approx(0.5)
-    assert _main(said(mechanisms[:1], (0.0,)), True) == {"joint_yield": 1.0}
-    assert _main(said((), ()), True) == {"none": 1.0}
+    assert _main(said(mechanisms, (2e-5, 1e-5)), (), False) == {"joint_yield": 1.0}
+    assert _main(said(mechanisms, (0.0, 0.0)), (), True)["joint_yield"] == pytest.approx(0.5)
+    assert _main(said(mechanisms[:1], (0.0,)), (), True) == {"joint_yield": 1.0}
+    assert _main(said((), ()), (), True) == {"none": 1.0}
 
 
 def test_what_explains_far_less_inherits_nothing_unless_it_fits_closely() -> None:
@@ -168,8 +171,27 @@ def test_a_play_and_a_curve_of_one_joint_are_one_trouble() -> None:
     play, drift = part("joint_backlash", [0], joint=1), part("thermal_drift", [0])
     for joint, curve in ((1, False), (2, True)):
         bends = part("joint_nonlinear_stiffness", [0], joint=joint)
-        assert _tells_of_three(said((play, bends, drift), (3e-5, 2e-5, 1e-5))) == curve
-    assert _tells_of_three(said((play, bends, drift, part("zero_shift", [0])), (1e-5,) * 4))
+        assert _tells_of_three(said((play, bends, drift), (3e-5, 2e-5, 1e-5)), ()) == curve
+    assert _tells_of_three(said((play, bends, drift, part("zero_shift", [0])), (1e-5,) * 4), ())
+
+
+@pytest.mark.parametrize("beside", [(), (part("thermal_drift", [0]),)])
+def test_a_play_and_a_curve_of_one_joint_are_called_by_what_explains_more_alone(
+    beside: tuple[Part, ...],
+) -> None:
+    """Beside each other the curve does more, whatever it does without the play."""
+    play, bends = (part(w, [0], joint=2) for w in ("joint_backlash", "joint_nonlinear_stiffness"))
+    both = said((bends, play, *beside), (3e-5, 1e-5, 2e-6)[: 2 + len(beside)])
+    for better in (play, bends):
+        alone = [said((p, *beside), (1e-5,), -9.0 + (p is better)) for p in (play, bends)]
+        alone.sort(key=lambda e: -e.log_weight)
+        shares = _main(both, [both, *alone], True)
+        assert max(shares, key=lambda w: shares[w]) == better.word
+        assert shares[better.word] > 0.9
+    elsewhere = replace(play, variant=replace(play.variant, info={"joint": 1}))
+    two = said((bends, elsewhere), (3e-5, 1e-5))
+    assert _main(two, [two, said((elsewhere,), (1e-5,), -1.0)], True)[bends.word] > 0.9
+    assert _main(both, [both], True)[bends.word] > 0.9  # nobody looked at either alone
 
 
 def test_springs_beside_a_mechanism_are_looked_for_in_other_joints_too() -> None:
@@ -429,6 +451,24 @@ def test_what_levels_without_an_arm_really_leave_is_looked_up() -> None:
     first, second = looked_up(one).explanations
     assert first.log_good > -0.1
     assert second is other  # so far down nobody looks
+
+
+def test_laws_of_a_rig_without_an_arm_may_leave_more() -> None:
+    """A spring or gain that is off by more than what springs leave counts as what it is."""
+    bench = small_bench()
+    plain = small_engine(bench)
+    arm = replace_bench(plain, replace(bench, data=replace(bench.data, arm=True)))
+    large, left = 9.0 * plain.structural, plain.structural
+    for engine, troubles, most in (
+        (plain, {"joint_creep": large}, OF_A_BENCH * left),
+        (arm, {"joint_creep": large}, REMAINDER * left),
+        (plain, {"force_scale": large, "joint_creep": left}, OF_A_BENCH * large),
+        (plain, {"joint_creep": large, "force_scale": large}, OF_A_BENCH * left),
+        (plain, {"force_scale": 0.1 * left}, OF_A_BENCH * left),
+        (arm, {"force_scale": large}, REMAINDER * left),
+        (plain, {}, OF_A_BENCH * left),
+    ):
+        assert may_remain(engine, troubles) == pytest.approx(most)
 
 
 def test_an_arm_s_explanation_that_leaves_much_of_the_gap_in_the_rows_is_none() -> None:

@@ -3,12 +3,14 @@
 The same function of the force in every direction and pose, ever flatter: `d (1 - exp(-F/F0))`,
 `d F / (F + F0)`, `d log(1 + F/F0)` of rough faces whose asperities take up the load one after the
 other, `d F^(2/3)` of a ball on a plate (Hertz 1881), or a gap that closes on a weak spring at F0;
-or several faces one after the other; unseen by encoders, 2 to 100 um. What is bedded in for the
-first time may stay so, all of it or some: then it goes by the largest force so far.
+or several faces one after the other, which friction may hold on the way (a bolt in its hole);
+unseen by encoders, 2 to 100 um. What is bedded in for the first time may stay so, all of it or
+some: then it goes by the largest force so far.
 
 Size: 2 to 100 um; 0.3 to 10 % of the deflection.
 Prior: depth positive, sd out of SHARES, equally likely; force scales and laws equally likely.
-Source: flattening of asperities in clamped joints, Greenwood and Williamson 1966.
+Source: flattening of asperities in clamped joints, Greenwood and Williamson 1966; slip of bolted
+joints within their clearance, Ibrahim and Pettit 2005.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ BENCH_FORCES = (0.002, 0.006, 0.02, 0.05, 0.1)
 BENCH_SLACKS = (0.0007, 0.002, 0.006, 0.02)  # under which what hangs loose comes to bear
 BENCH_SHARES = (0.01, 0.03, 0.1)
 STEPS = (0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45)  # of it, between which several faces seat
+RUBS = (0.02, 0.05)  # of it: friction that holds them there and back
 HERTZ_AT = 0.1  # of the largest force: where its scale is put
 SLACKS = (0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8)  # of an imposed stroke
 _WIDEST = 0.5  # of the stroke: what bends over more than that is a curve, no toe
@@ -63,6 +66,7 @@ LAWS: dict[str, Callable[[Array], Array]] = {
 STAYS, IN_A_RUN = " that stays", " that stays until the next run"
 LAWS |= {law + kept: LAWS[law] for law in SEATED for kept in (STAYS, IN_A_RUN)}
 _STAYING, _BACK = 0.25, 0.3  # prior; of the largest force, by which it comes back
+_RUBBING = 0.5  # prior
 
 
 def variants(bench: Bench) -> list[Variant]:
@@ -98,7 +102,11 @@ def variants(bench: Bench) -> list[Variant]:
         )
     )
     if bench.data.arm:
-        out.append(_one_after_the_other(bench, [s * top for s in STEPS], scales))
+        rubs = RUBS if bench.course.unloads else ()
+        out += [
+            _one_after_the_other(bench, [s * top for s in STEPS], scales, friction * top)
+            for friction in (0.0, *rubs)
+        ]
     if _comes_back(bench):
         kept = [STAYS, IN_A_RUN] if np.any(bench.rest & ~bench.rebuilt) else [STAYS]
         out += [
@@ -125,21 +133,26 @@ def _some_stays(bench: Bench, law: str, f0: float, scales: tuple[float, ...], ke
     return variant(WORD, label, columns, scales, each=True, prior=_STAYING, force_N=f0, laws=laws)
 
 
-def _one_after_the_other(bench: Bench, forces: list[float], scales: tuple[float, ...]) -> Variant:
+def _one_after_the_other(
+    bench: Bench, forces: list[float], scales: tuple[float, ...], rubs: float
+) -> Variant:
     """Faces that seat between one force (N) and the next, each by a depth of its own: any depth
-    that only grows. In terms of slacks, of which a step is one less a share of the one before."""
-    columns = [_late(bench, "slack", f) for f in forces]
+    that only grows. In terms of slacks, of which a step is one less a share of the one before.
+    rubs: friction N that holds them."""
+    columns = [_late(bench, "slack", f, rubs) for f in forces]
     edges = np.array([0.0, *forces])
     wide = np.diff(edges)
     root = np.diag(edges[1:] / wide) - np.diag(edges[1:-1] / wide[1:], 1)
     grows = np.asarray(np.linalg.inv(root))
     return variant(
         WORD,
-        "one after the other",
+        "one after the other" + (f", rubbing {rubs / forces[-1] * STEPS[-1]:.2g}" if rubs else ""),
         columns,
         scales,
         root=root,
         within=grows,
+        prior=_RUBBING if rubs else 1.0,
+        rubs=rubs,
         force_N=forces[0],
         laws=tuple(("slack", f) for f in forces),
     )
@@ -237,14 +250,18 @@ def _then_seats(bench: Bench, force: float, prior: float) -> Variant:
     )
 
 
-def _late(bench: Bench, law: str, force: float) -> int:
+def _late(bench: Bench, law: str, force: float, rubs: float = 0.0) -> int:
     """Column of what is lost to one law of a force, or of a slack's stroke, N."""
-    return bench.add(bench.outside_column(lost(bench, law, force)))
+    return bench.add(bench.outside_column(lost(bench, law, force, rubs)))
 
 
-def lost(bench: Bench, law: str, force: float) -> Array:
-    """(n,) what one law of a force scale N takes of its depth."""
+def lost(bench: Bench, law: str, force: float, rubs: float = 0.0) -> Array:
+    """(n,) what one law of a force scale N takes of its depth. rubs: friction N that takes its part
+    of the force first, there and back."""
     size, sign = pressed(bench)
+    if rubs:
+        carried = bench.plays(sign * size, np.array([rubs]), bench.rebuilt)[:, 0]
+        size, sign = np.abs(carried), np.sign(carried)
     for kept, fresh in ((STAYS, bench.rebuilt), (IN_A_RUN, bench.rebuilt | bench.rest)):
         if law.endswith(kept):
             size, sign = _so_far(size, sign, fresh)
@@ -304,15 +321,19 @@ def _parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Para
 
 def _describe(_: Bench, v: Variant) -> tuple[Law, Array]:
     """Terms: saturating curves of the force."""
+    rubs = {"rubs": float(v.info["rubs"])} if v.info.get("rubs") else {}
     terms = tuple(
-        Term("depth", {"law": law, "force_scale": float(f0)}) for law, f0 in v.info["laws"]
+        Term("depth", {"law": law, "force_scale": float(f0), **rubs}) for law, f0 in v.info["laws"]
     )
     return Law({}, terms), np.ones(len(terms))
 
 
 def _columns(bench: Bench, law: Law) -> list[Array]:
     """The saturating curves of `LAWS`, of the force on the seat."""
-    each = [(str(t.shape["law"]), float(t.shape["force_scale"])) for t in law.terms]
+    each = [
+        (str(t.shape["law"]), float(t.shape["force_scale"]), float(t.shape.get("rubs", 0.0)))
+        for t in law.terms
+    ]
     return [bench.outside_column(lost(bench, *one)) for one in each]
 
 

@@ -133,11 +133,11 @@ def _free(
     out.append(
         free_variant(WORD, f"{label}, each component", fewer, own, scales, tuple(axes), prior=1.0)
     )
-    along = _alike(bench)
-    together = amplifiers.together(hats, along)
-    if together != plain:
-        v = free_variant(WORD, f"{label}, all components", way, together, scales, ("",), prior=1.0)
-        out.append(replace(v, info={**v.info, "along": along}))
+    for name, along in (("all components", _alike(bench)), ("as read at rest", _at_rest(bench))):
+        together = amplifiers.together(hats, along) if along else plain
+        if together != plain:
+            v = free_variant(WORD, f"{label}, {name}", way, together, scales, ("",), prior=1.0)
+            out.append(replace(v, info={**v.info, "along": along}))
     return out
 
 
@@ -214,6 +214,29 @@ def _alike(bench: Bench) -> tuple[float, float, float]:
     units = np.unique([s.unit_vector for s in bench.data.setups], axis=0)
     x, y, z = np.where(units.sum(axis=0) < -0.1, -1.0, 1.0).tolist()
     return x, y, z
+
+
+def _at_rest(bench: Bench) -> tuple[float, float, float] | None:
+    """Along what the components that are read without load go to and fro together (the principal
+    axis of these readings), as amplifiers do that one cause drives; none where they don't, or all
+    do so alike."""
+    rows = bench.rows
+    if rows.tangential is None or np.sum(rows.zero) < _FEWEST:
+        return None
+    along = np.array([s.unit_vector for s in bench.data.setups])[rows.setup]
+    across = np.array([s.tangents for s in bench.data.setups])[rows.setup]
+    read = along * rows.measured_force[:, None] + np.einsum("nk,nkc->nc", rows.tangential, across)
+    _, size, axes = np.linalg.svd(read[rows.zero], full_matrices=False)
+    alike = np.array(_alike(bench)) / 3**0.5
+    if size[0] ** 2 < _TOGETHER * float(size @ size) or abs(float(axes[0] @ alike)) > _ALIKE:
+        return None
+    axis = axes[0] / np.abs(axes[0]).max()
+    x, y, z = axis.tolist()
+    return x, y, z
+
+
+_FEWEST, _TOGETHER = 6, 0.95  # readings; of their square
+_ALIKE = 0.99  # cosine
 
 
 def component(bench: Bench, axis: tuple[float, ...], path: Array) -> Array:

@@ -10,6 +10,9 @@ spring feels so much less, and deflects less. A spectrum of strengths makes any 
 Masing's rules (Iwan 1967). Friction that does not obey them: an asperity model whose bristles
 bend exponentially (Dahl 1968), one that lets go elastically (Bouc 1967, Wen 1976; beta = gamma);
 of a specimen either in proportion to the load that presses its parts together (Amontons).
+Loops that close towards large loads, as those of what has switched all it has (Preisach 1935), are
+those of plays on a load that saturates (generalised play; Al Janaideh, Rakheja and Su, IEEE/ASME
+Trans. Mechatronics 16, 2011).
 Where the stated spring is that of small loads, which make nothing slip, every element adds what it
 slips instead (plays: Prandtl 1928). The coefficients are the shares of the joint's compliance that
 work through friction, 0 to 1, or what it has more than was stated.
@@ -225,6 +228,45 @@ def growing(bench: Bench, found: Variant) -> list[Variant]:
 _GROWING = 6  # reaches
 
 
+def saturating(bench: Bench, found: Variant) -> list[Variant]:
+    """Spectra of the joint and memory of a friction that was found, of a load that saturates: loops
+    that close towards large loads. Of arms that unload; about no load, so of no weight."""
+    if not bench.data.arm or not bench.course.unloads or hangs(found):
+        return []
+    joint, memory = int(found.info["joint"]), str(found.info["memory"])
+    name, path = _as_found(bench, found)
+    torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
+    top, out = float(np.abs(torque).max()), []
+    for share in SATURATES:
+        most = share * top
+        through = with_loads(path, friction_law.saturating(path.load, most))
+        reached = friction_law.saturating(torque, most)
+        radius = bench.radii(reached, bench.reach_of(reached) * np.array(ARM_RADII))
+        columns = [bench.add_joint(joint, unit * state) for state in through.plays(radius).T]
+        out.append(
+            variant(
+                WORD,
+                f"{name} spectrum saturating at {share:g}",
+                columns,
+                SCALES,
+                root=smooth_root(len(columns), 0.6, 0.3),
+                prior=0.25 / len(SATURATES),
+                each=True,
+                form="spectrum",
+                joint=joint,
+                radius=radius,
+                law="Prandtl",
+                slips=True,
+                memory=memory,
+                saturates=most,
+            )
+        )
+    return out
+
+
+SATURATES = (0.3, 0.5, 0.8)  # of the joint's largest torque
+
+
 def _laws(bench: Bench, joint: int, span: float, memory: str, path: Path) -> list[Variant]:
     """All laws of one joint and memory."""
     name = f"joint {joint + 1}{memory}"
@@ -347,6 +389,7 @@ def _look_closer(word: Word) -> list[Variant]:
     for s in places(word.alone, word.beside):
         out += closer(bench, s.variant)
         out += growing(bench, s.variant)
+        out += saturating(bench, s.variant)
         out += outlasting(bench, s.variant)
     for s in places(word.alone, word.beside, hangs):
         out += refined(bench, s.variant)

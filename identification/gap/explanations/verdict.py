@@ -68,8 +68,10 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         fewer = _simpler(e, ranked, kept, arm)
         said = found.speakers.get(e.words) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
-        many = (THREE_CLOSELY if closely else THREE) if arm and _tells_of_three(said) else 1.0
-        for word, share in _main(_of(e, fewer.words) if fewer is said else said, arm).items():
+        three = arm and _tells_of_three(said, ranked)
+        many = (THREE_CLOSELY if closely else THREE) if three else 1.0
+        of = _of(e, fewer.words) if fewer is said else said
+        for word, share in _main(of, ranked, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
         heir = _heir(e, ranked, kept, found.engine.bench.noise.stated)
@@ -83,7 +85,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
     probabilities = trusted({w: m / total for w, m in mass.items()}, doubted, doubt)
     best = next((e for e in ranked if e.parts), None)
     if arm and best is not None:
-        probabilities = with_a_lead(probabilities, _main(best, arm))
+        probabilities = with_a_lead(probabilities, _main(best, ranked, arm))
     return replace(found, probabilities=probabilities, kept=kept)
 
 
@@ -186,18 +188,32 @@ def _simpler(
 _TWO, _MANY = 2, 3
 
 
-def _tells_of_three(explanation: Explanation) -> bool:
-    """Whether it takes three troubles; a play and a curve of the same joint are one, whose flanks
-    are curved."""
-    sizes = dict(explanation.troubles)
-    joints = {j for p in explanation.parts if p.word in FLANKS for j in p.variant.joints}
-    if sizes.keys() >= FLANKS and len(joints) == 1:
-        sizes.pop(min(FLANKS, key=lambda w: sizes[w]))
-    each = sorted(sizes.values(), reverse=True)
+def _tells_of_three(explanation: Explanation, ranked: Sequence[Explanation]) -> bool:
+    """Whether it takes three troubles."""
+    each = sorted(_troubles(explanation, ranked).values(), reverse=True)
     return len(each) >= _MANY and each[2] > TELLING * each[0]
 
 
 FLANKS = frozenset({"joint_backlash", "joint_nonlinear_stiffness"})
+
+
+def _troubles(explanation: Explanation, ranked: Sequence[Explanation]) -> dict[str, float]:
+    """Word -> rms m of what it does. A play and a curve of one joint are one trouble: flanks are
+    curved, and where one leaves something the other one mends it. Which does more beside the other
+    says nothing; it is called by the one that explains more without the other."""
+    sizes = dict(explanation.troubles)
+    joints = {j for p in explanation.parts if p.word in FLANKS for j in p.variant.joints}
+    if not sizes.keys() >= FLANKS or len(joints) > 1:
+        return sizes
+    alone = {w: _best_of(explanation.words - (FLANKS - {w}), ranked) for w in FLANKS}
+    name = max(FLANKS, key=lambda w: (alone[w], sizes[w]))
+    size = max(sizes.pop(w) for w in FLANKS)
+    return {name: size, **sizes}
+
+
+def _best_of(words: frozenset[str], ranked: Sequence[Explanation]) -> float:
+    """Log weight of the best explanation by these words alone."""
+    return next((e.log_weight for e in ranked if e.words == words), -np.inf)
 
 
 def _of(explanation: Explanation, words: frozenset[str]) -> Explanation:
@@ -208,7 +224,7 @@ def _of(explanation: Explanation, words: frozenset[str]) -> Explanation:
     return replace(explanation, parts=tuple(p for p, _ in kept), sizes=tuple(s for _, s in kept))
 
 
-def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
+def _main(explanation: Explanation, ranked: Sequence[Explanation], arm: bool) -> dict[str, float]:
     """Which effect of an explanation is its main one, an arm's by how far one is larger than the
     other. Without an arm all words speak of one spring, and a second one is mostly more
     of the first one's law."""
@@ -216,7 +232,7 @@ def _main(explanation: Explanation, arm: bool) -> dict[str, float]:
         return {"none": 1.0}
     if not arm:
         return {explanation.parts[0].word: 1.0}
-    return _chance_to_be_largest(explanation.troubles)
+    return _chance_to_be_largest(_troubles(explanation, ranked))
 
 
 def _chance_to_be_largest(sizes: Mapping[str, float]) -> dict[str, float]:

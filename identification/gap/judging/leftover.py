@@ -16,10 +16,10 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import STEP
 from identification.gap.explanations.explanation import (
     LAW_REMAINDER,
-    REMAINDER,
     Explanation,
     SearchResult,
     kept_within,
+    may_remain,
 )
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.explanations.verdict import with_posterior
@@ -149,8 +149,9 @@ def _left(engine: Engine, fitted: Fit) -> float:
 
 def _allowed(engine: Engine, explanation: Explanation, unseen: float, words: int = 1) -> float:
     """What an explanation may leave, m. unseen: what noise hides."""
-    law = min(LAW_REMAINDER * max(explanation.sizes), REMAINDER * engine.structural)
-    return float(max(REMAINDER * engine.structural / words**0.5, law, unseen))
+    remainder = may_remain(engine, explanation.troubles)
+    law = min(LAW_REMAINDER * max(explanation.sizes), remainder)
+    return float(max(remainder / words**0.5, law, unseen))
 
 
 def _judged(engine: Engine, explanation: Explanation) -> Explanation:

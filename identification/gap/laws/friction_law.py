@@ -55,6 +55,8 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
     if "tool_kg" in v.info:
         constants["tool"] = float(v.info["tool_kg"])
+    if "saturates" in v.info:
+        constants["saturates"] = float(v.info["saturates"])
     if law in BY_LOAD:
         constants["measured_to"] = bench.reach_of(bench.true_torque[:, joint])
     terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
@@ -75,6 +77,8 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     weight = bench.weight(joint, c.get("tool", TOOL_KG)) if c["memory"] == HUNG else None
     path = bench.path(torque, fresh, weight)
     path = worked_in(path) if c["memory"] == WORKED else path
+    if "saturates" in c:
+        path = with_loads(path, saturating(path.load, c["saturates"]))
     if at_strength:
         state = path.plays(size)
         held = -state if c["law"] == "Prandtl" else torque[:, None] - state
@@ -108,6 +112,11 @@ def by_ratio(load: Array, span: float) -> Array:
     they are at the span, ever longer towards none."""
     whole = (1 + _NONE) * span * np.log1p(np.abs(load) / (_NONE * span))
     return np.asarray(np.sign(load) * whole)
+
+
+def saturating(load: Array, most: float) -> Array:
+    """Loads (n,) of which ever less comes through towards `most`, Nm."""
+    return np.asarray(most * np.tanh(load / most))
 
 
 _NONE = 0.05  # of the range: loads below that are as good as none
