@@ -86,6 +86,7 @@ SHAPES: dict[str, Key] = {
     "ratchets_beyond": Key("ratchets_beyond_Nm", "positive"),
     "after": Key("after_Nm", "positive"),
     "strength": Key("friction_Nm", "positive"),
+    "slackens": Key("slackens_beyond_Nm", "positive"),
     "reach": Key("reach_Nm", "positive"),
     "grows_to": Key("grows_with_net_torque_to_Nm", "positive"),
     "beyond": Key("beyond_Nm", "positive"),
@@ -186,6 +187,7 @@ _PLAYS = (
 _GOES = ((), ("at_load",), ("at_load", "power"), ("drags_over",), ("at_load", "drags_over"))
 _REACHES = (("compliance", ("reach",)), ("compliance", ("reach", "grows_to")))
 _STRENGTH = ("compliance", ("strength",))
+_SLACKENS = ("compliance", ("slackens",))
 _BY_A_REACH = tuple(law for law in FRICTION_LAWS if law not in SLIP_AT_A_STRENGTH)
 _PATHS: dict[Kind, tuple[str, ...]] = {  # and the courses in time that are written so
     ("drift", ("time_constant",)): ("exponential", "rates"),
@@ -214,10 +216,15 @@ GRAMMAR: dict[str, Grammar] = {
         ("joint", "law", "memory", "measured_to", "saturates", "tool"),
         (
             _STRENGTH,
+            _SLACKENS,
             *_REACHES,
             ("compliance", ()),
         ),
-        _only_with("law", {_STRENGTH: SLIP_AT_A_STRENGTH} | dict.fromkeys(_REACHES, _BY_A_REACH)),
+        _only_with(
+            "law",
+            {_STRENGTH: SLIP_AT_A_STRENGTH, _SLACKENS: ("Iwan",)}
+            | dict.fromkeys(_REACHES, _BY_A_REACH),
+        ),
     ),
     "joint_backlash": Grammar(
         ("joint", "zone", "crossing", "kind", "tool", "preload"),

@@ -70,6 +70,20 @@ def play(u: Array) -> Array:
     return u - np.clip(u, -0.3, 0.3)
 
 
+def wall(t: Array) -> Array:
+    """Three cycles each of ten sizes."""
+    return np.asarray(np.floor(1 + 10 * t) / 10 * np.sin(2 * np.pi * 30 * t))
+
+
+def worn(u: Array) -> Array:
+    """Bears where it was last pushed to, on either side, with a texture of the place."""
+    out = np.zeros_like(u)
+    for sign in (1.0, -1.0):
+        pushed = sign * u
+        out += sign * np.maximum(pushed - np.maximum.accumulate(np.maximum(pushed - 0.2, 0)), 0)
+    return out * (1 + 0.1 * np.sin(40 * u))
+
+
 # name -> (path, answer): what answers follows from what is driven
 RIGS: dict[str, Callable[[Array], tuple[Array, Array]]] = {
     "friction, triangles": lambda t: (triangle(t, 6), slider(triangle(t, 6), 0.2)),
@@ -82,6 +96,7 @@ RIGS: dict[str, Callable[[Array], tuple[Array, Array]]] = {
     "ramps and holds": lambda t: (stairs(t, 3), relaxing(t, stairs(t, 3))),
     "held from the start": lambda t: (np.ones_like(t), 0.5 + 0.5 * np.exp(-t / 0.1)),
     "friction, by hand": lambda t: (by_hand(t), slider(by_hand(t), 0.1)),
+    "worn, thirty cycles": lambda t: (wall(t), worn(wall(t))),
     "rates far apart": lambda t: (rates(t), relaxing(t, rates(t))),
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -12,8 +14,11 @@ from identification.gap.explanations.priors import prior_of
 from identification.gap.laws.flow_back import BACK_FROM
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import play
+from identification.gap.model.path import Path
 from identification.gap.recording.loops import lost
 from tests.explained import explained
+from tests.unit.test_gap_closer import assert_lawful
+from tests.unit.test_gap_model import survive
 from tests.unit.test_gap_running import SPRING, running
 
 METER = Instruments(0.1, 1e-6, 0.005, 0.003)
@@ -216,3 +221,53 @@ def test_what_yields_walks_the_way_of_a_mean_load_and_heat_walks_without(mean: f
     found = explained(running(force, shown + noise, imposed="force", instruments=METER))
     assert "thermal_drift" in found.names or "force_drift" in found.names
     assert (found.verdict in ("joint_yield", "joint_hysteresis")) is (mean > 0)
+
+
+def bears(u: Array, radius: float) -> Array:
+    """What gives way at a radius and wears its hole by that, on either side; row by row."""
+    out, holes = np.zeros_like(u), {1.0: 0.0, -1.0: 0.0}
+    for i, at in enumerate(u):
+        for sign, worn in holes.items():
+            out[i] += sign * max(sign * at - worn, 0.0)
+            holes[sign] = max(worn, sign * at - radius)
+            out[i] -= sign * max(sign * at - worn - radius, 0.0)
+    return out
+
+
+def to_and_fro(cycles: int = 4, n: int = 60) -> Array:
+    """m: further each time, to either side, twice each."""
+    ends = [STROKE * (1 + k // 2) / (cycles // 2) for k in range(cycles)]
+    corners = [0.0, *(x for end in ends for x in (end, -end)), 0.0]
+    return np.concatenate([np.linspace(a, b, n) for a, b in pairwise(corners)])
+
+
+def test_what_wears_its_hole_bears_where_it_was_last_pushed_to() -> None:
+    u = to_and_fro()
+    start = np.arange(len(u)) == 0
+    path = Path(u, start, start, np.ones(len(u), dtype=bool))
+    radius = STROKE * np.array([0.05, 0.2, 2.0])
+    exact = np.stack([bears(u, float(r)) for r in radius], axis=1)
+    np.testing.assert_allclose(path.slacks(radius), exact, atol=1e-15)
+    np.testing.assert_allclose(exact[:, 2], u)  # never worn: a spring
+    twice = np.concatenate([u, u])
+    anew = Path(twice, np.tile(start, 2), np.tile(start, 2), np.ones(len(twice), dtype=bool))
+    np.testing.assert_allclose(anew.slacks(radius), np.tile(exact, (2, 1)), atol=1e-15)
+
+
+def test_a_loop_that_is_pinched_is_friction_that_wears() -> None:
+    """Nails in timber: every strength wears its hole; beside them some friction."""
+    u = to_and_fro(8)
+    spread = STROKE * np.array([0.04, 0.1, 0.17, 0.3, 0.42])
+    force = SPRING * sum(bears(u, float(r)) for r in spread) / 5 + 0.2 * rubbed(u, 8.0)
+    data = recording(u, np.asarray(force))
+    found = explained(data)
+    assert found.verdict == "joint_hysteresis"
+    assert found.probabilities["joint_hysteresis"] > 0.6
+    shown = found.found.explanations[0].parts[0].variant
+    assert shown.info["slackens"] > 0
+    bench = make_bench(data)
+    worn = [v for v in library(bench, ["joint_hysteresis"]) if v.info.get("slackens")]
+    assert_lawful(bench, worn)
+    survive(bench, worn)
+    one_way = make_bench(recording(*flowed(strokes())))
+    assert not any(v.info.get("slackens") for v in library(one_way, ["joint_hysteresis"]))

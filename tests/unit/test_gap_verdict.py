@@ -30,6 +30,7 @@ from identification.gap.explanations.verdict import (
     THREE,
     THREE_CLOSELY,
     UNKNOWN_DOUBT,
+    _closely,
     _heir,
     _main,
     _tells_of_three,
@@ -102,8 +103,16 @@ def test_what_explains_far_less_inherits_nothing_unless_it_fits_closely() -> Non
     failed = said(both, (2e-5, 1e-5), 0.0)
     for weight, eta, inherits in ((-10.0, 9e-6, True), (-90.0, 9e-6, False), (-90.0, 3e-6, True)):
         alone = said(both[:1], (2e-5,), weight, eta)
-        heir = _heir(failed, [failed, alone], {failed.words: 0.0}, 2e-6)
+        heir = _heir(failed, [failed, alone], {failed.words: 0.0}, 4e-6)
         assert heir is (alone if inherits else None)
+
+
+def test_what_explains_most_of_a_gap_fits_closely_whatever_its_noise() -> None:
+    engine = small_engine(small_bench())
+    noise = engine.bench.noise.stated
+    for structural, most in ((2 * noise, 2 * noise), (100 * noise, 17 * noise)):
+        engine.structural = structural
+        assert _closely(engine) == pytest.approx(most)
 
 
 def test_a_mean_of_evidence_leaves_out_what_weighs_nothing() -> None:

@@ -52,6 +52,7 @@ from identification.gap.model.variants import (
     SET_UP_ANEW,
     UNDER_WEIGHT,
     Variant,
+    block,
     smooth_root,
     variant,
 )
@@ -275,7 +276,48 @@ def _laws(bench: Bench, joint: int, span: float, memory: str, path: Path) -> lis
     if not bench.course.once:  # a curve that saturates would be taken for friction
         reaches = np.array(REACHES if bench.course.unloads else REACHES[:2])
         found += _exponential(bench, joint, name, reaches, path)
+    if memory == "":
+        found += _slackening(bench, joint, name, span, path)
     return _remembering(found, memory)
+
+
+def _slackening(bench: Bench, joint: int, name: str, span: float, path: Path) -> list[Variant]:
+    """Of a specimen that is driven to and fro: what gives way and wears its hole by that, so that
+    it bears again only where it was last pushed to; alone, and beside strengths that rub."""
+    if bench.data.arm or not bench.imposed or bench.course.one_sided:
+        return []
+    torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
+    radius = bench.radii(torque, span * np.array(SLACKENS))
+    rubs = bench.radii(torque, span * np.array(RADII))
+    worn = [bench.add_joint(joint, -unit * s) for s in path.slacks(radius).T]
+    held = [bench.add_joint(joint, unit * s) for s in (path.plays(rubs) - torque[:, None]).T]
+    out = []
+    for columns, radii, label in (
+        (worn, radius, "that slackens"),
+        ([*worn, *held], np.append(radius, rubs), "that slackens and rubs"),
+    ):
+        roots = [smooth_root(len(r), 0.6, 0.3) for r in (radius, rubs)]
+        out.append(
+            variant(
+                WORD,
+                f"{name} spectrum {label}",
+                columns,
+                SCALES,
+                root=block(roots[: 1 + (len(radii) > len(radius))]),
+                prior=0.25,
+                each=True,
+                form="spectrum",
+                joint=joint,
+                radius=radii,
+                law="Iwan",
+                slips=False,
+                slackens=len(radius),
+            )
+        )
+    return out
+
+
+SLACKENS = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.36, 0.5)  # of the range of motion
 
 
 def _spectra(

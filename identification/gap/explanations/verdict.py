@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import LAW_REMAINDER, Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
 from identification.gap.model.noise import UNSURE
@@ -74,7 +75,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         for word, share in _main(of, ranked, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
-        heir = _heir(e, ranked, kept, found.engine.bench.noise.stated)
+        heir = _heir(e, ranked, kept, _closely(found.engine))
         mass[heir.parts[0].word if heir else "unknown"] += whole - good
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
@@ -270,17 +271,24 @@ def _heir(
     explanation: Explanation,
     ranked: Sequence[Explanation],
     kept: Mapping[frozenset[str], float],
-    noise: float,
+    closely: float,
 ) -> Explanation | None:
     """Who gets the weight of an explanation that leaves too much for its number of effects: the
-    best one with fewer of the same effects that explains enough for itself, if any."""
+    best one with fewer of the same effects that explains enough for itself, if any. closely:
+    imperfection m below which it does so however much less likely it is."""
     for e in ranked:
         fewer = e.parts and e.words < explanation.words
-        near = e.log_weight > explanation.log_weight - _INHERITS or e.eta < _CLOSELY * noise
+        near = e.log_weight > explanation.log_weight - _INHERITS or e.eta < closely
         if fewer and near and e.good and foresaw(kept, e.words):
             return e
     return None
 
 
+def _closely(engine: Engine) -> float:
+    """m that a law may miss, and explains the gap all the same."""
+    return max(_CLOSELY * engine.bench.noise.stated, _MOSTLY * engine.structural)
+
+
 _INHERITS = 40.0  # nats: what explains so much less is no explanation of the same,
-_CLOSELY = 2.0  # but where it leaves no more than so many times the noise of one sample
+_CLOSELY = 2.0  # but where it leaves no more than so many times the noise of one sample,
+_MOSTLY = 0.17  # or such a share of what springs leave: laws of others' rigs are so far off

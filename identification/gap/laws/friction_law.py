@@ -59,7 +59,11 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
         constants["saturates"] = float(v.info["saturates"])
     if law in BY_LOAD:
         constants["measured_to"] = bench.reach_of(bench.true_torque[:, joint])
-    terms = tuple(Term("compliance", {key: float(r)}) for r in v.info["radius"])
+    worn = int(v.info.get("slackens", 0))
+    keys = ["slackens"] * worn + [key] * (len(v.info["radius"]) - worn)
+    terms = tuple(
+        Term("compliance", {k: float(r)}) for k, r in zip(keys, v.info["radius"], strict=True)
+    )
     if "grows_to" in v.info:
         terms = terms[0], Term("compliance", {**terms[1].shape, "grows_to": v.info["grows_to"]})
     terms += (Term("compliance"),) if v.other_springs else ()
@@ -73,7 +77,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     c = law.constants
     joint, at_strength = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
-    size = np.array([t.shape["strength" if at_strength else "reach"] for t in law.terms if t.shape])
+    size = np.array([_size_of(t) for t in law.terms if t.shape])
     weight = bench.weight(joint, c.get("tool", TOOL_KG)) if c["memory"] == HUNG else None
     path = bench.path(torque, fresh, weight)
     path = worked_in(path) if c["memory"] == WORKED else path
@@ -82,6 +86,8 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     if at_strength:
         state = path.plays(size)
         held = -state if c["law"] == "Prandtl" else torque[:, None] - state
+        worn = np.array(["slackens" in t.shape for t in law.terms if t.shape])
+        held[:, worn] = path.slacks(size[worn])
     else:
         by_load = c["law"] in BY_LOAD
         span = c.get("measured_to", bench.reach_of(torque))  # a file may lack it
@@ -96,6 +102,11 @@ def columns(bench: Bench, law: Law) -> list[Array]:
         bench.joint_column(joint, -bench.sense * next(each) if t.shape else torque)
         for t in law.terms
     ]
+
+
+def _size_of(term: Term) -> float:
+    """Strength or reach of an element, Nm."""
+    return float(next(term.shape[k] for k in ("strength", "reach", "slackens") if k in term.shape))
 
 
 def _grown(bench: Bench, law: Law, term: Term) -> Array:

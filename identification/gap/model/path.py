@@ -33,6 +33,20 @@ class Path:
         """States (n, k) of bristles that bend over reaches (k,)."""
         return self.at_rows(bristles(self.load, reach, self.fresh, elastic, self.weight))
 
+    def slacks(self, radius: Array) -> Array:
+        """Forces (n, k), as loads, of elements that give way at radii (k,) and wear their holes by
+        that: none until the load is back where they were last pushed to, less the radius, on either
+        side for itself."""
+        out = np.zeros((len(self.load), len(radius)))
+        starts = np.flatnonzero(self.fresh)
+        starts = starts if len(starts) and starts[0] == 0 else np.insert(starts, 0, 0)
+        for a, b in zip(starts, np.append(starts[1:], len(self.load)), strict=True):
+            for sign in (1.0, -1.0):
+                pushed = sign * self.load[a:b]
+                worn = np.maximum(np.maximum.accumulate(pushed)[:, None] - radius, 0.0)
+                out[a:b] += sign * np.maximum(pushed[:, None] - worn, 0.0)
+        return self.at_rows(out)
+
     def at_rows(self, states: Array) -> Array:
         """Those of states (m, ...) that rows show."""
         return states if self.kept.all() else states[self.kept]

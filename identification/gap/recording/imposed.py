@@ -17,7 +17,7 @@ from identification.arrays import Array, Ints
 from identification.gap.data import ZERO, GapData
 from identification.gap.recording.bins import even_path
 from identification.gap.recording.holds import hold_ids, is_continuous
-from identification.gap.recording.pieces import MISJUDGED, TOP, TURNS, Channel, cost, zigzag
+from identification.gap.recording.pieces import MISJUDGED, TOP, TURNS, Channel, cost, legs, zigzag
 from identification.gap.recording.turns import turns, way_back
 from identification.gap.recording.white import white_sd
 from identification.running import first_rows
@@ -75,7 +75,8 @@ def displacement_simpler(data: GapData) -> bool:
         _clock(data, mine), (force, moved), (instruments.force, instruments.displacement)
     )
     floor = max(_CLOSEST, *(c.noise**2 / np.sqrt(len(c.time)) for c in channels))
-    by_force, by_moved = (cost(c, floor) for c in channels)
+    common = min(map(legs, channels))
+    by_force, by_moved = (cost(c, floor, common) for c in channels)
     return by_force - by_moved > (_SLIDING if _slides(*channels) else _MARGIN)
 
 

@@ -12,7 +12,8 @@ from identification.arrays import Array, Ints
 TURNS = (0.5, 0.2, 0.08)  # of the range: what counts as going back
 MISJUDGED = 3.0  # factor by which a stated uncertainty may be too small
 TOP = 0.03  # of a leg: a level next to its turning point
-_PER_PIECE = 0.1  # nats that one more piece costs
+_PER_PIECE = 0.1  # nats that one more piece costs, of a path of a few legs,
+_FEW_LEGS = 10  # and of more the less: legs that both channels go tell nothing of either
 _MOST_PIECES, _PIECES_PER_LEG, _SPARE = 200, 4, 9
 
 
@@ -25,16 +26,23 @@ class Channel:
     noise: float
 
 
-def cost(channel: Channel, floor: float) -> float:
-    """Nats: half the logarithm of what the best number of pieces leaves, and what they cost."""
+def legs(channel: Channel) -> int:
+    """How often a channel goes one way."""
+    return len(zigzag(channel.values, max(TURNS[-1], 6 * channel.noise))) - 1
+
+
+def cost(channel: Channel, floor: float, of: int = 1) -> float:
+    """Nats: half the logarithm of what the best number of pieces leaves, and what they cost. of:
+    legs that it has in common with the channel that it is compared with."""
     costs, known = [], set()
+    per_piece = _PER_PIECE * min(1.0, _FEW_LEGS / of)
     for share in (np.inf, *TURNS):
         edges, times = _turns(channel, max(share, 6 * channel.noise))
         if len(edges) > _MOST_PIECES or edges.tobytes() in known:
             continue
         known.add(edges.tobytes())
         costs += [
-            0.5 * float(np.log(left + floor)) + _PER_PIECE * pieces
+            0.5 * float(np.log(left + floor)) + per_piece * pieces
             for pieces, left in _refined(channel, edges, times, 0.1 * floor)
         ]
     return min(costs)
