@@ -86,7 +86,7 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     if at_strength:
         state = path.plays(size)
         held = -state if c["law"] == "Prandtl" else torque[:, None] - state
-        worn = np.array(["slackens" in t.shape for t in law.terms if t.shape])
+        worn = np.array(["slackens" in t.shape for t in law.terms if t.shape], dtype=bool)
         held[:, worn] = path.slacks(size[worn])
     else:
         by_load = c["law"] in BY_LOAD
