@@ -8,7 +8,7 @@ from typing import cast
 
 import pytest
 
-from identification.gap.answer.notes import left_out
+from identification.gap.answer.notes import called, left_out
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult
@@ -150,3 +150,14 @@ def test_what_does_too_little_to_be_named_is_told() -> None:
     assert not left_out(*chosen_of(refused, CURVE))
     little = said({CURVE: 1.0, LAG: 0.9}, WORTH - 1)
     assert not left_out(*chosen_of(found(one, little), CURVE))
+
+
+def test_a_smaller_verdict_of_a_play_and_a_curve_is_told_why() -> None:
+    sizes = {CURVE: 1.0, "joint_backlash": 0.2}
+    both = said(sizes, 0.0)
+    (note,) = called(both, "joint_backlash")
+    assert "one that explains more without the other" in note.text
+    assert not called(both, CURVE)  # the larger one anyway
+    assert not called(said({CURVE: 1.0, LAG: 0.2}, 0.0), LAG)
+    apart = (Part(variant(word, word, [0], (1.0,), joint=j), 1.0) for j, word in enumerate(sizes))
+    assert not called(replace(both, parts=tuple(apart)), "joint_backlash")

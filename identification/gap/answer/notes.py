@@ -11,6 +11,7 @@ from identification.gap.data import GapData
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
+from identification.gap.explanations.verdict import FLANKS, flanks_of_one_joint
 from identification.gap.judging.strain import what_is_strained
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import NOISY, SWINGS
@@ -145,6 +146,20 @@ def left_out(chosen: Explanation, fuller: Explanation | None) -> tuple[Note, ...
         f"explain {fuller.log_weight - chosen.log_weight:.0f} nats more. So little may as well be "
         f"how far the law of {' and '.join(chosen.troubles)} is off: it is not named. To see it: "
         f"{' '.join(f'--add {w}' for w in small)}."
+    )
+    return (Note(REMARK, text),)
+
+
+def called(chosen: Explanation, verdict: str) -> tuple[Note, ...]:
+    """Of a play and a curve of one joint, why the smaller one is the verdict."""
+    if verdict not in FLANKS or not flanks_of_one_joint(chosen):
+        return ()
+    sizes, (other,) = chosen.troubles, FLANKS - {verdict}
+    if sizes[verdict] >= sizes[other]:
+        return ()
+    text = (
+        f"{verdict} and {other} of one joint are one trouble: the flanks of a play are curved. It "
+        "is called by the one that explains more without the other."
     )
     return (Note(REMARK, text),)
 

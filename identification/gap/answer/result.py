@@ -14,6 +14,7 @@ from identification.gap.answer.locate import Where, locate
 from identification.gap.answer.notes import (
     Note,
     across,
+    called,
     disbelieved,
     left_out,
     notes_of,
@@ -121,7 +122,7 @@ def result_of(
     notes = [*scale, *notes_of(bench, verdict)]
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
     notes += readings_missed(engine, fitted) if chosen.parts else ()
-    notes += left_out(chosen, fuller)
+    notes += [*called(chosen, verdict), *left_out(chosen, fuller)]
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,

@@ -198,13 +198,18 @@ def _tells_of_three(explanation: Explanation, ranked: Sequence[Explanation]) -> 
 FLANKS = frozenset({"joint_backlash", "joint_nonlinear_stiffness"})
 
 
+def flanks_of_one_joint(explanation: Explanation) -> bool:
+    """Whether it has a play and a curve, of the same joint."""
+    joints = {j for p in explanation.parts if p.word in FLANKS for j in p.variant.joints}
+    return explanation.words >= FLANKS and len(joints) <= 1
+
+
 def _troubles(explanation: Explanation, ranked: Sequence[Explanation]) -> dict[str, float]:
     """Word -> rms m of what it does. A play and a curve of one joint are one trouble: flanks are
     curved, and where one leaves something the other one mends it. Which does more beside the other
     says nothing; it is called by the one that explains more without the other."""
     sizes = dict(explanation.troubles)
-    joints = {j for p in explanation.parts if p.word in FLANKS for j in p.variant.joints}
-    if not sizes.keys() >= FLANKS or len(joints) > 1:
+    if not flanks_of_one_joint(explanation):
         return sizes
     alone = {w: _best_of(explanation.words - (FLANKS - {w}), ranked) for w in FLANKS}
     name = max(FLANKS, key=lambda w: (alone[w], sizes[w]))
