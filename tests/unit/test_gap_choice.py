@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -155,9 +156,23 @@ def test_what_does_too_little_to_be_named_is_told() -> None:
 def test_a_smaller_verdict_of_a_play_and_a_curve_is_told_why() -> None:
     sizes = {CURVE: 1.0, "joint_backlash": 0.2}
     both = said(sizes, 0.0)
-    (note,) = called(both, "joint_backlash")
+    both = replace(both, parts=placed(sizes, 1, 1))
+    play, curve = (said({w: 1.0}, -weight) for w, weight in (("joint_backlash", 5.0), (CURVE, 9.0)))
+    ranked = of_an_arm(found(both, play, curve))
+    (note,) = called(ranked, both, "joint_backlash")
     assert "one that explains more without the other" in note.text
-    assert not called(both, CURVE)  # the larger one anyway
-    assert not called(said({CURVE: 1.0, LAG: 0.2}, 0.0), LAG)
-    apart = (Part(variant(word, word, [0], (1.0,), joint=j), 1.0) for j, word in enumerate(sizes))
-    assert not called(replace(both, parts=tuple(apart)), "joint_backlash")
+    assert not called(ranked, both, CURVE)  # the larger one anyway
+    assert not called(ranked, said({CURVE: 1.0, LAG: 0.2}, 0.0), LAG)
+    assert not called(ranked, replace(both, parts=placed(sizes, 1, 2)), "joint_backlash")
+    assert not called(of_an_arm(found(both, curve)), both, "joint_backlash")  # said by others
+    assert not called(of_an_arm(found(both, play), arm=False), both, "joint_backlash")
+
+
+def placed(words: Iterable[str], *joints: int) -> tuple[Part, ...]:
+    each = zip(words, joints, strict=True)
+    return tuple(Part(variant(w, w, [0], (1.0,), joint=j), 1.0) for w, j in each)
+
+
+def of_an_arm(result: SearchResult, arm: bool = True) -> SearchResult:
+    bench = SimpleNamespace(data=SimpleNamespace(arm=arm))
+    return replace(result, engine=cast(Engine, SimpleNamespace(bench=bench)))

@@ -11,12 +11,13 @@ import pytest
 from identification.arrays import Array
 from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.effects import EFFECTS, joint_backlash, joint_hysteresis, library
-from identification.gap.effects.joint_hysteresis import REACHES, SATURATES
 from identification.gap.evidence.compare import by_word, closest, score
 from identification.gap.evidence.engine import Engine
 from identification.gap.laws import knees_closer
 from identification.gap.laws.closer import Word, closing_in
-from identification.gap.laws.friction_law import EXPONENTIAL, SLIPPING
+from identification.gap.laws.friction_forms import REACHES, SATURATES
+from identification.gap.laws.friction_law import EXPONENTIAL, SLIPPING, parameters
+from identification.gap.laws.interval import NOMINAL, Coefficients
 from identification.gap.model.base import base_columns
 from identification.gap.model.bench import Bench, make_bench
 from identification.gap.model.variants import Variant, variant
@@ -108,7 +109,7 @@ def test_friction_may_grow_with_what_the_gear_carries(memory: str) -> None:
     bench = make_bench(arm_data())
     grid = library(bench, ["joint_hysteresis"])
     found = next(v for v in grid if v.info["memory"] == memory and v.info["joint"] == 1)
-    finer = joint_hysteresis.growing(bench, found)
+    finer = [v for v in joint_hysteresis.further(bench, found) if "grows_to" in v.info]
     assert {v.info["law"] for v in finer} == {*EXPONENTIAL, *SLIPPING}
     assert_lawful(bench, finer)
     net = np.abs(bench.true_torque[:, 1] + bench.weight(1))
@@ -118,13 +119,13 @@ def test_friction_may_grow_with_what_the_gear_carries(memory: str) -> None:
         own = bench.joint_column(1, bench.elastic[:, 1])[:n] * (v.info["law"] in SLIPPING)
         same, grows = (bench.columns[c][:n] - own for c in v.columns)
         np.testing.assert_allclose(grows, same * net / net.max(), atol=1e-12 * np.abs(same).max())
-    assert joint_hysteresis.growing(bench_without_arm(), found) == []
+    assert joint_hysteresis.further(bench_without_arm(), found) == []
 
 
 def test_friction_that_grows_is_looked_at_where_a_joint_rubs() -> None:
     bench = make_bench(arm_data())
     grid = library(bench, ["joint_hysteresis"])
-    truth = joint_hysteresis.growing(bench, next(v for v in grid if v.info["joint"] == 1))[2]
+    truth = joint_hysteresis.further(bench, next(v for v in grid if v.info["joint"] == 1))[2]
     engine = engine_with(bench, bench.columns[truth.columns[1]])
     finer = refine(engine, score(engine, engine.levels, grid))
     assert any("grows_to" in v.info and v.info["joint"] == 1 for v in finer)
@@ -132,12 +133,11 @@ def test_friction_that_grows_is_looked_at_where_a_joint_rubs() -> None:
 
 @pytest.mark.parametrize("memory", ["", "worked in", "rested"])
 def test_loops_may_close_towards_large_loads(memory: str) -> None:
-    """As far as a load comes through it is rubbed on; at the ends the loops of a load that comes
-    and goes are narrower than in the middle."""
+    """Each element follows what comes through of the load, to within its strength."""
     bench = make_bench(arm_data())
     grid = library(bench, ["joint_hysteresis"])
     found = next(v for v in grid if v.info["memory"] == memory and v.info["joint"] == 1)
-    finer = joint_hysteresis.saturating(bench, found)
+    finer = [v for v in joint_hysteresis.further(bench, found) if "saturates" in v.info]
     assert len({v.label for v in finer}) == len(SATURATES)
     assert_lawful(bench, finer)
     survive(bench, finer)
@@ -145,18 +145,35 @@ def test_loops_may_close_towards_large_loads(memory: str) -> None:
     unit = bench.joint_column(1, bench.elastic[:, 1])[:n] / torque
     for v, share in zip(finer, SATURATES, strict=True):
         most = share * float(np.abs(torque).max())
-        through = bench.columns[v.columns[0]][:n] / unit
-        assert float(np.abs(through).max()) <= most * np.tanh(1 / share)
-        off = np.abs(through - most * np.tanh(torque / most))
-        assert float(off[np.abs(torque) > 0].max()) <= 1.01 * float(v.info["radius"][0])
+        for column, radius in zip(v.columns, v.info["radius"], strict=True):
+            through = bench.columns[column][:n] / unit
+            assert float(np.abs(through).max()) > 0
+            off = np.abs(through - most * np.tanh(torque / most))
+            assert float(off.max()) <= 1.001 * float(radius)
 
 
 def test_loops_close_about_no_load_and_where_it_comes_back() -> None:
     bench = make_bench(arm_data())
     grid = library(bench, ["joint_hysteresis"])
     hung = next(v for v in grid if joint_hysteresis.hangs(v))
-    assert joint_hysteresis.saturating(bench, hung) == []
-    assert joint_hysteresis.saturating(bench_without_arm(), grid[0]) == []
+    assert not any("saturates" in v.info for v in joint_hysteresis.further(bench, hung))
+
+
+def test_what_never_slips_is_no_friction_of_a_load_that_saturates() -> None:
+    """The strengths are those of what comes through: one that is as large as that does nothing."""
+    bench = make_bench(arm_data())
+    grid = library(bench, ["joint_hysteresis"])
+    found = next(v for v in grid if v.info["joint"] == 1 and v.info["memory"] == "")
+    for v in joint_hysteresis.further(bench, found):
+        if "saturates" not in v.info:
+            continue
+        through = float(v.info["saturates"]) * np.tanh(
+            float(np.abs(bench.torque[:, 1]).max()) / float(v.info["saturates"])
+        )
+        for w, r in zip(np.eye(len(v.columns)), v.info["radius"], strict=True):
+            found = parameters(bench, v, Coefficients(w, 1e-6 * np.eye(len(w)), NOMINAL))
+            slips = min((1 - float(r) / through) / 0.2, 1.0)
+            assert found["share_through_friction"].value == pytest.approx(slips / (1 + slips))
 
 
 def test_creep_may_be_forgotten_where_the_rig_is_set_up_anew() -> None:

@@ -12,6 +12,8 @@ from identification.gap.data import GapData, Instruments
 from identification.gap.effects import library
 from identification.gap.explanations.priors import prior_of
 from identification.gap.laws.flow_back import BACK_FROM
+from identification.gap.laws.friction_law import parameters
+from identification.gap.laws.interval import Coefficients, Softer
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import play
 from identification.gap.model.path import Path
@@ -254,6 +256,31 @@ def test_what_wears_its_hole_bears_where_it_was_last_pushed_to() -> None:
     np.testing.assert_allclose(anew.slacks(radius), np.tile(exact, (2, 1)), atol=1e-15)
 
 
+def test_a_wall_that_hardly_gives_way_has_no_element_twice() -> None:
+    u = to_and_fro(8)
+    bench = make_bench(recording(u, SPRING * u * 0.97))
+    for v in library(bench, ["joint_hysteresis"]):
+        if v.info.get("slackens"):
+            radius = np.asarray(v.info["radius"])[: v.info["slackens"]]
+            assert np.all(np.diff(radius) > 0)
+            assert len({bench.columns[c].tobytes() for c in v.columns}) == len(v.columns)
+
+
+def test_what_never_slips_beside_an_imposed_motion_is_a_spring() -> None:
+    """Half as much again, of the spring or of what never slips: the friction is the same share."""
+    u = to_and_fro(8)
+    bench = make_bench(recording(u, rubbed(u)))
+    v = next(v for v in library(bench, ["joint_hysteresis"]) if v.info["law"] == "Iwan")
+    k, joint = len(v.columns), int(v.info["joint"])
+    rubs = 0.3 * np.eye(k)[0]
+    shares = []
+    for w, stiffer in ((rubs, 0.5), (rubs + 0.5 * np.eye(k)[-1], 0.0)):
+        beside = Softer({joint: stiffer}, {joint: 0.0}, {joint: np.zeros(k)})
+        found = parameters(bench, v, Coefficients(w, 1e-9 * np.eye(k), beside))
+        shares.append(found["share_through_friction"].value)
+    assert shares[0] == pytest.approx(shares[1])
+
+
 def test_a_loop_that_is_pinched_is_friction_that_wears() -> None:
     """Nails in timber: every strength wears its hole; beside them some friction."""
     u = to_and_fro(8)
@@ -269,5 +296,7 @@ def test_a_loop_that_is_pinched_is_friction_that_wears() -> None:
     worn = [v for v in library(bench, ["joint_hysteresis"]) if v.info.get("slackens")]
     assert_lawful(bench, worn)
     survive(bench, worn)
+    for v in worn:  # a wall that hardly gives way as well: no element twice, none beyond the stroke
+        assert np.all(np.diff(v.info["radius"][: v.info["slackens"]]) > 0)
     one_way = make_bench(recording(*flowed(strokes())))
     assert not any(v.info.get("slackens") for v in library(one_way, ["joint_hysteresis"]))

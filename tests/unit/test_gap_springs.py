@@ -179,6 +179,15 @@ def test_amplifiers_that_one_cause_drives_show_at_rest_how(tare: str) -> None:
     engine = Engine(bench, base_columns(bench), target, np.array([0.0, 1e-6, 4e-6, 2e-5]))
     best, *others = sorted(score(engine, engine.levels, variants), key=lambda s: -s.log_evidence)
     assert best.variant.label == "winding path, as read at rest"
+    # a zero that is off, all the time, says nothing of what drifts
+    zero = np.array([30.0, 5.0, -20.0])
+    ahead = np.stack([s.unit_vector @ zero for s in data.setups])[data.setup]
+    aside = np.stack([s.tangents @ zero for s in data.setups])[data.setup]
+    off = make_bench(
+        replace(data, force=data.force + along * drift + ahead, tangential=seen + aside)
+    )
+    found = next(v for v in library(off, ["force_drift"]) if v.label == best.variant.label)
+    assert found.info["along"] == pytest.approx(best.variant.info["along"], abs=1e-6)
     assert best.log_evidence > others[0].log_evidence + 20
     assert np.array(best.variant.info["along"]) == pytest.approx(axis * -1, abs=0.05) or np.array(
         best.variant.info["along"]
@@ -186,6 +195,20 @@ def test_amplifiers_that_one_cause_drives_show_at_rest_how(tare: str) -> None:
     law, scale = law_of(bench, best.variant)
     exact = np.stack([bench.columns[c] for c in best.variant.columns], axis=1)
     assert rows_of(bench, "force_drift", law) * scale == pytest.approx(exact, abs=1e-12)
+
+
+def test_what_reads_nothing_at_rest_has_no_axis() -> None:
+    data = arm_data()
+    assert data.tangential is not None
+    quiet = data.branch == 0
+    still = replace(
+        data,
+        force=np.where(quiet, 0.0, data.force),
+        tangential=np.where(quiet[:, None], 0.0, data.tangential),
+    )
+    for seen in (data, still):
+        labels = [v.label for v in library(make_bench(seen), ["force_drift"])]
+        assert not any(label.endswith("as read at rest") for label in labels)
 
 
 def test_amplifiers_that_drift_each_on_its_own_have_no_axis_in_common() -> None:

@@ -11,7 +11,7 @@ from identification.gap.data import GapData
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import Fit, fit
-from identification.gap.explanations.verdict import FLANKS, flanks_of_one_joint
+from identification.gap.explanations.verdict import FLANKS, flanks_of_one_joint, troubles_named
 from identification.gap.judging.strain import what_is_strained
 from identification.gap.model.bench import Bench
 from identification.gap.model.noise import NOISY, SWINGS
@@ -150,12 +150,13 @@ def left_out(chosen: Explanation, fuller: Explanation | None) -> tuple[Note, ...
     return (Note(REMARK, text),)
 
 
-def called(chosen: Explanation, verdict: str) -> tuple[Note, ...]:
-    """Of a play and a curve of one joint, why the smaller one is the verdict."""
-    if verdict not in FLANKS or not flanks_of_one_joint(chosen):
+def called(found: SearchResult, chosen: Explanation, verdict: str) -> tuple[Note, ...]:
+    """Of a play and a curve of one joint of an arm, why the smaller one is the verdict."""
+    arm = found.engine.bench.data.arm
+    if not arm or verdict not in FLANKS or not flanks_of_one_joint(chosen):
         return ()
-    sizes, (other,) = chosen.troubles, FLANKS - {verdict}
-    if sizes[verdict] >= sizes[other]:
+    (other,), named = FLANKS - {verdict}, troubles_named(chosen, found.explanations)
+    if other in named or chosen.troubles[verdict] > chosen.troubles[other]:
         return ()
     text = (
         f"{verdict} and {other} of one joint are one trouble: the flanks of a play are curved. It "

@@ -122,7 +122,7 @@ def result_of(
     notes = [*scale, *notes_of(bench, verdict)]
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
     notes += readings_missed(engine, fitted) if chosen.parts else ()
-    notes += [*called(chosen, verdict), *left_out(chosen, fuller)]
+    notes += [*called(found, chosen, verdict), *left_out(chosen, fuller)]
     return GapResult(
         verdict=verdict,
         probabilities=found.probabilities,

@@ -226,9 +226,12 @@ def _at_rest(bench: Bench) -> tuple[float, float, float] | None:
     along = np.array([s.unit_vector for s in bench.data.setups])[rows.setup]
     across = np.array([s.tangents for s in bench.data.setups])[rows.setup]
     read = along * rows.measured_force[:, None] + np.einsum("nk,nkc->nc", rows.tangential, across)
-    _, size, axes = np.linalg.svd(read[rows.zero], full_matrices=False)
-    alike = np.array(_alike(bench)) / 3**0.5
-    if size[0] ** 2 < _TOGETHER * float(size @ size) or abs(float(axes[0] @ alike)) > _ALIKE:
+    rest = read[rows.zero]
+    _, size, axes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
+    plain = size[0] > _PLAINLY * bench.data.instruments.force * len(rest) ** 0.5
+    together = size[0] ** 2 > _TOGETHER * float(size @ size)
+    alike = abs(float(axes[0] @ np.array(_alike(bench)))) / 3**0.5 > _ALIKE
+    if not plain or not together or alike:
         return None
     axis = axes[0] / np.abs(axes[0]).max()
     x, y, z = axis.tolist()
@@ -236,6 +239,7 @@ def _at_rest(bench: Bench) -> tuple[float, float, float] | None:
 
 
 _FEWEST, _TOGETHER = 6, 0.95  # readings; of their square
+_PLAINLY = 3.0  # times the noise of a reading, rms
 _ALIKE = 0.99  # cosine
 
 

@@ -35,6 +35,16 @@ from identification.arrays import Array
 from identification.gap.laws import friction_law
 from identification.gap.laws.closer import Word, places
 from identification.gap.laws.effect import Effect
+from identification.gap.laws.friction_forms import (
+    ARM_RADII,
+    RADII,
+    REACHES,
+    SCALES,
+    WORD,
+    growing,
+    saturating,
+    slackening,
+)
 from identification.gap.laws.friction_law import (
     BY_LOAD,
     LAWS,
@@ -52,21 +62,12 @@ from identification.gap.model.variants import (
     SET_UP_ANEW,
     UNDER_WEIGHT,
     Variant,
-    block,
     smooth_root,
     variant,
 )
 
-WORD = "joint_hysteresis"
-# Strengths, of the joint's range of torque: near each other at small ones, which slip first. Of an
-# arm no further apart than a tenth, between which loops are chords of smooth ones; a specimen's
-# friction brings a spring of its own, and more strengths won nothing there at first sight.
-_WEAK = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2)
-RADII = (*_WEAK, 0.27, 0.36, 0.5, 0.7, 1.0)
 # Those of a specimen's closer look: loops of thousands of readings tell them apart.
 BETWEEN = tuple(sorted((*RADII, *((a * b) ** 0.5 for a, b in pairwise(RADII)))))
-ARM_RADII = (*_WEAK, 0.26, 0.33, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen
 # Without unloading no loop is seen: what then bends all at once, at a large load, is a knee; what
 # bends ever more from the first load on is a spectrum of strengths. Specimens yield.
@@ -74,7 +75,6 @@ _SMALL = 5
 TOOLS_KG = (0.0, 0.5, 1.0, 2.0, 2.5, 3.0)  # beside TOOL_KG, with which it is looked for at first
 _CLOSER = 6  # reaches of a closer look
 NEARER = 0.4  # times the reaches of others: at the largest load, and shorter below
-SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 OTHER_SCALES, _MORE = (0.05, 0.15, 0.5, 1.2, 3.0), 6.0  # the spring may be off by more than that
 
 
@@ -188,84 +188,17 @@ def _remembering(found: list[Variant], memory: str) -> list[Variant]:
     return [replace(v, info={**v.info, "memory": memory.strip()}) for v in found]
 
 
-def growing(bench: Bench, found: Variant) -> list[Variant]:
-    """Exponential laws of the joint and memory of a friction that was found, part of which grows in
-    proportion to what the gear carries, push and weights together: teeth and bearings rub the more
-    the harder they are pressed (Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134,
-    2012). Of arms."""
-    if not bench.data.arm or bench.course.once:
+def further(bench: Bench, found: Variant) -> list[Variant]:
+    """Friction of the joint and memory of one that was found, of an arm: part of which grows with
+    what the gear carries, and of a load that saturates."""
+    if not bench.data.arm:
         return []
     joint, memory = int(found.info["joint"]), str(found.info["memory"])
     name, path = _as_found(bench, found)
-    torque, unit = bench.true_torque[:, joint], -bench.sense * bench.compliance[joint]
-    carries = np.abs(torque + bench.weight(joint))
-    top, out = float(carries.max()), []
-    reach = bench.reach_of(torque) * np.geomspace(REACHES[0], REACHES[-1], _GROWING)
-    for law in friction_law.exponential_laws(bench):
-        held = reach * path.bristles(reach, law.startswith("Bouc-Wen"))
-        slips = torque[:, None] if law in SLIPPING else 0.0
-        both = zip((held - slips).T, (held * carries[:, None] / top - slips).T, strict=True)
-        for r, states in zip(reach, both, strict=True):
-            columns = [bench.add_joint(joint, unit * h) for h in states]
-            out.append(
-                variant(
-                    WORD,
-                    f"{name} {law} {r:.3g} Nm grows",
-                    columns,
-                    SCALES,
-                    each=True,
-                    prior=0.25 / (4 * _GROWING),
-                    joint=joint,
-                    radius=np.array([r, r]),
-                    law=law,
-                    slips=law in ON_TOP,
-                    memory=memory,
-                    grows_to=top,
-                )
-            )
-    return out
-
-
-_GROWING = 6  # reaches
-
-
-def saturating(bench: Bench, found: Variant) -> list[Variant]:
-    """Spectra of the joint and memory of a friction that was found, of a load that saturates: loops
-    that close towards large loads. Of arms that unload; about no load, so of no weight."""
-    if not bench.data.arm or not bench.course.unloads or hangs(found):
-        return []
-    joint, memory = int(found.info["joint"]), str(found.info["memory"])
-    name, path = _as_found(bench, found)
-    torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
-    top, out = float(np.abs(torque).max()), []
-    for share in SATURATES:
-        most = share * top
-        through = with_loads(path, friction_law.saturating(path.load, most))
-        reached = friction_law.saturating(torque, most)
-        radius = bench.radii(reached, bench.reach_of(reached) * np.array(ARM_RADII))
-        columns = [bench.add_joint(joint, unit * state) for state in through.plays(radius).T]
-        out.append(
-            variant(
-                WORD,
-                f"{name} spectrum saturating at {share:g}",
-                columns,
-                SCALES,
-                root=smooth_root(len(columns), 0.6, 0.3),
-                prior=0.25 / len(SATURATES),
-                each=True,
-                form="spectrum",
-                joint=joint,
-                radius=radius,
-                law="Prandtl",
-                slips=True,
-                memory=memory,
-                saturates=most,
-            )
-        )
-    return out
-
-
-SATURATES = (0.3, 0.5, 0.8)  # of the joint's largest torque
+    out = [] if bench.course.once else growing(bench, joint, name, path)
+    if bench.course.unloads and not hangs(found):  # about no load, so of no weight
+        out += saturating(bench, joint, name, path)
+    return _remembering(out, memory)
 
 
 def _laws(bench: Bench, joint: int, span: float, memory: str, path: Path) -> list[Variant]:
@@ -277,47 +210,8 @@ def _laws(bench: Bench, joint: int, span: float, memory: str, path: Path) -> lis
         reaches = np.array(REACHES if bench.course.unloads else REACHES[:2])
         found += _exponential(bench, joint, name, reaches, path)
     if memory == "":
-        found += _slackening(bench, joint, name, span, path)
+        found += slackening(bench, joint, name, path)
     return _remembering(found, memory)
-
-
-def _slackening(bench: Bench, joint: int, name: str, span: float, path: Path) -> list[Variant]:
-    """Of a specimen that is driven to and fro: what gives way and wears its hole by that, so that
-    it bears again only where it was last pushed to; alone, and beside strengths that rub."""
-    if bench.data.arm or not bench.imposed or bench.course.one_sided:
-        return []
-    torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
-    radius = bench.radii(torque, span * np.array(SLACKENS))
-    rubs = bench.radii(torque, span * np.array(RADII))
-    worn = [bench.add_joint(joint, -unit * s) for s in path.slacks(radius).T]
-    held = [bench.add_joint(joint, unit * s) for s in (path.plays(rubs) - torque[:, None]).T]
-    out = []
-    for columns, radii, label in (
-        (worn, radius, "that slackens"),
-        ([*worn, *held], np.append(radius, rubs), "that slackens and rubs"),
-    ):
-        roots = [smooth_root(len(r), 0.6, 0.3) for r in (radius, rubs)]
-        out.append(
-            variant(
-                WORD,
-                f"{name} spectrum {label}",
-                columns,
-                SCALES,
-                root=block(roots[: 1 + (len(radii) > len(radius))]),
-                prior=0.25,
-                each=True,
-                form="spectrum",
-                joint=joint,
-                radius=radii,
-                law="Iwan",
-                slips=False,
-                slackens=len(radius),
-            )
-        )
-    return out
-
-
-SLACKENS = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.36, 0.5)  # of the range of motion
 
 
 def _spectra(
@@ -430,8 +324,7 @@ def _look_closer(word: Word) -> list[Variant]:
     bench, out = word.engine.bench, []
     for s in places(word.alone, word.beside):
         out += closer(bench, s.variant)
-        out += growing(bench, s.variant)
-        out += saturating(bench, s.variant)
+        out += further(bench, s.variant)
         out += outlasting(bench, s.variant)
     for s in places(word.alone, word.beside, hangs):
         out += refined(bench, s.variant)

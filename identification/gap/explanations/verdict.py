@@ -75,8 +75,9 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         for word, share in _main(of, ranked, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
-        heir = _heir(e, ranked, kept, _closely(found.engine))
-        mass[heir.parts[0].word if heir else "unknown"] += whole - good
+        heir = _heir(e, ranked, kept, _may_miss(found.engine))
+        for word, share in (_main(heir, ranked, arm) if heir else {"unknown": 1.0}).items():
+            mass[word] += share * (whole - good)
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
         mass = {w: m**TEMPER for w, m in mass.items()}
     total = sum(mass.values())
@@ -191,7 +192,7 @@ _TWO, _MANY = 2, 3
 
 def _tells_of_three(explanation: Explanation, ranked: Sequence[Explanation]) -> bool:
     """Whether it takes three troubles."""
-    each = sorted(_troubles(explanation, ranked).values(), reverse=True)
+    each = sorted(troubles_named(explanation, ranked).values(), reverse=True)
     return len(each) >= _MANY and each[2] > TELLING * each[0]
 
 
@@ -201,10 +202,10 @@ FLANKS = frozenset({"joint_backlash", "joint_nonlinear_stiffness"})
 def flanks_of_one_joint(explanation: Explanation) -> bool:
     """Whether it has a play and a curve, of the same joint."""
     joints = {j for p in explanation.parts if p.word in FLANKS for j in p.variant.joints}
-    return explanation.words >= FLANKS and len(joints) <= 1
+    return explanation.words >= FLANKS and len(joints) == 1
 
 
-def _troubles(explanation: Explanation, ranked: Sequence[Explanation]) -> dict[str, float]:
+def troubles_named(explanation: Explanation, ranked: Sequence[Explanation]) -> dict[str, float]:
     """Word -> rms m of what it does. A play and a curve of one joint are one trouble: flanks are
     curved, and where one leaves something the other one mends it. Which does more beside the other
     says nothing; it is called by the one that explains more without the other."""
@@ -238,7 +239,7 @@ def _main(explanation: Explanation, ranked: Sequence[Explanation], arm: bool) ->
         return {"none": 1.0}
     if not arm:
         return {explanation.parts[0].word: 1.0}
-    return _chance_to_be_largest(_troubles(explanation, ranked))
+    return _chance_to_be_largest(troubles_named(explanation, ranked))
 
 
 def _chance_to_be_largest(sizes: Mapping[str, float]) -> dict[str, float]:
@@ -289,7 +290,7 @@ def _heir(
     return None
 
 
-def _closely(engine: Engine) -> float:
+def _may_miss(engine: Engine) -> float:
     """m that a law may miss, and explains the gap all the same."""
     return max(_CLOSELY * engine.bench.noise.stated, _MOSTLY * engine.structural)
 

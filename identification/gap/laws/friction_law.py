@@ -49,7 +49,8 @@ _MEMORY = {
 
 def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
     """The law, and scales (k,) of its terms: friction elements, with their strength in Nm where the
-    law has one, else with the reach (Nm) over which they bend."""
+    law has one (of what comes through of a load that saturates), else with the reach (Nm) over
+    which they bend; of elements that slacken with what they bear until they give way."""
     joint, law = int(v.info["joint"]), str(v.info["law"])
     key = "strength" if law in SLIP_AT_A_STRENGTH else "reach"
     constants = {"joint": joint, "law": law, "memory": _MEMORY[v.info["memory"]]}
@@ -73,7 +74,9 @@ def describe(bench: Bench, v: Variant) -> tuple[Law, Array]:
 def columns(bench: Bench, law: Law) -> list[Array]:
     """Column of every term, in their order: what the friction holds back, `S_r(tau)` (stop
     operator), or reach, or load, times bristle state; of laws that slip what that leaves of the
-    load, as `P_r(tau)` does of Prandtl's; of a term without a strength its own spring's line."""
+    load, as `P_r(tau)` does of Prandtl's; of a term without a strength its own spring's line, of
+    one that slackens what it bears where it was last pushed to. Of a load that saturates, tau is
+    what comes through."""
     c = law.constants
     joint, at_strength = c["joint"], c["law"] in SLIP_AT_A_STRENGTH
     torque, fresh = bench.true_torque[:, joint], fresh_after(bench, c["memory"])
@@ -163,12 +166,15 @@ def parameters(bench: Bench, v: Variant, found: Coefficients) -> dict[str, Param
     if v.other_springs:
         found = found.without_line(joint)
     largest = float(np.abs(bench.torque[:, joint]).max())
+    if "saturates" in v.info:  # strengths are those of what comes through
+        largest = float(saturating(np.array(largest), v.info["saturates"]))
     slips = np.clip((1 - radius / max(largest, _TINY)) / _HARDLY, 0.0, 1.0)
     law = str(v.info["law"])
     if law in BY_LOAD:
         radius = np.full(len(radius), largest)
-    if law == "Iwan":  # what never slips is a spring like the joint's own
-        found = found.on_spring(slips - 1, joint)
+    if law == "Iwan":  # what never slips is a spring like the joint's own, beside it
+        stiffens = bench.imposed and not bench.data.arm
+        found = found.on_spring(1 - slips if stiffens else slips - 1, joint)
     if law in ON_TOP:  # of all that gives way at large loads, as of the other convention
         found = found.on_spring(slips, joint)
     share = found.per_spring(slips, joint)

@@ -43,7 +43,7 @@ class KnownEffects:
     left: float
 
 
-_FURTHER, _ONE_WAY = 6, 0.9  # radii; of the range
+_FURTHER, _FIRST, _ONE_WAY = 6, 1.4, 0.9  # radii; the first, of the last inner one; of the range
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
 _BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
 _FELT = 0.03  # of the range of the load's torque
@@ -215,9 +215,10 @@ class Bench:
         range, since it is gone both ways; a single pull goes but one."""
         full, last = float(np.ptp(np.append(load, 0.0))), float(inner[-1])
         far = (_ONE_WAY if self.course.once else 0.5) * full
-        if not self.imposed or far < last:
+        if not self.imposed or far <= last:
             return inner
-        start = min(1.4, (far / last) ** (1 / _FURTHER)) if self.course.once else 1.4
+        evenly = self.course.once or _FIRST * last > far
+        start = min(_FIRST, (far / last) ** (1 / _FURTHER)) if evenly else _FIRST
         return np.concatenate([inner, np.geomspace(start * last, far, _FURTHER)])
 
     def add(self, column: Array) -> int:

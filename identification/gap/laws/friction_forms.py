@@ -1,0 +1,134 @@
+"""Friction of further forms: that grows with what a gear carries, whose loops close towards large
+loads, or that wears the holes of what gives way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.gap.laws import friction_law
+from identification.gap.laws.friction_law import ON_TOP, SLIPPING
+from identification.gap.model.bench import Bench
+from identification.gap.model.path import Path, with_loads
+from identification.gap.model.variants import Variant, block, smooth_root, variant
+
+WORD = "joint_hysteresis"
+# Strengths, of the joint's range of torque: near each other at small ones, which slip first. Of an
+# arm no further apart than a tenth, between which loops are chords of smooth ones; a specimen's
+# friction brings a spring of its own, and more strengths won nothing there at first sight.
+_WEAK = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2)
+RADII = (*_WEAK, 0.27, 0.36, 0.5, 0.7, 1.0)
+ARM_RADII = (*_WEAK, 0.26, 0.33, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of torque
+SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
+
+
+def growing(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:
+    """Exponential laws, part of whose friction grows in proportion to what the gear carries, push
+    and weights together: teeth and bearings rub the more the harder they are pressed (Bittencourt
+    and Gunnarsson, J. Dyn. Syst. Meas. Control 134, 2012)."""
+    torque, unit = bench.true_torque[:, joint], -bench.sense * bench.compliance[joint]
+    carries = np.abs(torque + bench.weight(joint))
+    top, out = float(carries.max()), []
+    reach = bench.reach_of(torque) * np.geomspace(REACHES[0], REACHES[-1], _GROWING)
+    for law in friction_law.exponential_laws(bench):
+        held = reach * path.bristles(reach, law.startswith("Bouc-Wen"))
+        slips = torque[:, None] if law in SLIPPING else 0.0
+        both = zip((held - slips).T, (held * carries[:, None] / top - slips).T, strict=True)
+        for r, states in zip(reach, both, strict=True):
+            columns = [bench.add_joint(joint, unit * h) for h in states]
+            out.append(
+                variant(
+                    WORD,
+                    f"{name} {law} {r:.3g} Nm grows",
+                    columns,
+                    SCALES,
+                    each=True,
+                    prior=0.25 / (4 * _GROWING),
+                    joint=joint,
+                    radius=np.array([r, r]),
+                    law=law,
+                    slips=law in ON_TOP,
+                    grows_to=top,
+                )
+            )
+    return out
+
+
+_GROWING = 6  # reaches
+
+
+def saturating(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:
+    """Spectra of a load that saturates: loops that close towards large loads."""
+    torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
+    top, out = float(np.abs(torque).max()), []
+    for share in SATURATES:
+        most = share * top
+        through = with_loads(path, friction_law.saturating(path.load, most))
+        reached = friction_law.saturating(torque, most)
+        radius = bench.reach_of(reached) * np.array(ARM_RADII)
+        radius = radius[radius < float(np.abs(reached).max())]  # beyond, nothing moves
+        columns = [bench.add_joint(joint, unit * state) for state in through.plays(radius).T]
+        out.append(
+            variant(
+                WORD,
+                f"{name} spectrum saturating at {share:g}",
+                columns,
+                SCALES,
+                root=smooth_root(len(columns), 0.6, 0.3),
+                prior=0.25 / len(SATURATES),
+                each=True,
+                form="spectrum",
+                joint=joint,
+                radius=radius,
+                law="Prandtl",
+                slips=True,
+                saturates=most,
+            )
+        )
+    return out
+
+
+SATURATES = (0.3, 0.5, 0.8)  # of the joint's largest torque
+
+
+def slackening(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:
+    """Of a specimen that is driven to and fro: what gives way and wears its hole by that, so that
+    it bears again only where it was last pushed to; alone, and beside strengths that rub."""
+    if bench.data.arm or not bench.imposed or bench.course.one_sided:
+        return []
+    torque, unit = bench.true_torque[:, joint], bench.sense * bench.compliance[joint]
+    span = bench.reach_of(torque)
+    far = _NEARLY * float(np.abs(torque).max())  # what gives way beyond is a spring like others
+    radius = bench.radii(torque, span * np.array(SLACKENS))
+    rubs = bench.radii(torque, span * np.array(RADII))
+    radius, rubs = radius[radius < far], rubs[rubs < far]
+    each = [smooth_root(len(r), 0.6, 0.3) for r in (radius, rubs)]
+    worn = [bench.add_joint(joint, -unit * s) for s in path.slacks(radius).T]
+    held = [bench.add_joint(joint, unit * s) for s in (path.plays(rubs) - torque[:, None]).T]
+    out = []
+    for columns, radii, root, label in (
+        (worn, radius, each[0], "that slackens"),
+        ([*worn, *held], np.append(radius, rubs), block(each), "that slackens and rubs"),
+    ):
+        out.append(
+            variant(
+                WORD,
+                f"{name} spectrum {label}",
+                columns,
+                SCALES,
+                root=root,
+                prior=0.25,
+                each=True,
+                form="spectrum",
+                joint=joint,
+                radius=radii,
+                law="Iwan",
+                slips=False,
+                slackens=len(radius),
+            )
+        )
+    return out
+
+
+_NEARLY = 0.999
+SLACKENS = (0.012, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.36, 0.5)  # of the range of motion
