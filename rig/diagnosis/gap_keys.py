@@ -170,11 +170,13 @@ Kind = tuple[str, tuple[str, ...]]  # of terms: a coefficient, and names of its 
 @dataclass(frozen=True)
 class Grammar:
     """What the laws of a word are written with: constants, and the kinds of terms. only_with: of
-    those that do not go with every law, a constant, and which of its values they go with."""
+    those that do not go with every law, a constant, and which of its values they go with; needs: of
+    constants likewise."""
 
     constants: tuple[str, ...]
     terms: tuple[Kind, ...]
     only_with: Mapping[Kind, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
+    needs: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
 
 
 _PLAYS = (
@@ -225,6 +227,7 @@ GRAMMAR: dict[str, Grammar] = {
             {_STRENGTH: SLIP_AT_A_STRENGTH, _SLACKENS: ("Iwan",)}
             | dict.fromkeys(_REACHES, _BY_A_REACH),
         ),
+        needs={"saturates": ("law", ("Prandtl",))},
     ),
     "joint_backlash": Grammar(
         ("joint", "zone", "crossing", "kind", "tool", "preload"),

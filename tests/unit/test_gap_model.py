@@ -336,6 +336,21 @@ def test_a_gain_that_bends_follows_the_reading(tmp_path: Path) -> None:
     np.testing.assert_allclose(moved - excess * moved**2 / 2e-3, springs, rtol=1e-9)
 
 
+@pytest.mark.parametrize("law", ["Iwan", "Dahl"])
+def test_a_load_saturates_for_one_law_only(law: str) -> None:
+    entry = {
+        "name": "joint_hysteresis",
+        "joint": 1,
+        "law": law,
+        "memory": "kept",
+        "saturates_at_Nm": 20,
+        "terms": [{"friction_Nm": 3.0, "compliance_rad_per_Nm": 1e-6}],
+    }
+    with pytest.raises(FormError, match=f"goes with law Prandtl only, not with {law}"):
+        from_entry(entry)
+    assert from_entry({**entry, "law": "Prandtl"}).law.constants["saturates"] == 20.0
+
+
 def test_what_cannot_be_foretold_is_left_out_and_said(tmp_path: Path) -> None:
     shift = {"name": "zero_shift", "terms": [{"run": 2, "lasts": True, "shift_mm": 0.03}]}
     warm = {
