@@ -152,7 +152,7 @@ def _one_after_the_other(
         root=root,
         within=grows,
         prior=_RUBBING if rubs else 1.0,
-        rubs=rubs,
+        **({"rubs": rubs} if rubs else {}),
         force_N=forces[0],
         laws=tuple(("slack", f) for f in forces),
     )
