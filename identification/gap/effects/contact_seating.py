@@ -144,18 +144,20 @@ def _one_after_the_other(
     wide = np.diff(edges)
     root = np.diag(edges[1:] / wide) - np.diag(edges[1:-1] / wide[1:], 1)
     grows = np.asarray(np.linalg.inv(root))
-    return variant(
+    plain = variant(
         WORD,
-        "one after the other" + (f", rubbing {rubs / forces[-1] * STEPS[-1]:.2g}" if rubs else ""),
+        "one after the other",
         columns,
         scales,
         root=root,
         within=grows,
-        prior=_RUBBING if rubs else 1.0,
-        **({"rubs": rubs} if rubs else {}),
         force_N=forces[0],
         laws=tuple(("slack", f) for f in forces),
     )
+    if not rubs:
+        return plain
+    share = rubs / forces[-1] * STEPS[-1]
+    return replace(plain, prior=_RUBBING).known_by(f", rubbing {share:.2g}", rubs=rubs)
 
 
 def _seated(
