@@ -98,7 +98,7 @@ def test_the_main_cause_of_two_is_the_larger_one_as_far_as_their_sizes_are_known
     assert _main(said((), ()), (), True) == {"none": 1.0}
 
 
-def test_what_explains_far_less_inherits_nothing_unless_it_fits_may_miss() -> None:
+def test_what_explains_far_less_inherits_nothing_unless_it_fits_closely() -> None:
     both = (part("thermal_drift", [0]), part("joint_yield", [1]))
     failed = said(both, (2e-5, 1e-5), 0.0)
     for weight, eta, inherits in ((-10.0, 9e-6, True), (-90.0, 9e-6, False), (-90.0, 3e-6, True)):
@@ -121,7 +121,7 @@ def test_an_heir_speaks_as_if_it_had_been_found_first() -> None:
     assert with_posterior(case, {}).probabilities["joint_backlash"] > 0.9
 
 
-def test_what_explains_most_of_a_gap_fits_may_miss_whatever_its_noise() -> None:
+def test_what_explains_most_of_a_gap_fits_closely_whatever_its_noise() -> None:
     engine = small_engine(small_bench())
     noise = engine.bench.noise.stated
     for structural, most in ((2 * noise, 2 * noise), (100 * noise, 17 * noise)):

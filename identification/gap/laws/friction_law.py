@@ -90,7 +90,8 @@ def columns(bench: Bench, law: Law) -> list[Array]:
         state = path.plays(size)
         held = -state if c["law"] == "Prandtl" else torque[:, None] - state
         worn = np.array(["slackens" in t.shape for t in law.terms if t.shape], dtype=bool)
-        held[:, worn] = path.slacks(size[worn])
+        if worn.any():
+            held[:, worn] = path.slacks(size[worn])
     else:
         by_load = c["law"] in BY_LOAD
         span = c.get("measured_to", bench.reach_of(torque))  # a file may lack it
