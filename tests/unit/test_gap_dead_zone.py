@@ -166,7 +166,6 @@ def bolted() -> Bench:
     return a_bench(force, u, "displacement")
 
 
-@pytest.mark.slow
 def test_friction_beside_it_does_not_hide_a_play() -> None:
     """What goes two ways has a middle; from one side nothing is said."""
     result = explained(bolted().data)

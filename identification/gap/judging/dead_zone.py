@@ -83,7 +83,7 @@ def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:
     bench, fitted = engine.bench, fit(engine, explanation)
     response = bench.response - engine.target[: bench.rows.n] + fitted.response
     for i, part in enumerate(explanation.parts):
-        if part.word not in FLANKS and "slackens" not in part.variant.info:  # loose as a play is
+        if part.word not in FLANKS and not part.variant.is_loose:
             response = response - fitted.contribution(engine, i)[: bench.rows.n]
     response = response / bench.slope
     mine = _where(bench, explanation)

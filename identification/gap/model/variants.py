@@ -108,6 +108,12 @@ class Variant:
         return float(self.info.get("flow_s", 0.0)) > 0
 
     @property
+    def is_loose(self) -> bool:
+        """Whether it bears nothing on a part of its way, as a play does: elements that wear their
+        holes, until they come to where they were last pushed to."""
+        return bool(self.info.get("slackens"))
+
+    @property
     def exceeds_proportion(self) -> bool:
         """Whether it creeps by more than in proportion to the load."""
         return bool(self.info.get("bent"))
