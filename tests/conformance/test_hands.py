@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -11,9 +13,10 @@ import pytest
 from identification.gap.data import GapData
 from identification.gap.evidence.imperfection import PATH
 from identification.gap.evidence.parts import Part
-from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.fit import fit
-from identification.gap.judging.hands import open_to_hands
+from identification.gap.judging import hands
+from identification.gap.judging.hands import acts_by_hands_alone, open_to_hands
 from identification.gap.model.bench import make_bench
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.effect_benches import of, quick_engine
@@ -83,6 +86,29 @@ def test_only_where_a_lag_acts_does_the_hand_count() -> None:
     engine = quick_engine(bench)
     creeps = fit(engine, Explanation((Part(typical(variants), 0.1),), 0.0, 0.0, (0.0,), 0.0))
     assert not open_to_hands(engine, creeps).any()
+
+
+def test_what_acts_at_other_levels_too_is_a_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not what acts in the holds alone beyond which a hand went."""
+    bench, _, _ = of("time_lag", "medium")
+    edges, rows = bench.rows.edges, bench.rows
+    gone = np.zeros(rows.n)
+    gone[edges[3::6]] = 0.1
+    there = np.isin(rows.hold, rows.hold[gone != 0])
+    engine = SimpleNamespace(bench=SimpleNamespace(rows=replace(rows, overshoot=gone)))
+
+    def alone(moved: Array, parts: tuple[int, ...] = (0,)) -> bool:
+        fitted = SimpleNamespace(contribution=lambda *_: moved)
+        monkeypatch.setattr(hands, "fit", lambda *_: fitted)
+        best = SimpleNamespace(parts=parts)
+        found = SimpleNamespace(engine=engine, explanations=(best,))
+        return acts_by_hands_alone(cast(SearchResult, found))
+
+    signs = np.where(np.arange(rows.n) % 2, 1.0, -1.0)
+    assert alone(signs * there)
+    assert not alone(signs * there, parts=())
+    assert not alone(signs * (there + 1.0))
+    assert not alone(signs)
 
 
 def test_a_recording_that_runs_on_shows_the_way() -> None:

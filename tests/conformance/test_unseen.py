@@ -11,7 +11,7 @@ import pytest
 from identification.arrays import Flags
 from identification.gap.answer.result import GapResult
 from identification.gap.judging.heldout import ALWAYS_IN, folds, held_out, stated_prediction
-from identification.gap.search.unseen import Unseen
+from identification.gap.search.unseen import Paths, Unseen, brought_to
 from rig.diagnosis.gap_data import gap_data
 from tests.conformance.gap_designs import (
     DESIGNS,
@@ -130,6 +130,21 @@ def test_friction_is_found_and_so_is_where_the_hand_went_too_far() -> None:
     assert np.isclose(size, TOO_FAR, rtol=0.1).any()  # between the sizes that are looked at first
 
 
+def test_runs_that_do_not_see_each_other_are_looked_at_at_once() -> None:
+    """For the same as one after the other."""
+    found = diagnosed(FRICTION)
+    at, out = brought_to(found.bench.rows), []
+    for apart in (True, False):
+        paths = Paths(found.engine, found.found.explanations[0], at, None)
+        runs = [run for together in paths.at_once for run in together]
+        assert len(paths.at_once) < len(runs) == len(np.unique(found.bench.rows.run))
+        if not apart:
+            paths.at_once = [[run] for run in runs]
+        out.append(paths.found()[0].overshoot)
+    assert out[0].any()
+    np.testing.assert_array_equal(*out)
+
+
 def test_a_calm_hand_is_not_said_to_have_gone_too_far() -> None:
     found = diagnosed(CALM)
     assert found.verdict == "joint_hysteresis"
@@ -176,7 +191,7 @@ def test_the_gap_of_withheld_levels_counts_no_level_that_told_itself() -> None:
 
 def test_more_places_and_more_of_them_cost_more() -> None:
     def cost(count: int, of: int) -> float:
-        return Unseen(np.zeros(1), count, of).cost
+        return Unseen(frozenset(), np.zeros(1), count, of).cost
 
     assert cost(0, 40) == pytest.approx(np.log(41))
     assert cost(1, 40) == pytest.approx(np.log(41 * 40 * 16))

@@ -8,9 +8,11 @@ from typing import Any
 import pytest
 
 from identification.gap import diagnose
+from identification.gap.words import WORDS
 
 FIRST = "first repetitions"
 NOISE = 2e-6  # m
+WORD = "joint_hysteresis"
 
 
 def result(
@@ -18,7 +20,7 @@ def result(
 ) -> Any:
     """What a search found, as far as rounds look at it; left: m, by the best explanation; lawless:
     log weight of a gap without a law."""
-    best = SimpleNamespace(log_weight=log_weight, eta=left)
+    best = SimpleNamespace(log_weight=log_weight, eta=left, parts=())
     bench = SimpleNamespace(noise=SimpleNamespace(stated=NOISE))
     engine = SimpleNamespace(bench=bench)
     return SimpleNamespace(explanations=[best], engine=engine, foretells=foretells, unknown=lawless)
@@ -29,15 +31,23 @@ class Rounds:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, *found: Any, cost: float = 10.0) -> None:
         self.asked: list[str | None] = []
-        results = iter(found)
+        self.searched: list[set[str]] = []  # words that were left out
+        self._loads = SimpleNamespace(words=frozenset({WORD}), cost=cost)
+        self._results, self._last = iter(found), None
         monkeypatch.setattr(diagnose, "foretells", lambda one: one.foretells)
         monkeypatch.setattr(diagnose, "first_repetitions", lambda engine: FIRST)
         monkeypatch.setattr(diagnose, "unseen", lambda one, told_by: self._ask(told_by))
-        monkeypatch.setattr(diagnose, "_along", lambda *_: (next(results), cost))
+        monkeypatch.setattr(diagnose, "_along", lambda *args: self._search(set(args[-1])))
 
-    def _ask(self, told_by: str | None) -> str:
+    def _ask(self, told_by: str | None) -> Any:
         self.asked.append(told_by)
-        return "loads"
+        return self._loads
+
+    def _search(self, withheld: set[str]) -> Any:
+        """With the word that asks, and once more with all of them."""
+        self.searched.append(withheld)
+        self._last = next(self._results) if withheld else self._last
+        return self._last
 
 
 def test_where_the_first_repetitions_lead_nowhere_all_are_asked(
@@ -106,3 +116,23 @@ def test_loads_that_hardly_pay_beside_more_than_noise_ask_for_no_more(
     made = Rounds(monkeypatch, result(gain, False, left), result(gain, False, left))
     assert diagnose._with_unseen(result(0.0, False), (), ()).explanations[0].log_weight == gain
     assert made.asked == [FIRST] * rounds
+
+
+def test_all_words_are_searched_where_those_that_ask_for_loads_gain_by_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rounds = Rounds(monkeypatch, result(9.0, True))
+    diagnose._with_unseen(result(0.0, True), (), ())
+    assert rounds.searched == [set(WORDS) - {WORD}]
+    rounds = Rounds(monkeypatch, result(11.0, True))
+    diagnose._with_unseen(result(0.0, True), (), ())
+    assert rounds.searched == [set(WORDS) - {WORD}, set()]
+
+
+def test_what_acts_only_where_a_hand_went_is_no_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    better = result(300.0, True)
+    Rounds(monkeypatch, better)
+    assert diagnose._with_unseen(start := result(0.0, True), (), ()) is better
+    Rounds(monkeypatch, better)
+    monkeypatch.setattr(diagnose, "acts_by_hands_alone", lambda one: one is better)
+    assert diagnose._with_unseen(start, (), ()) is start

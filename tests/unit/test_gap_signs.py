@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.optimize
 from scipy.optimize import minimize
 from scipy.special import log_ndtr
 
@@ -18,11 +19,34 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.finer import gained
 from identification.gap.evidence.imperfection import least_size, log_share
 from identification.gap.evidence.parts import Part, log_joint_between, log_joints, signs_kept
-from identification.gap.evidence.signs import Limits, all_kept, log_odds, log_odds_together
+from identification.gap.evidence.signs import (
+    Limits,
+    all_kept,
+    distance,
+    log_odds,
+    log_odds_together,
+)
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
 from identification.gap.model.variants import Variant, variant
 from tests.unit.test_gap_evidence import small_bench, small_engine
+
+
+def test_a_distance_is_found_where_its_first_solver_gives_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After three turns a limit, as it does now and then; a diagnosis had ended by that."""
+    rng = np.random.default_rng(8)
+    unit = np.tril(rng.normal(size=(6, 6)) + 2.0)
+    unit /= np.linalg.norm(unit, axis=1)[:, None]
+    z = np.array([-3.0, 1.0, -0.5, 0.3, -2.0, 0.1])
+    known = distance(z, unit)
+
+    def gives_up(*_: Array) -> None:
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    monkeypatch.setattr(scipy.optimize, "nnls", gives_up)
+    assert distance(z, unit) == pytest.approx(known, rel=1e-6)
 
 
 def odds(mean: Array, covariance: Array, prior: Array, **limits: object) -> float:

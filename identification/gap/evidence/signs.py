@@ -133,12 +133,16 @@ def distance(z: Array, unit: Array) -> float:
     """Mahalanobis distance of a mean from where all its sums z (m,) are positive. The
     least-distance problem of Lawson and Hanson (Solving Least Squares Problems, 1974, chapter
     23)."""
-    from scipy.optimize import nnls
+    from scipy.optimize import lsq_linear, nnls
 
     m, r = unit.shape
     both, last = np.empty((r + 1, m)), np.zeros(r + 1)
     both[:-1], both[-1], last[-1] = unit.T, -z, 1.0
-    left = both @ nnls(both, last)[0] - last
+    try:
+        pushes = nnls(both, last)[0]
+    except RuntimeError:  # it gives up after three turns a limit, which are too few now and then
+        pushes = lsq_linear(both, last, (0.0, np.inf)).x
+    left = both @ pushes - last
     return float(np.sqrt(left[:-1] @ left[:-1])) / max(float(-left[-1]), _TINY)
 
 

@@ -3,6 +3,9 @@
 A lag shows at the first readings of a hold what the load was before: on a path that somebody's
 hands took, quickly or slowly, first fast and then slow. Straight on is the best guess, and no more:
 what such a reading misses by a share of what the lag does there is no trouble of its own.
+
+Where loads between readings were put in, a law shows at other levels as well: what acts at those
+alone has none of its own there (bursts of a loose plug pass for a lag of whatever load it takes).
 """
 
 from __future__ import annotations
@@ -13,7 +16,8 @@ from identification.arrays import Array
 from identification.gap.effects import time_lag
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.imperfection import PATH
-from identification.gap.explanations.fit import Fit
+from identification.gap.explanations.explanation import SearchResult
+from identification.gap.explanations.fit import Fit, fit
 
 
 def open_to_hands(engine: Engine, fitted: Fit) -> Array:
@@ -25,3 +29,19 @@ def open_to_hands(engine: Engine, fitted: Fit) -> Array:
     late = [i for i, p in enumerate(fitted.parts) if p.word == time_lag.WORD]
     moved = sum((fitted.contribution(engine, i)[:n] for i in late), np.zeros(n))
     return np.asarray(PATH * np.abs(moved))
+
+
+def acts_by_hands_alone(found: SearchResult) -> bool:
+    """Whether the largest effect of the best explanation does most of what it does (in squares,
+    about the mean of each setup) in the holds beyond which a load went that nobody read."""
+    engine, best = found.engine, found.explanations[0]
+    if not best.parts:
+        return False
+    rows = engine.bench.rows
+    moved = fit(engine, best).contribution(engine, 0)[: rows.n]
+    square = rows.about_means(moved[:, None])[:, 0] ** 2
+    in_them = np.isin(rows.hold, rows.hold[rows.overshoot != 0])
+    return bool(square[in_them].sum() > _MOST * square.sum())
+
+
+_MOST = 0.5

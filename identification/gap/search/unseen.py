@@ -12,7 +12,7 @@ ones alone say what the law does, and the others where a hand went.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from math import inf, lgamma, log
@@ -49,9 +49,10 @@ _PAYS, _LEAST = 0.7, -inf  # of their cost, beside what leaves more than noise; 
 
 @dataclass(frozen=True, eq=False)
 class Unseen:
-    """overshoot (n,) as in `Rows`; count of the holds beyond which the load went, of how many;
-    cost: nats that it takes to say which, and how far."""
+    """words of the explanation that asks for it; overshoot (n,) as in `Rows`; count of the holds
+    beyond which the load went, of how many; cost: nats that it takes to say which, and how far."""
 
+    words: frozenset[str]
     overshoot: Array
     count: int
     of: int
@@ -72,13 +73,13 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     rows = engine.bench.rows
     if rows.continuous or engine.bench.imposed:
         return None
-    at = _brought_to(rows)
+    at = brought_to(rows)
     most = _MOST if told_by is None else _MOST_TOLD
     if len(at) < _FEWEST or len(at) * rows.n > most:
         return None
     first = found.explanations[0].log_weight
     able = (e for e in found.explanations if told_by is None or len(e.parts) <= _PARTS)
-    each = ((e, _Paths(engine, e, at, told_by)) for e in islice(able, _LOOKED_AT))
+    each = ((e, Paths(engine, e, at, told_by)) for e in islice(able, _LOOKED_AT))
     remember = ((first - e.log_weight, path) for e, path in each if path.remembers)
     many = 1 if told_by is None or len(at) * rows.n > _FEW else _SEVERAL
     asked = ((behind, *path.found()) for behind, path in islice(remember, many))
@@ -109,12 +110,31 @@ def _of_the_one_ahead(paths: Iterator[tuple[float, Unseen]], known: Array) -> Un
     return best or first
 
 
-def _brought_to(rows: Rows) -> Ints:
+def brought_to(rows: Rows) -> Ints:
     """First rows of holds under a load that was brought there from another, unread."""
     size = np.abs(rows.force)
     new = rows.hold_starts & ~rows.starts & ~rows.zero & ~rows.on_the_way
     new[1:] &= ~rows.on_the_way[:-1]
     return np.flatnonzero(new & (size > _LOADED * size.max(initial=0.0)))
+
+
+class _Run(NamedTuple):
+    """holds of a run, by their number; seen: the white values (flags) that loads in them change."""
+
+    holds: list[int]
+    seen: Flags
+
+
+_Asking = Generator[tuple[int, float], float, None]
+_MOVED = 1e-9  # of an effect: less is rounding
+
+
+def _told(asking: _Asking, mine: Flags, left: Array) -> tuple[int, float] | None:
+    """What is asked next, after the sum of squares of one's own of what is left (white)."""
+    try:
+        return asking.send(float(left[mine] @ left[mine]))
+    except StopIteration:
+        return None
 
 
 class _Fitted(NamedTuple):
@@ -127,7 +147,7 @@ class _Fitted(NamedTuple):
     log_evidence: float
 
 
-class _Paths:
+class Paths:
     """An explanation along paths that are tried, with the coefficients it has along them."""
 
     def __init__(
@@ -136,7 +156,7 @@ class _Paths:
         """at: first rows of the holds that the load may have gone beyond; told_by as in
         `unseen`."""
         bench = engine.bench
-        self._engine, self._at = engine, at
+        self._engine, self._at, self._words = engine, at, explanation.words
         load, top = bench.load[at], float(np.abs(bench.load).max())
         further = np.sign(load - bench.load[at - 1]) * top / load
         # back to none at most: a screw does not pull
@@ -151,6 +171,26 @@ class _Paths:
         self._likely = [_White(engine, eta) for eta in likely]
         self._root = block([np.diag(engine.base.sd), *(p.root for p in explanation.parts)])
         self._told_by = None if told_by is None else _white_rows(engine, told_by)
+        self.at_once = self._apart(everywhere) if self.remembers else []
+
+    def _apart(self, everywhere: Array) -> list[list[_Run]]:
+        """Runs that may be looked at at once, as none sees what is tried in another."""
+        rows = self._engine.bench.rows
+        straight = self._effect(rows.overshoot)
+        run, out = rows.run[self._at], list[list[_Run]]()
+        for each in np.unique(run):
+            holds = np.flatnonzero(run == each)
+            mine = np.isin(np.arange(rows.n), self._at[holds])
+            change = self._effect(np.where(mine, everywhere, rows.overshoot)) - straight
+            far = np.abs(change).max(axis=1) > _MOVED * np.abs(straight).max()
+            one = _Run(holds.tolist(), self._white.of(far))
+            blind = (r for r in out if not any((one.seen & other.seen).any() for other in r))
+            together = next(blind, None)
+            if together is None:
+                out.append([one])
+            else:
+                together.append(one)
+        return out
 
     def found(self) -> tuple[Unseen, float]:
         """What the data gain by, and nats gained; from what is known of it on. The last sweeps are
@@ -163,7 +203,7 @@ class _Paths:
             if np.array_equal(out, before):
                 break
         self._sweep(out, None, _CLOSER)
-        more = Unseen(out, int(np.count_nonzero(out)), len(self._at))
+        more = Unseen(self._words, out, int(np.count_nonzero(out)), len(self._at))
         return more, self._log_evidence(out) - none
 
     def _log_evidence(self, overshoot: Array) -> float:
@@ -187,27 +227,47 @@ class _Paths:
     def _sweep(self, out: Array, told_by: Flags | None, closer: tuple[float, ...] = ()) -> None:
         """Puts in, takes out or changes what gains, hold after hold, with coefficients as they
         fit in the beginning; told_by as in `_fit`."""
-        cost = 2 * log(len(self._at) * _COUNT)  # twice the nats: of a sum of squares
         first = self._fit(self._effect(out), self._white, told_by)
-        now, left = first.effect, first.left
-        off = self._white.off(left, self._at)
-        for i, k in enumerate(self._at.tolist()):
-            if off[i] < _OFF and out[k] == 0:
-                continue
-            best, trial = (0.0, float(out[k]), left, now), out.copy()
-            for step in (0.0, *closer):
-                near = {best[1] * step, max(best[1] / step, -1.0)} if step else self._sizes(i)
-                for beyond in sorted(near - {best[1]}):
+        off = self._white.off(first.left, self._at)
+        for runs in self.at_once:
+            left = self._left_along(out, first)
+            groups = []
+            for run in runs:
+                tried = [i for i in run.holds if off[i] >= _OFF or out[self._at[i]] != 0]
+                square = float(left[run.seen] @ left[run.seen])
+                groups.append((self._hold_by_hold(out, tried, square, closer), run.seen))
+            asked = {r: next(asking, None) for r, (asking, _) in enumerate(groups)}
+            while asked := {r: further for r, further in asked.items() if further is not None}:
+                trial = out.copy()
+                for k, beyond in asked.values():
                     trial[k] = beyond
-                    then = self._effect(trial) @ first.coefficients
-                    rest = left - self._white((then - now)[:, None])[:, 0]
-                    paid = cost * (int(beyond != 0) - int(out[k] != 0))
-                    gain = float(left @ left - rest @ rest) - paid
-                    if gain > best[0]:
-                        best = (gain, beyond, rest, then)
-                if best[1] == 0:
+                left = self._left_along(trial, first)
+                asked = {r: _told(*groups[r], left) for r in asked}
+
+    def _left_along(self, overshoot: Array, first: _Fitted) -> Array:
+        """What is left (white) along a path (n,), with coefficients as they fit first."""
+        effect = self._effect(overshoot) @ first.coefficients
+        return first.left - self._white((effect - first.effect)[:, None])[:, 0]
+
+    def _hold_by_hold(
+        self, out: Array, holds: list[int], square: float, closer: tuple[float, ...]
+    ) -> _Asking:
+        """Asks, row and size, for the sum of squares along what it tries in its holds, and
+        puts into `out` what gains; square: the sum of squares along what is there."""
+        cost = 2 * log(len(self._at) * _COUNT)  # twice the nats: of a sum of squares
+        for i in holds:
+            k = int(self._at[i])
+            gained, best, least = 0.0, float(out[k]), square
+            for step in (0.0, *closer):
+                near = {best * step, max(best / step, -1.0)} if step else self._sizes(i)
+                for beyond in sorted(near - {best}):
+                    then = yield k, beyond
+                    gain = square - then - cost * (int(beyond != 0) - int(out[k] != 0))
+                    if gain > gained:
+                        gained, best, least = gain, beyond, then
+                if best == 0:
                     break
-            _, out[k], left, now = best
+            out[k], square = best, least
 
     def _sizes(self, i: int) -> set[float]:
         return {0.0, *self._beyond[:, i].tolist()}
@@ -269,6 +329,12 @@ class _White:
         mean = np.add.reduceat(values[:n] * self._share, edges, axis=0)
         about = (values[:n] - mean[self._rows.hold]) * self._root
         return np.vstack([about, mean / self._mean_sd, values[n:] / self._rest])
+
+    def of(self, moved: Flags) -> Flags:
+        """Of the white values, those to which the values (size,) that moved contribute."""
+        n, edges = self._rows.n, self._rows.edges
+        held = np.logical_or.reduceat(moved[:n], edges)
+        return np.concatenate([held[self._rows.hold], held, moved[n:]])
 
     def off(self, left: Array, at: Ints) -> Array:
         """How many standard deviations the first rows `at` or the means of their holds are off."""
