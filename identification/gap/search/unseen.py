@@ -12,8 +12,9 @@ ones alone say what the law does, and the others where a hand went.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from math import inf, lgamma, log
 from typing import NamedTuple
@@ -34,12 +35,10 @@ SIZES = (0.03, 0.06, 0.12, 0.24)  # of the largest load, by which it goes beyond
 _CLOSER = (2**-0.5, 2**-0.25)  # steps between these, from the best of them on
 _COUNT = 4 * len(SIZES)  # in all
 _FEWEST = 8  # holds that a load was brought to: of fewer nobody tells chance from habit
-_MOST = 1_000_000  # holds times rows: of more it would last longer than all the rest
-_MOST_TOLD = 600_000  # likewise, where the search may go on for more than one round
-_LOOKED_AT, _SEVERAL = 12, 6  # explanations; that remember, where none foretells the others
+_MOST = 3_000_000  # holds times rows: of more it would last longer than all the rest
+_LOOKED_AT, _SEVERAL = 12, 3  # explanations; that remember, where none foretells the others
 _SELDOM = 0.5  # of the holds at most: whose law needs more is no law with a hand beside it
 _PARTS = 3  # of an explanation at most, where none foretells the others: more say nothing of loads
-_FEW = 200_000  # holds times rows: of more only the first of those is looked at
 _SWEEPS = 3
 _LOADED = 0.02  # of the largest load: less is none, and nobody pulls at a contact
 _OFF = 2.0  # standard deviations: holds that are nearer to what is expected are left alone
@@ -74,20 +73,31 @@ def unseen(found: SearchResult, told_by: Flags | None = None) -> Unseen | None:
     if rows.continuous or engine.bench.imposed:
         return None
     at = brought_to(rows)
-    most = _MOST if told_by is None else _MOST_TOLD
-    if len(at) < _FEWEST or len(at) * rows.n > most:
+    if len(at) < _FEWEST or len(at) * rows.n > _MOST:
         return None
     first = found.explanations[0].log_weight
     able = (e for e in found.explanations if told_by is None or len(e.parts) <= _PARTS)
     each = ((e, Paths(engine, e, at, told_by)) for e in islice(able, _LOOKED_AT))
-    remember = ((first - e.log_weight, path) for e, path in each if path.remembers)
-    many = 1 if told_by is None or len(at) * rows.n > _FEW else _SEVERAL
-    asked = ((behind, *path.found()) for behind, path in islice(remember, many))
+    remember = ((first - e.log_weight, path) for e, path in _unlike(each))
+    asked = (
+        (behind, *path.found())
+        for behind, path in islice(remember, 1 if told_by is None else _SEVERAL)
+    )
     pays = _LEAST if found.explanations[0].eta <= engine.bench.noise.stated else _PAYS
     worth = ((gain - behind, more) for behind, more, gain in asked if _worth(more, gain, pays))
     if told_by is None:
         return next((more for ahead, more in worth if ahead > _PLAIN), None)
     return _of_the_one_ahead(worth, rows.overshoot)
+
+
+def _unlike(each: Iterable[tuple[Explanation, Paths]]) -> Iterator[tuple[Explanation, Paths]]:
+    """Those that remember; of several whose memory is the same, whatever they have beside it, the
+    first."""
+    known = set()
+    for explanation, path in each:
+        if path.memory and path.memory not in known:
+            known.add(path.memory)
+            yield explanation, path
 
 
 def _worth(more: Unseen, gain: float, pays: float) -> bool:
@@ -148,7 +158,8 @@ class _Fitted(NamedTuple):
 
 
 class Paths:
-    """An explanation along paths that are tried, with the coefficients it has along them."""
+    """An explanation along paths that are tried, with the coefficients it has along them. memory:
+    its shapes to which a path makes a difference."""
 
     def __init__(
         self, engine: Engine, explanation: Explanation, at: Ints, told_by: Flags | None
@@ -164,16 +175,18 @@ class Paths:
         everywhere = np.zeros(bench.rows.n)
         everywhere[at] = self._beyond[-1]
         self._parts = [_Columns(bench, p, everywhere) for p in explanation.parts]
-        self.remembers = any(p.remembers for p in self._parts)
+        self._everywhere = everywhere
+        both = zip(self._parts, explanation.parts, strict=True)
+        self.memory = frozenset(part.variant for p, part in both if p.remembers)
         # along the right path a law misses no more than laws do
         self._white = _White(engine, IMPERFECTION * max(explanation.sizes, default=0.0))
         likely = engine.etas[engine.etas <= explanation.eta].tolist()
         self._likely = [_White(engine, eta) for eta in likely]
         self._root = block([np.diag(engine.base.sd), *(p.root for p in explanation.parts)])
         self._told_by = None if told_by is None else _white_rows(engine, told_by)
-        self.at_once = self._apart(everywhere) if self.remembers else []
 
-    def _apart(self, everywhere: Array) -> list[list[_Run]]:
+    @cached_property
+    def at_once(self) -> list[list[_Run]]:
         """Runs that may be looked at at once, as none sees what is tried in another."""
         rows = self._engine.bench.rows
         straight = self._effect(rows.overshoot)
@@ -181,7 +194,7 @@ class Paths:
         for each in np.unique(run):
             holds = np.flatnonzero(run == each)
             mine = np.isin(np.arange(rows.n), self._at[holds])
-            change = self._effect(np.where(mine, everywhere, rows.overshoot)) - straight
+            change = self._effect(np.where(mine, self._everywhere, rows.overshoot)) - straight
             far = np.abs(change).max(axis=1) > _MOVED * np.abs(straight).max()
             one = _Run(holds.tolist(), self._white.of(far))
             blind = (r for r in out if not any((one.seen & other.seen).any() for other in r))
