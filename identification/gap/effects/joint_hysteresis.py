@@ -39,16 +39,16 @@ from identification.gap.laws.friction_forms import (
     ARM_RADII,
     RADII,
     REACHES,
-    SCALES,
     WORD,
     growing,
     saturating,
+    shape,
     slackening,
+    spectrum,
 )
 from identification.gap.laws.friction_law import (
     BY_LOAD,
     LAWS,
-    ON_TOP,
     SLIPPING,
     THAT_SLIPS,
     by_ratio,
@@ -63,7 +63,6 @@ from identification.gap.model.variants import (
     UNDER_WEIGHT,
     Variant,
     smooth_root,
-    variant,
 )
 
 # Those of a specimen's closer look: loops of thousands of readings tell them apart.
@@ -239,51 +238,30 @@ def _spectra(
     for law, radii, states in laws:
         columns = [bench.add_joint(joint, unit * state) for state in states.T]
         label = f"{name} spectrum{THAT_SLIPS if law == 'Prandtl' else ''}"
-        out.append(
-            variant(
-                WORD,
-                label,
-                columns,
-                SCALES,
-                root=smooth_root(len(columns), 0.6, 0.3),
-                prior=0.25,
-                each=True,
-                within=friction_law.no_knee(bench, torque, reach * radii),
-                form="spectrum",
-                joint=joint,
-                radius=radii,
-                law=law,
-                slips=law in ON_TOP,
-            )
-        )
+        within = friction_law.no_knee(bench, torque, reach * radii)
+        out.append(spectrum(label, joint, columns, radii, law, within=within))
     return out
 
 
-def _pairs(
-    bench: Bench, name: str, span: float, spectrum: Variant, conventions: int
-) -> list[Variant]:
+def _pairs(bench: Bench, name: str, span: float, whole: Variant, conventions: int) -> list[Variant]:
     """Each strength of a spectrum with its neighbour, by the law of the spectrum. Friction acts
     from the first load on: one strength alone is a small one."""
-    radius, columns, out = np.asarray(spectrum.info["radius"]), list(spectrum.columns), []
-    law, joint = spectrum.info["law"], int(spectrum.info["joint"])
+    radius, columns, out = np.asarray(whole.info["radius"]), list(whole.columns), []
+    law, joint = whole.info["law"], int(whole.info["joint"])
     largest = float(np.abs(bench.true_torque[:, joint]).max())
     most = int(np.sum(radius < (largest if law == "Prandtl" else NEVER * span))) - 1
     alone = most if bench.imposed else min(_SMALL + bench.course.unloads, most)
     for k in range(alone):
         out.append(
-            variant(
-                WORD,
+            shape(
                 f"{name} r {radius[k] / span:.3g}{THAT_SLIPS if law == 'Prandtl' else ''}",
+                joint,
                 columns[k : k + 2],
-                SCALES,
+                radius[k : k + 2],
+                law,
                 root=smooth_root(2, 0.7),
-                each=True,
-                within=spectrum.within[:, k : k + 2],
+                within=whole.within[:, k : k + 2],
                 prior=0.25 / alone / conventions,
-                joint=joint,
-                radius=radius[k : k + 2],
-                law=law,
-                slips=law in ON_TOP,
             )
         )
     return out
@@ -303,18 +281,14 @@ def _exponential(bench: Bench, joint: int, name: str, reaches: Array, path: Path
         columns = [bench.add_joint(joint, -bench.sense * c * h) for h in held.T]
         for k in range(len(reach) - 1):
             out.append(
-                variant(
-                    WORD,
+                shape(
                     f"{name} {law} {reaches[k]:.3g}",
+                    joint,
                     columns[k : k + 2],
-                    SCALES,
+                    reach[k : k + 2],
+                    law,
                     root=smooth_root(2, 0.5),
                     prior=prior,
-                    each=True,
-                    joint=joint,
-                    radius=reach[k : k + 2],
-                    law=law,
-                    slips=law in ON_TOP,
                 )
             )
     return out

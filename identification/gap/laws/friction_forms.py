@@ -3,8 +3,11 @@ loads, or that wears the holes of what gives way."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from identification.arrays import Array
 from identification.gap.laws import friction_law
 from identification.gap.laws.friction_law import ON_TOP, SLIPPING
 from identification.gap.model.bench import Bench
@@ -22,6 +25,37 @@ REACHES = (0.08, 0.2, 0.5, 1.2)  # of exponential laws, of the joint's range of 
 SCALES = (0.015, 0.05, 0.15, 0.5, 1.2)
 
 
+def shape(
+    label: str, joint: int, columns: list[int], radius: Array, law: str, **more: Any
+) -> Variant:
+    """Friction by a law, of strengths or reaches radius (k,) Nm; more: as `variant` has it."""
+    return variant(
+        WORD,
+        label,
+        columns,
+        SCALES,
+        each=True,
+        joint=joint,
+        radius=radius,
+        law=law,
+        slips=law in ON_TOP,
+        **more,
+    )
+
+
+def spectrum(
+    label: str, joint: int, columns: list[int], radius: Array, law: str, **more: Any
+) -> Variant:
+    """The same of all strengths together, of which neighbours are alike."""
+    alike = {"root": spectrum_root(len(columns)), "prior": 0.25}
+    return shape(label, joint, columns, radius, law, form="spectrum", **alike | more)
+
+
+def spectrum_root(count: int) -> Array:
+    """(count, count) as of a variant: neighbours are alike, and all have something in common."""
+    return smooth_root(count, 0.6, 0.3)
+
+
 def growing(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:
     """Exponential laws, part of whose friction grows in proportion to what the gear carries, push
     and weights together: teeth and bearings rub the more the harder they are pressed (Bittencourt
@@ -36,21 +70,9 @@ def growing(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]:
         both = zip((held - slips).T, (held * carries[:, None] / top - slips).T, strict=True)
         for r, states in zip(reach, both, strict=True):
             columns = [bench.add_joint(joint, unit * h) for h in states]
-            out.append(
-                variant(
-                    WORD,
-                    f"{name} {law} {r:.3g} Nm grows",
-                    columns,
-                    SCALES,
-                    each=True,
-                    prior=0.25 / (4 * _GROWING),
-                    joint=joint,
-                    radius=np.array([r, r]),
-                    law=law,
-                    slips=law in ON_TOP,
-                    grows_to=top,
-                )
-            )
+            label, prior = f"{name} {law} {r:.3g} Nm grows", 0.25 / (4 * _GROWING)
+            radius = np.array([r, r])
+            out.append(shape(label, joint, columns, radius, law, prior=prior, grows_to=top))
     return out
 
 
@@ -68,23 +90,8 @@ def saturating(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]
         radius = bench.reach_of(reached) * np.array(ARM_RADII)
         radius = radius[radius < float(np.abs(reached).max())]  # beyond, nothing moves
         columns = [bench.add_joint(joint, unit * state) for state in through.plays(radius).T]
-        out.append(
-            variant(
-                WORD,
-                f"{name} spectrum saturating at {share:g}",
-                columns,
-                SCALES,
-                root=smooth_root(len(columns), 0.6, 0.3),
-                prior=0.25 / len(SATURATES),
-                each=True,
-                form="spectrum",
-                joint=joint,
-                radius=radius,
-                law="Prandtl",
-                slips=True,
-                saturates=most,
-            )
-        )
+        label, prior = f"{name} spectrum saturating at {share:g}", 0.25 / len(SATURATES)
+        out.append(spectrum(label, joint, columns, radius, "Prandtl", prior=prior, saturates=most))
     return out
 
 
@@ -102,32 +109,22 @@ def slackening(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]
     radius = bench.radii(torque, span * np.array(SLACKENS))
     rubs = bench.radii(torque, span * np.array(RADII))
     radius, rubs = radius[radius < far], rubs[rubs < far]
-    each = [smooth_root(len(r), 0.6, 0.3) for r in (radius, rubs)]
     worn = [bench.add_joint(joint, -unit * s) for s in path.slacks(radius).T]
     held = [bench.add_joint(joint, unit * s) for s in (path.plays(rubs) - torque[:, None]).T]
-    out = []
-    for columns, radii, root, label in (
-        (worn, radius, each[0], "that slackens"),
-        ([*worn, *held], np.append(radius, rubs), block(each), "that slackens and rubs"),
-    ):
-        out.append(
-            variant(
-                WORD,
-                f"{name} spectrum {label}",
-                columns,
-                SCALES,
-                root=root,
-                prior=0.25,
-                each=True,
-                form="spectrum",
-                joint=joint,
-                radius=radii,
-                law="Iwan",
-                slips=False,
-                slackens=len(radius),
-            )
-        )
-    return out
+    both = block([spectrum_root(len(r)) for r in (radius, rubs)])
+    label, facts = f"{name} spectrum that slackens", {"slackens": len(radius)}
+    return [
+        spectrum(label, joint, worn, radius, "Iwan", **facts),
+        spectrum(
+            f"{label} and rubs",
+            joint,
+            [*worn, *held],
+            np.append(radius, rubs),
+            "Iwan",
+            root=both,
+            **facts,
+        ),
+    ]
 
 
 _NEARLY = 0.999

@@ -87,9 +87,10 @@ def columns(bench: Bench, law: Law) -> list[Array]:
     if "saturates" in c:
         path = with_loads(path, saturating(path.load, c["saturates"]))
     if at_strength:
-        state = path.plays(size)
-        held = -state if c["law"] == "Prandtl" else torque[:, None] - state
         worn = np.array(["slackens" in t.shape for t in law.terms if t.shape], dtype=bool)
+        plays = path.plays(size[~worn])
+        held = np.empty((bench.rows.n, len(size)))
+        held[:, ~worn] = -plays if c["law"] == "Prandtl" else torque[:, None] - plays
         if worn.any():
             held[:, worn] = path.slacks(size[worn])
     else:
