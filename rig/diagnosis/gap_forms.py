@@ -96,13 +96,14 @@ def from_entry(entry: Mapping[str, Any]) -> Form:
         for n in grammar.constants
         if n not in MAY_BE_MISSING or CONSTANTS[n].name in entry
     }
-    for n, (other, allowing) in grammar.needs.items():
-        if n in constants and constants[other] not in allowing:
-            raise FormError(
-                (CONSTANTS[n].name,),
-                f"goes with {CONSTANTS[other].name} {' or '.join(allowing)} only, not with "
-                f"{constants[other]}.",
-            )
+    for n in constants:
+        for other, allowing in grammar.only_with.get(n, {}).items():
+            if constants[other] not in allowing:
+                raise FormError(
+                    (CONSTANTS[n].name,),
+                    f"goes with {CONSTANTS[other].name} {' or '.join(allowing)} only, not with "
+                    f"{constants[other]}.",
+                )
     written = entry.get("terms")
     if not isinstance(written, list) or not written:
         raise FormError(("terms",) if "terms" in entry else (), "wants a list of terms.")

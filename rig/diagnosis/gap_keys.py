@@ -165,18 +165,18 @@ MAY_BE_MISSING = (
 
 
 Kind = tuple[str, tuple[str, ...]]  # of terms: a coefficient, and names of its shape
+Values = Mapping[str, tuple[str, ...]]  # of constants
 
 
 @dataclass(frozen=True)
 class Grammar:
     """What the laws of a word are written with: constants, and the kinds of terms. only_with: of
-    those that do not go with every law, a constant, and which of its values they go with; needs: of
-    constants likewise."""
+    those of either that do not go with every law, other constants, and the values of these that
+    they go with."""
 
     constants: tuple[str, ...]
     terms: tuple[Kind, ...]
-    only_with: Mapping[Kind, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
-    needs: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
+    only_with: Mapping[Kind | str, Values] = field(default_factory=dict)
 
 
 _PLAYS = (
@@ -205,8 +205,8 @@ _LATE: dict[Kind, tuple[str, ...]] = {
 }
 
 
-def _only_with(constant: str, kinds: Mapping[Kind, tuple[str, ...]]) -> dict[Kind, Any]:
-    return {kind: (constant, values) for kind, values in kinds.items()}
+def _on(paths: Mapping[Kind, tuple[str, ...]]) -> dict[Kind | str, Values]:
+    return {kind: {"path": courses} for kind, courses in paths.items()}
 
 
 GRAMMAR: dict[str, Grammar] = {
@@ -222,12 +222,12 @@ GRAMMAR: dict[str, Grammar] = {
             *_REACHES,
             ("compliance", ()),
         ),
-        _only_with(
-            "law",
-            {_STRENGTH: SLIP_AT_A_STRENGTH, _SLACKENS: ("Iwan",)}
-            | dict.fromkeys(_REACHES, _BY_A_REACH),
-        ),
-        needs={"saturates": ("law", ("Prandtl",))},
+        {
+            _STRENGTH: {"law": SLIP_AT_A_STRENGTH},
+            _SLACKENS: {"law": ("Iwan",), "memory": (KEPT,)},  # no weight hangs on a specimen
+            **{reach: {"law": _BY_A_REACH} for reach in _REACHES},
+            "saturates": {"law": ("Prandtl",)},
+        },
     ),
     "joint_backlash": Grammar(
         ("joint", "zone", "crossing", "kind", "tool", "preload"),
@@ -285,12 +285,12 @@ GRAMMAR: dict[str, Grammar] = {
     "force_drift": Grammar(
         ("path", "quantity", "about"),
         (*_PATHS, *_ALONG, *_OF_RUNS),
-        _only_with("path", _PATHS | _ALONG | _OF_RUNS),
+        _on(_PATHS | _ALONG | _OF_RUNS),
     ),
     "thermal_drift": Grammar(
         ("path", "quantity"),
         (*_ALONG, *_LATE),
-        _only_with("path", _ALONG | _LATE),
+        _on(_ALONG | _LATE),
     ),
     "zero_shift": Grammar((), (("shift", ("run", "lasts")),)),
 }
@@ -304,8 +304,8 @@ def coefficient_key(name: str, constants: Mapping[str, Any]) -> Key:
 def kinds(grammar: Grammar, constants: Mapping[str, Any]) -> Iterator[Kind]:
     """The kinds of terms that go with these constants."""
     for kind in grammar.terms:
-        constant, values = grammar.only_with.get(kind, (None, ()))
-        if constant is None or constants.get(constant) in values:
+        needed = grammar.only_with.get(kind, {})
+        if all(constants.get(constant) in values for constant, values in needed.items()):
             yield kind
 
 

@@ -351,6 +351,19 @@ def test_a_load_saturates_for_one_law_only(law: str) -> None:
     assert from_entry({**entry, "law": "Prandtl"}).law.constants["saturates"] == 20.0
 
 
+def test_what_wears_its_hole_hangs_under_no_weight() -> None:
+    entry = {
+        "name": "joint_hysteresis",
+        "joint": 1,
+        "law": "Iwan",
+        "memory": "under weight",
+        "terms": [{"slackens_beyond_Nm": 3.0, "compliance_rad_per_Nm": 1e-6}],
+    }
+    with pytest.raises(FormError, match=r"wanted: \(friction_Nm, compliance_rad_per_Nm\) or "):
+        from_entry(entry)
+    assert from_entry({**entry, "memory": "kept"}).law.terms[0].shape == {"slackens": 3.0}
+
+
 def test_what_cannot_be_foretold_is_left_out_and_said(tmp_path: Path) -> None:
     shift = {"name": "zero_shift", "terms": [{"run": 2, "lasts": True, "shift_mm": 0.03}]}
     warm = {
