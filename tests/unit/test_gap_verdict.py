@@ -32,8 +32,8 @@ from identification.gap.explanations.verdict import (
     UNKNOWN_DOUBT,
     _heir,
     _main,
-    _may_miss,
     _tells_of_three,
+    may_miss,
     with_a_lead,
     with_posterior,
 )
@@ -126,7 +126,7 @@ def test_what_explains_most_of_a_gap_fits_closely_whatever_its_noise() -> None:
     noise = engine.bench.noise.stated
     for structural, most in ((2 * noise, 2 * noise), (100 * noise, 17 * noise)):
         engine.structural = structural
-        assert _may_miss(engine) == pytest.approx(most)
+        assert may_miss(engine) == pytest.approx(most)
 
 
 def test_a_mean_of_evidence_leaves_out_what_weighs_nothing() -> None:

@@ -75,7 +75,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         for word, share in _main(of, ranked, arm).items():
             mass[word if word in mass else "unknown"] += many * share * good
         mass["unknown"] += (1 - many) * good
-        heir = _heir(e, ranked, kept, _may_miss(found.engine))
+        heir = _heir(e, ranked, kept, may_miss(found.engine))
         for word, share in (_main(heir, ranked, arm) if heir else {"unknown": 1.0}).items():
             mass[word] += share * (whole - good)
     if found.engine.bench.rows.continuous and ranked[0].eta > 0:
@@ -282,15 +282,18 @@ def _heir(
     """Who gets the weight of an explanation that leaves too much for its number of effects: the
     best one with fewer of the same effects that explains enough for itself, if any. closely:
     imperfection m below which it does so however much less likely it is."""
-    for e in ranked:
-        fewer = e.parts and e.words < explanation.words
-        near = e.log_weight > explanation.log_weight - _INHERITS or e.eta < closely
-        if fewer and near and e.good and foresaw(kept, e.words):
-            return e
-    return None
+    able = (e for e in ranked if may_inherit(e, explanation, closely))
+    return next((e for e in able if e.good and foresaw(kept, e.words)), None)
 
 
-def _may_miss(engine: Engine) -> float:
+def may_inherit(heir: Explanation, explanation: Explanation, closely: float) -> bool:
+    """Whether one explanation has fewer of the effects of another, and explains about as much, or
+    enough for itself; closely as in `_heir`."""
+    near = heir.log_weight > explanation.log_weight - _INHERITS or heir.eta < closely
+    return bool(heir.parts) and heir.words < explanation.words and near
+
+
+def may_miss(engine: Engine) -> float:
     """m that a law may miss, and explains the gap all the same."""
     return max(_CLOSELY * engine.bench.noise.stated, _MOSTLY * engine.structural)
 
