@@ -14,8 +14,8 @@ from identification.gap.explanations.explanation import Explanation, SearchResul
 from identification.gap.judging.leftover import ARM_AS_STATED, AS_STATED, FOR_NOTHING, looked_up
 from identification.gap.model.base import base_columns
 from identification.gap.search.search import search
+from tests.unit.small_explanations import part, said, small_engine_of
 from tests.unit.test_gap_evidence import small_bench
-from tests.unit.test_gap_verdict import part, said, small_engine_of
 
 SLANT, GAIN, CURVE = "load_misalignment", "force_scale", "joint_nonlinear_stiffness"
 

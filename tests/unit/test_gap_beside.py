@@ -14,9 +14,9 @@ from identification.gap.explanations.penalties import _apart, _on_its_own, _same
 from identification.gap.model.bench import make_bench
 from identification.gap.recording.course import Course
 from identification.gap.words import DAMAGE, JERKS, SOFTENING, WANDERS
+from tests.unit.small_explanations import part, replace_bench, small_engine_of
 from tests.unit.test_gap_evidence import small_bench, small_engine
 from tests.unit.test_gap_operators import bench_data
-from tests.unit.test_gap_verdict import part, replace_bench, small_engine_of
 from tests.unit.test_gap_weights import UP, hanging
 
 
