@@ -160,7 +160,8 @@ def _better_along(
     """The search once more with those loads, where it explains more than these cost, nats; at first
     with the words that ask for them, as all of them take ten times as long."""
     others = [w for w in WORDS if w not in more.words]
-    if not _explains_more(_along(found, more, known, {*withheld, *others}), cost, found, foretold):
+    asking = _along(found, more, known, {*withheld, *others})
+    if not _explains_more(asking, max(cost - _OTHERS, 0.0), found, foretold):
         return None
     again = _along(found, more, known, withheld)
     return again if _explains_more(again, cost, found, foretold) else None
@@ -198,6 +199,7 @@ def _along(
     return _searched(*_prepared(make_bench(data, rows=rows), known, withheld))
 
 
+_OTHERS = 25.0  # nats that other words may gain more along a path than those that ask for it
 _ROUNDS = 3  # at most, and one where withheld repetitions are foretold
 
 

@@ -118,15 +118,17 @@ def test_loads_that_hardly_pay_beside_more_than_noise_ask_for_no_more(
     assert made.asked == [FIRST] * rounds
 
 
-def test_all_words_are_searched_where_those_that_ask_for_loads_gain_by_them(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("gain", "cost", "searched"), [(9.0, 30.0, 2), (9.0, 40.0, 1), (-1.0, 10.0, 1), (41.0, 40.0, 2)]
+)
+def test_all_words_are_searched_where_those_that_ask_for_loads_nearly_gain_by_them(
+    monkeypatch: pytest.MonkeyPatch, gain: float, cost: float, searched: int
 ) -> None:
-    rounds = Rounds(monkeypatch, result(9.0, True))
-    diagnose._with_unseen(result(0.0, True), (), ())
-    assert rounds.searched == [set(WORDS) - {WORD}]
-    rounds = Rounds(monkeypatch, result(11.0, True))
-    diagnose._with_unseen(result(0.0, True), (), ())
-    assert rounds.searched == [set(WORDS) - {WORD}, set()]
+    """Others may gain more along the same path."""
+    rounds = Rounds(monkeypatch, result(gain, True), cost=cost)
+    found = diagnose._with_unseen(start := result(0.0, True), (), ())
+    assert rounds.searched == [set(WORDS) - {WORD}, set()][:searched]
+    assert (found is not start) == (gain > cost)
 
 
 def test_what_acts_only_where_a_hand_went_is_no_law(monkeypatch: pytest.MonkeyPatch) -> None:
