@@ -161,7 +161,7 @@ def _better_along(
     with the words that ask for them, as all of them take ten times as long."""
     others = [w for w in WORDS if w not in more.words]
     asking = _along(found, more, known, {*withheld, *others})
-    if not _explains_more(asking, max(cost - _OTHERS, 0.0), found, foretold):
+    if not _explains_more(asking, cost - _OTHERS, found, foretold):
         return None
     again = _along(found, more, known, withheld)
     return again if _explains_more(again, cost, found, foretold) else None

@@ -98,11 +98,11 @@ def from_entry(entry: Mapping[str, Any]) -> Form:
     }
     for n in constants:
         for other, allowing in grammar.only_with.get(n, {}).items():
-            if constants[other] not in allowing:
+            if constants.get(other) not in allowing:
                 raise FormError(
                     (CONSTANTS[n].name,),
                     f"goes with {CONSTANTS[other].name} {' or '.join(allowing)} only, not with "
-                    f"{constants[other]}.",
+                    f"{constants.get(other)}.",
                 )
     written = entry.get("terms")
     if not isinstance(written, list) or not written:

@@ -95,7 +95,13 @@ def test_what_acts_at_other_levels_too_is_a_law(monkeypatch: pytest.MonkeyPatch)
     gone = np.zeros(rows.n)
     gone[edges[3::6]] = 0.1
     there = np.isin(rows.hold, rows.hold[gone != 0])
-    engine = SimpleNamespace(bench=SimpleNamespace(rows=replace(rows, overshoot=gone)))
+    load = bench.load
+
+    def of_rows(gone: Array) -> SimpleNamespace:
+        rows = replace(bench.rows, overshoot=gone)
+        return SimpleNamespace(bench=SimpleNamespace(rows=rows, load=load))
+
+    engine = of_rows(gone)
 
     def alone(moved: Array, parts: tuple[int, ...] = (0,)) -> bool:
         fitted = SimpleNamespace(contribution=lambda *_: moved)
@@ -109,6 +115,9 @@ def test_what_acts_at_other_levels_too_is_a_law(monkeypatch: pytest.MonkeyPatch)
     assert not alone(signs * there, parts=())
     assert not alone(signs * (there + 1.0))
     assert not alone(signs)
+    large = load > 0.7 * load.max()
+    engine = of_rows(np.where(np.isin(np.arange(rows.n), edges) & large, 0.1, 0.0))
+    assert not alone(load**3)  # as any law it acts at large loads
 
 
 def test_a_recording_that_runs_on_shows_the_way() -> None:

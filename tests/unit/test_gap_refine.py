@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from identification.gap.search import refine as room
@@ -46,8 +47,11 @@ def test_beside_nothing_but_noise_no_word_is_refined_that_is_far_behind(
     assert asked == looked_at
 
 
+NOWHERE = np.zeros(1)
+
+
 def test_loads_before_most_levels_or_for_little_are_no_hand() -> None:
-    few, most = (Unseen(None, count, 40) for count in (5, 25))  # type: ignore[arg-type]
+    few, most = (Unseen(frozenset(), NOWHERE, count, 40) for count in (5, 25))
     assert _worth(few, few.cost, 0.7)
     assert not _worth(few, 0.5 * few.cost, 0.7)
     assert not _worth(most, 10 * most.cost, 0.7)

@@ -27,13 +27,16 @@ def result(
 
 
 class Rounds:
-    """Rounds whose searches find the results of a list, at a cost; asked: who was."""
+    """Rounds whose searches find the results of a list, at a cost; with all words the same, or
+    `whole`; asked: who was."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, *found: Any, cost: float = 10.0) -> None:
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, *found: Any, cost: float = 10.0, whole: Any = None
+    ) -> None:
         self.asked: list[str | None] = []
         self.searched: list[set[str]] = []  # words that were left out
         self._loads = SimpleNamespace(words=frozenset({WORD}), cost=cost)
-        self._results, self._last = iter(found), None
+        self._results, self._last, self._whole = iter(found), None, whole
         monkeypatch.setattr(diagnose, "foretells", lambda one: one.foretells)
         monkeypatch.setattr(diagnose, "first_repetitions", lambda engine: FIRST)
         monkeypatch.setattr(diagnose, "unseen", lambda one, told_by: self._ask(told_by))
@@ -46,7 +49,7 @@ class Rounds:
     def _search(self, withheld: set[str]) -> Any:
         """With the word that asks, and once more with all of them."""
         self.searched.append(withheld)
-        self._last = next(self._results) if withheld else self._last
+        self._last = next(self._results) if withheld else self._whole or self._last
         return self._last
 
 
@@ -119,16 +122,18 @@ def test_loads_that_hardly_pay_beside_more_than_noise_ask_for_no_more(
 
 
 @pytest.mark.parametrize(
-    ("gain", "cost", "searched"), [(9.0, 30.0, 2), (9.0, 40.0, 1), (-1.0, 10.0, 1), (41.0, 40.0, 2)]
+    ("gain", "cost", "searched"), [(9.0, 30.0, 2), (9.0, 40.0, 1), (-1.0, 10.0, 2), (41.0, 40.0, 2)]
 )
 def test_all_words_are_searched_where_those_that_ask_for_loads_nearly_gain_by_them(
     monkeypatch: pytest.MonkeyPatch, gain: float, cost: float, searched: int
 ) -> None:
     """Others may gain more along the same path."""
-    rounds = Rounds(monkeypatch, result(gain, True), cost=cost)
-    found = diagnose._with_unseen(start := result(0.0, True), (), ())
-    assert rounds.searched == [set(WORDS) - {WORD}, set()][:searched]
-    assert (found is not start) == (gain > cost)
+    for more in (0.0, 50.0):
+        whole = result(gain + more, True)
+        rounds = Rounds(monkeypatch, result(gain, True), cost=cost, whole=whole)
+        found = diagnose._with_unseen(start := result(0.0, True), (), ())
+        assert rounds.searched == [set(WORDS) - {WORD}, set()][:searched]
+        assert found is (whole if searched == 2 and gain + more > cost else start)
 
 
 def test_what_acts_only_where_a_hand_went_is_no_law(monkeypatch: pytest.MonkeyPatch) -> None:

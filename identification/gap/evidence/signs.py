@@ -138,12 +138,15 @@ def distance(z: Array, unit: Array) -> float:
     m, r = unit.shape
     both, last = np.empty((r + 1, m)), np.zeros(r + 1)
     both[:-1], both[-1], last[-1] = unit.T, -z, 1.0
-    try:
-        pushes = nnls(both, last)[0]
-    except RuntimeError:  # it gives up after three turns a limit, which are too few now and then
-        pushes = lsq_linear(both, last, (0.0, np.inf)).x
+    try:  # three turns a limit, after which it gives up by itself, are too few now and then
+        pushes = nnls(both, last, maxiter=_TURNS * m)[0]
+    except RuntimeError:
+        pushes = lsq_linear(both, last, (0.0, np.inf), "bvls", max_iter=_TURNS * m).x
     left = both @ pushes - last
     return float(np.sqrt(left[:-1] @ left[:-1])) / max(float(-left[-1]), _TINY)
+
+
+_TURNS = 100
 
 
 def _distances(z: Array, unit: Array) -> Array:

@@ -33,15 +33,16 @@ def open_to_hands(engine: Engine, fitted: Fit) -> Array:
 
 def acts_by_hands_alone(found: SearchResult) -> bool:
     """Whether the largest effect of the best explanation does most of what it does (in squares,
-    about the mean of each setup) in the holds beyond which a load went that nobody read."""
+    about the mean of each setup) in the holds beyond which a load went that nobody read, and far
+    more of it than the load has there: any law does most at large ones."""
     engine, best = found.engine, found.explanations[0]
     if not best.parts:
         return False
     rows = engine.bench.rows
     moved = fit(engine, best).contribution(engine, 0)[: rows.n]
-    square = rows.about_means(moved[:, None])[:, 0] ** 2
-    in_them = np.isin(rows.hold, rows.hold[rows.overshoot != 0])
-    return bool(square[in_them].sum() > _MOST * square.sum())
+    both = rows.about_means(np.column_stack([moved, engine.bench.load])) ** 2
+    share, load = both[rows.gone_beyond].sum(axis=0) / np.maximum(both.sum(axis=0), _TINY)
+    return bool(share > max(_MOST, _MORE * load))
 
 
-_MOST = 0.5
+_MOST, _MORE, _TINY = 0.5, 2.0, 1e-300

@@ -37,9 +37,9 @@ LET_GO = 1e-8  # share that is kept where forces let go at once: no law does tha
 COMES_BACK = 14.0  # nats against a drift of the channel that reads the same whenever it is let go
 _WANDERING = {"force": "thermal_drift", "displacement": "force_drift", None: ""}
 FAULTY = 0.1  # share that is kept by laws of load and time where an instrument fails
-# What takes any path in time is bound by no law that could be off: of what springs leave it leaves
-# hardly anything. A stand that slips once, and stays there, leaves a sixth of a path beside its
-# jump; the drifts of the blind check leave 0.03 at most.
+# What takes any path in time is bound by no law that could be off: as the main cause it leaves
+# hardly anything of what springs leave. Of a stand that slips once, and stays there, it leaves a
+# sixth beside the jump; the drifts of the blind check leave 0.03 at most.
 OF_ANY_PATH = 0.1
 NO_DRIFT = 0.03  # share that is kept by a drift that goes as none does
 _LOOKED_AT, _WITHIN = 12, 40.0  # explanations, and nats below the best, that are looked at

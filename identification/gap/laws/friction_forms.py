@@ -46,9 +46,12 @@ def shape(
 def spectrum(
     label: str, joint: int, columns: list[int], radius: Array, law: str, **more: Any
 ) -> Variant:
-    """The same of all strengths together, of which neighbours are alike."""
-    alike = {"root": spectrum_root(len(columns)), "prior": 0.25}
-    return shape(label, joint, columns, radius, law, form="spectrum", **alike | more)
+    """The same of all strengths together; of which neighbours are alike, unless `root` says
+    otherwise."""
+    more = {"prior": 0.25, **more}
+    if "root" not in more:
+        more["root"] = spectrum_root(len(columns))
+    return shape(label, joint, columns, radius, law, form="spectrum", **more)
 
 
 def spectrum_root(count: int) -> Array:

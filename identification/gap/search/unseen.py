@@ -33,6 +33,7 @@ from identification.gap.recording.rows import Rows
 
 SIZES = (0.03, 0.06, 0.12, 0.24)  # of the largest load, by which it goes beyond a level
 _CLOSER = (2**-0.5, 2**-0.25)  # steps between these, from the best of them on
+_FURTHEST = SIZES[-1] / (_CLOSER[0] * _CLOSER[1])
 _COUNT = 4 * len(SIZES)  # in all
 _FEWEST = 8  # holds that a load was brought to: of fewer nobody tells chance from habit
 _MOST = 3_000_000  # holds times rows: of more it would last longer than all the rest
@@ -173,7 +174,7 @@ class Paths:
         # back to none at most: a screw does not pull
         self._beyond = np.maximum(np.multiply.outer(np.array(SIZES), further), -1.0)  # (s, holds)
         everywhere = np.zeros(bench.rows.n)
-        everywhere[at] = self._beyond[-1]
+        everywhere[at] = np.maximum(_FURTHEST * further, -1.0)
         self._parts = [_Columns(bench, p, everywhere) for p in explanation.parts]
         self._everywhere = everywhere
         both = zip(self._parts, explanation.parts, strict=True)
