@@ -50,7 +50,7 @@ def test_every_word_has_a_file_and_every_file_a_word() -> None:
     assert sorted(WORDS) == FILES
 
 
-_BOUNDS = "SCALES|SHARES|RADII|OFFSETS_M|ANGLES_RAD|DEPTHS_M|LAGS"
+_BOUNDS = "SCALES|SHARES|OFFSETS_M|ANGLES_RAD|DEPTHS_M|LAGS"
 
 
 @pytest.mark.parametrize("word", WORDS)

@@ -18,9 +18,7 @@ from identification.gap.explanations.explanation import (
 )
 from identification.gap.judging.leftover import OF_ANY_PATH, _allowed, looked_up
 from identification.gap.model.base import base_columns, prediction
-from identification.gap.search.search import (
-    search,
-)
+from identification.gap.search.search import search
 from tests.unit.small_explanations import part, replace_bench, said, small_engine_of
 from tests.unit.test_gap_evidence import small_bench, small_engine
 

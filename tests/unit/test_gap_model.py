@@ -45,6 +45,13 @@ YIELD: dict[str, Any] = {
     "flow_time_s": 0,
     "terms": [{"threshold_Nm": 40.0, "compliance_rad_per_Nm": 1e-4}],
 }
+RUBS: dict[str, Any] = {
+    "name": "joint_hysteresis",
+    "joint": 1,
+    "law": "Iwan",
+    "memory": "kept",
+    "terms": [{"friction_Nm": 3.0, "compliance_rad_per_Nm": 1e-6}],
+}
 
 
 @pytest.fixture(scope="module")
@@ -183,15 +190,8 @@ def test_terms_go_with_the_law_of_their_effect() -> None:
     }
     with pytest.raises(FormError, match=r"wanted: \(drift_N_per_s\)"):
         from_entry(drift)
-    friction = {
-        "name": "joint_hysteresis",
-        "joint": 1,
-        "law": "Dahl",
-        "memory": "kept",
-        "terms": [{"friction_Nm": 3, "compliance_rad_per_Nm": 1e-6}],
-    }
     with pytest.raises(FormError, match=r"wanted: \(reach_Nm, compliance_rad_per_Nm\)"):
-        from_entry(friction)
+        from_entry({**RUBS, "law": "Dahl"})
 
 
 def test_all_problems_of_a_file_come_at_once(tmp_path: Path) -> None:
@@ -338,27 +338,15 @@ def test_a_gain_that_bends_follows_the_reading(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("law", ["Iwan", "Dahl"])
 def test_a_load_saturates_for_one_law_only(law: str) -> None:
-    entry = {
-        "name": "joint_hysteresis",
-        "joint": 1,
-        "law": law,
-        "memory": "kept",
-        "saturates_at_Nm": 20,
-        "terms": [{"friction_Nm": 3.0, "compliance_rad_per_Nm": 1e-6}],
-    }
+    entry = {**RUBS, "law": law, "saturates_at_Nm": 20}
     with pytest.raises(FormError, match=f"goes with law Prandtl only, not with {law}"):
         from_entry(entry)
     assert from_entry({**entry, "law": "Prandtl"}).law.constants["saturates"] == 20.0
 
 
 def test_what_wears_its_hole_hangs_under_no_weight() -> None:
-    entry = {
-        "name": "joint_hysteresis",
-        "joint": 1,
-        "law": "Iwan",
-        "memory": "under weight",
-        "terms": [{"slackens_beyond_Nm": 3.0, "compliance_rad_per_Nm": 1e-6}],
-    }
+    slackens = {"slackens_beyond_Nm": 3.0, "compliance_rad_per_Nm": 1e-6}
+    entry = {**RUBS, "memory": "under weight", "terms": [slackens]}
     with pytest.raises(FormError, match=r"wanted: \(friction_Nm, compliance_rad_per_Nm\) or "):
         from_entry(entry)
     assert from_entry({**entry, "memory": "kept"}).law.terms[0].shape == {"slackens": 3.0}

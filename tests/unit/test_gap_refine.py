@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from identification.gap.search import refine as room
-from identification.gap.search.unseen import Unseen, _worth
+from identification.gap.search.unseen import Unseen, _unlike, _worth
 
 
 @pytest.mark.parametrize(
@@ -45,6 +45,15 @@ def test_beside_nothing_but_noise_no_word_is_refined_that_is_far_behind(
     engine: Any = SimpleNamespace(levels=[SimpleNamespace(log_base=0.0)])
     assert room.refine(engine, []) == []
     assert asked == looked_at
+
+
+def test_of_laws_with_the_same_memory_the_likeliest_says_where_hands_went() -> None:
+    lag, rubs, creeps = object(), object(), object()
+    each = [
+        (n, SimpleNamespace(memory=frozenset(m)))
+        for n, m in enumerate(([lag], [], [lag], [rubs, creeps], [creeps, rubs], [rubs]))
+    ]
+    assert [n for n, _ in _unlike(cast(Any, each))] == [0, 3, 5]
 
 
 NOWHERE = np.zeros(1)

@@ -30,9 +30,7 @@ from identification.gap.explanations.verdict import (
     with_posterior,
 )
 from identification.gap.judging.leftover import looked_up
-from identification.gap.search.search import (
-    search,
-)
+from identification.gap.search.search import search
 from identification.gap.words import JERKS
 from tests.unit.small_explanations import OFF, part, replace_bench, said, small_engine_of
 from tests.unit.test_gap_evidence import small_bench, small_engine

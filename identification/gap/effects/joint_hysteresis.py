@@ -32,7 +32,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.laws import friction_law
+from identification.gap.laws import friction_forms, friction_law
 from identification.gap.laws.closer import Word, places
 from identification.gap.laws.effect import Effect
 from identification.gap.laws.friction_forms import (
@@ -65,6 +65,7 @@ from identification.gap.model.variants import (
     smooth_root,
 )
 
+SCALES = friction_forms.SCALES  # of all its shapes
 # Those of a specimen's closer look: loops of thousands of readings tell them apart.
 BETWEEN = tuple(sorted((*RADII, *((a * b) ** 0.5 for a, b in pairwise(RADII)))))
 NEVER = 1.5  # of the range: strengths that never slip here, and only stiffen

@@ -135,8 +135,8 @@ def _less_likely(explanation: Explanation, nats: float) -> Explanation:
 
 
 _TINY = 1e-6
-# Standard deviations; of an arm's ten springs and gains, of 150 runs without a fault, none is off
-# by 3.
+# Standard deviations. Of the springs and gains of arms without a fault none was off by 3 in 107
+# cases of the blind check.
 AS_STATED, ARM_AS_STATED = 3.0, 4.0
 # Nats against an arm's explanations by linear effects alone where all is explained without them as
 # it was stated: what springs and gains do within that is no fault. Of 245 linear faults of the

@@ -3,6 +3,7 @@ loads, or that wears the holes of what gives way."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,14 +45,20 @@ def shape(
 
 
 def spectrum(
-    label: str, joint: int, columns: list[int], radius: Array, law: str, **more: Any
+    label: str,
+    joint: int,
+    columns: list[int],
+    radius: Array,
+    law: str,
+    *,
+    root: Array | None = None,
+    prior: float = 0.25,
+    **more: Any,
 ) -> Variant:
-    """The same of all strengths together; of which neighbours are alike, unless `root` says
-    otherwise."""
-    more = {"prior": 0.25, **more}
-    if "root" not in more:
-        more["root"] = spectrum_root(len(columns))
-    return shape(label, joint, columns, radius, law, form="spectrum", **more)
+    """The same of all strengths together. root: None: neighbours are alike."""
+    root = spectrum_root(len(columns)) if root is None else root
+    kind = {"form": "spectrum", "root": root, "prior": prior}
+    return shape(label, joint, columns, radius, law, **kind, **more)
 
 
 def spectrum_root(count: int) -> Array:
@@ -115,18 +122,11 @@ def slackening(bench: Bench, joint: int, name: str, path: Path) -> list[Variant]
     worn = [bench.add_joint(joint, -unit * s) for s in path.slacks(radius).T]
     held = [bench.add_joint(joint, unit * s) for s in (path.plays(rubs) - torque[:, None]).T]
     both = block([spectrum_root(len(r)) for r in (radius, rubs)])
-    label, facts = f"{name} spectrum that slackens", {"slackens": len(radius)}
+    label, all_of_them = f"{name} spectrum that slackens", np.append(radius, rubs)
+    wears = partial(spectrum, joint=joint, law="Iwan", slackens=len(radius))
     return [
-        spectrum(label, joint, worn, radius, "Iwan", **facts),
-        spectrum(
-            f"{label} and rubs",
-            joint,
-            [*worn, *held],
-            np.append(radius, rubs),
-            "Iwan",
-            root=both,
-            **facts,
-        ),
+        wears(label, columns=worn, radius=radius),
+        wears(f"{label} and rubs", columns=[*worn, *held], radius=all_of_them, root=both),
     ]
 
 
