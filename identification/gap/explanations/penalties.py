@@ -256,11 +256,11 @@ def _only_rubs(engine: Engine, play: Part, curve: Part) -> bool:
 
 
 def _on_its_own(parts: tuple[Part, ...], found: Sizes, i: int, k: int) -> bool:
-    """One of them is wrong springs that move the arm far more than the mechanism beside them: no
+    """One of them is wrong springs, or a gain, and moves far more than the mechanism beside it: no
     linear part of its law. A curve that has a line of its own has one of any size."""
     for a, b in ((i, k), (k, i)):
         line = parts[b].variant.has_line
-        if parts[a].word == SPRINGS and parts[b].word not in LINEAR and not line:
+        if parts[a].word in LINEAR and parts[b].word not in LINEAR and not line:
             return bool(found.moved[a] > _FAR_MORE * found.moved[b])
     return False
 

@@ -1,0 +1,147 @@
+"""Whether the stiffness that was stated is met anywhere along what an explanation fits.
+
+On a rig without an arm a mechanism brings a mean stiffness of its own, and may so stand for a
+spring or a gain that is off by far more than it does itself: a little friction beside a spring half
+as stiff as stated, a few percent of curvature beside a gain. But what was stated of a joint that
+hardens, yields or rubs is its stiffness somewhere: where it begins, where it ends, after a turn.
+Where the load goes along no piece of its way with that stiffness, spring or gains are off by what
+the nearest piece says; and where that does more than all the rest, it is the main cause.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import hypot, log
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array, Flags
+from identification.gap.evidence.engine import Engine
+from identification.gap.explanations.explanation import Explanation
+from identification.gap.explanations.fit import Fit, fit
+from identification.gap.model.bench import Bench
+from identification.gap.words import LATE, LINEAR, MECHANISMS
+from identification.turns import turning_points
+
+_PIECE = 0.08  # of the range of the load, or of what it does: no stiffness is read off less
+_TURNS = 0.02  # of the range of the load: what goes back by less is no turn
+_SDS = 3.0  # standard deviations of spring and gains together: so far they may be off
+_NEXT = 2.0  # times: neighbouring pieces so much alike pass through what lies between
+
+
+class Springs(NamedTuple):
+    """rms m of what springs or gains that are off do to the gap, and of all the rest."""
+
+    off: float
+    rest: float
+
+
+def led_by_springs(engine: Engine, ranked: tuple[Explanation, ...]) -> tuple[Explanation, ...]:
+    """Explanations (best first) of a rig without an arm in which springs that are off lead where
+    they do most, whatever the effect beside them says of its own mean stiffness."""
+    return tuple(_led(engine, e) if len(e.words) > 1 and e.words & LINEAR else e for e in ranked)
+
+
+def _led(engine: Engine, explanation: Explanation) -> Explanation:
+    e = explanation
+    found = None if e.parts[0].word in LINEAR else off_from_stated(engine, e)
+    if found is None:
+        return e
+    others = [s for p, s in zip(e.parts, e.sizes, strict=True) if p.word not in LINEAR]
+    share = found.rest / max(hypot(*others), 1e-300)
+    sizes = zip(e.parts, e.sizes, strict=True)
+    return e.sized(found.off if p.word in LINEAR else share * s for p, s in sizes)
+
+
+def spoken_for_by_springs(
+    engine: Engine, ranked: tuple[Explanation, ...], near: list[Explanation]
+) -> dict[frozenset[str], Explanation]:
+    """Words of explanations that matter -> that which says that springs or gains are off, where
+    that is what they show. Of a rig without an arm."""
+    linear = (e for e in ranked if e.good and e.words and e.words <= LINEAR)
+    heir = next(linear, None)
+    if heir is None:
+        return {}
+    rest = [e for e in near if e.parts and not e.words & LINEAR]
+    return {e.words: heir for e in rest if off_from_stated(engine, e)}
+
+
+def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
+    """Of springs or gains that are off, where they do more to the gap than all the rest."""
+    bench, fitted = engine.bench, fit(engine, explanation)
+    whole = bench.response - engine.target[: bench.rows.n] + fitted.response
+    goes = MECHANISMS | LINEAR  # with the load, without a delay
+    paths = [whole - _of_others(engine, fitted, goes)]
+    if explanation.words & LATE:  # all that comes, and what comes at once
+        paths.append(whole - _of_others(engine, fitted, goes - LATE))
+    mine = _where(bench, explanation)
+    factor = _nearest(bench, mine, paths)
+    if factor is None:
+        return None
+    line, rows = bench.stated_slope * bench.load, bench.rows
+    off, rest = (
+        rows.rms(rows.about_means((v * mine)[:, None])[:, 0])
+        for v in ((factor - 1) * line, whole - factor * line)
+    )
+    return Springs(off, rest) if off > rest else None
+
+
+def _of_others(engine: Engine, fitted: Fit, words: frozenset[str]) -> Array:
+    """(n,) m what the effects but these words do."""
+    n = engine.bench.rows.n
+    others = [i for i, p in enumerate(fitted.parts) if p.word not in words]
+    return sum((fitted.contribution(engine, i)[:n] for i in others), np.zeros(n))
+
+
+def _where(bench: Bench, explanation: Explanation) -> Flags:
+    """(n,) rows of the direction in which the largest effect sits."""
+    joint = explanation.parts[0].variant.joint
+    everywhere = np.ones(bench.rows.n, dtype=bool)
+    return everywhere if joint is None else np.asarray(bench.lever[:, joint] != 0)
+
+
+def _nearest(bench: Bench, mine: Flags, paths: list[Array]) -> float | None:
+    """The slope of the response (n,) over the load, of what was stated, that comes nearest to it;
+    None where it is met within what was stated as uncertain, or nothing was passed."""
+    each = [np.log(np.maximum(s, _NONE)) for path in paths for s in _slopes(bench, mine, path)]
+    if not each:
+        return None
+    meter, springs = bench.data.instruments, float(bench.data.compliance_relative_sd.max())
+    sd = hypot(springs, meter.force_gain, meter.displacement_gain)
+    near = float(min(np.concatenate(each), key=abs))
+    between = [(a, b) for one in each for a, b in pairwise(one.tolist())]
+    if len(paths) > 1:
+        between.append((min(s.min() for s in each), max(s.max() for s in each)))
+    passed = any(a * b < 0 and abs(a - b) < log(_NEXT) for a, b in between)
+    stiffness = float(np.exp(near if bench.imposed else -near))
+    return None if passed or abs(stiffness - 1) < _SDS * sd else float(np.exp(near))
+
+
+_NONE = 1e-6  # of what was stated: no stiffness
+
+
+def _slopes(bench: Bench, mine: Flags, response: Array) -> list[Array]:
+    """Of every pass of the load, the slopes (k,) of its pieces as a share of what was stated."""
+    path = response / bench.stated_slope
+    spans = np.array([np.ptp(bench.load[mine]), np.ptp(path[mine])])
+    if not spans.min() > 0:
+        return []
+    out: list[Array] = []
+    for run in np.unique(bench.rows.run[mine]):
+        rows = np.flatnonzero(mine & (bench.rows.run == run))
+        way = np.column_stack([bench.load[rows], path[rows]])
+        ends = [0, *turning_points(way[:, 0], _TURNS * spans[0]), len(rows) - 1]
+        out += [_pieces(way[a : b + 1], spans) for a, b in pairwise(ends)]
+    return [one for one in out if one.size]
+
+
+def _pieces(way: Array, spans: Array) -> Array:
+    """Slopes (k,) of the pieces of one pass (n, 2), load and response, each as long as may be seen
+    in one of the two: a stiff beginning may take no more than a hundredth of an imposed way."""
+    load, path = way[np.argsort(way[:, 0], kind="stable")].T
+    gone = np.maximum(np.abs(np.diff(load)) / spans[0], np.abs(np.diff(path)) / spans[1])
+    length = np.concatenate([[0.0], np.cumsum(gone)])
+    at = np.linspace(0.0, length[-1], int(length[-1] / _PIECE) + 1)
+    rise, run = (np.diff(np.interp(at, length, v)) for v in (path, load))
+    return np.asarray(rise[run > 0] / run[run > 0])
