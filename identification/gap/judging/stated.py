@@ -104,16 +104,17 @@ def _where(bench: Bench, explanation: Explanation) -> Flags:
 def _nearest(bench: Bench, mine: Flags, paths: list[Array]) -> float | None:
     """The slope of the response (n,) over the load, of what was stated, that comes nearest to it;
     None where it is met within what was stated as uncertain, or nothing was passed."""
-    each = [np.log(np.maximum(s, _NONE)) for path in paths for s in _slopes(bench, mine, path)]
-    if not each:
+    each = [[np.log(np.maximum(s, _NONE)) for s in _slopes(bench, mine, p)] for p in paths]
+    if not each[0]:
         return None
     meter, springs = bench.data.instruments, float(bench.data.compliance_relative_sd.max())
     sd = hypot(springs, meter.force_gain, meter.displacement_gain)
-    near = float(min(np.concatenate(each), key=abs))
-    between = [(a, b) for one in each for a, b in pairwise(one.tolist())]
-    if len(paths) > 1:
-        between.append((min(s.min() for s in each), max(s.max() for s in each)))
-    passed = any(a * b < 0 and abs(a - b) < log(_NEXT) for a, b in between)
+    alike = (pair for path in each for s in path for pair in pairwise(s.tolist()))
+    passed = any(a * b < 0 and abs(a - b) < log(_NEXT) for a, b in alike)
+    whole = [np.concatenate(path) for path in each]
+    common = [float(np.median(s)) for s in whole]
+    passed = passed or min(common) < 0 < max(common)  # between what comes at once and all
+    near = float(min(np.concatenate(whole), key=abs))
     stiffness = float(np.exp(near if bench.imposed else -near))
     return None if passed or abs(stiffness - 1) < _SDS * sd else float(np.exp(near))
 

@@ -1,0 +1,169 @@
+"""Springs and gains that are off beside a mechanism that brings a mean stiffness of its own."""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.gap.explanations.explanation import SearchResult
+from identification.gap.explanations.verdict import with_posterior
+from identification.gap.judging.stated import (
+    _nearest,
+    led_by_springs,
+    off_from_stated,
+    spoken_for_by_springs,
+)
+from identification.gap.model.bench import Bench
+from identification.gap.words import LINEAR
+from tests.explained import explained
+from tests.unit.small_explanations import part, said, small_engine_of
+from tests.unit.test_gap_flanks import a_bench, held, to_and_fro
+
+CURVE, FRICTION, SPRINGS = "joint_nonlinear_stiffness", "joint_hysteresis", "joint_stiffness_error"
+EVERYWHERE = np.ones(480, dtype=bool)
+X = to_and_fro()  # of the load, -1 to 1
+
+
+def a_straight(imposed: str = "force") -> Bench:
+    return a_bench(X, X, imposed)
+
+
+def path(response: Array, bench: Bench) -> Array:
+    """A response in units of what the stated spring gives at the largest load."""
+    return np.asarray(response * (bench.stated_slope * bench.load).max())
+
+
+OFF = {
+    "softer": (2.0 * X, 2.0),
+    "stiffer": (0.4 * X, 0.4),
+    "and a little curved": (2.0 * X + 0.1 * X**3, 2.0),
+    "and rubbing": (2.0 * X - 0.05 * (X - held(X, 0.05)), 2.0),
+}
+MET = {
+    "stated": X,
+    "hardens from what was stated": X - 0.4 * X * np.abs(X),
+    "ends as stated": X + 0.4 * np.tanh(X / 0.2),
+    "as stated halfway": 0.6 * X + 0.5 * X**3,
+    "sticks as stated and slips": 2.0 * X - (X - held(X, 0.1)),
+}
+
+
+@pytest.mark.parametrize("name", OFF)
+def test_what_no_piece_meets_is_off_by_what_the_nearest_says(name: str) -> None:
+    bench, (response, factor) = a_straight(), OFF[name]
+    found = _nearest(bench, EVERYWHERE, [path(response, bench)])
+    assert found == pytest.approx(factor, rel=0.03)
+
+
+@pytest.mark.parametrize("name", MET)
+def test_what_a_piece_of_the_way_meets_is_as_stated(name: str) -> None:
+    bench = a_straight()
+    assert _nearest(bench, EVERYWHERE, [path(MET[name], bench)]) is None
+
+
+def test_a_stiff_beginning_of_a_long_way_is_seen_in_what_answers() -> None:
+    """A metal that yields after a hundredth of its stroke."""
+    bench = a_straight("displacement")
+    flows = 0.02 * np.tanh(X / 0.02) + 0.001 * X
+    assert _nearest(bench, EVERYWHERE, [path(flows, bench)]) is None
+    assert _nearest(bench, EVERYWHERE, [path(0.3 * flows, bench)]) is not None
+
+
+def test_a_jump_is_no_stiffness_that_was_passed() -> None:
+    """The flanks of a play are stiffer than stated, and what lies between them is no spring."""
+    bench = a_straight()
+    play = 0.4 * X + 0.3 * np.tanh(X / 0.01)
+    assert _nearest(bench, EVERYWHERE, [path(play, bench)]) == pytest.approx(0.4, rel=0.1)
+    stiffens = 0.3 * X + 0.5 * X**3  # by and by
+    assert _nearest(bench, EVERYWHERE, [path(stiffens, bench)]) is None
+
+
+def test_what_comes_late_is_met_between_what_comes_at_once_and_all() -> None:
+    bench = a_straight()
+    at_once, whole = path(0.6 * X, bench), path(1.6 * X, bench)
+    assert _nearest(bench, EVERYWHERE, [whole]) == pytest.approx(1.6, rel=0.03)
+    assert _nearest(bench, EVERYWHERE, [whole, at_once]) is None
+    assert _nearest(bench, EVERYWHERE, [whole, 0.9 * whole]) == pytest.approx(1.44, rel=0.03)
+
+
+def bent(bench: Bench, spring: float, bend: float) -> Bench:
+    """A spring so many times softer than stated, and what it bends, of the stated response."""
+    return a_bench(X, spring * X + bend * X**3, "force")
+
+
+def columns(bench: Bench) -> tuple[int, int]:
+    """Of the spring and of a cubic, as large as what the stated spring gives."""
+    line = bench.stated_slope * bench.load
+    return bench.add_joint(0, bench.elastic[:, 0]), bench.add_joint(
+        0, bench.elastic[:, 0] * (line / line.max()) ** 2
+    )
+
+
+@pytest.mark.parametrize(("spring", "bend", "off"), [(2.0, 0.1, True), (2.0, 2.5, False)])
+def test_springs_lead_where_they_do_more_than_all_the_rest(
+    spring: float, bend: float, off: bool
+) -> None:
+    bench = bent(a_straight(), spring, bend)
+    line, cubic = columns(bench)
+    engine = small_engine_of(bench)
+    curve = said((part(CURVE, [line, cubic], joint=0, joints=(0,)),), (1e-5,), -1.0)
+    both = said(
+        (
+            part(CURVE, [cubic], joint=0, joints=(0,)),
+            part(SPRINGS, [line], joint=0, joints=(0,)),
+        ),
+        (1e-5, 1e-6),
+        -2.0,
+    )
+    spring_alone = said((part(SPRINGS, [line], joint=0, joints=(0,)),), (1e-4,), -50.0)
+    gain = said((part("force_scale", [line]),), (1e-4,), -60.0)
+    ranked = (curve, both, spring_alone, gain)
+    found = off_from_stated(engine, curve)
+    assert (found is not None) == off
+    speakers = spoken_for_by_springs(engine, ranked, list(ranked))
+    assert speakers == ({curve.words: spring_alone} if off else {})
+    led = led_by_springs(engine, ranked)
+    assert led[1].parts[0].word == (SPRINGS if off else CURVE)
+    assert [e.words for e in led] == [e.words for e in ranked]
+    if off:
+        assert led[1].sizes[0] > 5 * led[1].sizes[1]
+        assert found is not None
+        assert found.off == pytest.approx(led[1].sizes[0], rel=0.1)
+
+
+def test_who_speaks_for_fewer_effects_speaks_for_more_that_bring_no_more() -> None:
+    bench = a_straight()
+    engine = small_engine_of(bench)
+    line, cubic = columns(bench)
+    curve, drift, lag = (part(w, [cubic]) for w in (CURVE, "thermal_drift", "time_lag"))
+    two, three = said((curve, drift), (3e-5, 2e-5), -5.0), said((curve, drift, lag), (1e-5,) * 3)
+    spring = said((part(SPRINGS, [line]),), (1e-4,), -50.0)
+    none = said((), (), -log(1e30))
+    found = SearchResult(
+        engine, (three, two, spring, none), {}, {}, -np.inf, 0.0, speakers={two.words: spring}
+    )
+    likeliest = max((p := with_posterior(found, {}).probabilities), key=lambda w: p[w])
+    assert likeliest == SPRINGS
+
+
+FLAWS = {
+    "curved": 0.08 * X**3,
+    "rubs": held(X, 0.04) - X,
+}
+
+
+@pytest.mark.parametrize("name", FLAWS)
+def test_a_spring_half_as_stiff_as_stated_is_named_beside_what_it_does_beside(name: str) -> None:
+    found = explained(a_bench(X, 2.2 * X + FLAWS[name], "force").data)
+    assert found.verdict in LINEAR
+    assert sum(found.probabilities[w] for w in LINEAR) > 0.7
+
+
+@pytest.mark.parametrize("imposed", ["force", "displacement"])
+def test_friction_that_sticks_as_stated_is_friction(imposed: str) -> None:
+    force = X if imposed == "force" else 0.4 * X + 0.6 * (X - held(X, 0.12))
+    moved = X + 0.8 * held(X, 0.12) if imposed == "force" else X
+    assert explained(a_bench(force, moved, imposed).data).verdict == FRICTION
