@@ -24,10 +24,10 @@ from identification.gap.model.bench import Bench
 from identification.gap.words import LATE, LINEAR, MECHANISMS
 from identification.turns import turning_points
 
-_PIECE = 0.08  # of the range of the load, or of what it does: no stiffness is read off less
+_PIECE = 0.04  # of the range of the load, or of what it does; a stiffness is read off two of them
 _TURNS = 0.02  # of the range of the load: what goes back by less is no turn
 _SDS = 3.0  # standard deviations of spring and gains together: so far they may be off
-_NEXT = 2.0  # times: neighbouring pieces so much alike pass through what lies between
+_ALIKE = 1.5  # times: neighbouring pieces so much alike pass through what lies between
 
 
 class Springs(NamedTuple):
@@ -104,40 +104,43 @@ def _where(bench: Bench, explanation: Explanation) -> Flags:
 def _nearest(bench: Bench, mine: Flags, paths: list[Array]) -> float | None:
     """The slope of the response (n,) over the load, of what was stated, that comes nearest to it;
     None where it is met within what was stated as uncertain, or nothing was passed."""
-    each = [[np.log(np.maximum(s, _NONE)) for s in _slopes(bench, mine, p)] for p in paths]
-    if not each[0]:
+    each = [_passed(bench, mine, path) for path in paths]
+    if not each[0].size:
+        return None
+    common = [float(np.median(s)) for s in each if s.size]
+    if min(common) < 0 < max(common):  # between what comes at once and all
         return None
     meter, springs = bench.data.instruments, float(bench.data.compliance_relative_sd.max())
     sd = hypot(springs, meter.force_gain, meter.displacement_gain)
-    alike = (pair for path in each for s in path for pair in pairwise(s.tolist()))
-    passed = any(a * b < 0 and abs(a - b) < log(_NEXT) for a, b in alike)
-    whole = [np.concatenate(path) for path in each]
-    common = [float(np.median(s)) for s in whole]
-    passed = passed or min(common) < 0 < max(common)  # between what comes at once and all
-    near = float(min(np.concatenate(whole), key=abs))
+    near = float(min(np.concatenate(each), key=abs))
     stiffness = float(np.exp(near if bench.imposed else -near))
-    return None if passed or abs(stiffness - 1) < _SDS * sd else float(np.exp(near))
+    return None if abs(stiffness - 1) < _SDS * sd else float(np.exp(near))
+
+
+def _passed(bench: Bench, mine: Flags, response: Array) -> Array:
+    """(k,) logarithms of the slopes that a path passes, of what was stated: of any two neighbouring
+    pieces that are about as steep, what comes nearest to it. A corner is no slope."""
+    path = response / bench.stated_slope
+    spans = np.array([np.ptp(bench.load[mine]), np.ptp(path[mine])])
+    out = [np.zeros(0)]
+    if not spans.min() > 0:
+        return out[0]
+    for run in np.unique(bench.rows.run[mine]):
+        rows = np.flatnonzero(mine & (bench.rows.run == run))
+        way = np.column_stack([bench.load[rows], path[rows]])
+        ends = [0, *turning_points(way[:, 0], _TURNS * spans[0]), len(rows) - 1]
+        for a, b in pairwise(ends):
+            slopes = np.log(np.maximum(_slopes(way[a : b + 1], spans), _NONE))
+            one, other = slopes[:-1], slopes[1:]
+            near = np.where(one * other < 0, 0.0, (one + other) / 2)
+            out.append(near[np.abs(one - other) < log(_ALIKE)])
+    return np.concatenate(out)
 
 
 _NONE = 1e-6  # of what was stated: no stiffness
 
 
-def _slopes(bench: Bench, mine: Flags, response: Array) -> list[Array]:
-    """Of every pass of the load, the slopes (k,) of its pieces as a share of what was stated."""
-    path = response / bench.stated_slope
-    spans = np.array([np.ptp(bench.load[mine]), np.ptp(path[mine])])
-    if not spans.min() > 0:
-        return []
-    out: list[Array] = []
-    for run in np.unique(bench.rows.run[mine]):
-        rows = np.flatnonzero(mine & (bench.rows.run == run))
-        way = np.column_stack([bench.load[rows], path[rows]])
-        ends = [0, *turning_points(way[:, 0], _TURNS * spans[0]), len(rows) - 1]
-        out += [_pieces(way[a : b + 1], spans) for a, b in pairwise(ends)]
-    return [one for one in out if one.size]
-
-
-def _pieces(way: Array, spans: Array) -> Array:
+def _slopes(way: Array, spans: Array) -> Array:
     """Slopes (k,) of the pieces of one pass (n, 2), load and response, each as long as may be seen
     in one of the two: a stiff beginning may take no more than a hundredth of an imposed way."""
     load, path = way[np.argsort(way[:, 0], kind="stable")].T
