@@ -27,7 +27,7 @@ from identification.turns import turning_points
 _PIECE = 0.04  # of the range of the load, or of what it does; a stiffness is read off two of them
 _TURNS = 0.02  # of the range of the load: what goes back by less is no turn
 _SDS = 3.0  # standard deviations of spring and gains together: so far they may be off
-_ALIKE = 1.5  # times: neighbouring pieces so much alike pass through what lies between
+_ALIKE = 1.5  # times: pieces that are about as steep
 
 
 class Springs(NamedTuple):
@@ -119,7 +119,7 @@ def _nearest(bench: Bench, mine: Flags, paths: list[Array]) -> float | None:
 
 def _passed(bench: Bench, mine: Flags, response: Array) -> Array:
     """(k,) logarithms of the slopes that a path passes, of what was stated: of any two neighbouring
-    pieces that are about as steep, what comes nearest to it. A corner is no slope."""
+    pieces that are about as steep. A corner is no slope."""
     path = response / bench.stated_slope
     spans = np.array([np.ptp(bench.load[mine]), np.ptp(path[mine])])
     out = [np.zeros(0)]
@@ -132,8 +132,7 @@ def _passed(bench: Bench, mine: Flags, response: Array) -> Array:
         for a, b in pairwise(ends):
             slopes = np.log(np.maximum(_slopes(way[a : b + 1], spans), _NONE))
             one, other = slopes[:-1], slopes[1:]
-            near = np.where(one * other < 0, 0.0, (one + other) / 2)
-            out.append(near[np.abs(one - other) < log(_ALIKE)])
+            out.append(((one + other) / 2)[np.abs(one - other) < log(_ALIKE)])
     return np.concatenate(out)
 
 
