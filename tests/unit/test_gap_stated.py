@@ -14,7 +14,6 @@ from identification.gap.judging.stated import (
     _nearest,
     led_by_springs,
     off_from_stated,
-    spoken_for_by_springs,
 )
 from identification.gap.model.bench import Bench
 from identification.gap.words import LINEAR
@@ -121,17 +120,18 @@ def test_springs_lead_where_they_do_more_than_all_the_rest(
     spring_alone = said((part(SPRINGS, [line], joint=0, joints=(0,)),), (1e-4,), -50.0)
     gain = said((part("force_scale", [line]),), (1e-4,), -60.0)
     ranked = (curve, both, spring_alone, gain)
-    found = off_from_stated(engine, curve)
+    shapes = [p.variant for e in ranked for p in e.parts]
+    result = SearchResult(engine, ranked, {}, {}, -np.inf, 0.0, variants=tuple(shapes))
+    found, led = off_from_stated(engine, curve), led_by_springs(result, ranked)
     assert (found is not None) == off
-    speakers = spoken_for_by_springs(engine, ranked, list(ranked))
-    assert speakers == ({curve.words: spring_alone} if off else {})
-    led = led_by_springs(engine, ranked)
-    assert led[1].parts[0].word == (SPRINGS if off else CURVE)
-    assert [e.words for e in led] == [e.words for e in ranked]
+    assert led.speakers == ({curve.words: spring_alone} if off else {})
+    pair = next(e for e in led.explanations if e.words == both.words)
+    assert pair.parts[0].word == (SPRINGS if off else CURVE)
+    assert {e.words for e in led.explanations} == {e.words for e in ranked}
     if off:
-        assert led[1].sizes[0] > 5 * led[1].sizes[1]
+        assert pair.sizes[0] > 5 * pair.sizes[1]
         assert found is not None
-        assert found.off == pytest.approx(led[1].sizes[0], rel=0.1)
+        assert found.off == pytest.approx(pair.sizes[0], rel=0.1)
 
 
 def test_who_speaks_for_fewer_effects_speaks_for_more_that_bring_no_more() -> None:

@@ -26,7 +26,7 @@ from identification.gap.explanations.verdict import may_inherit, may_miss, with_
 from identification.gap.judging.dead_zone import spoken_for
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.paths import goes_as_no_drift
-from identification.gap.judging.stated import led_by_springs, spoken_for_by_springs
+from identification.gap.judging.stated import led_by_springs
 from identification.gap.judging.strain import LIMIT, strain
 from identification.gap.model.noise import UNSURE
 from identification.gap.words import CURVES, FRICTION, LINEAR
@@ -84,12 +84,10 @@ def looked_up(found: SearchResult) -> SearchResult:
         tuple(sorted((done.get(e.words, e) for e in each), key=lambda e: -e.log_weight))
         for each in (found.explanations, found.nameless)
     )
-    said: dict[frozenset[str], Explanation] = {}
+    found = replace(found, explanations=out, nameless=nameless)
     if not engine.bench.data.arm:
-        near = led_by_springs(engine, tuple(_near(out)))
-        out = (*near, *out[len(near) :])
-        said = spoken_for(engine, out) | spoken_for_by_springs(engine, out, list(near))
-    found = replace(found, explanations=out, nameless=nameless, speakers=said)
+        found = replace(found, speakers=spoken_for(engine, out))
+        found = led_by_springs(found, _near(out))
     return with_posterior(found, found.kept)
 
 

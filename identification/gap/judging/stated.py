@@ -10,6 +10,8 @@ the nearest piece says; and where that does more than all the rest, it is the ma
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import hypot, log
 from typing import NamedTuple
@@ -17,10 +19,18 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array, Flags
+from identification.gap.evidence.compare import closest, marginal, score
 from identification.gap.evidence.engine import Engine
-from identification.gap.explanations.explanation import Explanation
+from identification.gap.evidence.parts import Part
+from identification.gap.explanations.explanation import (
+    Explanation,
+    SearchResult,
+    explain,
+    up_to_likeliest,
+)
 from identification.gap.explanations.fit import Fit, fit
 from identification.gap.model.bench import Bench
+from identification.gap.model.variants import Variant
 from identification.gap.words import LATE, LINEAR, MECHANISMS
 from identification.turns import turning_points
 
@@ -37,13 +47,30 @@ class Springs(NamedTuple):
     rest: float
 
 
-def led_by_springs(engine: Engine, ranked: tuple[Explanation, ...]) -> tuple[Explanation, ...]:
-    """Explanations (best first) of a rig without an arm in which springs that are off lead where
-    they do most, whatever the effect beside them says of its own mean stiffness."""
-    return tuple(_led(engine, e) if len(e.words) > 1 and e.words & LINEAR else e for e in ranked)
+def led_by_springs(found: SearchResult, near: Sequence[Explanation]) -> SearchResult:
+    """The result for a rig without an arm in which springs or gains that are off lead where they do
+    most, whatever the effect beside them says of its own mean stiffness. near: the explanations
+    that matter. What speaks for those without a linear effect is the best one by linear effects
+    alone; beside that, their own effect is looked for in shapes that have no spring of their own.
+    """
+    engine, ranked = found.engine, {e.words: e for e in found.explanations}
+    ranked |= {e.words: _led(engine, e) for e in near if len(e.words) > 1 and e.words & LINEAR}
+    linear = (e for e in found.explanations if e.good and e.words and e.words <= LINEAR)
+    heir, speakers = next(linear, None), dict(found.speakers)
+    for e in near:
+        if heir is None or not e.parts or e.words & LINEAR or not off_from_stated(engine, e):
+            continue
+        speakers[e.words] = heir
+        both = _beside(engine, found.variants, heir, e)
+        known = ranked.get(both.words)
+        if known is None or known.log_weight < both.log_weight:
+            ranked[both.words] = both
+    best_first = tuple(sorted(ranked.values(), key=lambda e: -e.log_weight))
+    return replace(found, explanations=best_first, speakers=speakers)
 
 
 def _led(engine: Engine, explanation: Explanation) -> Explanation:
+    """With the linear effect first, if it does most."""
     e = explanation
     found = None if e.parts[0].word in LINEAR else off_from_stated(engine, e)
     if found is None:
@@ -54,17 +81,22 @@ def _led(engine: Engine, explanation: Explanation) -> Explanation:
     return e.sized(found.off if p.word in LINEAR else share * s for p, s in sizes)
 
 
-def spoken_for_by_springs(
-    engine: Engine, ranked: tuple[Explanation, ...], near: list[Explanation]
-) -> dict[frozenset[str], Explanation]:
-    """Words of explanations that matter -> that which says that springs or gains are off, where
-    that is what they show. Of a rig without an arm."""
-    linear = (e for e in ranked if e.good and e.words and e.words <= LINEAR)
-    heir = next(linear, None)
-    if heir is None:
-        return {}
-    rest = [e for e in near if e.parts and not e.words & LINEAR]
-    return {e.words: heir for e in rest if off_from_stated(engine, e)}
+def _beside(
+    engine: Engine, variants: Sequence[Variant], heir: Explanation, other: Explanation
+) -> Explanation:
+    """The heir with the largest effect of the other explanation beside it, if that is better."""
+    mine = other.parts[0].variant
+    same = (v for v in variants if v.word == mine.word and v.joint == mine.joint)
+    shapes = [v for v in same if not (v.has_line or v.other_springs)]
+    if not shapes or heir.eta <= engine.bench.noise.stated:
+        return heir
+    levels, energy = up_to_likeliest(engine, heir.parts)
+    scored = score(engine, levels, shapes, energy)
+    top = closest(scored)
+    parts = (*heir.parts, Part(top.variant, top.scale))
+    both = _led(engine, explain(engine, parts, marginal(scored), energy))
+    first = both.parts[0].word in LINEAR
+    return both if first and both.log_weight > heir.log_weight else heir
 
 
 def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
