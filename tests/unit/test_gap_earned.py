@@ -267,6 +267,17 @@ def test_one_of_two_that_foretells_better_speaks_for_both(second: str, needed: b
         assert result.probabilities[word] > 0.7
 
 
+def test_what_another_one_speaks_for_speaks_for_none() -> None:
+    e = engine(np.full(REPETITIONS, BUMP))
+    bump = explained([0], "joint_nonlinear_stiffness", -40.0)
+    drift = explained([1, 2], "thermal_drift", -40.0)
+    both = Explanation(bump.parts + drift.parts, 0.0, 0.0, (BUMP / 3, BUMP / 9), 0.0)
+    alone = found(e, both, bump, drift)
+    spoken = replace(alone, speakers={bump.words: drift})
+    assert earned(alone).speakers.get(both.words) is bump
+    assert both.words not in earned(spoken).speakers
+
+
 def test_a_drift_alone_speaks_for_nobody() -> None:
     """It foretells nothing, also where another effect foretells less than nothing."""
     e = engine(np.array([0.0, 3.0, -3.0]) * BUMP)

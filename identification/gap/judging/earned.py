@@ -87,8 +87,8 @@ def _foretold(found: SearchResult, name: str, fold: Ints) -> dict[frozenset[str]
     """Of explanations with two effects that matter, the one effect that foretells withheld data
     better than both: words that stand for each other foretell the same; of two that do, alike, the
     one that explains more. What comes late speaks for no friction at one rate, at which they do the
-    same. What a drift does nothing foretells: where it is the larger one, another has to be plainly
-    better to speak for both."""
+    same; what another one speaks for speaks for none. What a drift does nothing foretells: where it
+    is the larger one, another has to be plainly better to speak for both."""
     first, out = found.explanations[0].log_weight, {}
     pairs = [e for e in found.explanations[:_PAIRS] if e.log_weight > first - _NEAR]
     for both in (e for e in pairs if len(e.words) == _TWO):
@@ -96,7 +96,8 @@ def _foretold(found: SearchResult, name: str, fold: Ints) -> dict[frozenset[str]
         most = held_out(found.engine, both, name, fold).after * (_PLAINLY if drifts else _BETTER)
         rubs = found.engine.bench.course.one_rate and both.words & FRICTION
         mute = BETWEEN_RUNS | LATE if rubs else BETWEEN_RUNS
-        each = [e for e in found.explanations if e.words < both.words and e.words - mute]
+        fewer = [e for e in found.explanations if e.words < both.words and e.words - mute]
+        each = [e for e in fewer if e.words not in found.speakers]
         after = [held_out(found.engine, e, name, fold).after for e in each]
         best = min(after, default=most)
         limit = min(_ALIKE * best, most)
