@@ -117,8 +117,9 @@ BENDS = 0.04  # of what a curve moves: so much the springs can't give at least
 
 
 def within_stated(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
-    """Penalty in nats, a steep wall, for an arm's gains that are off by no more than twice what is
-    stated, and for one spring that is off by no more than what is stated: that is `none`."""
+    """Penalty in nats, a steep wall, for an arm's gains that are off by no more than three times
+    what is stated, and for one spring that is off by no more than one and a half times that: it is
+    `none`."""
     if not engine.bench.data.arm:
         return 0.0
     meter, penalty = engine.bench.data.instruments, 0.0
@@ -144,7 +145,7 @@ def _rms_of_line(engine: Engine, part: Part) -> float:
     return max(rows.rms(rows.about_means(line)[:, 0]), 1e-300)
 
 
-_WITHIN, _SPRING_WITHIN = 2.0, 1.5  # standard deviations
+_WITHIN, _SPRING_WITHIN = 3.0, 1.5  # standard deviations
 
 
 def below_noise(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> float:
