@@ -43,13 +43,17 @@ def pursuit(path: Array, goal: Array, length: float, start: float = 0.0) -> Arra
 
 
 def lowpass(time: Array, signal: Array, tau: float) -> Array:
-    """(n,) a first-order filter's answer; exact for a signal that stands between samples."""
-    out, state = np.empty(len(signal)), float(signal[0])
-    keep = np.exp(-np.diff(time, prepend=time[0]) / tau).tolist()
-    for i, (share, end) in enumerate(zip(keep, signal.tolist(), strict=True)):
-        state = end + (state - end) * share
-        out[i] = state
-    return out
+    """(n,) a first-order filter's answer; exact for a signal that goes straight from sample to
+    sample, so that it comes late by tau, and not by half a sample less."""
+    out, late = np.empty(len(signal)), 0.0  # by how much the answer lies behind the signal
+    change = np.diff(time, prepend=time[0]) / tau
+    fades = np.exp(-change).tolist()
+    grows = np.divide(-np.expm1(-change), change, out=np.ones(len(change)), where=change > 0)
+    steps = np.diff(signal, prepend=signal[0])
+    for i, (share, step) in enumerate(zip(fades, (grows * steps).tolist(), strict=True)):
+        late = late * share + step
+        out[i] = late
+    return np.asarray(signal - out)
 
 
 def maxwell(time: Array, strain: Array, tau: Array, weight: Array) -> Array:
