@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import log
 
 import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.gap.data import Curve
 from identification.gap.explanations.explanation import SearchResult
 from identification.gap.explanations.verdict import with_posterior
 from identification.gap.judging.stated import (
@@ -15,11 +17,11 @@ from identification.gap.judging.stated import (
     led_by_springs,
     off_from_stated,
 )
-from identification.gap.model.bench import Bench
+from identification.gap.model.bench import Bench, make_bench
 from identification.gap.words import LINEAR
 from tests.explained import explained
 from tests.unit.small_explanations import part, said, small_engine_of
-from tests.unit.test_gap_flanks import a_bench, held, to_and_fro
+from tests.unit.test_gap_flanks import TOP, K, a_bench, held, to_and_fro
 
 CURVE, FRICTION, SPRINGS = "joint_nonlinear_stiffness", "joint_hysteresis", "joint_stiffness_error"
 EVERYWHERE = np.ones(480, dtype=bool)
@@ -61,6 +63,15 @@ def test_what_no_piece_meets_is_off_by_what_the_nearest_says(name: str) -> None:
 def test_what_a_piece_of_the_way_meets_is_as_stated(name: str) -> None:
     bench = a_straight()
     assert _nearest(bench, EVERYWHERE, [path(MET[name], bench)]) is None
+
+
+def test_what_another_simulator_says_is_met_where_its_curve_is() -> None:
+    bench, ends = a_straight(), np.array([-TOP, 0.0, TOP])
+    bends = Curve(ends, np.array([-1.0, 0.0, 3.0]) * TOP / K)  # three times softer one way
+    bench = make_bench(replace(bench.data, curves=(bends,)))
+    as_said, half = np.where(X > 0, 3 * X, X), 1.6 * np.where(X > 0, 3 * X, X)
+    assert _nearest(bench, EVERYWHERE, [path(as_said, bench)]) is None
+    assert _nearest(bench, EVERYWHERE, [path(half, bench)]) == pytest.approx(1.6, rel=0.03)
 
 
 def test_a_stiff_beginning_of_a_long_way_is_seen_in_what_answers() -> None:

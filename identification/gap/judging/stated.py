@@ -107,16 +107,20 @@ def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
     paths = [whole - _of_others(engine, fitted, goes)]
     if explanation.words & LATE:  # all that comes, and what comes at once
         paths.append(whole - _of_others(engine, fitted, goes - LATE))
-    mine = _where(bench, explanation)
+    mine, line = _where(bench, explanation), _line(bench)
     factor = _nearest(bench, mine, paths)
     if factor is None:
         return None
-    line, rows = bench.stated_slope * bench.load, bench.rows
     off, rest = (
-        rows.rms(rows.about_means((v * mine)[:, None])[:, 0])
+        bench.rows.rms(bench.rows.about_means((v * mine)[:, None])[:, 0])
         for v in ((factor - 1) * line, whole - factor * line)
     )
     return Springs(off, rest) if off > rest else None
+
+
+def _line(bench: Bench) -> Array:
+    """(n,) m the response that was simulated: by a spring, or by another simulator."""
+    return bench.stated_slope * bench.load if bench.simulated is None else bench.simulated
 
 
 def _of_others(engine: Engine, fitted: Fit, words: frozenset[str]) -> Array:
@@ -134,8 +138,8 @@ def _where(bench: Bench, explanation: Explanation) -> Flags:
 
 
 def _nearest(bench: Bench, mine: Flags, paths: list[Array]) -> float | None:
-    """The slope of the response (n,) over the load, of what was stated, that comes nearest to it;
-    None where it is met within what was stated as uncertain, or nothing was passed."""
+    """The slope of responses (n,) over the simulated one that comes nearest to 1; None where what
+    was stated is met within its uncertainty, or nothing was passed."""
     each = [_passed(bench, mine, path) for path in paths]
     if not each[0].size:
         return None
@@ -150,16 +154,15 @@ def _nearest(bench: Bench, mine: Flags, paths: list[Array]) -> float | None:
 
 
 def _passed(bench: Bench, mine: Flags, response: Array) -> Array:
-    """(k,) logarithms of the slopes that a path passes, of what was stated: of any two neighbouring
-    pieces that are about as steep. A corner is no slope."""
-    path = response / bench.stated_slope
-    spans = np.array([np.ptp(bench.load[mine]), np.ptp(path[mine])])
-    out = [np.zeros(0)]
+    """(k,) logarithms of the slopes that a response passes over the simulated one: of any two
+    neighbouring pieces that are about as steep. A corner is no slope."""
+    line, out = _line(bench), [np.zeros(0)]
+    spans = np.array([np.ptp(line[mine]), np.ptp(response[mine])])
     if not spans.min() > 0:
         return out[0]
     for run in np.unique(bench.rows.run[mine]):
         rows = np.flatnonzero(mine & (bench.rows.run == run))
-        way = np.column_stack([bench.load[rows], path[rows]])
+        way = np.column_stack([line[rows], response[rows]])
         ends = [0, *turning_points(way[:, 0], _TURNS * spans[0]), len(rows) - 1]
         for a, b in pairwise(ends):
             slopes = np.log(np.maximum(_slopes(way[a : b + 1], spans), _NONE))
@@ -172,11 +175,11 @@ _NONE = 1e-6  # of what was stated: no stiffness
 
 
 def _slopes(way: Array, spans: Array) -> Array:
-    """Slopes (k,) of the pieces of one pass (n, 2), load and response, each as long as may be seen
-    in one of the two: a stiff beginning may take no more than a hundredth of an imposed way."""
-    load, path = way[np.argsort(way[:, 0], kind="stable")].T
-    gone = np.maximum(np.abs(np.diff(load)) / spans[0], np.abs(np.diff(path)) / spans[1])
+    """Slopes (k,) of the pieces of one pass (n, 2), simulated and response, each as long as may be
+    seen in one of the two: a stiff beginning may take but a hundredth of an imposed way."""
+    line, response = way[np.argsort(way[:, 0], kind="stable")].T
+    gone = np.maximum(np.abs(np.diff(line)) / spans[0], np.abs(np.diff(response)) / spans[1])
     length = np.concatenate([[0.0], np.cumsum(gone)])
     at = np.linspace(0.0, length[-1], int(length[-1] / _PIECE) + 1)
-    rise, run = (np.diff(np.interp(at, length, v)) for v in (path, load))
+    rise, run = (np.diff(np.interp(at, length, v)) for v in (response, line))
     return np.asarray(rise[run > 0] / run[run > 0])
