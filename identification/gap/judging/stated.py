@@ -5,7 +5,7 @@ spring or a gain that is off by far more than it does itself: a little friction 
 as stiff as stated, a few percent of curvature beside a gain. But what was stated of a joint that
 hardens, yields or rubs is its stiffness somewhere: where it begins, where it ends, after a turn.
 Where the load goes along no piece of its way with that stiffness, spring or gains are off by what
-the nearest piece says; and where that does more than all the rest, it is the main cause.
+the nearest piece says; and where that does far more than all the rest, it is the main cause.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from identification.gap.explanations.explanation import (
     up_to_likeliest,
 )
 from identification.gap.explanations.fit import Fit, fit
+from identification.gap.laws.specimens import without_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 from identification.gap.words import LATE, LINEAR, MECHANISMS
@@ -38,6 +39,9 @@ _PIECE = 0.04  # of the range of the load, or of what it does; a stiffness is re
 _TURNS = 0.02  # of the range of the load: what goes back by less is no turn
 _SDS = 3.0  # standard deviations of spring and gains together: so far they may be off
 _ALIKE = 1.5  # times: pieces that are about as steep
+# Times all the rest: a metal that flows over most of its way is far from any line, whatever was
+# stated of its spring, and what the rest takes back of the line is none of its error.
+_LEADS = 3.0
 
 
 class Springs(NamedTuple):
@@ -86,8 +90,8 @@ def _beside(
 ) -> Explanation:
     """The heir with the largest effect of the other explanation beside it, if that is better."""
     mine = other.parts[0].variant
-    same = (v for v in variants if v.word == mine.word and v.joint == mine.joint)
-    shapes = [v for v in same if not (v.has_line or v.other_springs)]
+    same = [v for v in variants if v.word == mine.word and v.joint == mine.joint and not v.has_line]
+    shapes = [without_springs(v) if v.other_springs else v for v in same]
     if not shapes or heir.eta <= engine.bench.noise.stated:
         return heir
     levels, energy = up_to_likeliest(engine, heir.parts)
@@ -100,7 +104,7 @@ def _beside(
 
 
 def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
-    """Of springs or gains that are off, where they do more to the gap than all the rest."""
+    """Of springs or gains that are off, where they do far more to the gap than all the rest."""
     bench, fitted = engine.bench, fit(engine, explanation)
     whole = bench.response - engine.target[: bench.rows.n] + fitted.response
     goes = MECHANISMS | LINEAR  # with the load, without a delay
@@ -115,7 +119,7 @@ def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
         bench.rows.rms(bench.rows.about_means((v * mine)[:, None])[:, 0])
         for v in ((factor - 1) * line, whole - factor * line)
     )
-    return Springs(off, rest) if off > rest else None
+    return Springs(off, rest) if off > _LEADS * rest else None
 
 
 def _line(bench: Bench) -> Array:

@@ -24,6 +24,7 @@ OWN = 1.5  # a spring of its own, in the scales of what gives way: stiffer by as
 _FROM, _TO, _FEWEST = 0.1, (0.2, 0.3, 0.45), 4  # and rows there
 _OFF = 1.5  # times: as much as a simulated stiffness is off before thresholds miss the knee
 
+_OTHER = ", other springs"
 PLATEAU = " plateau to"
 _ENDS, _NEAREST, _FARTHEST = 24, 1.3, 0.9  # of plateaus: of the knee, and of the range
 _ABOUT = (0.87, 1.0, 1.2, 1.6)  # the knee: up, and down to the lower yield point
@@ -65,7 +66,7 @@ def with_other_springs(
         out.append(
             replace(
                 v,
-                label=f"{v.label}, other springs",
+                label=f"{v.label}{_OTHER}",
                 columns=(*v.columns, line),
                 scales=scales,
                 root=block([v.root, more * np.eye(1)]),
@@ -77,6 +78,21 @@ def with_other_springs(
             )
         )
     return out
+
+
+def without_springs(found: Variant) -> Variant:
+    """Such a variant without the line of its own spring: what another effect says of that."""
+    v, own = found, len(found.columns) - 1
+    return replace(
+        v,
+        label=v.label.removesuffix(_OTHER),
+        columns=v.columns[:own],
+        root=v.root[:own, :own],
+        positive=None if v.positive is None else v.positive[:own],
+        each=v.each[:own],
+        within=v.within[:, :own],
+        info={**v.info, "other_springs": False},
+    )
 
 
 def plateaus(bench: Bench, found: Variant) -> list[Variant]:
