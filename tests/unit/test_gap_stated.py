@@ -171,6 +171,9 @@ def test_a_spring_half_as_stiff_as_stated_is_named_beside_what_it_does_beside(na
     found = explained(a_bench(X, 2.2 * X + FLAWS[name], "force").data)
     assert found.verdict in LINEAR
     assert sum(found.probabilities[w] for w in LINEAR) > 0.7
+    first = found.effects[0]
+    assert first.name == found.verdict
+    assert first.probability >= found.probabilities[found.verdict]
 
 
 @pytest.mark.parametrize("imposed", ["force", "displacement"])

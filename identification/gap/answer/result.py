@@ -167,7 +167,9 @@ def _effects(
     out = []
     for i, part in enumerate(chosen.parts):
         present = sum(
-            float(s) for e, s in zip(all_of_them, share, strict=True) if part.word in e.words
+            float(s)
+            for e, s in zip(all_of_them, share, strict=True)
+            if part.word in e.words | _said(found, e)
         )
         out.append(
             EffectFound(
@@ -182,6 +184,12 @@ def _effects(
             )
         )
     return tuple(out)
+
+
+def _said(found: SearchResult, explanation: Explanation) -> frozenset[str]:
+    """What speaks for it says that is there."""
+    speaker = found.speakers.get(explanation.words)
+    return frozenset() if speaker is None else speaker.words
 
 
 def _placed(data: GapData, places: dict[str, float]) -> dict[str, float]:
