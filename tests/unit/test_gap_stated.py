@@ -174,6 +174,8 @@ def test_a_spring_half_as_stiff_as_stated_is_named_beside_what_it_does_beside(na
     first = found.effects[0]
     assert first.name == found.verdict
     assert first.probability >= found.probabilities[found.verdict]
+    gains = {"force_scale", "displacement_scale", SPRINGS}
+    assert {first.name, *first.indistinguishable_from} >= gains
 
 
 @pytest.mark.parametrize("imposed", ["force", "displacement"])

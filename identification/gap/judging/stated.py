@@ -44,6 +44,9 @@ _ALIKE = 1.5  # times: pieces that are about as steep
 _LEADS = 3.0
 
 
+_AS_GOOD = 5.0  # nats: spring and gains differ in what was stated of them alone
+
+
 class Springs(NamedTuple):
     """rms m of what springs or gains that are off do to the gap, and of all the rest."""
 
@@ -55,20 +58,22 @@ def led_by_springs(found: SearchResult, near: Sequence[Explanation]) -> SearchRe
     """The result for a rig without an arm in which springs or gains that are off lead where they do
     most, whatever the effect beside them says of its own mean stiffness. near: the explanations
     that matter. What speaks for those without a linear effect is the best one by linear effects
-    alone; beside that, their own effect is looked for in shapes that have no spring of their own.
+    alone; beside that, and others about as good, their own effect is looked for in shapes that have
+    no spring of their own.
     """
     engine, ranked = found.engine, {e.words: e for e in found.explanations}
     ranked |= {e.words: _led(engine, e) for e in near if len(e.words) > 1 and e.words & LINEAR}
-    linear = (e for e in found.explanations if e.good and e.words and e.words <= LINEAR)
-    heir, speakers = next(linear, None), dict(found.speakers)
+    linear = [e for e in found.explanations if e.good and e.words and e.words <= LINEAR]
+    heirs = [e for e in linear if e.log_weight > linear[0].log_weight - _AS_GOOD]
+    speakers = dict(found.speakers)
     for e in near:
-        if heir is None or not e.parts or e.words & LINEAR or not off_from_stated(engine, e):
+        if not heirs or not e.parts or e.words & LINEAR or not off_from_stated(engine, e):
             continue
-        speakers[e.words] = heir
-        both = _beside(engine, found.variants, heir, e)
-        known = ranked.get(both.words)
-        if known is None or known.log_weight < both.log_weight:
-            ranked[both.words] = both
+        speakers[e.words] = heirs[0]
+        for both in (_beside(engine, found.variants, heir, e) for heir in heirs):
+            known = ranked.get(both.words)
+            if known is None or known.log_weight < both.log_weight:
+                ranked[both.words] = both
     best_first = tuple(sorted(ranked.values(), key=lambda e: -e.log_weight))
     return replace(found, explanations=best_first, speakers=speakers)
 
