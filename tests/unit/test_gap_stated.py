@@ -17,7 +17,7 @@ from identification.gap.judging.stated import (
     led_by_springs,
     off_from_stated,
 )
-from identification.gap.model.bench import Bench, make_bench
+from identification.gap.model.bench import Bench, KnownEffects, make_bench
 from identification.gap.words import LINEAR
 from tests.explained import explained
 from tests.unit.small_explanations import part, said, small_engine_of
@@ -41,7 +41,7 @@ OFF = {
     "softer": (2.0 * X, 2.0),
     "stiffer": (0.4 * X, 0.4),
     "and a little curved": (2.0 * X + 0.1 * X**3, 2.0),
-    "and rubbing": (2.0 * X - 0.05 * (X - held(X, 0.05)), 2.0),
+    "and rubbing": (2.0 * X - 0.3 * (X - held(X, 0.05)), 1.7),
 }
 MET = {
     "stated": X,
@@ -86,9 +86,31 @@ def test_a_jump_is_no_stiffness_that_was_passed() -> None:
     """The flanks of a play are stiffer than stated, and what lies between them is no spring."""
     bench = a_straight()
     play = 0.4 * X + 0.3 * np.sign(X)
-    assert _nearest(bench, EVERYWHERE, [path(play, bench)]) == pytest.approx(0.4, rel=0.1)
+    found = _nearest(bench, EVERYWHERE, [path(play, bench)])
+    assert found is not None
+    assert found < 0.4 * 1.5**0.5  # a piece with a little of the gap is half as unlike at most
     stiffens = 0.3 * X + 0.5 * X**3  # by and by
     assert _nearest(bench, EVERYWHERE, [path(stiffens, bench)]) is None
+
+
+@pytest.mark.parametrize(("imposed", "softer"), [("force", 0.76), ("displacement", 1.32)])
+def test_the_stiffness_counts_by_what_was_stated_of_it(imposed: str, softer: float) -> None:
+    """Three standard deviations are 0.3 of it, whatever the response is."""
+    bench = a_straight(imposed)
+    assert bench.data.compliance_relative_sd.tolist() == [0.1]
+    assert _nearest(bench, EVERYWHERE, [path(softer * X, bench)]) is not None
+    assert _nearest(bench, EVERYWHERE, [path(X / softer, bench)]) is None
+
+
+def test_what_the_simulation_has_beside_its_springs_is_no_error_of_these() -> None:
+    bench = bent(a_straight(), 1.0, 0.1)
+    known = path(X, bench)  # a second spring, say
+    data = replace(bench, response=bench.response + known, observed=bench.observed + known)
+    nothing = KnownEffects(known, np.zeros((bench.layout.size, 0)), (), 0.0)
+    for case, off in ((data, True), (replace(data, known=nothing), False)):
+        line, cubic = columns(case)
+        curve = said((part(CURVE, [line, cubic], joint=0, joints=(0,)),), (1e-5,), -1.0)
+        assert (off_from_stated(small_engine_of(case), curve) is not None) == off
 
 
 def test_what_comes_late_is_met_between_what_comes_at_once_and_all() -> None:
@@ -96,7 +118,7 @@ def test_what_comes_late_is_met_between_what_comes_at_once_and_all() -> None:
     at_once, whole = path(0.6 * X, bench), path(1.6 * X, bench)
     assert _nearest(bench, EVERYWHERE, [whole]) == pytest.approx(1.6, rel=0.03)
     assert _nearest(bench, EVERYWHERE, [whole, at_once]) is None
-    assert _nearest(bench, EVERYWHERE, [whole, 0.9 * whole]) == pytest.approx(1.44, rel=0.03)
+    assert _nearest(bench, EVERYWHERE, [whole, 0.95 * whole]) == pytest.approx(1.52, rel=0.03)
 
 
 def bent(bench: Bench, spring: float, bend: float) -> Bench:
@@ -162,7 +184,7 @@ def test_who_speaks_for_fewer_effects_speaks_for_more_that_bring_no_more() -> No
 
 FLAWS = {
     "curved": 0.08 * X**3,
-    "rubs": held(X, 0.04) - X,
+    "rubs": 0.1 * (held(X, 0.05) - X),
 }
 
 
@@ -174,12 +196,12 @@ def test_a_spring_half_as_stiff_as_stated_is_named_beside_what_it_does_beside(na
     first = found.effects[0]
     assert first.name == found.verdict
     assert first.probability >= found.probabilities[found.verdict]
-    gains = {"force_scale", "displacement_scale", SPRINGS}
-    assert {first.name, *first.indistinguishable_from} >= gains
+    assert "displacement_scale" in {first.name, *first.indistinguishable_from}
+    assert {e.name for e in found.effects} - LINEAR == {CURVE if name == "curved" else FRICTION}
 
 
-@pytest.mark.parametrize("imposed", ["force", "displacement"])
-def test_friction_that_sticks_as_stated_is_friction(imposed: str) -> None:
-    force = X if imposed == "force" else 0.4 * X + 0.6 * (X - held(X, 0.12))
-    moved = X + 0.8 * held(X, 0.12) if imposed == "force" else X
+@pytest.mark.parametrize(("imposed", "radius"), [("force", 0.05), ("displacement", 0.12)])
+def test_friction_that_sticks_as_stated_is_friction(imposed: str, radius: float) -> None:
+    force = X if imposed == "force" else 0.4 * X + 0.6 * (X - held(X, radius))
+    moved = X + 2.0 * held(X, radius) if imposed == "force" else X
     assert explained(a_bench(force, moved, imposed).data).verdict == FRICTION

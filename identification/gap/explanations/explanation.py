@@ -121,7 +121,8 @@ class SearchResult:
     gap that no law explains, what share of its weight withheld data leave an explanation, and what
     a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
     that no word names, best first. speakers: words of an explanation -> the one that speaks for it:
-    fewer of its effects that foretell withheld data better, or a play in a curve's place. variants:
+    fewer of its effects that foretell withheld data better, a play in a curve's place, or springs
+    or gains that are off by more than it does. variants:
     all that were compared, those that were made on the way with them."""
 
     engine: Engine

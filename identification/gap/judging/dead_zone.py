@@ -53,7 +53,7 @@ def spoken_for(
     best, bench = ranked[0], engine.bench
     if not best.parts or best.parts[0].word not in FLANKS:
         return {}
-    load = bench.load[_where(bench, best)]
+    load = bench.load[where_it_sits(bench, best)]
     if bench.course.one_sided or len(_distinct(np.sort(load), load)[0]) < _FEWEST:
         return {}
     rest, word = best.words - FLANKS, best.parts[0].word
@@ -86,12 +86,12 @@ def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:
         if part.word not in FLANKS and not part.variant.is_loose:
             response = response - fitted.contribution(engine, i)[: bench.rows.n]
     response = response / bench.slope
-    mine = _where(bench, explanation)
+    mine = where_it_sits(bench, explanation)
     both = bench.load[mine], response[mine]
     return both if bench.imposed else both[::-1]
 
 
-def _where(bench: Bench, explanation: Explanation) -> Flags:
+def where_it_sits(bench: Bench, explanation: Explanation) -> Flags:
     """(n,) rows of the direction in which the largest effect sits."""
     joint = explanation.parts[0].variant.joint
     everywhere = np.ones(bench.rows.n, dtype=bool)

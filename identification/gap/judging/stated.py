@@ -29,13 +29,14 @@ from identification.gap.explanations.explanation import (
     up_to_likeliest,
 )
 from identification.gap.explanations.fit import Fit, fit
+from identification.gap.judging.dead_zone import where_it_sits
 from identification.gap.laws.specimens import without_springs
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
 from identification.gap.words import LATE, LINEAR, MECHANISMS
 from identification.turns import turning_points
 
-_PIECE = 0.04  # of the range of the load, or of what it does; a stiffness is read off two of them
+_PIECE = 0.02  # of the range of the load, or of what it does; a stiffness is read off two of them
 _TURNS = 0.02  # of the range of the load: what goes back by less is no turn
 _SDS = 3.0  # standard deviations of spring and gains together: so far they may be off
 _ALIKE = 1.5  # times: pieces that are about as steep
@@ -84,10 +85,10 @@ def _led(engine: Engine, explanation: Explanation) -> Explanation:
     found = None if e.parts[0].word in LINEAR else off_from_stated(engine, e)
     if found is None:
         return e
-    others = [s for p, s in zip(e.parts, e.sizes, strict=True) if p.word not in LINEAR]
-    share = found.rest / max(hypot(*others), 1e-300)
-    sizes = zip(e.parts, e.sizes, strict=True)
-    return e.sized(found.off if p.word in LINEAR else share * s for p, s in sizes)
+    does = {True: found.off, False: found.rest}  # by whether an effect is linear
+    sizes = [(p.word in LINEAR, s) for p, s in zip(e.parts, e.sizes, strict=True)]
+    each = {kind: max(hypot(*(s for k, s in sizes if k == kind)), 1e-300) for kind in does}
+    return e.sized(does[kind] * s / each[kind] for kind, s in sizes)
 
 
 def _beside(
@@ -96,7 +97,8 @@ def _beside(
     """The heir with the largest effect of the other explanation beside it, if that is better."""
     mine = other.parts[0].variant
     same = [v for v in variants if v.word == mine.word and v.joint == mine.joint and not v.has_line]
-    shapes = [without_springs(v) if v.other_springs else v for v in same]
+    stripped = (without_springs(v) if v.other_springs else v for v in same)
+    shapes = list({v.columns: v for v in stripped}.values())
     if not shapes or heir.eta <= engine.bench.noise.stated:
         return heir
     levels, energy = up_to_likeliest(engine, heir.parts)
@@ -112,12 +114,15 @@ def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
     """Of springs or gains that are off, where they do far more to the gap than all the rest."""
     bench, fitted = engine.bench, fit(engine, explanation)
     whole = bench.response - engine.target[: bench.rows.n] + fitted.response
+    if bench.known is not None:  # what the simulation has beside its springs
+        whole = whole - bench.known.does[: bench.rows.n]
     goes = MECHANISMS | LINEAR  # with the load, without a delay
     paths = [whole - _of_others(engine, fitted, goes)]
     if explanation.words & LATE:  # all that comes, and what comes at once
         paths.append(whole - _of_others(engine, fitted, goes - LATE))
-    mine, line = _where(bench, explanation), _line(bench)
-    factor = _nearest(bench, mine, paths)
+    joint, line = explanation.parts[0].variant.joint, _line(bench)
+    mine = where_it_sits(bench, explanation)
+    factor = _nearest(bench, mine, paths, joint)
     if factor is None:
         return None
     off, rest = (
@@ -139,24 +144,24 @@ def _of_others(engine: Engine, fitted: Fit, words: frozenset[str]) -> Array:
     return sum((fitted.contribution(engine, i)[:n] for i in others), np.zeros(n))
 
 
-def _where(bench: Bench, explanation: Explanation) -> Flags:
-    """(n,) rows of the direction in which the largest effect sits."""
-    joint = explanation.parts[0].variant.joint
-    everywhere = np.ones(bench.rows.n, dtype=bool)
-    return everywhere if joint is None else np.asarray(bench.lever[:, joint] != 0)
-
-
-def _nearest(bench: Bench, mine: Flags, paths: list[Array]) -> float | None:
+def _nearest(
+    bench: Bench, mine: Flags, paths: list[Array], joint: int | None = None
+) -> float | None:
     """The slope of responses (n,) over the simulated one that comes nearest to 1; None where what
-    was stated is met within its uncertainty, or nothing was passed."""
+    was stated is met within its uncertainty, or nothing was passed. joint: the direction that they
+    are of, None: all."""
     each = [_passed(bench, mine, path) for path in paths]
     if not each[0].size:
         return None
     common = [float(np.median(s)) for s in each if s.size]
     if min(common) < 0 < max(common):  # between what comes at once and all
         return None
-    meter, springs = bench.data.instruments, float(bench.data.compliance_relative_sd.max())
-    sd = hypot(springs, meter.force_gain, meter.displacement_gain)
+    meter, springs = bench.data.instruments, bench.data.compliance_relative_sd
+    sd = hypot(
+        float(springs.max() if joint is None else springs[joint]),
+        meter.force_gain,
+        meter.displacement_gain,
+    )
     near = float(min(np.concatenate(each), key=abs))
     stiffness = float(np.exp(near if bench.imposed else -near))
     return None if abs(stiffness - 1) < _SDS * sd else float(np.exp(near))
