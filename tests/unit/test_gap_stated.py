@@ -20,8 +20,10 @@ from identification.gap.judging.stated import (
 from identification.gap.model.bench import Bench, KnownEffects, make_bench
 from identification.gap.words import LINEAR
 from tests.explained import explained
+from tests.unit.small_explanations import OFF as LEFT
 from tests.unit.small_explanations import part, said, small_engine_of
 from tests.unit.test_gap_flanks import TOP, K, a_bench, held, to_and_fro
+from tests.unit.test_gap_operators import bench_data
 
 CURVE, FRICTION, SPRINGS = "joint_nonlinear_stiffness", "joint_hysteresis", "joint_stiffness_error"
 EVERYWHERE = np.ones(480, dtype=bool)
@@ -103,7 +105,7 @@ def test_the_stiffness_counts_by_what_was_stated_of_it(imposed: str, softer: flo
 
 
 def test_what_the_simulation_has_beside_its_springs_is_no_error_of_these() -> None:
-    bench = bent(a_straight(), 1.0, 0.1)
+    bench = bent(1.0, 0.1)
     known = path(X, bench)  # a second spring, say
     data = replace(bench, response=bench.response + known, observed=bench.observed + known)
     nothing = KnownEffects(known, np.zeros((bench.layout.size, 0)), (), 0.0)
@@ -121,7 +123,7 @@ def test_what_comes_late_is_met_between_what_comes_at_once_and_all() -> None:
     assert _nearest(bench, EVERYWHERE, [whole, 0.95 * whole]) == pytest.approx(1.52, rel=0.03)
 
 
-def bent(bench: Bench, spring: float, bend: float) -> Bench:
+def bent(spring: float, bend: float) -> Bench:
     """A spring so many times softer than stated, and what it bends, of the stated response."""
     return a_bench(X, spring * X + bend * X**3, "force")
 
@@ -134,11 +136,13 @@ def columns(bench: Bench) -> tuple[int, int]:
     )
 
 
-@pytest.mark.parametrize(("spring", "bend", "off"), [(2.0, 0.1, True), (2.0, 2.5, False)])
-def test_springs_lead_where_they_do_more_than_all_the_rest(
+@pytest.mark.parametrize(
+    ("spring", "bend", "off"), [(2.0, 0.1, True), (2.0, 0.8, False), (2.0, 2.5, False)]
+)
+def test_springs_lead_where_they_do_far_more_than_all_the_rest(
     spring: float, bend: float, off: bool
 ) -> None:
-    bench = bent(a_straight(), spring, bend)
+    bench = bent(spring, bend)
     line, cubic = columns(bench)
     engine = small_engine_of(bench)
     curve = said((part(CURVE, [line, cubic], joint=0, joints=(0,)),), (1e-5,), -1.0)
@@ -165,6 +169,69 @@ def test_springs_lead_where_they_do_more_than_all_the_rest(
         assert pair.sizes[0] > 5 * pair.sizes[1]
         assert found is not None
         assert found.off == pytest.approx(pair.sizes[0], rel=0.1)
+
+
+def test_the_mechanism_is_looked_for_beside_spring_and_gains_without_a_spring_of_its_own() -> None:
+    bench = bent(2.0, 0.1)
+    line, cubic = columns(bench)
+    at = {"joint": 0, "joints": (0,)}
+    curve = said((part(CURVE, [cubic, line], other_springs=True, **at),), (1e-5,), -1.0)
+    spring = said((part(SPRINGS, [line], **at),), (1e-4,), -1e5, LEFT)
+    gain = said((part("force_scale", [line]),), (1e-4,), -1e5 - 3, LEFT)
+    far = said((part("displacement_scale", [line]),), (1e-4,), -1e5 - 8, LEFT)
+    ranked = (curve, spring, gain, far)
+    shapes = tuple(p.variant for e in ranked for p in e.parts)
+    result = SearchResult(small_engine_of(bench), ranked, {}, {}, -np.inf, 0.0, variants=shapes)
+    led = {e.words: e for e in led_by_springs(result, ranked).explanations}
+    for word in (SPRINGS, "force_scale"):
+        both = led[frozenset({word, CURVE})]
+        assert [p.word for p in both.parts] == [word, CURVE]
+        assert both.parts[1].variant.columns == (cubic,)
+    assert frozenset({"displacement_scale", CURVE}) not in led
+
+
+@pytest.mark.parametrize(("word", "off"), [(CURVE, True), ("joint_creep", False)])
+def test_what_creeps_is_as_stiff_as_stated_at_once(word: str, off: bool) -> None:
+    bench = bent(1.6, 0.0)
+    law = said((part(word, [columns(bench)[0]], joint=0, joints=(0,)),), (1e-5,))
+    assert (off_from_stated(small_engine_of(bench), law) is not None) == off
+
+
+def two_ways(sds: tuple[float, float]) -> Bench:
+    """A spring in x that is twice as soft as stated, and one in y that is as stated."""
+    half = X[::2]
+    one = bench_data(half, half).setups[0]
+    flat = {"tangent_lever": np.zeros((2, 2)), "offset_lever": np.zeros((2, 3))}
+    flat |= {"turned_lever": np.zeros((2, 2)), "gravity": np.zeros(2)}
+    x, y = (replace(one, direction="xy"[k], lever=np.eye(2)[k], **flat) for k in range(2))
+    run = np.repeat([0, 1], len(half))
+    data = bench_data(
+        TOP * np.tile(half, 2),
+        TOP / K * np.concatenate([2.0 * half, half]),
+        step=np.full(2 * len(half), -1),
+        branch=np.full(2 * len(half), 3),
+        run=run,
+        setup=run,
+        setups=(x, y),
+        compliance=np.full(2, 1 / K),
+        compliance_relative_sd=np.array(sds),
+    )
+    return make_bench(data)
+
+
+@pytest.mark.parametrize(
+    ("joint", "sds", "off"),
+    [(0, (0.1, 0.1), True), (0, (0.1, 0.9), True), (0, (0.9, 0.1), False), (1, (0.1, 0.1), False)],
+)
+def test_every_direction_is_met_or_off_by_itself(
+    joint: int, sds: tuple[float, float], off: bool
+) -> None:
+    bench = two_ways(sds)
+    line = bench.add_joint(joint, bench.elastic[:, joint])
+    spring = bench.add_joint(0, bench.elastic[:, 0])
+    parts = part(CURVE, [line], joint=joint, joints=(joint,)), part(SPRINGS, [spring])
+    law = said(parts, (1e-5, 1e-6))
+    assert (off_from_stated(small_engine_of(bench), law) is not None) == off
 
 
 def test_who_speaks_for_fewer_effects_speaks_for_more_that_bring_no_more() -> None:

@@ -188,7 +188,7 @@ def _effects(
 
 def _said(found: SearchResult, explanation: Explanation) -> frozenset[str]:
     """What speaks for it says that is there."""
-    speaker = found.speakers.get(explanation.words)
+    speaker = found.speaker_for(explanation)
     return frozenset() if speaker is None else speaker.words
 
 

@@ -122,8 +122,8 @@ class SearchResult:
     a gap that no law explains looks like, if like anything. nameless: explanations with a trouble
     that no word names, best first. speakers: words of an explanation -> the one that speaks for it:
     fewer of its effects that foretell withheld data better, a play in a curve's place, or springs
-    or gains that are off by more than it does. variants:
-    all that were compared, those that were made on the way with them."""
+    or gains that are off by more than it does. variants: all that were compared, those that were
+    made on the way with them."""
 
     engine: Engine
     explanations: tuple[Explanation, ...]
@@ -136,6 +136,10 @@ class SearchResult:
     nameless: tuple[Explanation, ...] = ()
     speakers: Mapping[frozenset[str], Explanation] = field(default_factory=dict)
     variants: tuple[Variant, ...] = ()
+
+    def speaker_for(self, explanation: Explanation | None) -> Explanation | None:
+        """Who speaks for an explanation, if anybody does."""
+        return None if explanation is None else self.speakers.get(explanation.words)
 
 
 def explain(

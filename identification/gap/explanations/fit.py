@@ -48,6 +48,11 @@ class Fit:
         start = sum(len(p.variant.columns) for p in self.parts[:index])
         return slice(start, start + len(self.parts[index].variant.columns))
 
+    def whole(self, engine: Engine) -> Array:
+        """(n,) m: the response that simulation, base and effects give together."""
+        bench = engine.bench
+        return np.asarray(bench.response - engine.target[: bench.rows.n] + self.response)
+
     def contribution(self, engine: Engine, index: int) -> Array:
         """(size,) stacked contribution of one part."""
         w, _ = self.of(index)

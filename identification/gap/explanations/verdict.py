@@ -67,7 +67,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
         fewer = _simpler(e, ranked, kept, arm)
-        said = _speaker(found, e) or _speaker(found, fewer) or fewer or e
+        said = found.speaker_for(e) or found.speaker_for(fewer) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
         three = arm and _tells_of_three(said, ranked)
         many = (THREE_CLOSELY if closely else THREE) if three else 1.0
@@ -89,11 +89,6 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
     if arm and best is not None:
         probabilities = with_a_lead(probabilities, _main(best, ranked, arm))
     return replace(found, probabilities=probabilities, kept=kept)
-
-
-def _speaker(found: SearchResult, explanation: Explanation | None) -> Explanation | None:
-    """Who speaks for it, if anybody does."""
-    return None if explanation is None else found.speakers.get(explanation.words)
 
 
 # Of 307 verdicts `unknown` above 0.9 on arms 280 were right, on test sets of others 97 of 115; of

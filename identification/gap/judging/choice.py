@@ -80,7 +80,7 @@ def _too_small(explanation: Explanation) -> list[str]:
 
 def _needless(found: SearchResult, explanation: Explanation) -> bool:
     """Whether another explanation speaks for it; for what drifts, which nothing foretells, none."""
-    simpler = found.speakers.get(explanation.words)
+    simpler = found.speaker_for(explanation)
     return simpler is not None and not (explanation.words - simpler.words) & BETWEEN_RUNS
 
 

@@ -173,8 +173,7 @@ def noise_of(bench: Bench) -> float:
 
 def left_of(engine: Engine, fitted: Fit) -> float:
     """rms (m) over samples that a fit leaves."""
-    bench = engine.bench
-    return sample_rms(bench, bench.response - engine.target[: bench.rows.n] + fitted.response)
+    return sample_rms(engine.bench, fitted.whole(engine))
 
 
 def sample_rms(bench: Bench, predicted: Array) -> float:

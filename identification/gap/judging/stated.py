@@ -43,8 +43,6 @@ _ALIKE = 1.5  # times: pieces that are about as steep
 # Times all the rest: a metal that flows over most of its way is far from any line, whatever was
 # stated of its spring, and what the rest takes back of the line is none of its error.
 _LEADS = 3.0
-
-
 _AS_GOOD = 5.0  # nats: spring and gains differ in what was stated of them alone
 
 
@@ -113,7 +111,7 @@ def _beside(
 def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
     """Of springs or gains that are off, where they do far more to the gap than all the rest."""
     bench, fitted = engine.bench, fit(engine, explanation)
-    whole = bench.response - engine.target[: bench.rows.n] + fitted.response
+    whole = fitted.whole(engine)
     if bench.known is not None:  # what the simulation has beside its springs
         whole = whole - bench.known.does[: bench.rows.n]
     goes = MECHANISMS | LINEAR  # with the load, without a delay

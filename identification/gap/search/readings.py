@@ -28,7 +28,7 @@ def reading_all(engine: Engine, explanation: Explanation) -> list[Variant]:
     if not bench.data.arm or bench.imposed or not mine or len(explanation.parts) == len(mine):
         return []
     fitted = fit(engine, explanation)
-    shown = bench.response - engine.target[:n] + fitted.response
+    shown = fitted.whole(engine)
     out = []
     for i in mine:
         found = explanation.parts[i].variant
