@@ -20,6 +20,7 @@ from identification.gap.judging.choice import chosen_of
 from identification.gap.judging.earned import _foretold, earned
 from identification.gap.judging.heldout import (
     ALWAYS_IN,
+    GROUPS,
     HeldOut,
     _stacked_keep,
     folds,
@@ -43,10 +44,10 @@ BUMP = 2e-5  # m
 
 
 def engine(extra: Array, datum: str = "setup", zeros: bool = True) -> Engine:
-    """Steps up from zero load, three times; extra (repetitions,): size of a bump in each, m."""
+    """Steps up from zero load, over and over; extra (repetitions,): size of a bump in each, m."""
     rng = np.random.default_rng(8)
-    step = np.tile(np.repeat(np.arange(STEPS), SAMPLES), REPETITIONS)
-    run = np.repeat(np.arange(REPETITIONS), STEPS * SAMPLES)
+    step = np.tile(np.repeat(np.arange(STEPS), SAMPLES), len(extra))
+    run = np.repeat(np.arange(len(extra)), STEPS * SAMPLES)
     force = 20.0 * step
     shape = np.exp(-(((force - 80) / 25) ** 2))
     u = 1e-5 * force + extra[run] * shape + rng.normal(0, 5e-7, len(step))
@@ -56,7 +57,7 @@ def engine(extra: Array, datum: str = "setup", zeros: bool = True) -> Engine:
     target = bench.observed - prediction(bench)
     mine = [
         (bench.rows.repetition == r + 1) * np.exp(-(((bench.load - 80) / 25) ** 2))
-        for r in range(REPETITIONS)
+        for r in range(len(extra))
     ]
     bench.add(bench.stacked(np.sum(mine, axis=0)))
     for m in mine:
@@ -81,6 +82,16 @@ def test_the_first_repetition_is_never_withheld() -> None:
     fold = folds(e)["repetition"]
     assert set(fold[e.bench.rows.repetition == 1]) == {ALWAYS_IN}
     assert len(set(fold[e.bench.rows.repetition > 1])) == REPETITIONS - 1
+
+
+@pytest.mark.parametrize("each", [1, 3])
+def test_many_repetitions_are_withheld_in_groups_from_all_over(each: int) -> None:
+    e = engine(np.full(1 + each * GROUPS, BUMP))
+    fold, repetition = folds(e)["repetition"], e.bench.rows.repetition
+    groups = [set(repetition[fold == f]) for f in np.unique(fold[fold != ALWAYS_IN])]
+    assert [len(g) for g in groups] == [each] * GROUPS
+    assert set().union(*groups) == set(range(2, 2 + each * GROUPS))
+    assert all(np.ptp(list(g)) >= (each - 1) * GROUPS for g in groups)
 
 
 def test_what_repeats_is_foreseen_and_what_is_fitted_run_by_run_is_not() -> None:

@@ -305,6 +305,20 @@ def test_strokes_slide_however_finely_they_are_read_in_noise() -> None:
     assert _slides(Channel(time, rubs, 0.001), Channel(time, noisy, 0.02))
 
 
+def test_what_rings_under_a_force_that_stands_does_not_slide() -> None:
+    """A target on a soft post, after every step of a weight."""
+    t = np.arange(1600) * 0.05
+    step = (t // 10).astype(int)
+    force = np.array([0.0, 1.0, 2.0, 1.0, 3.0, 0.0, 2.0, 1.0])[step]
+    jump = np.diff(np.array([0.0, 0.0, 1.0, 2.0, 1.0, 3.0, 0.0, 2.0, 1.0]))[step]
+    since = t % 10
+    moved = force - jump * np.exp(-since / 8) * np.cos(2 * np.pi * 0.9 * since)
+    assert not _slides(Channel(t, force / 3, 1e-3), Channel(t, moved / np.ptp(moved), 1e-3))
+    data = bench_data(100 * force, 1e-3 * moved, time=t, session=t, step=np.full(1600, -1))
+    known = replace(data.instruments, force=0.1, displacement=1e-6)
+    assert not displacement_simpler(replace(data, instruments=known))
+
+
 @pytest.mark.slow
 def test_an_arm_that_is_read_at_rest_answers_the_force_that_was_read() -> None:
     """Whatever its screw holds: the displacement is linear in what the springs give way."""

@@ -1,13 +1,13 @@
 """Withheld data: parameters fitted without a fold, judged on the fold.
 
-Folds are whole repetitions, directions or poses; of a single run, blocks of time. The first
-repetition of a setup is never withheld: where something slipped or yielded in it for good, the
-later ones do not show what happened, and the datum is set in it. The zero-load rows of a withheld
-run stay in: they carry its datum (of the laser, and of a drift), which no model can know; as do the
-forces that it was pushed across with. The datum of a withheld direction, of a laser that is zeroed
-before each run, or of a run that was never read without load is taken from its own mean: what is
-left after is less that, as no model knows it. Before is the simulation as given. Holds that
-tell themselves that the load went beyond them before (`search.unseen`) are not judged.
+Folds are whole repetitions (many of them in groups), directions or poses; of a single run, blocks
+of time. The first repetition of a setup is never withheld: where something slipped or yielded in it
+for good, the later ones do not show what happened, and the datum is set in it. The zero-load rows
+of a withheld run stay in: they carry its datum (of the laser, and of a drift), which no model can
+know; as do the forces that it was pushed across with. The datum of a withheld direction, of a laser
+that is zeroed before each run, or of a run that was never read without load is taken from its own
+mean: what is left after is less that, as no model knows it. Before is the simulation as given.
+Holds that tell themselves that the load went beyond them before (`search.unseen`) are not judged.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from identification.gap.model.variants import block
 from identification.uncertainty import coverage_factor
 
 BLOCKS = 5
+GROUPS = 10  # of repetitions at most: more are as many fits, for hardly more to fit on
 ALWAYS_IN = -1  # number of the fold of rows that are never withheld
 
 
@@ -69,10 +70,11 @@ def folds(engine: Engine) -> dict[str, Ints]:
 
 
 def _later(setup: Ints, repetition: Ints) -> Ints:
-    """Number of the repetition of every row, ALWAYS_IN for the first of its setup."""
+    """Number of the fold of every row, ALWAYS_IN for the first repetition of its setup: repetitions
+    one by one, or many of them in groups, each from all over the measurement."""
     first = np.array([repetition[setup == s].min() for s in range(int(setup.max()) + 1)])
     number = np.unique(repetition, return_inverse=True)[1].astype(np.int64)
-    return np.where(repetition == first[setup], ALWAYS_IN, number)
+    return np.where(repetition == first[setup], ALWAYS_IN, number % GROUPS)
 
 
 def held_out(

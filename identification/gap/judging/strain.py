@@ -18,13 +18,14 @@ from identification.gap.evidence.engine import LEVER_M, Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import REMAINDER
 from identification.gap.explanations.fit import Fit
-from identification.gap.words import MECHANISMS, SPRINGS
+from identification.gap.words import FRICTION, IN_JOINTS, MECHANISMS, SPRINGS
 
 # Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and
 # two beyond 5.5; of 16 stand-ins that were strained at all 13 beyond 6, the others between 5 and 6.
 LIMIT = 5.5
 # Of one step of a path among a dozen: of 60 paths of air that wanders the largest was at 3.5.
 JUMP = 4.2
+_RESTS = FRICTION & IN_JOINTS | {"joint_backlash"}  # without load elsewhere than where it was
 
 
 def strain(engine: Engine, fitted: Fit, eta: float) -> float:
@@ -70,9 +71,10 @@ def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
 
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     """(b,) Springs that are said to be off may be off, and so may that of a joint whose mechanism
-    brings its own mean stiffness; a joint with play rests anywhere in it, and is sent to where its
-    reading should be; a force that drifts has done so since it was tared; tares, and offsets of the
-    joint readings, count as far as they move a share of the gap that an explanation may not leave.
+    brings its own mean stiffness; a joint with play rests anywhere in it, one that yielded or rubs
+    where it was left, and is sent to where its reading should be; a force that drifts has done so
+    since it was tared; tares, and offsets of the joint readings, count as far as they move a share
+    of the gap that an explanation may not leave.
     """
     base, n, weight = engine.base, engine.bench.rows.n, engine.bench.rows.weight
     columns = base.columns[:n]
@@ -85,9 +87,9 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     own = {j for p in fitted.parts if p.word in MECHANISMS for j in p.variant.joints}
     for j in range(engine.bench.data.joints) if said else own:
         pulls[base.index(f"spring{j + 1}")] = 0.0
-    played = {j for p in fitted.parts if p.word == "joint_backlash" for j in p.variant.joints}
+    rests = {j for p in fitted.parts if p.word in _RESTS for j in p.variant.joints}
     for i in base.index("offset"):
-        if int(base.names[i].split()[-1]) - 1 in played:
+        if int(base.names[i].split()[-1]) - 1 in rests:
             pulls[i] = 0.0
     if any(p.word == "force_drift" for p in fitted.parts):
         pulls[base.index("tare")] = 0.0
