@@ -18,11 +18,13 @@ from identification.gap.judging.dead_zone import (
     PLAINLY,
     PLAY,
     SOMEHOW,
+    _curve,
     has_dead_zone,
     spoken_for,
 )
-from identification.gap.model.bench import Bench
+from identification.gap.model.bench import Bench, KnownEffects
 from tests.explained import explained
+from tests.unit.small_explanations import part, said, small_engine_of
 from tests.unit.test_gap_flanks import N, a_bench, held, to_and_fro
 
 U = np.linspace(-1.0, 1.0, 600)
@@ -157,6 +159,17 @@ def test_a_play_that_friction_holds_is_no_curve_however_soft_its_mean_looks() ->
     inside = np.clip(held(force, 0.05) / 0.02, -0.2, 0.2)
     found = explained(a_bench(force, force + inside, "force").data)
     assert found.verdict == PLAY
+
+
+def test_a_play_that_the_simulation_has_is_none_of_a_curve() -> None:
+    u = to_and_fro()
+    bench = a_bench(gap(0.3)(u), u, "displacement")
+    play = bench.stated_slope * bench.load - bench.response
+    straight = replace(bench, response=bench.response + play, observed=bench.observed + play)
+    known = KnownEffects(-play, np.zeros((bench.layout.size, 0)), (), 0.0)
+    for case, is_play in ((straight, False), (bench, True), (replace(bench, known=known), False)):
+        curve = said((part(CURVE, [case.add(case.stacked(play))]),), (0.0,))
+        assert has_dead_zone(*_curve(small_engine_of(case), curve), SOMEHOW) is is_play
 
 
 def bolted() -> Bench:

@@ -28,7 +28,7 @@ def located(bench: Bench, gap: Array, word: str = "") -> Where:
 
 def balanced(bench: Bench, values: Array) -> Array:
     """Values (n,) without the mean of their setup."""
-    return bench.rows.about_means(values[:, None])[:, 0]
+    return bench.rows.about_means(values)
 
 
 def in_y(bench: Bench) -> Array:

@@ -41,7 +41,7 @@ def knowing(bench: Bench, forms: Sequence[Form]) -> Bench:
     free = np.hstack([SIZE_SD * does, later])
     names = tuple(f"known {what} {f.word}" for what in ("size", "load") for f in forms)
     rows, noise, total = bench.rows, bench.noise, does.sum(axis=1)
-    left = LAW_REMAINDER * rows.rms(rows.about_means(total[: rows.n, None])[:, 0])
+    left = LAW_REMAINDER * rows.rms_about_means(total[: rows.n])
     return replace(
         bench,
         known=KnownEffects(total, free, names, left),

@@ -42,7 +42,7 @@ def locate(engine: Engine, verdict: str, fit: Fit, sizes: Sequence[float], gap: 
     bench, n = engine.bench, engine.bench.rows.n
     same = [i for i, p in enumerate(fit.parts) if p.word == verdict]
     main = sum((fit.contribution(engine, i)[:n] for i in same), np.zeros(n)) if same else gap
-    moved = bench.rows.about_means(main[:, None])[:, 0]
+    moved = bench.rows.about_means(main)
     if same and verdict not in LINEAR:
         moved = _beyond_springs(engine, moved)
     per_setup = _size_per_setup(engine, moved)
@@ -79,7 +79,7 @@ def _seen(engine: Engine, word: str) -> bool | None:
 def _beyond_springs(engine: Engine, moved: Array) -> Array:
     """What an effect moves (n,) less what the springs would take over per setup."""
     out, bench = moved.copy(), engine.bench
-    load = bench.rows.about_means(bench.load[:, None])[:, 0]
+    load = bench.rows.about_means(bench.load)
     for s in range(len(bench.data.setups)):
         mine = bench.rows.setup == s
         weight, x = bench.rows.weight[mine], load[mine]

@@ -361,4 +361,4 @@ def structural_rms(bench: Bench, base: Base, target: Array) -> float:
 def _variance(bench: Bench) -> float:
     """Mean square (m^2) of the response about its mean per setup: a law that does more, as what
     yields far beyond its threshold on an imposed path, is no further off for that."""
-    return bench.rows.rms(bench.rows.about_means(bench.response[:, None])[:, 0]) ** 2
+    return bench.rows.rms_about_means(bench.response) ** 2

@@ -65,7 +65,7 @@ def part_sizes(engine: Engine, parts: tuple[Part, ...], level: int) -> Sizes:
     for p in parts:
         c, k = list(p.variant.columns), len(p.variant.columns)
         part = w[start : start + k]
-        moved = rows.about_means((engine.responses(c) @ part)[:, None])[:, 0]
+        moved = rows.about_means(engine.responses(c) @ part)
         moves.append(rows.rms(moved))
         if p.word in LINEAR:
             linear += moved

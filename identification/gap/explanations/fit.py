@@ -53,6 +53,11 @@ class Fit:
         bench = engine.bench
         return np.asarray(bench.response - engine.target[: bench.rows.n] + self.response)
 
+    def unknown(self, engine: Engine) -> Array:
+        """(n,) m: the same without the effects that the simulation has beside its springs."""
+        bench, whole = engine.bench, self.whole(engine)
+        return whole if bench.known is None else whole - bench.known.does[: bench.rows.n]
+
     def contribution(self, engine: Engine, index: int) -> Array:
         """(size,) stacked contribution of one part."""
         w, _ = self.of(index)
@@ -113,7 +118,7 @@ def _imperfection_columns(engine: Engine, parts: tuple[Part, ...], w: Array, eta
         engine.cache["imperfection"] = np.column_stack([levels, runs, *begin])
     rows = engine.bench.rows
     columns = engine.columns(c for p in parts for c in p.variant.columns)
-    moved = rows.about_means((columns[: rows.n] @ w)[:, None])[:, 0]
+    moved = rows.about_means(columns[: rows.n] @ w)
     size = rows.rms(moved)
     own = [engine.bench.stacked(moved * m / size) for m in _phases(engine) if size > 0]
     return eta * np.column_stack([engine.cache["imperfection"], *own])

@@ -141,8 +141,8 @@ def within_stated(engine: Engine, parts: tuple[Part, ...], found: Sizes) -> floa
 def _rms_of_line(engine: Engine, part: Part) -> float:
     """rms (m) by which a gain of one, or a spring twice as soft, moves."""
     rows = engine.bench.rows
-    line = engine.columns(part.variant.columns)[: rows.n, :1]
-    return max(rows.rms(rows.about_means(line)[:, 0]), 1e-300)
+    line = engine.columns(part.variant.columns)[: rows.n, 0]
+    return max(rows.rms_about_means(line), 1e-300)
 
 
 _WITHIN, _SPRING_WITHIN = 3.0, 1.5  # standard deviations

@@ -159,8 +159,7 @@ def _moved(engine: Engine, fitted: Fit) -> float:
     n = engine.bench.rows.n
     bent = [i for i, p in enumerate(fitted.parts) if p.word not in LINEAR]
     moved = sum((fitted.contribution(engine, i)[:n] for i in bent), np.zeros(n))
-    rows = engine.bench.rows
-    return max(engine.structural, rows.rms(rows.about_means(moved[:, None])[:, 0]))
+    return max(engine.structural, engine.bench.rows.rms_about_means(moved))
 
 
 def noise_of(bench: Bench) -> float:

@@ -111,9 +111,7 @@ def _beside(
 def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
     """Of springs or gains that are off, where they do far more to the gap than all the rest."""
     bench, fitted = engine.bench, fit(engine, explanation)
-    whole = fitted.whole(engine)
-    if bench.known is not None:  # what the simulation has beside its springs
-        whole = whole - bench.known.does[: bench.rows.n]
+    whole = fitted.unknown(engine)
     goes = MECHANISMS | LINEAR  # with the load, without a delay
     paths = [whole - _of_others(engine, fitted, goes)]
     if explanation.words & LATE:  # all that comes, and what comes at once
@@ -124,8 +122,7 @@ def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
     if factor is None:
         return None
     off, rest = (
-        bench.rows.rms(bench.rows.about_means((v * mine)[:, None])[:, 0])
-        for v in ((factor - 1) * line, whole - factor * line)
+        bench.rows.rms_about_means(v * mine) for v in ((factor - 1) * line, whole - factor * line)
     )
     return Springs(off, rest) if off > _LEADS * rest else None
 

@@ -114,8 +114,7 @@ def _of_heat(engine: Engine, fitted: Fit) -> Array:
 def _of_the_gap(engine: Engine, contribution: Array) -> float:
     """1 for what moves at least a share of the gap that an explanation may not leave, less below:
     what a slip leaves, a little heat beside it may mop up."""
-    rows = engine.bench.rows
-    size = rows.rms(rows.about_means(contribution[: rows.n, None])[:, 0])
+    size = engine.bench.rows.rms_about_means(contribution[: engine.bench.rows.n])
     return min(size / max(REMAINDER * engine.structural, 1e-300), 1.0) ** 2
 
 

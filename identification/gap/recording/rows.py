@@ -134,9 +134,13 @@ class Rows:
         return np.where(np.isfinite(out), out, 0.0)  # no power of what is below zero
 
     def about_means(self, values: Array) -> Array:
-        """Values (n, k) less their mean per setup: the datum says nothing."""
+        """Values (n,) or (n, k) less their mean per setup: the datum says nothing."""
         means = values.T @ self._share_of_setup
-        return np.asarray(values - means[:, self.setup].T)
+        return np.asarray(values - means[..., self.setup].T)
+
+    def rms_about_means(self, values: Array) -> float:
+        """rms of values (n,) about their mean per setup."""
+        return self.rms(self.about_means(values))
 
     def hold_means(self, values: Array) -> Array:
         """(holds, ...) means of values (n, ...) over every hold, each sample counted."""
