@@ -126,3 +126,15 @@ def test_of_creep_and_friction_in_an_imposed_stroke_the_needed_one_is_larger(
     found = _ranking_sizes(engine, parts, sizes, 0)
     assert found.argmax() == larger
     assert sorted(found) == sorted(sizes.gap)
+
+
+@pytest.mark.parametrize("late", ["joint_creep", "time_lag"])
+def test_in_loops_at_one_rate_what_rubs_is_larger_than_what_comes_late(
+    monkeypatch: pytest.MonkeyPatch, late: str
+) -> None:
+    engine = small_engine_of(small_bench())
+    parts = part(late, [0]), part("joint_hysteresis", [1])
+    sizes = Sizes(np.array([5e-7, 1e-7]), np.array([8e-6, 8e-6]), 0.0)
+    for one_rate, larger in ((True, 1), (False, 0)):
+        monkeypatch.setattr(Course, "one_rate", one_rate)
+        assert _ranking_sizes(engine, parts, sizes, 0).argmax() == larger

@@ -36,7 +36,7 @@ from identification.gap.explanations.penalties import (
 from identification.gap.explanations.priors import prior_of
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
-from identification.gap.words import CURVES, DRIFTS, FRICTION, LINEAR, YIELD
+from identification.gap.words import CURVES, DRIFTS, FRICTION, LATE, LINEAR, YIELD
 
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain. Laws of other people's rigs are
@@ -220,7 +220,8 @@ def _leading_of_two(engine: Engine, parts: tuple[Part, ...], level: int) -> int 
 
     - Beside a curve the friction, where most of the way is left when the load is gone: no curve
       keeps anything.
-    - Beside creep at one rate the friction: creep then differs from it in details only.
+    - Beside creep or a lag at one rate the friction: what comes late then differs from it in
+      details only.
     - Beside a drift the friction or yield, where the driven load goes to and fro about a mean and
       the drift is the way of that: what yields ratchets so (Armstrong and Frederick 1966).
     - Beside creep under an imposed stroke the one that the other can do less without: both bring a
@@ -235,9 +236,10 @@ def _leading_of_two(engine: Engine, parts: tuple[Part, ...], level: int) -> int 
         return gives
     if rubs is None:
         return None
-    curves, creeps = any(w in CURVES for w in words), "joint_creep" in words
-    if (curves and bench.course.stays > _STAYS) or (creeps and bench.course.one_rate):
+    curves, late = any(w in CURVES for w in words), bool(LATE & frozenset(words))
+    if (curves and bench.course.stays > _STAYS) or (late and bench.course.one_rate):
         return rubs
+    creeps = "joint_creep" in words
     return int(needed(engine, parts, level).argmax()) if creeps and bench.imposed else None
 
 
