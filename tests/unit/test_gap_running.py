@@ -489,6 +489,23 @@ def test_a_stroke_that_runs_on_while_the_force_stands_is_no_hold(
     assert not make_bench(running(force, 10 * force / SPRING + slow)).course.always_moves
 
 
+@pytest.mark.parametrize(
+    ("load", "holds"), [("later", False), ("at once", True), ("at once, and gone", True)]
+)
+def test_before_the_load_comes_nothing_is_held(load: str, holds: bool) -> None:
+    """Grips that are slack pull with next to nothing; what was loaded before creeps back."""
+    t = np.arange(240.0)
+    slack, pull = 1 + 0.005 * t, np.clip((t - 80) / 160, 0, 1)
+    force = {
+        "later": slack + 50 * pull,
+        "at once": 50 + 50 * pull,
+        "at once, and gone": 50 * np.clip(1 - t / 60, 0, 1) + 0.1,
+    }[load]
+    bench = make_bench(running(force, force / SPRING, imposed="force"))
+    assert bench.course.always_moves != holds
+    assert bool(words_with(bench, "joint_creep")) == holds
+
+
 def test_a_long_table_of_numbered_readings_runs() -> None:
     """Sixty levels and more, each read once, are no levels; fewer are a table of them, and what is
     read several times rests, or is met again on the way back."""

@@ -38,6 +38,7 @@ _ENCLOSES, _AGAIN = 0.05, 0.1  # of its box, by a loop; of that, by the next one
 _MET_AGAIN = 0.2  # of the smaller one's range of load
 _RUNS_ON = 2.0  # times its mean speed: faster than anything creeps at rest
 _STANDS = 0.1  # of the mean speed, and of the time
+_BEGUN = 0.1  # of the largest load: before anything comes near it nothing is held
 _HELD, _MANY_A_LEVEL = 2, 8  # samples
 _FEW_LEVELS, _MANY_LEVELS, _BACK = 5, 40, 2.0  # readings; standard uncertainties
 _SCATTERS = 1.0  # squares of differences over squares: of what scatters it is 2 (von Neumann 1941)
@@ -252,19 +253,23 @@ class Course:
 
     @cached_property
     def _moving_share(self) -> float:
-        """Share of the session in which the load moves, by means of even pieces of it: noise of the
-        driven channel moves as well."""
+        """Share of the session in which the load moves, or is still to come, by means of even
+        pieces of it: noise of the driven channel moves as well."""
         t = (self.rows.session - self.rows.session.min()) / self.session_span
         count = int(np.clip(self.rows.n // 4, 8, max(40, 10 * self.passes)))
         at = np.minimum((t * count).astype(np.int64), count - 1)
         rows = np.bincount(at, minlength=count)
         held, first = np.unique(at, return_index=True)
 
-        def speed(values: Array) -> Array:
-            mean = np.bincount(at, weights=values, minlength=count)[held] / rows[held]
-            return np.asarray(np.diff(mean) / np.diff(held) * count / (np.ptp(values) or 1.0))
+        def mean(values: Array) -> Array:
+            return np.asarray(np.bincount(at, weights=values, minlength=count)[held] / rows[held])
 
-        slow = np.abs(speed(self.load)) < _STANDS
+        def speed(values: Array) -> Array:
+            change = np.diff(mean(values)) / np.diff(held)
+            return np.asarray(change * count / (np.ptp(values) or 1.0))
+
+        begun = np.maximum.accumulate(np.abs(mean(self.load))) > _BEGUN * np.abs(self.load).max()
+        slow = (np.abs(speed(self.load)) < _STANDS) & begun[1:]
         if self.imposed:  # a force that grows is no hold, wherever the displacement was read
             slow &= speed(np.abs(self.rows.measured_force)) < _STANDS
         elif self.data.imposed != "force":  # a stroke that runs on while the force stands
