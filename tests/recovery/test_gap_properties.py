@@ -141,6 +141,17 @@ def test_unit_of_time_does_not_matter(law: str, unit: float) -> None:
         assert time.value == pytest.approx(first.value * unit, rel=0.3)
 
 
+@pytest.mark.parametrize("law", ["seating", "creep"])
+@pytest.mark.parametrize("unit", [60.0, 1 / 60])
+def test_unit_of_time_does_not_matter_where_levels_were_read_once(law: str, unit: float) -> None:
+    rows = table(arm=False, law=law)
+    once = rows[rows["step"].diff().shift(-1) != 0]
+    data = data_of(once, meta(BENCH))
+    assert data.session is not None
+    other = replace(data, time=data.time * unit, session=data.session * unit)
+    alike(explained(other), explained(data), within=0.01)
+
+
 def test_units_of_force_and_displacement_do_not_matter() -> None:
     data, a, b = bench_data(), 64.0, 1 / 1024
     meter = replace(

@@ -27,7 +27,7 @@ from identification.gap.laws.effect import Effect
 from identification.gap.laws.interval import Coefficients, Parameter, factors
 from identification.gap.laws.law import ANEW, Law, Laws, Term
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import retarded, row_time
+from identification.gap.model.history import retarded
 from identification.gap.model.variants import SET_UP_ANEW, Variant, smooth_root, variant
 
 WORD = "joint_creep"
@@ -42,7 +42,7 @@ def times(bench: Bench) -> np.ndarray:
     which no more than a thousand samples tell; of an arm one more that flows. Of a recording that
     runs on, or of a rig without an arm, to three times its length: a viscous flow looks like a line
     then."""
-    step = row_time(bench.rows) or 1.0
+    step = bench.rows.row_time or 1.0
     longest = min(bench.course.session_span / 3, _LONGEST * max(step, 1.0))
     if not (bench.data.arm or bench.rows.continuous):
         step = 2 * bench.rows.half_sample  # of rows there are the fewer, the longer it stood
@@ -60,7 +60,7 @@ def in_a_run(bench: Bench, times_s: Array) -> Array:
     """(k,) in how many units of its coefficient an element of a time (k,) s ends: what flows counts
     by what it does under a load that stands for one run, however many runs there are."""
     flows = times_s >= VISCOUS * bench.course.session_span
-    return np.where(flows, times_s / max(run_seconds(bench), row_time(bench.rows), 1e-6), 1.0)
+    return np.where(flows, times_s / max(run_seconds(bench), bench.rows.row_time, 1e-6), 1.0)
 
 
 def scales(bench: Bench) -> tuple[float, ...]:

@@ -222,13 +222,7 @@ def standing_on(rows: Rows) -> Array:
 
 def sampling_time(rows: Rows) -> float:
     """Time between two samples of a hold; of a running recording, between most of its rows, s."""
-    return (row_time(rows) or 1.0) if rows.continuous else 2 * rows.half_sample
-
-
-def row_time(rows: Rows) -> float:
-    """Time between most neighbouring rows, s; 0 where no time goes by."""
-    step: Array = np.diff(rows.time)
-    return float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+    return (rows.row_time or 1.0) if rows.continuous else 2 * rows.half_sample
 
 
 def delayed(values: Array, delay: float, rows: Rows) -> Array:

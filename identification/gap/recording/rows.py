@@ -99,10 +99,18 @@ class Rows:
     @cached_property
     def half_sample(self) -> float:
         """Half of the time between two samples of a hold, s: between its first two rows, which are
-        single readings; of most holds, since one stamp may be wrong."""
+        single readings; of most holds, since one stamp may be wrong. Where every level was read
+        once, between these; of what has no clock half a second."""
         first = np.flatnonzero(self.hold_starts[:-1] & ~self.hold_starts[1:])
         step = np.diff(self.time)[first]
-        return float(np.median(step[step > 0])) / 2 if np.any(step > 0) else 0.5
+        within = float(np.median(step[step > 0])) if np.any(step > 0) else self.row_time
+        return (within or 1.0) / 2
+
+    @cached_property
+    def row_time(self) -> float:
+        """Time between most neighbouring rows, s; 0 where no time goes by."""
+        step: Array = np.diff(self.time)
+        return float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
 
     @cached_property
     def gone_beyond(self) -> Flags:

@@ -29,7 +29,7 @@ from identification.gap.explanations.verdict import TAKES_TWO, with_posterior
 from identification.gap.laws.drift import by_direction, free_path, path_root, waited
 from identification.gap.model.base import Base
 from identification.gap.model.bench import Bench
-from identification.gap.model.history import retarded, row_time
+from identification.gap.model.history import retarded
 from identification.gap.model.variants import Variant, smooth_root, variant
 
 KINDS = 6
@@ -158,9 +158,9 @@ def _swings(bench: Bench, base: Base, target: Array) -> list[Variant]:
     span = bench.course.session_span
     least = LEAST_SWINGS * bench.rows.n / min(int(m.sum()) for m in masks)
     most = bench.rows.n / _SHORTEST_ROWS / 2
-    if bench.data.arm and bench.noise.raised > 1.0 and row_time(bench.rows) > 0:
+    if bench.data.arm and bench.noise.raised > 1.0 and bench.rows.row_time > 0:
         # readings of holds scatter more than stated, as with a hum that is sampled once a second
-        fastest = span / (_FASTEST * row_time(bench.rows))
+        fastest = span / (_FASTEST * bench.rows.row_time)
         most = max(most, min(fastest, _PERIODS_PER_ROW * bench.rows.n))
     if bench.course.rests or waited(bench).any():
         least = max(least, RESTING_SWINGS)
@@ -239,7 +239,7 @@ def _settles(bench: Bench) -> list[Variant]:
     """The displacement of an arm goes on after every change of the load, in every setup by amounts
     and times of its own; what went on goes back between two runs, as the session's clock tells.
     Without an arm there is but one spring, whose creep that is."""
-    rows, step = bench.rows, row_time(bench.rows)
+    rows, step = bench.rows, bench.rows.row_time
     times = step * np.array(SETTLING)
     times = times[times < bench.course.session_span / 3]
     if not (bench.data.arm and step > 0 and times.size):
