@@ -15,9 +15,9 @@ from identification.gap.answer.forms import law_of, rows_of
 from identification.gap.answer.result import GapResult
 from identification.gap.data import GapData
 from identification.gap.effects import load_misalignment
-from identification.gap.effects.load_misalignment import Shape
 from identification.gap.effects.pose_error import turned
 from identification.gap.evidence.compare import score
+from identification.gap.laws.across_law import Shape
 from identification.gap.model.bench import make_bench
 from rig.diagnosis.gap_data import gap_data
 from rig.models.robot import load_robot

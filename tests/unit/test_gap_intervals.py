@@ -9,15 +9,12 @@ from typing import cast
 import numpy as np
 import pytest
 
-from identification.gap.answer import posterior
+from identification.gap.answer import mixing, posterior
+from identification.gap.answer.mixing import SHARING, mixture, stretched, wider
 from identification.gap.answer.parameters import parameters
 from identification.gap.answer.posterior import (
     DEFINED,
     FLOWING,
-    SHARING,
-    _mixture,
-    _stretched,
-    _wider,
     settled,
 )
 from identification.gap.evidence.engine import Engine
@@ -33,18 +30,18 @@ from tests.unit.test_gap_parameters import known_of, sd
 
 def test_a_mixture_spans_what_its_parts_span() -> None:
     each = [Parameter(10.0, 8.04, 11.96, "Nm"), Parameter(20.0, 18.04, 21.96, "Nm")]
-    both = _mixture(each, np.array([0.5, 0.5]))
+    both = mixture(each, np.array([0.5, 0.5]))
     assert both.low == pytest.approx(8.36, abs=0.05)  # 5 % of the lower one lie below
     assert both.high == pytest.approx(21.64, abs=0.05)
     assert both.ci90 == pytest.approx((8.72, 21.28), abs=0.02)
-    seldom = _mixture(each, np.array([0.06, 0.94]))
+    seldom = mixture(each, np.array([0.06, 0.94]))
     assert seldom.ci90[0] == pytest.approx(10.97, abs=0.02)  # by the normal law of its 95 %: 11.4
     more = (15 - np.hypot(6.28, 1.645 * 2), 15 + np.hypot(6.28, 1.645 * 2))
-    assert _wider(both, 4.0).ci90 == pytest.approx(more, abs=0.02)
-    assert _stretched(both).ci90[0] == pytest.approx(15 * (8.72 / 15) ** SHARING, abs=0.02)
+    assert wider(both, 4.0).ci90 == pytest.approx(more, abs=0.02)
+    assert stretched(both).ci90[0] == pytest.approx(15 * (8.72 / 15) ** SHARING, abs=0.02)
     plain = Parameter(10.0, 8.04, 11.96, "Nm")
     assert plain.ci90 == pytest.approx((10 - 1.645, 10 + 1.645), abs=1e-3)
-    almost = _mixture(each, np.array([0.999, 0.001]))
+    almost = mixture(each, np.array([0.999, 0.001]))
     assert (almost.value, almost.high) == pytest.approx((10.0, 11.96), abs=0.02)
 
 
@@ -206,7 +203,7 @@ def test_beside_another_effect_intervals_are_wider(monkeypatch: pytest.MonkeyPat
     both = Explanation(parts, 0.0, 0.0, (1.0, 0.5), 0.0)
     wide = known_of(engine, family, both)[1].parameters["factor"]
     alone = known_of(engine, family, replace(both, parts=parts[1:], sizes=(1.0,)))
-    monkeypatch.setattr(posterior, "SHARING", 1.0)
+    monkeypatch.setattr(mixing, "SHARING", 1.0)
     narrow = known_of(engine, family, both)[1].parameters["factor"]
     assert SHARING > 1.2
     assert np.log(wide.high / wide.value) == pytest.approx(
@@ -279,16 +276,16 @@ def test_what_is_known_to_a_factor_moves_by_factors() -> None:
             "factor_joint1", mine, 0, [], [({"factor_joint1": factors(other, 2.0, "1")}, 1.0)]
         )
         assert moves == pytest.approx(nats**2 / 2)
-    wide = _wider(mine, 0.5)
+    wide = wider(mine, 0.5)
     spread = np.exp(np.hypot(np.log(3.0), TWO_SIDED * 0.5**0.5))
     assert (wide.low, wide.high) == pytest.approx((2.0 / spread, 2.0 * spread))
 
 
 def test_intervals_of_effects_that_share_a_gap_are_wider() -> None:
     above, across = Parameter(2.0, 1.0, 3.0, "1"), Parameter(1.0, -1.0, 3.0, "1")
-    assert _stretched(above).low == pytest.approx(2 * 0.5**SHARING)
-    assert _stretched(above).high == pytest.approx(2 * 1.5**SHARING)
-    assert (_stretched(across).low, _stretched(across).high) == (1 - 2 * SHARING, 1 + 2 * SHARING)
+    assert stretched(above).low == pytest.approx(2 * 0.5**SHARING)
+    assert stretched(above).high == pytest.approx(2 * 1.5**SHARING)
+    assert (stretched(across).low, stretched(across).high) == (1 - 2 * SHARING, 1 + 2 * SHARING)
 
 
 def test_explanations_by_other_words_move_parameters_as_far_as_they_are_likely() -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.gap.answer.mixing import apart, mixture, stretched, wider
 from identification.gap.answer.parameters import parameters
 from identification.gap.effects import EFFECTS
 from identification.gap.effects.base_slip import ACROSS, slides
@@ -26,7 +26,6 @@ from identification.gap.model.variants import Variant, place_of
 from identification.gap.search.readings import as_moved
 from identification.gap.search.shares import sized
 from identification.gap.words import LINEAR
-from identification.uncertainty import TWO_SIDED, TWO_SIDED_90
 
 Parameters = dict[str, Parameter]
 
@@ -80,8 +79,8 @@ def _known(
         word, own = chosen.parts[i].word, shapes.own(said[i])
         beside = [e for e in each if e.index != i]
         of_rivals = [(r[word], w) for r, w in others if word in r]
-        wide = {n: _wider(p, _moves(n, p, i, beside, of_rivals)) for n, p in own.items()}
-        found = {n: _stretched(p) for n, p in wide.items()} if beside else wide
+        wide = {n: wider(p, _moves(n, p, i, beside, of_rivals)) for n, p in own.items()}
+        found = {n: stretched(p) for n, p in wide.items()} if beside else wide
         found = {n: p.possible(_least(word, n)) for n, p in found.items()}
         out.append(Known(found, shapes.places()))
     return out
@@ -90,23 +89,6 @@ def _known(
 def _least(word: str, name: str) -> float:
     """Of a parameter, by its name."""
     return 0.0 if declared(name, EFFECTS[word].not_negative) else -np.inf
-
-
-# Of 78 parameters in blind mixtures 78 % lay within what should have been 90 % intervals, of 94
-# alone 89 %: what one law leaves of the gap its neighbours take, and the posterior does not know
-# that the laws are only families. The same rule as with probabilities (`verdict.trusted`).
-SHARING = 1.25
-
-
-def _stretched(p: Parameter) -> Parameter:
-    """Its interval so much wider; what is above zero stays there."""
-    ends = np.array([p.low, p.high, *p.ci90])
-    if p.low > 0:
-        ends = p.value * (ends / p.value) ** SHARING
-    else:
-        ends = p.value + SHARING * (ends - p.value)
-    low, high, *inner = ends.tolist()
-    return replace(p, low=low, high=high, inner=None if p.inner is None else tuple(inner))
 
 
 class _Shapes:
@@ -135,11 +117,11 @@ class _Shapes:
             mine = np.array([name in f for f in found])
             alike = [f[name] for f, m in zip(found, mine, strict=True) if m]
             value = said[name].value
-            mixed = _mixture(alike, self.share[mine]) if alike else said[name]
+            mixed = mixture(alike, self.share[mine]) if alike else said[name]
             about = replace(mixed, value=value)
-            grid = _apart(about, step[name].value) / 12**0.5 if name in step else 0.0
-            meant = 0.0 if word in LINEAR else _apart(about, value * (1 + self._defined))
-            out[name] = _wider(about, grid**2 + meant**2)
+            grid = apart(about, step[name].value) / 12**0.5 if name in step else 0.0
+            meant = 0.0 if word in LINEAR else apart(about, value * (1 + self._defined))
+            out[name] = wider(about, grid**2 + meant**2)
         return out
 
     def places(self) -> dict[str, float]:
@@ -194,11 +176,11 @@ def _moves(
     total = 0.0
     for other in beside:
         with_it = [i for i, r in enumerate(other.read) if name in r[index]]
-        values = np.array([_apart(found, other.read[i][index][name].value) for i in with_it])
+        values = np.array([apart(found, other.read[i][index][name].value) for i in with_it])
         share = other.share[with_it]
         if values.size:
             total += float(share @ (values - values[0]) ** 2) / float(share.sum())
-    have = [(_apart(found, r[name].value), weight) for r, weight in rivals if name in r]
+    have = [(apart(found, r[name].value), weight) for r, weight in rivals if name in r]
     whole = 1.0 + sum(weight for _, weight in have)
     return total + sum(weight * off**2 for off, weight in have) / whole
 
@@ -215,37 +197,6 @@ def _likely(rivals: Iterable[Explanation], chosen: Explanation) -> _Weighed:
 
 def _by_word(explanation: Explanation, read: list[Parameters]) -> dict[str, Parameters]:
     return dict(zip((p.word for p in explanation.parts), read, strict=True))
-
-
-def _apart(p: Parameter, value: float) -> float:
-    """By how much another value is more; nats where it is known to a factor, beyond _FAR no more: a
-    spring twenty times as stiff is as good as rigid, and beside it another million is no number."""
-    if not p.by_factors:
-        return value - p.value
-    return float(np.clip(np.log(value / p.value), -_FAR, _FAR))
-
-
-_FAR = 3.0  # nats
-
-
-def _wider(p: Parameter, variance: float) -> Parameter:
-    """With so much more variance, where it has an interval at all; where it is known to a factor,
-    of its logarithm."""
-    if not p.low < p.high:
-        return p
-    sd = variance**0.5
-
-    def ends(low: float, high: float, deviations: float) -> tuple[float, float]:
-        if p.by_factors:
-            off, more = np.log([p.value / low, high / p.value]), deviations * sd
-            below, above = np.exp(np.hypot(np.maximum(off, 0.0), more))
-            return p.value / float(below), p.value * float(above)
-        below, above = np.hypot(np.maximum([p.value - low, high - p.value], 0.0), deviations * sd)
-        return p.value - float(below), p.value + float(above)
-
-    low, high = ends(p.low, p.high, TWO_SIDED)
-    inner = None if p.inner is None else ends(*p.inner, TWO_SIDED_90)
-    return replace(p, low=low, high=high, inner=inner)
 
 
 # Standard uncertainty of what a mechanism's parameter means, as its share (VIM 2.27): where a knee
@@ -374,35 +325,3 @@ def _softer(engine: Engine, fitted: Fit, index: int) -> Softer:
         {j: float(covariance[i, i]) for j, i in at.items()},
         {j: covariance[i, mine] for j, i in at.items()},
     )
-
-
-def _mixture(each: list[Parameter], share: Array) -> Parameter:
-    """Median and interval of a mixture of normals, of what is known to a factor by its logarithm;
-    one alone keeps its own, skewed as it may be."""
-    if len(each) == 1:
-        return each[0]
-    share = share / share.sum()
-    ends = np.array([[p.value, p.low, p.high] for p in each])
-    skewed = each[0].by_factors
-    mean, low, high = (np.log(ends) if skewed else ends).T
-    sd = np.maximum(high - low, 0.0) / (2 * TWO_SIDED) + 1e-300
-    out = _quantiles(mean, sd, share, (0.5, 0.025, 0.975, 0.05, 0.95))
-    value, least, most, *inner = (float(np.exp(v)) for v in out) if skewed else out
-    largest = max(p.most for p in each)
-    return replace(
-        each[0], value=value, low=least, high=most, inner=(inner[0], inner[1]), most=largest
-    )
-
-
-def _quantiles(mean: Array, sd: Array, share: Array, of: Sequence[float]) -> list[float]:
-    """Quantiles of a mixture of normal distributions, by its shares below a fine grid about each of
-    them. (A root of scipy.optimize costs a tenth of a second of import.)"""
-    from scipy.special import ndtr
-
-    x = np.sort((mean + sd * np.linspace(-8, 8, _FINE)[:, None]).ravel())
-    with np.errstate(over="ignore"):
-        below = ndtr((x[:, None] - mean) / sd) @ (share / share.sum())
-    return [float(np.interp(q, below, x)) for q in of]
-
-
-_FINE = 801  # to a hundredth of a standard deviation

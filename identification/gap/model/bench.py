@@ -20,6 +20,7 @@ from identification.gap.data import GapData
 from identification.gap.model.driven import driven
 from identification.gap.model.history import moves, rests
 from identification.gap.model.layout import Layout, layout_of
+from identification.gap.model.lines import force_without_load, means_move, measured_slope
 from identification.gap.model.noise import Noise, estimate_noise
 from identification.gap.model.other_springs import springs_behind
 from identification.gap.model.path import Path, load_path
@@ -47,7 +48,6 @@ _FURTHER, _FIRST, _ONE_WAY = 6, 1.4, 0.9  # radii; the first, of the last inner 
 TOOL_KG, TOOL_SD_KG = 1.5, 0.9  # screwed to the flange: 0 to 3 kg, nobody states it
 _BOTH, _UNLIKE = 0.2, 0.03  # of a joint's largest torque
 _FELT = 0.03  # of the range of the load's torque
-_DRIFTS = 5.0  # standard deviations by which the force at zero load must have moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,15 +129,7 @@ class Bench:
     def line_slope(self) -> Array:
         """(n,) slope of the response over the load, m/N, as measured in each setup; what a gain or
         a lag acts on, however wrong the simulated springs are."""
-        out = np.zeros(self.rows.n)
-        for s in range(len(self.data.setups)):
-            mine = self.rows.setup == s
-            weight = self.rows.weight[mine]
-            x = self.load[mine] - np.average(self.load[mine], weights=weight)
-            power = float(weight @ x**2)
-            if power > 0:
-                out[mine] = max(float(weight @ (x * self.response[mine])) / power, 0.0)
-        return out
+        return measured_slope(self.rows, self.load, self.response)
 
     @cached_property
     def line(self) -> Array:
@@ -149,46 +141,16 @@ class Bench:
     def moves_on(self) -> bool:
         """Whether the mean of the response, but for what goes with the load, is another one from
         one run of a setup to the next, by more than noise is."""
-        left, rows = self.response - self.line, self.rows
-        for s in range(len(self.data.setups)):
-            mine = rows.setup == s
-            if np.ptp(self.load[mine]) > 0:
-                means = [left[mine & (rows.run == r)].mean() for r in np.unique(rows.run[mine])]
-                if np.abs(np.diff(means)).max(initial=0.0) > _MOVES_ON * self.noise.stated:
-                    return True
-        return False
+        left = self.response - self.line
+        return means_move(self.rows, self.load, left, _MOVES_ON * self.noise.stated)
 
     @cached_property
     def zero_line(self) -> Array:
         """(n,) N: what the force shows at zero load before and after a run, straight in between; 0
         where it stands still within its noise, or was not read at both ends. A threshold is met
         by the force less this; springs alone would not mind."""
-        rows, out = self.rows, np.zeros(self.rows.n)
-        if self.imposed:
-            return out
-        for run in np.unique(rows.run):
-            mine = np.flatnonzero(rows.run == run)
-            pushed = mine[~rows.zero[mine]]
-            if not pushed.size:
-                continue
-            ends = [
-                mine[rows.zero[mine] & (mine < pushed[0])],
-                mine[rows.zero[mine] & (mine > pushed[-1])],
-            ]
-            if not all(e.size for e in ends):
-                continue
-            weight = [rows.weight[e] for e in ends]
-            force = [
-                np.average(rows.measured_force[e], weights=w)
-                for e, w in zip(ends, weight, strict=True)
-            ]
-            time = [
-                np.average(rows.session[e], weights=w) for e, w in zip(ends, weight, strict=True)
-            ]
-            sd = self.noise.force * float(np.sqrt(sum(1 / w.sum() for w in weight)))
-            if abs(force[1] - force[0]) > _DRIFTS * sd:
-                out[mine] = np.interp(rows.session[mine], time, force)
-        return out
+        none = np.zeros(self.rows.n)
+        return none if self.imposed else force_without_load(self.rows, self.noise.force)
 
     @cached_property
     def true_load(self) -> Array:
@@ -232,19 +194,8 @@ class Bench:
         tangential: Array | None = None,
         zero_force: Array | None = None,
     ) -> Array:
-        """A stacked column of response (n,), q (n, m), tangential (n, 2), zero_force (n,): joint
-        readings and force across the direction are too coarse to tell more of a hold than where it
-        lies."""
-        out = np.zeros(self.layout.size)
-        if response is not None:
-            out[: self.layout.n] = response
-        if q is not None and self.has_q:
-            out[self.layout.q] = self.rows.hold_means(q).T.reshape(-1)
-        if tangential is not None and self.rows.tangential is not None:
-            out[self.layout.tangential] = self.rows.hold_means(tangential).T.reshape(-1)
-        if zero_force is not None and self.has_zero_force:
-            out[self.layout.zero_force] = zero_force[self.rows.zero]
-        return out
+        """A stacked column, as `Layout.stacked` has it."""
+        return self.layout.stacked(self.rows, response, q, tangential, zero_force)
 
     def joint_column(self, joint: int, deflection: Array) -> Array:
         """What a deflection (n,) rad of one joint does to the laser and to that joint's reading;
@@ -416,14 +367,6 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         scatter, trend = rows.displacement_scatter, rows.displacement_trend
     torque = lever * load[:, None]
     layout = layout_of(data, rows, imposed)
-    observed = np.zeros(layout.size)
-    observed[: rows.n] = response
-    if layout.q.stop > layout.q.start and rows.q is not None:
-        observed[layout.q] = rows.hold_means(rows.q).T.reshape(-1)
-    if rows.tangential is not None:
-        observed[layout.tangential] = rows.hold_means(rows.tangential).T.reshape(-1)
-    if layout.zero_force.stop > layout.zero_force.start:
-        observed[layout.zero_force] = rows.measured_force[rows.zero]
     reach = max(float(np.ptp(slope * load)), float(np.ptp(response)), 1e-15)
     return Bench(
         data=data,
@@ -442,5 +385,5 @@ def make_bench(data: GapData, compliance: Array | None = None, rows: Rows | None
         reach=reach,
         scatter=scatter,
         trend=trend,
-        observed=observed,
+        observed=layout.stacked(rows, response, rows.q, rows.tangential, rows.measured_force),
     )

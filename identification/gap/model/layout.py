@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.arrays import Flags
+from identification.arrays import Array, Flags
 from identification.gap.data import GapData
 from identification.gap.recording.rows import Rows
 
@@ -21,6 +21,28 @@ class Layout:
     tangential: slice
     zero_force: slice
     size: int
+
+    def stacked(
+        self,
+        rows: Rows,
+        response: Array | None = None,
+        q: Array | None = None,
+        tangential: Array | None = None,
+        zero_force: Array | None = None,
+    ) -> Array:
+        """(size,) of response (n,), q (n, m), tangential (n, 2), zero_force (n,), as far as there
+        are such channels: joint readings and force across the direction are too coarse to tell more
+        of a hold than where it lies."""
+        out = np.zeros(self.size)
+        if response is not None:
+            out[: self.n] = response
+        if q is not None and self.q.stop > self.q.start:
+            out[self.q] = rows.hold_means(q).T.reshape(-1)
+        if tangential is not None and self.tangential.stop > self.tangential.start:
+            out[self.tangential] = rows.hold_means(tangential).T.reshape(-1)
+        if zero_force is not None and self.zero_force.stop > self.zero_force.start:
+            out[self.zero_force] = zero_force[rows.zero]
+        return out
 
     def read_in(self, row: Flags, held: Flags) -> Flags:
         """(size,) what moved, as read in rows (n,) and their holds (h,); of all rows what they were
