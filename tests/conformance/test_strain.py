@@ -134,11 +134,17 @@ def test_a_joint_that_plays_yields_or_rubs_may_rest_elsewhere(word: str, anywher
     bench, variants, _ = of(word, "rich")
     engine = quick_engine(bench)
     v = next(v for v in variants if v.joints == (3,))
-    loose = fit(engine, Explanation((Part(v, 1e-4),), 0.0, 0.0, (0.0,), 0.0))
+    none = fit(engine, Explanation((Part(v, 1e-4),), 0.0, 0.0, (0.0,), 0.0))
     engine.structural = 1e-9
-    off = strain(engine, pulled(engine, "offset P1 4", loose), 0.0)
-    assert off == pytest.approx(0.0 if anywhere else FAR)
-    assert strain(engine, pulled(engine, "offset P1 3", loose), 0.0) == pytest.approx(FAR)
+    off = FAR * engine.base.sd[engine.base.index("offset P1 4")[0]]
+    q, joints = engine.bench.layout.q, engine.bench.data.joints
+    turns = engine.columns(v.columns)[q].sum(axis=1).reshape(joints, -1)[3]
+    for times, left in ((0.0, FAR), (0.5, FAR / 2), (2.0, 0.0)):
+        unit = times * off / np.abs(turns).max()
+        gives = replace(none, coefficients=np.full(len(v.columns), unit))
+        found = strain(engine, pulled(engine, "offset P1 4", gives), 0.0)
+        assert found == pytest.approx(left if anywhere else FAR, abs=1e-9)
+        assert strain(engine, pulled(engine, "offset P1 3", gives), 0.0) == pytest.approx(FAR)
 
 
 def test_runs_may_be_off_by_the_imperfection_of_the_law_too() -> None:

@@ -134,7 +134,18 @@ def test_in_loops_at_one_rate_what_rubs_is_larger_than_what_comes_late(
 ) -> None:
     engine = small_engine_of(small_bench())
     parts = part(late, [0]), part("joint_hysteresis", [1])
-    sizes = Sizes(np.array([5e-7, 1e-7]), np.array([8e-6, 8e-6]), 0.0)
+    sizes = Sizes(np.array([5e-7, 2e-7]), np.array([8e-6, 8e-6]), 0.0)
     for one_rate, larger in ((True, 1), (False, 0)):
         monkeypatch.setattr(Course, "one_rate", one_rate)
+        assert _ranking_sizes(engine, parts, sizes, 0).argmax() == larger
+
+
+def test_a_trace_of_friction_beside_a_lag_is_not_what_leads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Course, "one_rate", True)
+    engine = small_engine_of(small_bench())
+    parts = part("time_lag", [0]), part("joint_yield", [1])
+    for share, larger in ((0.1, 0), (0.3, 1)):
+        sizes = Sizes(np.array([5e-7, share * 5e-7]), np.array([8e-6, 8e-6]), 0.0)
         assert _ranking_sizes(engine, parts, sizes, 0).argmax() == larger

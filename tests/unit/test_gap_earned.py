@@ -22,6 +22,7 @@ from identification.gap.judging.heldout import (
     ALWAYS_IN,
     GROUPS,
     HeldOut,
+    _later,
     _stacked_keep,
     folds,
     held_out,
@@ -92,6 +93,18 @@ def test_many_repetitions_are_withheld_in_groups_from_all_over(each: int) -> Non
     assert [len(g) for g in groups] == [each] * GROUPS
     assert set().union(*groups) == set(range(2, 2 + each * GROUPS))
     assert all(np.ptp(list(g)) >= (each - 1) * GROUPS for g in groups)
+
+
+def test_of_setups_in_turn_each_keeps_repetitions_to_foretell_by() -> None:
+    """Numbered through all of them."""
+    setup = np.tile(np.repeat(np.arange(10), 4), 4)
+    repetition = np.repeat(np.arange(1, 41), 4)
+    fold = _later(setup.astype(np.int64), repetition.astype(np.int64))
+    for s in range(10):
+        mine = fold[setup == s]
+        assert len(set(mine.tolist()) - {ALWAYS_IN}) == 3
+    few = _later(np.zeros(12, dtype=np.int64), np.arange(12) // 2 + 5)
+    assert few.tolist() == [ALWAYS_IN] * 2 + [1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
 
 
 def test_what_repeats_is_foreseen_and_what_is_fitted_run_by_run_is_not() -> None:

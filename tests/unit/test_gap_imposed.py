@@ -319,6 +319,17 @@ def test_what_rings_under_a_force_that_stands_does_not_slide() -> None:
     assert not displacement_simpler(replace(data, instruments=known))
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("rubs", [0.0, 0.03])
+def test_a_play_that_is_driven_through_slides(rubs: float, sign: float) -> None:
+    """No force on the way, there or back, and all of it at its ends; gauges of either sign."""
+    t = np.arange(1200.0)
+    u = np.sin(2 * np.pi * t / 200) + 0.05 * np.sin(2 * np.pi * t / 37)
+    force = 20 * (u - np.clip(u, -0.95, 0.95)) + rubs * np.sign(np.gradient(u))
+    scaled = sign * force / np.ptp(force)
+    assert _slides(Channel(t, scaled, 1e-3), Channel(t, u / np.ptp(u), 1e-3))
+
+
 @pytest.mark.slow
 def test_an_arm_that_is_read_at_rest_answers_the_force_that_was_read() -> None:
     """Whatever its screw holds: the displacement is linear in what the springs give way."""

@@ -17,6 +17,7 @@ from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.products import White
 from identification.gap.laws import knees_closer
 from identification.gap.model.bench import make_bench
+from identification.gap.model.history import _paths
 from identification.gap.model.variants import Variant
 from identification.gap.recording.holds import hold_ids, swing_within
 from identification.gap.recording.imposed import displacement_imposed
@@ -342,3 +343,35 @@ def test_three_readings_of_a_level_show_their_noise() -> None:
         data = of_three(sd, goes_on, arm)
         assert make_bench(data).noise.response[0] == pytest.approx(found, rel=0.15)
     assert explained(of_three(3e-6)).verdict == "none"
+
+
+def read_once(seconds: float, late: float = 0.0, jitter: float = 0.0) -> GapData:
+    """Levels up and down again, each read once; the load goes straight from one to the next."""
+    rng = np.random.default_rng(1)
+    step = np.concatenate([np.arange(20), np.arange(20)[::-1]])
+    force = 5.0 * step + rng.uniform(-1, 1, 40)
+    t = seconds * (np.arange(40) + jitter * rng.uniform(-1, 1, 40))
+    u = 1e-5 * np.interp(t - late, t, force) + rng.normal(0, 2e-7, 40)
+    way = np.repeat([1, 2], 20)
+    data = bench_data(force, u, step=step, branch=way, time=t, session=t, imposed="force")
+    return replace(data, instruments=Instruments(0.05, 2e-7, 0.005, 0.003))
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_the_path_through_levels_that_were_read_once_goes_from_one_to_the_next(
+    jitter: float,
+) -> None:
+    rows = make_bench(read_once(10.0, jitter=jitter)).rows
+    up = np.arange(20.0)
+    ((_, _, t, v),) = _paths(np.append(up, up[::-1]), rows)
+    assert np.all(np.diff(t) >= 0)
+    assert np.abs(np.diff(v)).sum() == pytest.approx(38.0)  # and never back
+
+
+@pytest.mark.parametrize("seconds", [3.0, 60.0])
+def test_a_lag_is_found_where_every_level_was_read_once(seconds: float) -> None:
+    found = explained(read_once(seconds, late=0.6 * seconds))
+    assert found.verdict == "time_lag"
+    lag = found.effects[0].parameters["lag"]
+    assert lag.low < 0.6 * seconds < lag.high
+    assert lag.high - lag.low < 0.2 * seconds

@@ -490,7 +490,14 @@ def test_a_stroke_that_runs_on_while_the_force_stands_is_no_hold(
 
 
 @pytest.mark.parametrize(
-    ("load", "holds"), [("later", False), ("at once", True), ("at once, and gone", True)]
+    ("load", "holds"),
+    [
+        ("later", False),
+        ("later, pressed", False),
+        ("at once", True),
+        ("at once, and gone", True),
+        ("a preload", True),
+    ],
 )
 def test_before_the_load_comes_nothing_is_held(load: str, holds: bool) -> None:
     """Grips that are slack pull with next to nothing; what was loaded before creeps back."""
@@ -498,12 +505,29 @@ def test_before_the_load_comes_nothing_is_held(load: str, holds: bool) -> None:
     slack, pull = 1 + 0.005 * t, np.clip((t - 80) / 160, 0, 1)
     force = {
         "later": slack + 50 * pull,
+        "later, pressed": -slack - 50 * pull,
         "at once": 50 + 50 * pull,
+        "a preload": 4 + 46 * pull,
         "at once, and gone": 50 * np.clip(1 - t / 60, 0, 1) + 0.1,
     }[load]
     bench = make_bench(running(force, force / SPRING, imposed="force"))
     assert bench.course.always_moves != holds
     assert bool(words_with(bench, "joint_creep")) == holds
+
+
+def test_waiting_before_loops_is_a_stand_and_takes_no_time_of_them() -> None:
+    force = np.append(np.zeros(600), 50 * triangle(300, 6))
+    course = make_bench(running(force, force / SPRING, imposed="force")).course
+    assert not course.always_moves
+    assert course.stroke_s == pytest.approx(25, rel=0.15)
+
+
+def test_a_specimen_that_relaxes_before_its_stroke_is_held() -> None:
+    t = np.arange(240.0)
+    stroke = 1e-3 * np.clip((t - 80) / 160, 0, 1)
+    force = 40 * np.exp(-np.minimum(t, 80) / 30) + stroke * SPRING
+    data = running(force, stroke, imposed="displacement")
+    assert not make_bench(data).course.always_moves
 
 
 def test_a_long_table_of_numbered_readings_runs() -> None:

@@ -76,7 +76,9 @@ class Elsewhere:
 def present_design(bench: Bench) -> Design:
     """The design behind a measurement, as nearly as its rows tell."""
     rows, data = bench.rows, bench.data
-    sample = 2 * rows.half_sample
+    sample = rows.sample_time
+    if rows.read_once:  # from level to level, and on the way for a part of it
+        sample = max(sample - APPROACH_S, 1.0)
     hold, approach, zero = 5 * sample, APPROACH_S, _zero_s(bench, sample)
     if not rows.continuous:
         hold = float(np.median(rows.hold_weight[~rows.zero])) * sample if ~rows.zero.all() else hold

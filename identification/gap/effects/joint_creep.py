@@ -45,7 +45,7 @@ def times(bench: Bench) -> np.ndarray:
     step = bench.rows.row_time or 1.0
     longest = min(bench.course.session_span / 3, _LONGEST * max(step, 1.0))
     if not (bench.data.arm or bench.rows.continuous):
-        step = 2 * bench.rows.half_sample  # of rows there are the fewer, the longer it stood
+        step = bench.rows.sample_time  # of rows there are the fewer, the longer it stood
     if not (bench.data.arm or bench.course.always_moves):
         longest = 3 * bench.course.session_span
     first = max(step * 3 if bench.course.always_moves else step, 1e-6)

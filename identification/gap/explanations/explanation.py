@@ -36,7 +36,7 @@ from identification.gap.explanations.penalties import (
 from identification.gap.explanations.priors import prior_of
 from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant
-from identification.gap.words import CURVES, DRIFTS, FRICTION, LATE, LINEAR, YIELD
+from identification.gap.words import CURVES, DRIFTS, FRICTION, LINEAR
 
 # An explanation must leave less than this share of the gap (rms), with two effects half of it and
 # so on: the more words are spent, the better they have to explain. Laws of other people's rigs are
@@ -207,7 +207,7 @@ def _ranking_sizes(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level:
     apart = any(in_directions_of_their_own(bench, a, b) for a, b in combinations(parts, 2))
     if bench.data.arm or apart:
         return sizes.gap
-    leads = _leading_of_two(engine, parts, level)
+    leads = _leading_of_two(engine, parts, sizes.gap, level)
     if leads is not None:
         return sizes.gap if sizes.gap.argmax() == leads else sizes.gap[::-1]
     if _toe_and_knee(parts):
@@ -215,35 +215,36 @@ def _ranking_sizes(engine: Engine, parts: tuple[Part, ...], sizes: Sizes, level:
     return _beside_friction(engine, parts, sizes)
 
 
-def _leading_of_two(engine: Engine, parts: tuple[Part, ...], level: int) -> int | None:
-    """Which one of friction and another effect is the larger, where sizes can't say.
+def _leading_of_two(
+    engine: Engine, parts: tuple[Part, ...], sizes: Array, level: int
+) -> int | None:
+    """Which one of friction (or yield) and another effect is the larger, where sizes (p,) m can't
+    say.
 
     - Beside a curve the friction, where most of the way is left when the load is gone: no curve
       keeps anything.
-    - Beside creep or a lag at one rate the friction: what comes late then differs from it in
-      details only.
-    - Beside a drift the friction or yield, where the driven load goes to and fro about a mean and
+    - Beside creep at one rate the friction: creep then differs from it in details only; beside a
+      lag as well, where that does no more than a few times as much.
+    - Beside a drift the friction, where the driven load goes to and fro about a mean and
       the drift is the way of that: what yields ratchets so (Armstrong and Frederick 1966).
     - Beside creep under an imposed stroke the one that the other can do less without: both bring a
       mean stiffness, and what a spring leaves of either says little.
     """
     bench, words = engine.bench, [p.word for p in parts]
     rubs = next((i for i, w in enumerate(words) if w in FRICTION), None)
-    gives = next((i for i, w in enumerate(words) if w in FRICTION | {YIELD}), None)
-    if len(parts) != _PAIR or gives is None:
+    if len(parts) != _PAIR or rubs is None:
         return None
     if DRIFTS & frozenset(words) and _walks(bench):
-        return gives
-    if rubs is None:
-        return None
-    curves, late = any(w in CURVES for w in words), bool(LATE & frozenset(words))
+        return rubs
+    curves, creeps = any(w in CURVES for w in words), "joint_creep" in words
+    late = creeps or ("time_lag" in words and sizes[rubs] > _OF_A_LAG * sizes.max())
     if (curves and bench.course.stays > _STAYS) or (late and bench.course.one_rate):
         return rubs
-    creeps = "joint_creep" in words
     return int(needed(engine, parts, level).argmax()) if creeps and bench.imposed else None
 
 
 _PAIR, _STAYS = 2, 0.5  # effects; of the way
+_OF_A_LAG = 0.2  # of what a lag does, by friction beside it
 
 
 def _walks(bench: Bench) -> bool:

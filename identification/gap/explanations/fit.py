@@ -53,8 +53,9 @@ class Fit:
         bench = engine.bench
         return np.asarray(bench.response - engine.target[: bench.rows.n] + self.response)
 
-    def unknown(self, engine: Engine) -> Array:
-        """(n,) m: the same without the effects that the simulation has beside its springs."""
+    def beyond_known(self, engine: Engine) -> Array:
+        """(n,) m: what `whole` has beside the effects, as large as stated, that the simulation has
+        beside its springs."""
         bench, whole = engine.bench, self.whole(engine)
         return whole if bench.known is None else whole - bench.known.does[: bench.rows.n]
 

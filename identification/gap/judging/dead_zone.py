@@ -81,7 +81,7 @@ def _curve(engine: Engine, explanation: Explanation) -> tuple[Array, Array]:
     """Displacement (m,) and force (m,) of a fit, in the units of the load, in the direction in
     which its largest effect sits; without what takes another way there than back."""
     bench, fitted = engine.bench, fit(engine, explanation)
-    response = fitted.unknown(engine)
+    response = fitted.beyond_known(engine)
     for i, part in enumerate(explanation.parts):
         if part.word not in FLANKS and not part.variant.is_loose:
             response = response - fitted.contribution(engine, i)[: bench.rows.n]

@@ -26,7 +26,7 @@ from identification.gap.model.variants import block
 from identification.uncertainty import coverage_factor
 
 BLOCKS = 5
-GROUPS = 10  # of repetitions at most: more are as many fits, for hardly more to fit on
+GROUPS = 10  # of repetitions at most: 200 one by one took ten times as long
 ALWAYS_IN = -1  # number of the fold of rows that are never withheld
 
 
@@ -71,10 +71,17 @@ def folds(engine: Engine) -> dict[str, Ints]:
 
 def _later(setup: Ints, repetition: Ints) -> Ints:
     """Number of the fold of every row, ALWAYS_IN for the first repetition of its setup: repetitions
-    one by one, or many of them in groups, each from all over the measurement."""
+    one by one; where there are many, in groups, the n-th of every setup in one, each from all over
+    the measurement."""
     first = np.array([repetition[setup == s].min() for s in range(int(setup.max()) + 1)])
     number = np.unique(repetition, return_inverse=True)[1].astype(np.int64)
-    return np.where(repetition == first[setup], ALWAYS_IN, number % GROUPS)
+    later = repetition != first[setup]
+    if len(np.unique(number[later])) > GROUPS:
+        for s in np.unique(setup):
+            mine = setup == s
+            place = np.unique(repetition[mine], return_inverse=True)[1].astype(np.int64)
+            number[mine] = (place - 1) % GROUPS
+    return np.where(later, number, ALWAYS_IN)
 
 
 def held_out(

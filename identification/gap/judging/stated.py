@@ -111,7 +111,7 @@ def _beside(
 def off_from_stated(engine: Engine, explanation: Explanation) -> Springs | None:
     """Of springs or gains that are off, where they do far more to the gap than all the rest."""
     bench, fitted = engine.bench, fit(engine, explanation)
-    whole = fitted.unknown(engine)
+    whole = fitted.beyond_known(engine)
     goes = MECHANISMS | LINEAR  # with the load, without a delay
     paths = [whole - _of_others(engine, fitted, goes)]
     if explanation.words & LATE:  # all that comes, and what comes at once

@@ -18,14 +18,14 @@ from identification.gap.evidence.engine import LEVER_M, Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import REMAINDER
 from identification.gap.explanations.fit import Fit
-from identification.gap.words import FRICTION, IN_JOINTS, MECHANISMS, SPRINGS
+from identification.gap.words import FRICTION, MECHANISMS, SPRINGS
 
 # Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and
 # two beyond 5.5; of 16 stand-ins that were strained at all 13 beyond 6, the others between 5 and 6.
 LIMIT = 5.5
 # Of one step of a path among a dozen: of 60 paths of air that wanders the largest was at 3.5.
 JUMP = 4.2
-_RESTS = FRICTION & IN_JOINTS | {"joint_backlash"}  # without load elsewhere than where it was
+_RESTS_ELSEWHERE = FRICTION | {"joint_backlash"}
 
 
 def strain(engine: Engine, fitted: Fit, eta: float) -> float:
@@ -71,10 +71,10 @@ def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
 
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     """(b,) Springs that are said to be off may be off, and so may that of a joint whose mechanism
-    brings its own mean stiffness; a joint with play rests anywhere in it, one that yielded or rubs
-    where it was left, and is sent to where its reading should be; a force that drifts has done so
-    since it was tared; tares, and offsets of the joint readings, count as far as they move a share
-    of the gap that an explanation may not leave.
+    brings its own mean stiffness; a joint that plays, yielded or rubs may rest elsewhere without
+    load, by as much as that moves it, and so may its reading be off; a force that drifts has done
+    so since it was tared; tares, and offsets of the joint readings, count as far as they move a
+    share of the gap that an explanation may not leave.
     """
     base, n, weight = engine.base, engine.bench.rows.n, engine.bench.rows.weight
     columns = base.columns[:n]
@@ -87,16 +87,32 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     own = {j for p in fitted.parts if p.word in MECHANISMS for j in p.variant.joints}
     for j in range(engine.bench.data.joints) if said else own:
         pulls[base.index(f"spring{j + 1}")] = 0.0
-    rests = {j for p in fitted.parts if p.word in _RESTS for j in p.variant.joints}
+    left = _left_at_rest(engine, fitted)
     for i in base.index("offset"):
-        if int(base.names[i].split()[-1]) - 1 in rests:
-            pulls[i] = 0.0
+        off = float(np.abs(fitted.base[i]))
+        pulls[i] *= max(1.0 - left[int(base.names[i].split()[-1]) - 1] / max(off, _TINY), 0.0)
     if any(p.word == "force_drift" for p in fitted.parts):
         pulls[base.index("tare")] = 0.0
     constant = base.index("tare") + base.index("offset")
     size = moves[constant] * np.abs(fitted.base[constant])
     pulls[constant] *= np.minimum(size / max(REMAINDER * engine.structural, 1e-300), 1.0)
     return np.asarray(pulls)
+
+
+def _left_at_rest(engine: Engine, fitted: Fit) -> Array:
+    """(m,) rad by which every joint may rest elsewhere: the most that its
+    plays, yields and friction turn it by."""
+    q, joints = engine.bench.layout.q, engine.bench.data.joints
+    out = np.zeros(joints)
+    for i, part in enumerate(fitted.parts):
+        if part.word in _RESTS_ELSEWHERE and q.stop > q.start:
+            turned = np.abs(fitted.contribution(engine, i)[q].reshape(joints, -1)).max(axis=1)
+            mine = list(part.variant.joints)
+            out[mine] += turned[mine]
+    return out
+
+
+_TINY = 1e-300
 
 
 def _of_heat(engine: Engine, fitted: Fit) -> Array:

@@ -222,7 +222,7 @@ def standing_on(rows: Rows) -> Array:
 
 def sampling_time(rows: Rows) -> float:
     """Time between two samples of a hold; of a running recording, between most of its rows, s."""
-    return (rows.row_time or 1.0) if rows.continuous else 2 * rows.half_sample
+    return (rows.row_time or 1.0) if rows.continuous else rows.sample_time
 
 
 def delayed(values: Array, delay: float, rows: Rows) -> Array:

@@ -139,7 +139,7 @@ def _apart(rows: Rows) -> Array:
     time, way = np.diff(rows.time), np.abs(np.diff(rows.displacement))
     speed = np.divide(way, time, out=np.zeros(len(way)), where=(time > 0) & ~rows.hold_starts[1:])
     either_side = np.maximum(np.append(speed, 0.0), np.append(0.0, speed))
-    return np.asarray(_TOGETHER * 2 * rows.half_sample * either_side)
+    return np.asarray(_TOGETHER * rows.sample_time * either_side)
 
 
 _TOGETHER = 0.02

@@ -38,7 +38,7 @@ _ENCLOSES, _AGAIN = 0.05, 0.1  # of its box, by a loop; of that, by the next one
 _MET_AGAIN = 0.2  # of the smaller one's range of load
 _RUNS_ON = 2.0  # times its mean speed: faster than anything creeps at rest
 _STANDS = 0.1  # of the mean speed, and of the time
-_BEGUN = 0.1  # of the largest load: before anything comes near it nothing is held
+_COME = 0.03  # of the largest force: what stands below it, before anything is above it, waits
 _HELD, _MANY_A_LEVEL = 2, 8  # samples
 _FEW_LEVELS, _MANY_LEVELS, _BACK = 5, 40, 2.0  # readings; standard uncertainties
 _SCATTERS = 1.0  # squares of differences over squares: of what scatters it is 2 (von Neumann 1941)
@@ -230,10 +230,12 @@ class Course:
 
     @cached_property
     def always_moves(self) -> bool:
-        """A running recording in which the load never stands: rate and load are one thing."""
+        """A running recording in which the load never stands: rate and load are one thing. Of a
+        single pull the wait before it is no stand."""
         if not self.rows.continuous or self.rests:
             return False
-        return self._moving_share > 1 - _STANDS
+        moves, waits = self._shares
+        return moves + (waits if self.once else 0.0) > 1 - _STANDS
 
     @cached_property
     def one_rate(self) -> bool:
@@ -249,12 +251,12 @@ class Course:
     @property
     def stroke_s(self) -> float:
         """s that one pass of the load takes, holds and pauses left out."""
-        return self._moving_share * self.session_span / self.passes
+        return self._shares[0] * self.session_span / self.passes
 
     @cached_property
-    def _moving_share(self) -> float:
-        """Share of the session in which the load moves, or is still to come, by means of even
-        pieces of it: noise of the driven channel moves as well."""
+    def _shares(self) -> tuple[float, float]:
+        """Shares of the session in which the load moves, and in which it stands and is still to
+        come, by means of even pieces of it: noise of the driven channel moves as well."""
         t = (self.rows.session - self.rows.session.min()) / self.session_span
         count = int(np.clip(self.rows.n // 4, 8, max(40, 10 * self.passes)))
         at = np.minimum((t * count).astype(np.int64), count - 1)
@@ -268,8 +270,7 @@ class Course:
             change = np.diff(mean(values)) / np.diff(held)
             return np.asarray(change * count / (np.ptp(values) or 1.0))
 
-        begun = np.maximum.accumulate(np.abs(mean(self.load))) > _BEGUN * np.abs(self.load).max()
-        slow = (np.abs(speed(self.load)) < _STANDS) & begun[1:]
+        slow = np.abs(speed(self.load)) < _STANDS
         if self.imposed:  # a force that grows is no hold, wherever the displacement was read
             slow &= speed(np.abs(self.rows.measured_force)) < _STANDS
         elif self.data.imposed != "force":  # a stroke that runs on while the force stands
@@ -279,7 +280,10 @@ class Course:
         one_run = self.rows.run[first[1:] - 1] == self.rows.run[first[1:]]
         left_out = (np.diff(held) > 1) & one_run
         stands = slow & (beside[:-2] | beside[2:] | left_out)
-        return float(np.diff(held)[~stands].sum()) / max(count - 1, 1)
+        force = np.abs(mean(self.rows.measured_force))
+        come = np.maximum.accumulate(force)[1:] > _COME * np.abs(self.rows.measured_force).max()
+        whole, time = max(count - 1, 1), np.diff(held)
+        return float(time[~stands].sum()) / whole, float(time[stands & ~come].sum()) / whole
 
     @cached_property
     def flows_out(self) -> bool:

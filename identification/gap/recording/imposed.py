@@ -11,6 +11,8 @@ both are alike; force is the answer then, and it does not matter.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from identification.arrays import Array, Ints
@@ -28,7 +30,7 @@ _MARGIN = 0.05  # nats by which the displacement has to be simpler: half a piece
 _SLIDING = -2.5  # nats, where it slides to and fro: so much simpler the force may look by chance
 _FLAT = 0.33  # of the displacement's change, each in its range: what the force changes on a plateau
 _SPENT, _MOST = 0.15, 0.45  # of the time, and of the way, in each sense
-_APART = 0.1  # of the force's range: plateaus there and back, of what rubs at least 0.4
+_TURNS_BY = 0.1  # of the force's range, along most of the ways there and back
 _BEYOND = 3.0  # standard deviations of a point: so far it goes from one mean of points to the next
 _STILL = 2.0  # stated standard uncertainties: a channel that spreads by no more stands still
 _FOLLOWS = 0.5  # of its variance that the other channel explains
@@ -179,9 +181,9 @@ def turned_alike(values: Array, other: Array, least: float = _ELSEWHERE) -> bool
 
 
 def _slides(force: Channel, moved: Channel) -> bool:
-    """Whether the displacement goes to and fro while the force hardly changes, elsewhere on the way
-    back: a force that was driven would hold such a plateau in one sense only, as under a weight, or
-    run through it; what rings under a force that stands meets the same one on the way back."""
+    """Whether the displacement goes to and fro while the force hardly changes but at the turns: a
+    force that was driven would hold such a plateau in one sense only, as under a weight, or run
+    through it; what rings under a force that stands goes all of its ways at that one."""
     length = float(_senses(moved) @ np.diff(moved.values))  # of all legs
     if not length > 0:
         return False
@@ -191,13 +193,14 @@ def _slides(force: Channel, moved: Channel) -> bool:
     went, time = np.diff(moved.values), np.diff(force.time)
     flat = np.abs(np.diff(force.values)) < _FLAT * np.abs(went)
     sense = _senses(moved)  # of its legs: what noise does back and forth is no way
-    means = []
     for way in (sense > 0, sense < 0):
         path, spent = np.abs(went) * way, time * way
         if flat @ spent < _SPENT * time.sum() or flat @ path < _MOST * path.sum():
             return False
-        means.append(float(np.average(force.values[1:], weights=flat * spent)))
-    return means[0] - means[1] > _APART
+    starts = np.flatnonzero(np.diff(sense, prepend=0.0))
+    spans = [float(np.ptp(force.values[a : b + 1])) for a, b in pairwise([*starts, len(sense)])]
+    ways = np.add.reduceat(np.abs(went), starts)
+    return bool(ways @ (np.array(spans) > _TURNS_BY) > 0.5 * ways.sum())
 
 
 def _coarser(channel: Channel, step: int) -> Channel:

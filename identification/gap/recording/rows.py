@@ -26,6 +26,9 @@ from identification.gap.recording.turns import rises
 _LEVELS = 12  # force classes of a continuous recording, per sense of motion
 
 
+_MOMENT = 0.05  # of the time between two levels that were read once
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """n rows. weight (n,): samples behind a row; hold, level, run, setup (n,): consecutive ids.
@@ -98,13 +101,29 @@ class Rows:
 
     @cached_property
     def half_sample(self) -> float:
-        """Half of the time between two samples of a hold, s: between its first two rows, which are
-        single readings; of most holds, since one stamp may be wrong. Where every level was read
-        once, between these; of what has no clock half a second."""
+        """How long a load has stood before it is first read, s: half of the time between samples.
+        Where every level was read once nobody knows, and the load is taken to go straight from
+        reading to reading, but for a moment about each."""
+        return (_MOMENT if self.read_once else 0.5) * self.sample_time
+
+    @property
+    def read_once(self) -> bool:
+        """Every level was read once, or none has a clock."""
+        return not self._within
+
+    @cached_property
+    def sample_time(self) -> float:
+        """Time between two samples, s: of a hold, between its first two rows, which are single
+        readings, and of most holds, since one stamp may be wrong; where every level was read once,
+        between these; of what has no clock 1 s."""
+        return self._within or self.row_time or 1.0
+
+    @cached_property
+    def _within(self) -> float:
+        """The same of holds that were read more than once; 0 where there are none."""
         first = np.flatnonzero(self.hold_starts[:-1] & ~self.hold_starts[1:])
         step = np.diff(self.time)[first]
-        within = float(np.median(step[step > 0])) if np.any(step > 0) else self.row_time
-        return (within or 1.0) / 2
+        return float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
 
     @cached_property
     def row_time(self) -> float:
