@@ -1,15 +1,21 @@
-"""Joints that turn otherwise than an explanation has it are named."""
+"""Joints that turn otherwise than an explanation has it are named, and speak against it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from identification.gap.answer.notes import readings_missed
 from identification.gap.evidence.engine import Engine
 from identification.gap.explanations.explanation import Explanation
 from identification.gap.explanations.fit import fit
+from identification.gap.judging import leftover
+from identification.gap.judging.leftover import _still_good, readings_left
 from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import make_bench
+from tests.unit.small_explanations import part, said
 from tests.unit.test_gap_forms import arm_data
 
 NOTHING = Explanation((), 0.0, 0.0, (), 0.0)
@@ -32,3 +38,30 @@ def test_a_joint_that_bends_where_a_spring_was_found_is_said() -> None:
     (said,) = texts(0.4)
     assert said.startswith("Joint 2 turns otherwise than the effects found have it, by up to ")
     assert "its stiffness is a mean over these loads" in said
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_what_a_joint_was_seen_to_do_no_mounting_did(
+    turns: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A motion of the target that meets the displacement to the last digit, while the joint that
+    made it is read, or stands still."""
+    bench = make_bench(arm_data())
+    torque, most = bench.true_torque[:, BENT], float(np.abs(bench.true_torque[:, BENT]).max())
+    turned = 40 * most * bench.compliance[BENT] * (torque / most) ** 3
+    q = np.zeros((bench.rows.n, bench.data.joints))
+    q[:, BENT] = turned * turns
+    moved = bench.lever[:, BENT] * turned
+    target = bench.stacked(moved, q=q)
+    for other in ("strain", "_left"):  # of the joint's spring, and of the displacement
+        monkeypatch.setattr(leftover, other, lambda *_: 0.0)
+    mounting = part("base_slip", [bench.add(bench.stacked(moved))])
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0, 3e-6]))
+    slips = said((mounting,), (bench.rows.rms(moved),))
+    off = readings_left(engine, fit(engine, slips))
+    share = off / bench.rows.rms(moved)  # of which the joint's spring takes what is straight
+    assert 0.4 < share < 0.7 if turns else share < 0.02
+    assert _still_good(engine, slips).good is not turns
+    no_readings = make_bench(replace(arm_data(), output_encoder=False))
+    blind = Engine(no_readings, base_columns(no_readings), no_readings.observed, np.array([0.0]))
+    assert readings_left(blind, fit(blind, NOTHING)) == 0.0

@@ -172,9 +172,8 @@ def readings_missed(engine: Engine, fitted: Fit) -> tuple[Note, ...]:
     bench, q = engine.bench, engine.bench.layout.q
     if not bench.has_q:
         return ()
-    columns = engine.columns(c for p in fitted.parts for c in p.variant.columns)
-    left = engine.target - engine.base.columns @ fitted.base - columns @ fitted.coefficients
-    missed, turned = (v[q].reshape(bench.data.joints, -1) for v in (left, bench.observed))
+    both = fitted.left(engine), bench.observed
+    missed, turned = (v[q].reshape(bench.data.joints, -1) for v in both)
     noise = np.hypot(engine.sigma[q].reshape(missed.shape), bench.noise.q_run)
     beyond = np.sqrt(np.mean((missed / noise) ** 2, axis=1))
     most = np.abs(missed).max(axis=1)

@@ -59,6 +59,12 @@ class Fit:
         bench, whole = engine.bench, self.whole(engine)
         return whole if bench.known is None else whole - bench.known.does[: bench.rows.n]
 
+    def left(self, engine: Engine) -> Array:
+        """(size,) what it leaves of the stacked target."""
+        columns = engine.columns(c for p in self.parts for c in p.variant.columns)
+        base = engine.base.columns @ self.base
+        return np.asarray(engine.target - base - columns @ self.coefficients)
+
     def contribution(self, engine: Engine, index: int) -> Array:
         """(size,) stacked contribution of one part."""
         w, _ = self.of(index)

@@ -97,12 +97,13 @@ def _near(ranked: tuple[Explanation, ...]) -> list[Explanation]:
 
 
 def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
-    """Of an arm: with as much of its weight as what it leaves allows it, the less the more words
-    are spent; with no more than what the sizes of the imperfection allow where these are far
-    beyond: another channel, which the rows of the response do not show, asks for them."""
+    """Of an arm: with as much of its weight as what it leaves allows it, of the displacement and of
+    the joint readings, the less the more words are spent; with no more than what the sizes of the
+    imperfection allow where these are far beyond: another channel, which the rows of the response
+    do not show, asks for them."""
     allowed = _allowed(engine, explanation, engine.bench.noise.stated, words=len(explanation.words))
     fitted = fit(engine, explanation)
-    share = kept_within(_left(engine, fitted), allowed)
+    share = kept_within(max(_left(engine, fitted), readings_left(engine, fitted)), allowed)
     if goes_as_no_drift(engine, fitted):
         share *= NO_DRIFT
     good = explanation.log_weight + float(np.log(max(share, 1e-300)))
@@ -156,6 +157,21 @@ def _left(engine: Engine, fitted: Fit) -> float:
     left = engine.target[:n] - fitted.response
     known = noise.response**2 + noise.hold**2 + open_to_hands(engine, fitted) ** 2
     square = weight @ (left**2 - known)
+    return float(np.sqrt(max(float(square), 0.0)))
+
+
+def readings_left(engine: Engine, fitted: Fit) -> float:
+    """rms (m) by which the target would be elsewhere, beyond noise, were the joints where they were
+    read and not where a fit has them; 0 without readings. However well it meets the displacement:
+    what a joint was seen to do, no mounting did."""
+    bench, rows, q = engine.bench, engine.bench.rows, engine.bench.layout.q
+    if not bench.has_q:
+        return 0.0
+    lever = bench.lever[rows.edges].T  # (m, holds)
+    moved = np.sum(lever * fitted.left(engine)[q].reshape(lever.shape), axis=0)
+    noise = np.hypot(engine.sigma[q].reshape(lever.shape), bench.noise.q_run)
+    weight = rows.hold_weight[rows.edges] / rows.hold_weight[rows.edges].sum()
+    square = weight @ (moved**2 - np.sum((lever * noise) ** 2, axis=0))
     return float(np.sqrt(max(float(square), 0.0)))
 
 
