@@ -160,16 +160,19 @@ def _left(engine: Engine, fitted: Fit) -> float:
     return float(np.sqrt(max(float(square), 0.0)))
 
 
+PLAINLY = 3.0  # times the noise of the readings, which is known to a fifth
+
+
 def readings_left(engine: Engine, fitted: Fit) -> float:
-    """rms (m) by which the target would be elsewhere, beyond noise, were the joints where they were
-    read and not where a fit has them; 0 without readings. However well it meets the displacement:
-    what a joint was seen to do, no mounting did."""
+    """rms (m) by which the target would be elsewhere, plainly beyond noise, were the joints where
+    they were read and not where a fit has them; 0 without readings. However well it meets the
+    displacement: what a joint was seen to do, no mounting did."""
     bench, rows, q = engine.bench, engine.bench.rows, engine.bench.layout.q
     if not bench.has_q:
         return 0.0
     lever = bench.lever[rows.edges].T  # (m, holds)
     moved = np.sum(lever * fitted.left(engine)[q].reshape(lever.shape), axis=0)
-    noise = np.hypot(engine.sigma[q].reshape(lever.shape), bench.noise.q_run)
+    noise = PLAINLY * np.hypot(engine.sigma[q].reshape(lever.shape), bench.noise.q_run)
     weight = rows.hold_weight[rows.edges] / rows.hold_weight[rows.edges].sum()
     square = weight @ (moved**2 - np.sum((lever * noise) ** 2, axis=0))
     return float(np.sqrt(max(float(square), 0.0)))
