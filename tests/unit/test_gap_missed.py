@@ -65,3 +65,14 @@ def test_what_a_joint_was_seen_to_do_no_mounting_did(
     no_readings = make_bench(replace(arm_data(), output_encoder=False))
     blind = Engine(no_readings, base_columns(no_readings), no_readings.observed, np.array([0.0]))
     assert readings_left(blind, fit(blind, NOTHING)) == 0.0
+
+
+@pytest.mark.parametrize(("times", "counts"), [(2.0, False), (6.0, True)])
+def test_readings_speak_only_plainly_beyond_their_noise(times: float, counts: bool) -> None:
+    """How large that is nobody knows better than to a fifth."""
+    bench = make_bench(arm_data())
+    q, target = bench.layout.q, np.zeros(bench.layout.size)
+    signs = np.random.default_rng(5).choice((-1.0, 1.0), q.stop - q.start)
+    target[q] = times * signs * np.hypot(bench.sigma[q], bench.noise.q_run)
+    engine = Engine(bench, base_columns(bench), target, np.array([0.0]))
+    assert (readings_left(engine, fit(engine, NOTHING)) > 0) is counts

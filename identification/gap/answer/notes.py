@@ -169,12 +169,11 @@ def readings_missed(engine: Engine, fitted: Fit) -> tuple[Note, ...]:
     """Of joints that turn otherwise than an explanation has it: where the displacement's gap is
     large, its law may be so far off, and a joint that bends a little is a spring for all it
     knows."""
-    bench, q = engine.bench, engine.bench.layout.q
+    bench = engine.bench
     if not bench.has_q:
         return ()
-    both = fitted.left(engine), bench.observed
-    missed, turned = (v[q].reshape(bench.data.joints, -1) for v in both)
-    noise = np.hypot(engine.sigma[q].reshape(missed.shape), bench.noise.q_run)
+    missed, noise = fitted.missed_readings(engine)
+    turned = bench.observed[bench.layout.q].reshape(missed.shape)
     beyond = np.sqrt(np.mean((missed / noise) ** 2, axis=1))
     most = np.abs(missed).max(axis=1)
     off = (beyond > _MISSED) & (most > _OF_WAY * np.ptp(turned, axis=1))

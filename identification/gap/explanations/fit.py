@@ -59,11 +59,15 @@ class Fit:
         bench, whole = engine.bench, self.whole(engine)
         return whole if bench.known is None else whole - bench.known.does[: bench.rows.n]
 
-    def left(self, engine: Engine) -> Array:
-        """(size,) what it leaves of the stacked target."""
+    def missed_readings(self, engine: Engine) -> tuple[Array, Array]:
+        """(m, holds) rad by which it misses the joint readings, and (m, holds) rad their noise; of
+        no holds without readings."""
+        bench, q = engine.bench, engine.bench.layout.q
         columns = engine.columns(c for p in self.parts for c in p.variant.columns)
-        base = engine.base.columns @ self.base
-        return np.asarray(engine.target - base - columns @ self.coefficients)
+        gives = engine.base.columns @ self.base + columns @ self.coefficients
+        missed = (engine.target - gives)[q].reshape(bench.data.joints, -1)
+        noise = engine.sigma[q].reshape(missed.shape)
+        return missed, np.hypot(noise, bench.noise.q_run)
 
     def contribution(self, engine: Engine, index: int) -> Array:
         """(size,) stacked contribution of one part."""

@@ -167,14 +167,14 @@ def readings_left(engine: Engine, fitted: Fit) -> float:
     """rms (m) by which the target would be elsewhere, plainly beyond noise, were the joints where
     they were read and not where a fit has them; 0 without readings. However well it meets the
     displacement: what a joint was seen to do, no mounting did."""
-    bench, rows, q = engine.bench, engine.bench.rows, engine.bench.layout.q
+    bench, rows = engine.bench, engine.bench.rows
     if not bench.has_q:
         return 0.0
+    missed, noise = fitted.missed_readings(engine)
     lever = bench.lever[rows.edges].T  # (m, holds)
-    moved = np.sum(lever * fitted.left(engine)[q].reshape(lever.shape), axis=0)
-    noise = PLAINLY * np.hypot(engine.sigma[q].reshape(lever.shape), bench.noise.q_run)
+    moved = np.sum(lever * missed, axis=0)
     weight = rows.hold_weight[rows.edges] / rows.hold_weight[rows.edges].sum()
-    square = weight @ (moved**2 - np.sum((lever * noise) ** 2, axis=0))
+    square = weight @ (moved**2 - np.sum((lever * PLAINLY * noise) ** 2, axis=0))
     return float(np.sqrt(max(float(square), 0.0)))
 
 

@@ -122,14 +122,12 @@ class Rows:
     def _within(self) -> float:
         """The same of holds that were read more than once; 0 where there are none."""
         first = np.flatnonzero(self.hold_starts[:-1] & ~self.hold_starts[1:])
-        step = np.diff(self.time)[first]
-        return float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+        return _usual(np.diff(self.time)[first])
 
     @cached_property
     def row_time(self) -> float:
         """Time between most neighbouring rows, s; 0 where no time goes by."""
-        step: Array = np.diff(self.time)
-        return float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+        return _usual(np.diff(self.time))
 
     @cached_property
     def gone_beyond(self) -> Flags:
@@ -178,6 +176,11 @@ class Rows:
     def rms(self, values: Array) -> float:
         """Of values (n,), every sample counted."""
         return float(np.sqrt(self.weight @ values**2 / self.weight.sum()))
+
+
+def _usual(step: Array) -> float:
+    """Most of the steps (k,) s that take any time; 0 where none does."""
+    return float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
 
 
 def reduce_rows(data: GapData) -> Rows:
