@@ -195,3 +195,16 @@ def test_weights_are_written_down_and_do_not_drift(read: bool) -> None:
     assert words == ({"force_drift", "thermal_drift"} if read else {"thermal_drift"})
     if not read:
         assert explained(data).verdict == "thermal_drift"
+
+
+@pytest.mark.parametrize(("held", "word"), [(0.0, "force_drift"), (4e-4, "joint_creep")])
+def test_a_force_that_goes_while_no_stroke_is_held_is_the_channels(held: float, word: str) -> None:
+    """However far the noise of many readings of the stroke reaches; held away from rest, the part
+    relaxes."""
+    at = np.linspace(0.0, 1.0, 400)
+    noise = np.random.default_rng(1).standard_normal((2, 400))
+    stroke = held + 1e-6 * noise[0]
+    assert np.abs(stroke - held).max() > 3e-6  # the stated noise of one reading is 1e-6 m
+    force = held / 1e-5 + 20.0 * np.exp(-2 * at) + 0.1 * noise[1]
+    data = bench_data(force, stroke, step=np.full(400, -1), imposed="displacement")
+    assert explained(data).verdict == word

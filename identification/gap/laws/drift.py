@@ -156,7 +156,7 @@ _LOADED = 0.3  # of the largest force
 def _loaded(bench: Bench) -> bool:
     """A recording that starts with a force: drifts are recorded from zero on. Where a stroke is
     imposed and there is none, no force is due, and what is read is the instrument's."""
-    meter, stroke = bench.data.instruments, float(np.abs(bench.slope * bench.load).max())
+    meter, stroke = bench.data.instruments, bench.rows.rms(bench.slope * bench.load)
     if bench.imposed and stroke <= 3 * meter.displacement:
         return False
     force = bench.rows.measured_force
