@@ -317,6 +317,7 @@ class _Table:
 
     def _note_order(self, columns: Mapping[str, Values]) -> None:
         """Rows stand in the order of measurement; a clock that goes back is worth a word."""
+        self._check_order(columns)
         run = [columns[n] for n in ("pose", "direction", "repetition")]
         same = np.logical_and.reduce([c[1:] == c[:-1] for c in run])
         back = np.flatnonzero(same & (np.diff(columns["time_s"]) < 0))
@@ -326,6 +327,25 @@ class _Table:
         if "session_s" in columns and np.any(np.diff(columns["session_s"]) < 0):
             at = int(np.flatnonzero(np.diff(columns["session_s"]) < 0)[0])
             self.notes.append(f"session_s goes back, first at sample {at + 2}")
+
+    def _check_order(self, columns: Mapping[str, Values]) -> None:
+        """InputError for rows in another order than they were measured in."""
+        name = "session_s" if "session_s" in columns else "time_s"
+        clock = columns[name]
+        back = np.flatnonzero(np.diff(clock) < 0)
+        # a clock of runs, or of steps, starts anew with each of them
+        if len(back) < _FEW or len(back) < _OUT_OF_ORDER[name] * (len(clock) - 1):
+            return
+        at = int(back[0])
+        raise InputError(
+            f"{self._path}: the rows are not in the order of measurement: {name} goes back "
+            f"{len(back)} times in {len(clock)} samples, first from {clock[at]:g} to "
+            f"{clock[at + 1]:g} s at sample {at + 2}. Sort the rows by the time they were taken "
+            "at."
+        )
+
+
+_FEW, _OUT_OF_ORDER = 5, {"session_s": 0.1, "time_s": 0.4}  # times; shares of the steps
 
 
 def _meant(near: str, unit: str) -> str:

@@ -99,8 +99,7 @@ class Diagnosis:
 
     def _outside(self) -> list[str]:
         """What the simulation has beside springs and effects."""
-        curves = self.result.bench.data.curves is not None  # the simulation is what they are
-        if self.model is None or not self.model.written_outside or curves:
+        if self.model is None or not self.model.written_outside:
             return []
         keys = " and ".join(f"`{key}`" for key in self.model.written_outside)
         return [f"The simulation has the model's {keys}: the gap is what goes beyond them."]
@@ -116,9 +115,14 @@ def diagnose(
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnoses a data set. model: a model file whose springs (and links, mounting, effects) stand
-    for META's;
-    simulation: CSV with another simulator's curves; withhold: words taken out of the library; add:
-    words the explanation must contain. InputError for anything wrong."""
+    for META's; simulation: CSV with another simulator's curves, instead of a model; withhold: words
+    taken out of the library; add: words the explanation must contain. InputError for anything
+    wrong."""
+    if model is not None and simulation is not None:
+        raise InputError(
+            f"--model {model}, --simulation {simulation}: each says what was simulated. Leave one "
+            "out."
+        )
     read = None if model is None else load_model(model)
     given = _Believed(gap_data(dataset)) if read is None else _believing(dataset, read)
     data = given.data if simulation is None else with_curves(given.data, simulation)

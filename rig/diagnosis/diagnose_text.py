@@ -55,14 +55,16 @@ _SHARE = "share_through_friction"
 # Parameters whose name alone misleads: a share of a compliance ends at 1, a stiffness does not.
 _HELD_BACK = "of the compliance, what friction holds back until it slips; 1: nothing moves before"
 _STIFFER = "how stiff the friction is until it slips, over the spring's stiffness; it may pass 1"
+_BEYOND = "slope_beyond_over_elastic"
+_ADDED = "compliance added beyond the threshold, over the elastic one; 1: twice as soft there"
 
 
 def parameter_meanings(r: GapResult) -> dict[str, str]:
     """Parameter -> what its number is, of those found that need it. Of a rig without an arm whose
     displacement is imposed, springs and friction are stiffnesses beside each other."""
-    if not any(_SHARE in e.parameters for e in r.effects):
-        return {}
-    return {_SHARE: _STIFFER if r.bench.imposed and not r.bench.data.arm else _HELD_BACK}
+    share = _STIFFER if r.bench.imposed and not r.bench.data.arm else _HELD_BACK
+    found = {name for e in r.effects for name in e.parameters}
+    return {k: told for k, told in ((_SHARE, share), (_BEYOND, _ADDED)) if k in found}
 
 
 # What is said in place of a word's meaning.
@@ -155,16 +157,26 @@ def _answer(r: GapResult) -> str:
     before, after, noise = (brief(v * MM_PER_M, 3) for v in (r.before, r.after, r.noise))
     like = None if r.looks_like is None else looks_like(r.looks_like, arm=r.bench.data.arm)
     meaning = meanings(arm=r.bench.data.arm).get(r.verdict, "")
-    told = answer(r.verdict, meaning, r.names, like, nothing=r.learned_nothing)
+    met = within_noise(r.after, r.noise)
+    told = answer(r.verdict, meaning, r.names, like, nothing=r.learned_nothing, met=met)
     shown = told.format(before=before, after=after, noise=noise)
     return f"{r.verdict} ({likely(r.probabilities[r.verdict])}): {shown}"
 
 
+def within_noise(after: float, noise: float) -> bool:
+    """Whether what is left is no more than noise, which is known to a fifth."""
+    return after <= _NOISE_TO * noise
+
+
+_NOISE_TO = 1.2
+
+
 def answer(
-    verdict: str, meaning: str, names: Iterable[str], like: str | None, *, nothing: bool
+    verdict: str, meaning: str, names: Iterable[str], like: str | None, *, nothing: bool, met: bool
 ) -> str:
     """What a verdict says, with {before}, {after} and {noise} where rms in mm are to stand. names:
-    of the effects; like: what an unknown gap looks like; nothing: that was learned."""
+    of the effects; like: what an unknown gap looks like; nothing: that was learned; met: what is
+    left of the displacement is no more than noise."""
     alone = "the instruments alone leave {noise} mm."
     if nothing:
         return (
@@ -176,6 +188,12 @@ def answer(
             f"{OTHERWISE[verdict]} that was measured. There is no gap to close. Of the {{before}} "
             "mm rms that the simulation misses as it stands, {after} mm remain when these are "
             f"fitted within that; {alone}"
+        )
+    if verdict == "unknown" and met:
+        return (
+            "the displacement is met without any effect, {after} of {before} mm rms remain, and "
+            f"{alone} But that takes springs, gains or readings farther off than META states, and "
+            "no effect of the library is believed to be the reason."
         )
     if verdict == "unknown":
         alike = "" if like is None else f" It looks like this: {like}."

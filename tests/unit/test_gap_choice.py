@@ -13,10 +13,12 @@ from identification.gap.answer.notes import called, left_out
 from identification.gap.evidence.engine import Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import Explanation, SearchResult
+from identification.gap.explanations.verdict import TAKES_TWO, simpler_of
 from identification.gap.judging.choice import WORTH, WORTH_OF_THIRD, chosen_of, foresees
 from identification.gap.model.variants import variant
 
 CURVE, LAG, ASKEW = "joint_nonlinear_stiffness", "time_lag", "load_misalignment"
+TILT = "base_compliance"
 LARGE = 1e-5  # m
 
 
@@ -34,7 +36,8 @@ def said(
 
 def found(*explanations: Explanation) -> SearchResult:
     ranked = tuple(sorted(explanations, key=lambda e: -e.log_weight))
-    engine = SimpleNamespace(bench=SimpleNamespace(noise=SimpleNamespace(stated=NOISE)))
+    arm = SimpleNamespace(noise=SimpleNamespace(stated=NOISE), data=SimpleNamespace(arm=True))
+    engine = SimpleNamespace(bench=arm)
     return SearchResult(cast(Engine, engine), (*ranked, said({}, -500.0)), {}, {}, -400.0, 1e-6)
 
 
@@ -96,10 +99,35 @@ def test_a_larger_effect_that_is_one_of_several_alike_is_shown_beside_the_verdic
     """Which of them it is nobody can tell; what splits it between them is no better."""
     beside = [said({large: 2.0, LAG: 1.0}, 0.0) for large in ("force_scale", "pose_error")]
     split = said({LAG: 1.0, "force_scale": 0.9, "pose_error": 0.9}, -3.0)
-    for weight in (-40.0, -5.0):
+    for weight in (-40.0, -TAKES_TWO - 1):
         assert shown_of(found(*beside, split, said({LAG: 1.0}, weight)), LAG) is beside[0]
     alone = said({LAG: 1.0}, 1 - WORTH)
     assert shown_of(found(*beside, split, alone), LAG) is alone
+
+
+@pytest.mark.parametrize(
+    ("worth", "largest", "named"), [(21.0, LAG, 2), (21.0, CURVE, 3), (91.0, LAG, 3)]
+)
+def test_what_brings_too_little_to_lead_is_not_shown_as_the_largest(
+    worth: float, largest: str, named: int
+) -> None:
+    """A third effect that takes the gap over from the two that the verdict is of."""
+    two = said({CURVE: 1.0, ASKEW: 0.5}, 0.0)
+    sizes = {largest: 1.3, **{w: 1.0 for w in (CURVE, LAG) if w != largest}, ASKEW: 0.6}
+    choice = chosen_of(found(two, said(sizes, worth)), CURVE)
+    assert len(choice.shown.words) == named
+    assert [n.text.count("few nats") for n in left_out(*choice)] == [1] * (named == 2)
+
+
+def test_springs_far_off_speak_for_no_pair() -> None:
+    """What stands for wrong springs by springs that are off explains nothing without them."""
+    both, alone = (
+        said(s, w)
+        for s, w in (({"joint_stiffness_error": 1.0, TILT: 0.2}, 8.0), ({TILT: 0.1}, 0.0))
+    )
+    for off, speaks in ((1.0, True), (5.0, False)):
+        ranked = (both, replace(alone, off=off))
+        assert (simpler_of(both, ranked, {}, arm=True) is not None) is speaks
 
 
 def test_what_is_added_to_a_failure_was_not_foreseen_either() -> None:

@@ -18,6 +18,7 @@ from rig.diagnosis.diagnose import Diagnosis, diagnose
 from rig.diagnosis.gap_data import gap_data
 from rig.diagnosis.gap_model import write_model
 from rig.diagnosis.other_setups import elsewhere
+from rig.errors import InputError
 from rig.models.model import load_model
 from rig.models.simulate import simulate, write_csv
 from tests.conformance.gap_designs import DESIGNS, STATED, TCP_MM, Array, Q, imported, meta, noisy
@@ -97,6 +98,8 @@ def test_a_model_and_its_curves_are_one_simulation(folder: Path, found: Diagnosi
     curves = diagnose(measured(folder), simulation=folder / "curves.csv")
     assert curves.result.verdict == "none"
     assert curves.result.before == pytest.approx(found.result.before, rel=1e-3)
+    with pytest.raises(InputError, match="each says what was simulated. Leave one out"):
+        diagnose(measured(folder), model=model(folder), simulation=folder / "curves.csv")
 
 
 def test_a_corrected_model_keeps_them(folder: Path, found: Diagnosis) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -556,3 +557,17 @@ def test_fast_and_plain_reader_agree(
     if fast is not None:
         for name, values in plain.items():
             assert example.same_values(values, fast[name]), name
+
+
+@pytest.mark.parametrize("clock", ["session_s", "time_s"])
+def test_rows_out_of_order_are_refused(tmp_path: Path, clock: str) -> None:
+    mixed = np.random.default_rng(2).permutation(40)
+
+    def table(order: Iterable[int], each: int) -> str:
+        rows = "".join(f"{i % each},{i},{i / 7!r}\n" for i in order)
+        return f"{clock},force_N,displacement_mm\n" + rows
+
+    with pytest.raises(InputError, match=f"not in the order of measurement: {clock} goes back"):
+        bring(tmp_path, table(mixed.tolist(), 40), example.META_SPECIMEN)
+    if clock == "time_s":  # which starts anew with every step
+        bring(tmp_path, table(range(40), 4), example.META_SPECIMEN)

@@ -44,12 +44,21 @@ def notes_of(bench: Bench, verdict: str) -> Iterator[Note]:
 
 
 def _faults(bench: Bench) -> Iterator[str]:
+    force, moved = bench.data.force, bench.data.displacement
+    if len(force) > _BY_CHANCE and not np.ptp(force) > 0 and not np.ptp(moved) > 0:
+        yield (
+            f"Force and displacement read one number each, {len(force)} times: real channels "
+            "scatter. See whether they were connected."
+        )
     yield from (f.text for f in bench.course.faults)
     if bench.noise.raised > NOISY:
         yield (
             f"Readings scatter {bench.noise.raised:.0f} times as much as stated: vibration, or an "
             "uncertainty that was judged too small. They were taken as uncertain as they are."
         )
+
+
+_BY_CHANCE = 3  # readings that may be alike
 
 
 def _nothing_moves(bench: Bench) -> Iterator[str]:
@@ -141,10 +150,12 @@ def left_out(chosen: Explanation, fuller: Explanation | None) -> tuple[Note, ...
     if fuller is None or fuller.words <= chosen.words:
         return ()
     small = {w: s for w, s in fuller.troubles.items() if w not in chosen.words}
+    larger = max(small.values()) > max(chosen.troubles.values())
     text = (
         f"{' and '.join(f'{w} ({1e3 * s:.2g} mm rms)' for w, s in small.items())} beside it would "
-        f"explain {fuller.log_weight - chosen.log_weight:.0f} nats more. So little may as well be "
-        f"how far the law of {' and '.join(chosen.troubles)} is off: it is not named. To see it: "
+        f"explain {fuller.log_weight - chosen.log_weight:.0f} nats more. "
+        f"So {'few nats' if larger else 'little'} may as well be how far the law of "
+        f"{' and '.join(chosen.troubles)} is off: it is not named. To see it: "
         f"{' '.join(f'--add {w}' for w in small)}."
     )
     return (Note(REMARK, text),)

@@ -133,7 +133,7 @@ class _Shapes:
             if name:
                 out[name] = out.get(name, 0.0) + float(share)
         ranked = sorted(out.items(), key=lambda item: -item[1])
-        return {name: share for name, share in ranked if share > _LEAST_SHARE}
+        return {name: min(share, 1.0) for name, share in ranked if share > _LEAST_SHARE}
 
     def elsewhere(self) -> Explanation | None:
         """The best shape at the likeliest place, where that is another one than the explanation's;

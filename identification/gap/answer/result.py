@@ -10,8 +10,10 @@ import numpy as np
 
 from identification.arrays import Ints
 from identification.gap.answer.discriminate import NextMeasurement
+from identification.gap.answer.gear_side import read_elsewhere
 from identification.gap.answer.locate import Where, locate
 from identification.gap.answer.notes import (
+    FAULT,
     Note,
     across,
     called,
@@ -118,8 +120,8 @@ def result_of(
     springs = fit(engine, next(e for e in found.explanations if not e.parts))
     structural = engine.target[:n] - springs.response
     simulated = stated_prediction(engine)
-    scale = off_scale(bench, simulated)
-    notes = [*scale, *notes_of(bench, verdict)]
+    contradicted = (*off_scale(bench, simulated), *read_elsewhere(bench))
+    notes = [*contradicted, *notes_of(bench, verdict)]
     notes += [*disbelieved(found, verdict), *across(bench, chosen)]
     notes += readings_missed(engine, fitted) if chosen.parts else ()
     notes += [*called(found, chosen, verdict), *left_out(chosen, fuller)]
@@ -135,7 +137,7 @@ def result_of(
         runners_up=_runners_up(engine, found, verdict, ways),
         next_measurement=None,
         remainder=found.unknown_eta if verdict == "unknown" else chosen.eta,
-        looks_like=_likeness(found, verdict, scale),
+        looks_like=_likeness(found, verdict, contradicted),
         said=ordered(notes),
         bench=bench,
         engine=engine,
@@ -144,11 +146,11 @@ def result_of(
     )
 
 
-def _likeness(found: SearchResult, verdict: str, scale: tuple[Note, ...]) -> Likeness | None:
-    """Of an unknown gap; none of one of another order of size, or whose channels count in opposite
-    senses, or of which one says nothing."""
-    faults = found.engine.bench.course.faults
-    if verdict != "unknown" or scale or any(f.kind in (SIGNS, SILENT) for f in faults):
+def _likeness(found: SearchResult, verdict: str, said: tuple[Note, ...]) -> Likeness | None:
+    """Of an unknown gap; none where what is said is that META is wrong, or of one whose channels
+    count in opposite senses, or of which one says nothing."""
+    faults, wrong = found.engine.bench.course.faults, any(n.kind == FAULT for n in said)
+    if verdict != "unknown" or wrong or any(f.kind in (SIGNS, SILENT) for f in faults):
         return None
     return found.looks_like
 

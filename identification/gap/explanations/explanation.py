@@ -51,13 +51,15 @@ LAW_REMAINDER = 0.03
 @dataclass(frozen=True, eq=False)
 class Explanation:
     """Effects (largest first, none for the base alone), posterior weight as log, imperfection eta
-    m, sizes (rms m) of the effects, and log share of the posterior with little remainder."""
+    m, sizes (rms m) of the effects, and log share of the posterior with little remainder. off: by
+    how many standard deviations springs and gains are off at most, where that was looked up."""
 
     parts: tuple[Part, ...]
     log_weight: float
     eta: float
     sizes: tuple[float, ...]
     log_good: float
+    off: float = 0.0
 
     def sized(self, sizes: Iterable[float]) -> Explanation:
         """With other sizes (rms m) of its effects, the largest first."""

@@ -66,7 +66,7 @@ def with_posterior(found: SearchResult, kept: Mapping[frozenset[str], float]) ->
         good *= kept.get(e.words, 1.0)
         if not e.parts and found.engine.bench.noise.misjudged:
             good *= STATED
-        fewer = _simpler(e, ranked, kept, arm)
+        fewer = simpler_of(e, ranked, kept, arm=arm)
         said = found.speaker_for(e) or found.speaker_for(fewer) or fewer or e
         closely = said.eta <= _CLOSELY * found.engine.bench.noise.stated
         three = arm and _tells_of_three(said, ranked)
@@ -160,14 +160,15 @@ TAKES_TWO = 20.0
 TAKES_MORE = 90.0
 
 
-def _simpler(
+def simpler_of(
     explanation: Explanation,
     ranked: Sequence[Explanation],
     kept: Mapping[frozenset[str], float],
+    *,
     arm: bool,
 ) -> Explanation | None:
-    """With an effect less, where that explains nearly as much: of three effects two; of an arm's
-    two the one."""
+    """With an effect less, where that explains nearly as much, and the springs and gains are about
+    what was stated: of three effects two; of an arm's two the one."""
     e, many = explanation, len(explanation.words)
     if many < (_TWO if arm else _MANY):
         return None
@@ -182,12 +183,15 @@ def _simpler(
         and f.words < e.words
         and f.log_weight > e.log_weight - most
         and f.good
+        and f.off < ARM_AS_STATED
         and foresaw(kept, f.words)
     )
     return next(near, None)
 
 
 _TWO, _MANY = 2, 3
+# Standard deviations beyond which springs and gains of an arm are no uncertainty any more.
+ARM_AS_STATED = 4.0
 
 
 def _tells_of_three(explanation: Explanation, ranked: Sequence[Explanation]) -> bool:

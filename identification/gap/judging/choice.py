@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
-from identification.gap.explanations.verdict import FORESAW
+from identification.gap.explanations.verdict import FORESAW, simpler_of
 from identification.gap.words import BETWEEN_RUNS, DATUM_JUMPS, DRIFTS, LINEAR
 
 # Nats that a second effect has to bring before it is named, and a third one: what that does to some
@@ -45,7 +45,19 @@ def chosen_of(found: SearchResult, verdict: str) -> Choice:
     simpler = [e for e in held if e.good and e.words < best.words]
     best = _worthwhile(best, simpler)
     shown = _without_small(best, simpler, CLOSELY * found.engine.bench.noise.stated)
+    shown = _as_it_speaks(found, shown, verdict)
     return Choice(shown, best if shown is not best else None)
+
+
+def _as_it_speaks(found: SearchResult, shown: Explanation, verdict: str) -> Explanation:
+    """Of an arm: without the effect that would be larger than the verdict, where what is left
+    speaks for both: so many nats may be how far its laws are off, and then it has no size of its
+    own."""
+    if not found.engine.bench.data.arm or next(iter(shown.troubles)) == verdict:
+        return shown
+    fewer = simpler_of(shown, found.explanations, found.kept, arm=True)
+    leads = fewer is not None and next(iter(fewer.troubles), "") == verdict
+    return fewer if fewer is not None and leads else shown
 
 
 def _without_small(best: Explanation, simpler: list[Explanation], most: float) -> Explanation:

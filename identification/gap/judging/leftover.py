@@ -22,12 +22,17 @@ from identification.gap.explanations.explanation import (
     may_remain,
 )
 from identification.gap.explanations.fit import Fit, fit
-from identification.gap.explanations.verdict import may_inherit, may_miss, with_posterior
+from identification.gap.explanations.verdict import (
+    ARM_AS_STATED,
+    may_inherit,
+    may_miss,
+    with_posterior,
+)
 from identification.gap.judging.dead_zone import spoken_for
 from identification.gap.judging.hands import open_to_hands
 from identification.gap.judging.paths import goes_as_no_drift
 from identification.gap.judging.stated import led_by_springs
-from identification.gap.judging.strain import LIMIT, strain
+from identification.gap.judging.strain import LIMIT, most_off, strain
 from identification.gap.model.noise import UNSURE
 from identification.gap.words import CURVES, FRICTION, LINEAR
 
@@ -58,7 +63,7 @@ def looked_up(found: SearchResult) -> SearchResult:
     done = {e.words: judge(engine, e) for e in first if e.parts}
     for none in (e for e in first if not e.parts):
         fitted = fit(engine, none)
-        off = _most_off(engine, fitted)
+        off = most_off(engine, fitted)
         if not engine.bench.data.arm:  # nothing is wrong while springs and gains are as stated
             share = kept_within(off, AS_STATED)
             done[none.words] = _less_likely(none, -float(np.log(max(share, 1e-300))))
@@ -111,7 +116,8 @@ def _still_good(engine: Engine, explanation: Explanation) -> Explanation:
     if explanation.eta > STEP * float(np.hypot(allowed, hands)):  # so much the grid may be off
         good = min(good, explanation.log_good)
     asked = strain(engine, fitted, explanation.eta)
-    return _unstrained(replace(explanation, log_good=good), asked)
+    off = most_off(engine, fitted)
+    return _unstrained(replace(explanation, log_good=good, off=off), asked)
 
 
 def _unstrained(explanation: Explanation, asked: float) -> Explanation:
@@ -120,28 +126,14 @@ def _unstrained(explanation: Explanation, asked: float) -> Explanation:
     return replace(explanation, log_good=explanation.log_good + kept)
 
 
-def _most_off(engine: Engine, fitted: Fit) -> float:
-    """By how many standard deviations springs and gains are off at most. What is normal in the
-    compliance is not in the stiffness, nor what is normal in a gain in the share of its readings
-    that is too much: by both."""
-    base, off = engine.base, 0.0
-    for name, change, sd in zip(base.names, fitted.base.tolist(), base.sd.tolist(), strict=True):
-        if not name.startswith(("spring", "gain")) or not sd > 0:
-            continue
-        whole = 1 + change if name.startswith("spring") else 1 - change
-        off = max(off, abs(change) / sd, abs(change / max(whole, _TINY)) / sd)
-    return off
-
-
 def _less_likely(explanation: Explanation, nats: float) -> Explanation:
     e = explanation
     return replace(e, log_weight=e.log_weight - nats, log_good=e.log_good - nats)
 
 
-_TINY = 1e-6
 # Standard deviations. Of the springs and gains of arms without a fault none was off by 3 in 107
 # cases of the blind check.
-AS_STATED, ARM_AS_STATED = 3.0, 4.0
+AS_STATED = 3.0
 # Nats against an arm's explanations by linear effects alone where all is explained without them as
 # it was stated: what springs and gains do within that is no fault. Of 245 linear faults of the
 # blind check that do three times the noise six gains alone lay there, which have bounds of their

@@ -11,6 +11,8 @@ how far off they are.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from identification.arrays import Array
@@ -18,6 +20,7 @@ from identification.gap.evidence.engine import LEVER_M, Engine
 from identification.gap.evidence.parts import Part
 from identification.gap.explanations.explanation import REMAINDER
 from identification.gap.explanations.fit import Fit
+from identification.gap.explanations.verdict import ARM_AS_STATED
 from identification.gap.words import FRICTION, MECHANISMS, SPRINGS
 
 # Standard deviations. Of 360 known effects and mixtures of the blind check three were beyond 5 and
@@ -42,7 +45,7 @@ def _most(pulls: Array) -> float:
 
 
 _CALLED = {
-    "spring": "the stiffness of a joint",
+    "spring": "the stiffness of a joint",  # with its number
     "gain": "the gain of an instrument",
     "tare": "the zero of the force",
     "crosstalk": "the cross-talk of the force",
@@ -58,15 +61,28 @@ def what_is_strained(engine: Engine, fitted: Fit, eta: float) -> str:
     """What an explanation asks most of, and how much, for people; empty where that is allowed."""
     base, heat = _of_base(engine, fitted, eta), _of_heat(engine, fitted)
     if _most(np.concatenate([base, heat])) <= LIMIT:
-        return ""
+        return "" if fitted.parts else _beyond_stated(engine, fitted)
     if heat.max(initial=0.0) > LIMIT and heat.max() > base.max(initial=0.0):
         return "heat that jumps"
     worst = int(base.argmax())
     if base[worst] <= LIMIT:
         return "many things a little off what META states"
-    name = next(v for k, v in _CALLED.items() if engine.base.names[worst].startswith(k))
-    who = "the model" if name == _CALLED["known"] else "META"
-    return f"{name} {base[worst]:.0f} standard deviations off what {who} states"
+    return _off(engine.base.names[worst], float(base[worst]))
+
+
+def _beyond_stated(engine: Engine, fitted: Fit) -> str:
+    """The spring or gain that is farthest off, where no fault at all is to be wrong."""
+    each = _springs_and_gains(engine, fitted)
+    worst = max(each, key=lambda name: each[name], default="")
+    return _off(worst, each[worst]) if worst and each[worst] > ARM_AS_STATED else ""
+
+
+def _off(name: str, deviations: float) -> str:
+    called = next(v for k, v in _CALLED.items() if name.startswith(k))
+    if name.startswith("spring"):
+        called = f"the stiffness of joint {name.removeprefix('spring')}"
+    who = "the model" if called == _CALLED["known"] else "META"
+    return f"{called} {deviations:.0f} standard deviations off what {who} states"
 
 
 def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
@@ -83,9 +99,7 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     moves[base.index("offset")] = LEVER_M
     loose = np.divide(eta, moves, out=np.zeros(len(moves)), where=moves > 0)
     pulls = np.abs(fitted.base) / np.hypot(base.sd, loose)
-    said = any(p.word == SPRINGS for p in fitted.parts)
-    own = {j for p in fitted.parts if p.word in MECHANISMS for j in p.variant.joints}
-    for j in range(engine.bench.data.joints) if said else own:
+    for j in _springs_that_may(engine, fitted):
         pulls[base.index(f"spring{j + 1}")] = 0.0
     left = _left_at_rest(engine, fitted)
     for i in base.index("offset"):
@@ -97,6 +111,36 @@ def _of_base(engine: Engine, fitted: Fit, eta: float) -> Array:
     size = moves[constant] * np.abs(fitted.base[constant])
     pulls[constant] *= np.minimum(size / max(REMAINDER * engine.structural, 1e-300), 1.0)
     return np.asarray(pulls)
+
+
+def most_off(engine: Engine, fitted: Fit) -> float:
+    """By how many standard deviations springs and gains are off at most, but for those that may be.
+    What is normal in the compliance is not in the stiffness, nor what is normal in a gain in the
+    share of its readings that is too much: by both."""
+    return max(_springs_and_gains(engine, fitted).values(), default=0.0)
+
+
+def _springs_and_gains(engine: Engine, fitted: Fit) -> dict[str, float]:
+    """Name -> standard deviations, by compliance or stiffness."""
+    base, out = engine.base, {}
+    free = {f"spring{j + 1}" for j in _springs_that_may(engine, fitted)}
+    for name, change, sd in zip(base.names, fitted.base.tolist(), base.sd.tolist(), strict=True):
+        if not name.startswith(("spring", "gain")) or name in free or not sd > 0:
+            continue
+        whole = 1 + change if name.startswith("spring") else 1 - change
+        out[name] = max(abs(change) / sd, abs(change / max(whole, _NEARLY_NONE)) / sd)
+    return out
+
+
+_NEARLY_NONE = 1e-6
+
+
+def _springs_that_may(engine: Engine, fitted: Fit) -> Iterable[int]:
+    """Joints whose spring may be off: all where springs are said to be, else those whose mechanism
+    brings its own mean stiffness."""
+    if any(p.word == SPRINGS for p in fitted.parts):
+        return range(engine.bench.data.joints)
+    return {j for p in fitted.parts if p.word in MECHANISMS for j in p.variant.joints}
 
 
 def _left_at_rest(engine: Engine, fitted: Fit) -> Array:
