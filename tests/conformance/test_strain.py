@@ -205,7 +205,7 @@ def test_it_is_said_what_an_explanation_asks_for() -> None:
 
 _OFF = "7 standard deviations off what META states"
 NAMED = {
-    "spring2": f"the stiffness of a joint {_OFF}",
+    "spring2": f"the stiffness of joint 2 {_OFF}",
     "gain force": f"the gain of an instrument {_OFF}",
     "crosstalk": f"the cross-talk of the force {_OFF}",
     "geometry": f"the turn of the levers under load {_OFF}",

@@ -122,15 +122,22 @@ _UNSEEN = 3  # readings in a row
 def _stiffness(u: Array, force: Array) -> Array:
     """(p,) of force (n,) over displacement u (n,), row by row, at even points of its way, as a
     share of that of the flanks; ones where none is stiff. The mean of there and back: a part that
-    stays where it was left in its play meets the same ends at other forces."""
+    stays where it was left in its play meets the same ends at other forces. The median of a few
+    neighbours: where a random drive turns within the play, friction stands otherwise at every
+    passage, and steps from one to the next."""
     at = np.linspace(float(u.min()), float(u.max()), _POINTS)
     back = _falls(u)
     ways = [_rise(u[mine], force[mine], at) for mine in (~back, back) if mine.sum() > 1]
     count = np.isfinite(ways).sum(axis=0)
     stiffness = np.nansum(ways, axis=0) / np.maximum(count, 1)
     stiffness = np.interp(at, at[count > 0], stiffness[count > 0])
+    beside = np.pad(stiffness, _BESIDE, mode="edge")
+    stiffness = np.median(np.lib.stride_tricks.sliding_window_view(beside, 2 * _BESIDE + 1), axis=1)
     flank = float(np.quantile(stiffness, _STIFF))
     return stiffness / flank if flank > 0 else np.ones(_POINTS)
+
+
+_BESIDE = 2  # points on each side; half of the narrowest play
 
 
 def _falls(u: Array) -> Flags:
