@@ -1,6 +1,8 @@
-"""Seats that friction holds on the way."""
+"""Seats: that friction holds on the way, and that only get flatter."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from identification.gap.effects import library
 from identification.gap.effects.contact_seating import RUBS, STEPS
 from identification.gap.model.bench import make_bench
+from tests.explained import explained
 from tests.unit.test_gap_closer import assert_lawful
 from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_model import survive
@@ -31,3 +34,17 @@ def test_seats_that_rub_are_pressed_by_what_friction_lets_through() -> None:
             assert slack.sum() > 20
             wanted = (bench.load[slack] + friction) / last
             assert taken[slack] == pytest.approx(wanted, abs=5e-3)
+
+
+@pytest.mark.parametrize(("opens", "seats"), [(False, True), (True, False)])
+def test_what_gives_way_under_more_force_is_no_seat(opens: bool, seats: bool) -> None:
+    """A flange that opens at half of the load, in every direction and pose."""
+    data = arm_data()
+    top = float(np.abs(data.force).max())
+    share = np.abs(data.force) / top
+    law = np.logaddexp(0.0, (share - 0.5) / 0.03) * 0.06 if opens else share / (share + 0.1)
+    moved = 6e-5 * law * np.sign(data.force)
+    springs = np.array([s.lever**2 @ data.compliance for s in data.setups])[data.setup]
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(len(moved))
+    given = replace(data, displacement=springs * data.force + moved + noise, q=None)
+    assert (explained(given).verdict == "contact_seating") is seats

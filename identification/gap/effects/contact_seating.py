@@ -97,6 +97,7 @@ def variants(bench: Bench) -> list[Variant]:
             prior=2.0,
             # in a running pull, a seat that stiffens and gives way again is the foot of a knee
             each=bench.rows.continuous and not bench.data.arm,
+            within=_ever_flatter(np.array(forces)),
             force_N=0.1 * top,
             laws=tuple(("exponential", s * top) for s in forces),
         )
@@ -116,6 +117,17 @@ def variants(bench: Bench) -> list[Variant]:
             for law in SEATED
         ]
     return [*out, *_slacks(bench)]
+
+
+def _ever_flatter(shares: Array) -> Array:
+    """(m, k) sums of the depths of exponential seats, of shares (k,) of the largest force, that are
+    not negative where the compliance of all of them never grows with the force, nor is below none:
+    what gives way under more force seats nothing."""
+    slope = np.exp(-_AT[:, None] / shares) / shares  # (m, k) over the largest force
+    return np.vstack([slope[:-1] - slope[1:], slope[-1:]])
+
+
+_AT = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0])  # of the largest force
 
 
 def _comes_back(bench: Bench) -> bool:
