@@ -64,16 +64,18 @@ def search(
     singly = _seeds(pool, seeds)
     near = _near(pool, singly)
     front, alone_best = _in_more_joints(engine, all_of_them, pool, near), _best(pool)
+    closely: set[frozenset[str]] = set()
     for depth in range(2, deepest + 1):
         kept = max(2, seeds // depth)
-        front = _deepen(engine, all_of_them, pool, front, depth, kept)
+        front = _deepen(engine, all_of_them, pool, front, depth, kept, closely)
         if depth == 2:  # what a second effect wins for the best, it may win for others as well
             reach = alone_best - (_best(pool) - alone_best)
             late = [e for e in singly if e not in near and e.log_weight > reach]
             late = _in_more_joints(engine, all_of_them, pool, late)
-            front += _deepen(engine, all_of_them, pool, late, depth, kept)
+            front += _deepen(engine, all_of_them, pool, late, depth, kept, closely)
         if not front:
             break
+    _polish_rivals(engine, all_of_them, pool, closely)
     ranked = _sharpened(engine, sorted(pool.values(), key=lambda e: -e.log_weight))
     ranked = measured(engine, ranked)
     named = tuple(e for e in ranked if not e.words & frozenset(NAMELESS))
@@ -172,9 +174,11 @@ def _deepen(
     front: list[Explanation],
     depth: int,
     kept: int,
+    closely: set[frozenset[str]],
 ) -> list[Explanation]:
     """Adds one more effect to each explanation of the front; those that gain, up to `kept`, are the
-    next front. The variants grow by what is looked at beside others."""
+    next front. The variants grow by what is looked at beside others. closely: words of those that
+    are polished, which grow, too."""
     best = _best(pool)
     grown: dict[frozenset[str], Explanation] = {}
     for start in front:
@@ -188,6 +192,7 @@ def _deepen(
             pool[words] = explanation
     ranked = sorted(grown.values(), key=lambda e: -e.log_weight)
     first = [_anew(engine, variants, polished(engine, variants, e)) for e in ranked[:kept]]
+    closely |= {e.words for e in first}
     lent = (_with_lent_shapes(engine, variants, e, first) for e in ranked[kept:_READING])
     others = [_anew(engine, variants, e) for e in lent]
     for explanation in [*first, *others]:
@@ -195,6 +200,35 @@ def _deepen(
             pool[explanation.words] = explanation
     good = _in_more_joints(engine, variants, pool, first)
     return [e for e in good if e.log_weight > best - 2.0]
+
+
+def _polish_rivals(
+    engine: Engine,
+    variants: list[Variant],
+    pool: dict[frozenset[str], Explanation],
+    closely: set[frozenset[str]],
+) -> None:
+    """Polishes what differs from the best explanation in one word: the shape that a word had alone,
+    before another effect stood beside it, may make up for what that explains, and lose by it."""
+    for _ in range(_RIVALS):
+        best = max(pool.values(), key=lambda e: e.log_weight)
+        rivals = [
+            e
+            for e in pool.values()
+            if len(e.words) == len(best.words) == len(e.words & best.words) + 1 > 1
+            and e.words not in closely
+            and e.log_weight > best.log_weight - _MAY_GAIN
+        ]
+        if not rivals:
+            return
+        rival = max(rivals, key=lambda e: e.log_weight)
+        closely.add(rival.words)
+        again = polished(engine, variants, rival)
+        if again.log_weight > rival.log_weight:
+            pool[rival.words] = again
+
+
+_RIVALS, _MAY_GAIN = 3, 60.0  # at most; nats that polishing has been seen to bring
 
 
 def _with_lent_shapes(
