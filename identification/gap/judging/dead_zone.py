@@ -165,8 +165,12 @@ def _distinct(u: Array, force: Array) -> tuple[Array, Array]:
 
 
 def _soft(share: Array) -> list[tuple[int, int]]:
-    """The stretches of points that are soft."""
-    return _stretches(np.asarray(share < _SOFT))
+    """The stretches of points that are soft; over a few in between, at which what rubs sticks."""
+    soft = np.asarray(share < _SOFT)
+    each = _stretches(soft)
+    for (_, a), (b, _) in pairwise(each):
+        soft[a:b] |= b - a <= _LEAST
+    return _stretches(soft)
 
 
 def _stretches(inside: Flags) -> list[tuple[int, int]]:
@@ -189,4 +193,4 @@ def _is_play(share: Array, a: int, b: int, limits: Limits) -> bool:
     return bool(max(ends) <= max(limits.sharp * width, _LEAST))
 
 
-_LEAST = 4  # points, of a corner that lies between two readings
+_LEAST = 4  # points, of a corner that lies between two readings, or of what sticks within a play
