@@ -16,6 +16,7 @@ from identification.gap.explanations.explanation import Explanation, SearchResul
 from identification.gap.explanations.verdict import TAKES_TWO, simpler_of
 from identification.gap.judging.choice import WORTH, WORTH_OF_THIRD, chosen_of, foresees
 from identification.gap.model.variants import variant
+from tests.unit.small_explanations import part
 
 CURVE, LAG, ASKEW = "joint_nonlinear_stiffness", "time_lag", "load_misalignment"
 TILT = "base_compliance"
@@ -204,3 +205,14 @@ def placed(words: Iterable[str], *joints: int) -> tuple[Part, ...]:
 def of_an_arm(result: SearchResult, arm: bool = True) -> SearchResult:
     bench = SimpleNamespace(data=SimpleNamespace(arm=arm))
     return replace(result, engine=cast(Engine, SimpleNamespace(bench=bench)))
+
+
+@pytest.mark.parametrize(("worth", "joints", "named"), [(15.0, 0, 1), (15.0, 1, 2), (25.0, 0, 2)])
+def test_a_curve_is_named_beside_a_play_of_its_joint_only_for_much(
+    worth: float, joints: int, named: int
+) -> None:
+    """They are one trouble; in joints of their own they are two."""
+    play, curve = part("joint_backlash", [0], joint=0), part(CURVE, [1], joint=joints)
+    alone = Explanation((play,), 0.0, 0.0, (LARGE,), 0.0)
+    both = Explanation((play, curve), worth, 0.0, (LARGE, 0.6 * LARGE), worth)
+    assert len(shown_of(found(alone, both), "joint_backlash").words) == named

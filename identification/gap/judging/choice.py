@@ -6,12 +6,21 @@ from typing import NamedTuple
 
 from identification.gap.explanations.explanation import Explanation, SearchResult
 from identification.gap.explanations.penalties import LEAST_SHARE
-from identification.gap.explanations.verdict import FORESAW, simpler_of
+from identification.gap.explanations.verdict import (
+    FLANKS,
+    FORESAW,
+    TAKES_TWO,
+    flanks_of_one_joint,
+    simpler_of,
+)
 from identification.gap.words import BETWEEN_RUNS, DATUM_JUMPS, DRIFTS, LINEAR
 
 # Nats that a second effect has to bring before it is named, and a third one: what that does to some
 # channel may be how far the other two's laws are off.
 WORTH, WORTH_OF_THIRD = 3.0, 10.0
+# A play and a curve of one joint of an arm are one trouble: where one of them explains nearly all,
+# the other one takes from its size and gives nothing but freedom (flanks are curved).
+WORTH_OF_FLANK = TAKES_TWO
 # Nor is a second one named that does less to the gap than LEAST_SHARE of what another does, or a
 # third one less than this, however plainly it shows: as far laws are off. In ten runs of the blind
 # check 55 of 57 such second effects were not there; of 69 such third ones 42 were not, and 24 stood
@@ -99,12 +108,18 @@ def _needless(found: SearchResult, explanation: Explanation) -> bool:
 def _worthwhile(best: Explanation, simpler: list[Explanation]) -> Explanation:
     """With no effect that brings less than it has to."""
     while True:
-        worth = WORTH if len(best.words) <= _TWO else WORTH_OF_THIRD
         fewer = [e for e in simpler if e.words < best.words and len(e.words) == len(best.words) - 1]
-        near = [e for e in fewer if e.log_weight > best.log_weight - worth]
+        near = [e for e in fewer if e.log_weight > best.log_weight - _worth(best, e)]
         if not near:
             return best
         best = max(near, key=lambda e: e.log_weight)
+
+
+def _worth(explanation: Explanation, fewer: Explanation) -> float:
+    """Nats that the effect has to bring that the one has and the other one, with fewer, has not."""
+    if explanation.words - fewer.words <= FLANKS and flanks_of_one_joint(explanation):
+        return WORTH_OF_FLANK
+    return WORTH if len(explanation.words) <= _TWO else WORTH_OF_THIRD
 
 
 def foresees(found: SearchResult, explanation: Explanation) -> bool:
