@@ -9,6 +9,7 @@ import pytest
 
 from identification.gap.answer.forms import Form, describe, law_of, lawful, realise, rows_of
 from identification.gap.answer.known import NotKnown, knowing
+from identification.gap.answer.notes import notes_of
 from identification.gap.answer.twins import twin_of
 from identification.gap.data import GapData
 from identification.gap.effects import library
@@ -350,6 +351,26 @@ def test_a_known_effect_is_predicted_in_every_channel(known: Form) -> None:
             mine = np.flatnonzero(there.rows.setup == s)
             moved[mine] -= moved[mine[0]]
         np.testing.assert_allclose(load[0], moved, atol=1e-12)
+
+
+@pytest.mark.parametrize("memory", ["kept", "kept across poses"])
+def test_whether_what_yielded_stays_from_pose_to_pose_these_data_tell(memory: str) -> None:
+    """A model that was made in one pose has it gone in the next one."""
+    there = make_bench(arm_data())
+
+    def yields(remembers: str) -> Form:
+        law = replace(YIELD.law, constants={**YIELD.law.constants, "memory": remembers})
+        return replace(YIELD, law=law)
+
+    measured = replace(there, observed=there.observed + realise(there, yields(memory)))
+    knows = knowing(measured, [yields("kept")])
+    assert knows.known is not None
+    assert knows.known.across is (memory != "kept")
+    told = [n.text for n in notes_of(knows, "none") if "from pose to pose" in n.text]
+    assert bool(told) is knows.known.across
+    lost = knowing(measured, [yields("lost between runs")])  # says so itself
+    assert lost.known is not None
+    assert not lost.known.across
 
 
 def test_a_play_that_jumps_is_not_known_to_several_of_itself() -> None:

@@ -10,6 +10,8 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.answer.forms import Form, lawful, realise
 from identification.gap.explanations.explanation import LAW_REMAINDER
+from identification.gap.laws.law import ACROSS, KEPT
+from identification.gap.model.base import base_columns, prediction
 from identification.gap.model.bench import Bench, KnownEffects
 
 # What is known of a law that was found in other data: its size, and at which loads it happens.
@@ -24,14 +26,48 @@ class NotKnown(ValueError):
 def knowing(bench: Bench, forms: Sequence[Form]) -> Bench:
     """The bench of a simulation with these effects, each of a size, and at loads, as well as such a
     law is known; a few percent of what they do may stay. Its noise is what was measured with them:
-    where a joint gives way, that of the force moves far. Raises NotKnown where the displacement is
-    imposed: the effects are known as displacements."""
+    where a joint gives way, that of the force moves far. What yielded in one pose may have stayed
+    when the arm left it: which of the two it is these data tell, where they are of several. Raises
+    NotKnown where the displacement is imposed: the effects are known as displacements."""
     if not forms:
         return bench
     if bench.imposed:
         raise NotKnown(
             "effects of a model are known as displacements, and here the displacement is imposed"
         )
+    found, poses = _with_known(bench, forms), {s.pose for s in bench.data.setups}
+    across = [_across(f) for f in forms]
+    if len(poses) < _SEVERAL or all(a is f for a, f in zip(across, forms, strict=True)):
+        return found
+    stays = _with_known(bench, across)
+    if _misfit(stays) > _misfit(found) - _PLAINLY or stays.known is None:
+        return found
+    return replace(stays, known=replace(stays.known, across=True))
+
+
+_SEVERAL, _PLAINLY = 2, 20.0  # poses; nats
+
+
+def _across(form: Form) -> Form:
+    """The effect with a memory that outlasts the way to another pose, if it has one of the pose."""
+    constants = form.law.constants
+    if constants.get("memory") != KEPT:
+        return form
+    return replace(form, law=replace(form.law, constants={**constants, "memory": ACROSS}))
+
+
+def _misfit(bench: Bench) -> float:
+    """Half of the sum of squares, in standard deviations, that the base leaves of what is measured:
+    nats, but for what both ways have alike."""
+    base = base_columns(bench)
+    white = base.columns * (base.sd / bench.sigma[:, None])
+    target = (bench.observed - prediction(bench)) / bench.sigma
+    inner = np.linalg.solve(white.T @ white + np.eye(white.shape[1]), white.T @ target)
+    return float((target @ target - inner @ (white.T @ target)) / 2)
+
+
+def _with_known(bench: Bench, forms: Sequence[Form]) -> Bench:
+    """The bench with these effects known, whatever they remember."""
     less, does, more = (
         np.column_stack([_stacked(_pushed(bench, by), lawful(f)) for f in forms])
         for by in (1 - LOAD_SD, 1.0, 1 + LOAD_SD)

@@ -98,6 +98,11 @@ def _remarks(bench: Bench) -> Iterator[str]:
             f"Up to {1e3 * bench.known.left:.3g} mm rms of what the simulation's effects do are no "
             "gap: no law is met better than that."
         )
+    if bench.known is not None and bench.known.across:
+        yield (
+            "What the model's effects leave stays here while the arm goes from pose to pose. A "
+            "model that was made in one pose can't know that, and the gap is what goes beyond it."
+        )
     if bench.course.let_go:
         yield _let_go(bench.course.let_go, bench.data)
     beyond = int(np.count_nonzero(bench.rows.overshoot))

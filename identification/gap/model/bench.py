@@ -36,12 +36,14 @@ _MOVES_ON = 2.0  # times the noise of a sample
 class KnownEffects:
     """Stacked: what effects do that the simulation has, does (size,), and what is not known of
     them, free (size, k), of independent unit coefficients called names (k); left m: what may stay
-    of them, rms."""
+    of them, rms. across: what they leave stays while the arm goes to another pose, which a model
+    that was made in one pose can't tell; these data do."""
 
     does: Array
     free: Array
     names: tuple[str, ...]
     left: float
+    across: bool = False
 
 
 _FURTHER, _FIRST, _ONE_WAY = 6, 1.4, 0.9  # radii; the first, of the last inner one; of the range
