@@ -62,9 +62,12 @@ _ADDED = "compliance added beyond the threshold, over the elastic one; 1: twice 
 def parameter_meanings(r: GapResult) -> dict[str, str]:
     """Parameter -> what its number is, of those found that need it. Of a rig without an arm whose
     displacement is imposed, springs and friction are stiffnesses beside each other."""
-    share = _STIFFER if r.bench.imposed and not r.bench.data.arm else _HELD_BACK
-    found = {name for e in r.effects for name in e.parameters}
-    return {k: told for k, told in ((_SHARE, share), (_BEYOND, _ADDED)) if k in found}
+    found, told = {name for e in r.effects for name in e.parameters}, {}
+    if _SHARE in found:
+        told[_SHARE] = _STIFFER if r.bench.imposed and not r.bench.data.arm else _HELD_BACK
+    if _BEYOND in found:
+        told[_BEYOND] = _ADDED
+    return told
 
 
 # What is said in place of a word's meaning.
@@ -238,9 +241,10 @@ def _effects(r: GapResult) -> str:
 
 
 def _title(e: EffectFound, names: list[str]) -> str:
-    """Its name; of one that sits in several joints with the joint."""
+    """Its name; with where it sits, if that is known, or it sits in several joints."""
     place = next(iter(e.places), "")
-    return f"{e.name}, {place}" if place and names.count(e.name) > 1 else e.name
+    told = len(e.places) == 1 or names.count(e.name) > 1
+    return f"{e.name}, {place}" if place and told else e.name
 
 
 def _one_effect(e: EffectFound, title: str) -> list[str]:

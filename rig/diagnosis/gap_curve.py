@@ -83,16 +83,17 @@ def _curve_panel(shown: Shown, points: Points, axes: Any, setup: int) -> None:
     zero = mine & (points.sense == 0)
     if zero.any():
         axes.plot(x[zero], y[zero], "x", color=GREY, markersize=4, label="measured, zero load")
-    order = np.flatnonzero(mine)[np.argsort(x[mine], kind="stable")]
-    axes.plot(
-        x[order],
-        (points.before * scale)[order],
-        "--",
-        color="black",
-        linewidth=1.2,
-        label="simulated before",
-        zorder=3,
-    )
+    in_order = np.flatnonzero(mine)[np.argsort(x[mine], kind="stable")]
+    for i, way in enumerate(legs(points, x, setup) if shown.remembers else [in_order]):
+        axes.plot(
+            x[way],
+            (points.before * scale)[way],
+            "--",
+            color="black",
+            linewidth=1.2,
+            label="_" if i else "simulated before",
+            zorder=3,
+        )
     for i, leg in enumerate(legs(points, x, setup)):
         axes.plot(
             x[leg],

@@ -67,13 +67,15 @@ class Shown:
     """What figures and tables show of a diagnosis beside its points: no samples.
 
     setups: (pose, direction) each. imposed: whether the rig drove the displacement; clock: whether
-    the session's time was recorded; continuous: a running recording. before, after, noise: m rms.
+    the session's time was recorded; continuous: a running recording; remembers: the simulation has
+    effects, which may go another way in every run. before, after, noise: m rms.
     """
 
     setups: tuple[tuple[str, str], ...]
     imposed: bool
     clock: bool
     continuous: bool
+    remembers: bool
     verdict: str
     probabilities: dict[str, float]
     effects: tuple[EffectFound, ...]
@@ -104,6 +106,7 @@ def shown(r: GapResult) -> Shown:
         imposed=r.bench.imposed,
         clock=rows.clock,
         continuous=rows.continuous,
+        remembers=r.bench.known is not None,
         verdict=r.verdict,
         probabilities=r.probabilities,
         effects=r.effects,

@@ -442,3 +442,15 @@ def test_command_writes_the_figures_and_refuses_a_file_for_a_folder(tmp_path: Pa
     assert (tmp_path / "new/gap_curve.png").exists()
     refused = CliRunner().invoke(cli.app, [*args, str(tmp_path / "d.h5")])
     assert "d.h5 is a file, no folder" in str(refused.exception)
+
+
+@pytest.mark.parametrize("remembers", [False, True])
+def test_what_remembers_is_simulated_run_by_run(slipped: Diagnosis, remembers: bool) -> None:
+    """Sorted by force, ways there and back would be one zigzag."""
+    told, p = shown(slipped.result), points(slipped.result)
+    figure = curve(replace(told, remembers=remembers), p)
+    before = [line for line in figure.axes[0].lines if line.get_linestyle() == "--"]
+    runs = len(list(legs(p, p.force, 0)))
+    assert runs > 1
+    assert len(before) == (runs if remembers else 1)
+    assert sum(not str(line.get_label()).startswith("_") for line in before) == 1

@@ -148,3 +148,26 @@ def test_what_each_of_many_runs_has_to_itself_is_one_line_with_its_range() -> No
     assert diagnose_text._value(cut).endswith(" N; the largest seen is 1.5 N)")
     assert diagnose._parameter(cut)["largest_seen"] == 1.5
     assert "largest_seen" not in diagnose._parameter(two["drift_x_run1"])
+
+
+@pytest.mark.parametrize(
+    ("places", "title"),
+    [({"joint 4": 1.0}, "joint_yield, joint 4"), ({}, "joint_yield")],
+)
+def test_an_effect_is_told_with_its_joint_where_that_is_known(
+    places: dict[str, float], title: str
+) -> None:
+    result = shown.explained().result
+    first = replace(result.effects[0], places=places)
+    text = diagnose_text.render(replace(result, effects=(first, *result.effects[1:])))
+    assert f"  {title}: present with a probability of 99 %" in text
+
+
+@pytest.mark.parametrize(("after", "met"), [(1e-6, True), (9e-6, False)])
+def test_a_gap_that_nothing_may_explain_though_it_is_met_is_said_to_be_met(
+    after: float, met: bool
+) -> None:
+    result = replace(shown.explained().result, verdict="unknown", effects=(), noise=1e-6)
+    text = diagnose_text.render(replace(result, after=after))
+    assert ("is met without any effect" in text) is met
+    assert ("there is a gap" in text) is not met
