@@ -24,7 +24,7 @@ from identification.gap.model.bench import Bench
 from identification.gap.model.variants import Variant, variant
 
 WORD = "link_flexibility"
-SCALES = (0.15, 0.5, 1.5)
+SCALES = (0.15, 0.5, 1.5, 5.0)
 
 
 BENDING = {"bending at start": 1 / 6, "bending in the middle": 4 / 6, "bending at end": 1 / 6}
