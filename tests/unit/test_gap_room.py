@@ -12,11 +12,12 @@ from identification.gap.answer.parameters import parameters
 from identification.gap.data import GapData
 from identification.gap.effects import library
 from identification.gap.evidence.parts import Part
-from identification.gap.laws.drift import _goes, own_clock
+from identification.gap.laws.drift import _goes, own_clock, waited
 from identification.gap.model.bench import make_bench
 from identification.gap.model.history import followed
 from identification.gap.recording.bins import Bins
 from tests.explained import explained
+from tests.unit.test_gap_forms import arm_data
 from tests.unit.test_gap_operators import bench_data
 
 
@@ -179,3 +180,13 @@ def test_a_rest_that_only_scatters_is_no_drift(n: int) -> None:
     digit[-n // 4 :] = 1e-6  # the last digit, once
     assert not _goes(digit, 1e-6)
     assert _goes(np.linspace(0.0, 1e-5, n) + 1e-6 * rng.standard_normal(n), 1e-6)
+
+
+def test_a_pause_between_two_runs_is_no_hold() -> None:
+    """The arm stands unloaded then, for however long; a force that drifts shows at the next run."""
+    data = arm_data()
+    assert data.session is not None
+    later = 10 * float(np.ptp(data.session)) * (data.run > 0)
+    bench = make_bench(replace(data, session=data.session + later))
+    assert not waited(bench).any()
+    assert library(bench, ["force_drift"])
