@@ -3,11 +3,11 @@
 A load at the tool bends a segment by moments that grow in proportion along it, so that what any
 distribution of stiffness along it gives is a sum of squares of the moment at its two ends and in
 its middle; of an even tube by Simpson's rule, which is exact then. Coefficients: 1 is the nominal
-aluminium tube, 50 to 870 um at 100 N; castings are 0.2 to 3 times it.
+aluminium tube, 50 to 870 um at 100 N; castings are 0.2 to 3 times it, thin ones 6 times.
 No data sheet says where a casting's neutral axis runs: where the model file has the tube, beside
 the plane of the joints, or from joint to joint.
 
-Size: 0.2 to 3 times the nominal tubes: 50 to 870 um at 100 N.
+Size: 0.2 to 6 times the nominal tubes: 50 to 870 um at 100 N and more.
 Prior: factors positive and alike in one segment, sd out of SCALES, equally likely.
 Source: beam theory for the segments in the robot's model file.
 """
