@@ -70,6 +70,6 @@ def test_those_that_are_not_looked_at_closely_are_lent_what_the_first_found(
     alone = explain(e, (Part(v["off"], BUMP),), 0.0)
     pool = {alone.words: alone}
     ranked = sorted(grown.values(), key=lambda x: -x.log_weight)
-    search._deepen(e, list(v.values()), pool, [alone], 2, 1)  # one is looked at closely
+    search._deepen(e, list(v.values()), pool, [alone], 2, 1, set())  # one is looked at closely
     assert labels(pool[ranked[0].words]) >= {"true"}
     assert labels(pool[ranked[1].words]) >= {"true"}

@@ -162,7 +162,7 @@ def _one_after_the_other(
         columns,
         scales,
         root=root,
-        within=grows,
+        within=np.vstack([grows, _soft_first(grows, edges[1:], forces[-1] / STEPS[-1])]),
         force_N=forces[0],
         laws=tuple(("slack", f) for f in forces),
     )
@@ -170,6 +170,17 @@ def _one_after_the_other(
         return plain
     share = rubs / forces[-1] * STEPS[-1]
     return replace(plain, prior=_RUBBING).known_by(f", rubbing {share:.2g}", rubs=rubs)
+
+
+_SOFT_BY = 0.15  # of the largest force
+
+
+def _soft_first(grows: Array, forces: Array, top: float) -> Array:
+    """(m, k) sums that are not negative where the depth per force, once it is soft at all, only
+    falls from one force (k,) N to the next: what is stiff, then soft, then stiff again snaps."""
+    mean = np.cumsum(grows, axis=0) / forces[:, None] * forces[0]
+    here = np.flatnonzero(forces[:-1] >= _SOFT_BY * top * (1 - 1e-9))
+    return np.asarray(mean[here] - mean[here + 1])
 
 
 def _seated(

@@ -46,6 +46,9 @@ WORD = "time_lag"
 # of the time between two samples
 LAGS = (0.3, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.2, 7.0, 9.0, 12.0)
 
+# Sums of a delay's and a filter's share that are not negative where nothing is ahead of the load:
+# when the delay is over, and long after it. A hand's overshoot is no lag.
+_NEVER_AHEAD = np.array([[1.0, np.exp(-1.0)], [0.5, 1.0]])
 LEAST = 0.6  # of the lag itself: a part of the response that comes late is creep
 _USUAL = 2.5  # samples: a reading so late would have been noticed, the later the sooner
 _OF_STROKE = 0.5  # of the time that one pass of the load takes
@@ -122,6 +125,7 @@ def _of(bench: Bench, channel: str, lag: float, likely: float) -> list[Variant]:
                 (0.5,),
                 prior=0.5 * likely,
                 least=LEAST,
+                within=_NEVER_AHEAD,
                 **info,
             )
         )

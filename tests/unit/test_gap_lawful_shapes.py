@@ -1,0 +1,70 @@
+"""Shapes that contradict the word they would carry are none of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.gap.data import GapData
+from identification.gap.effects import library
+from identification.gap.laws.knees import FLOWS_BACK
+from identification.gap.model.bench import make_bench
+from tests.explained import explained
+from tests.unit.test_gap_forms import arm_data
+
+
+def moved(data: GapData, by: Array) -> GapData:
+    """The arm on its springs, and moved (n,) m beside them."""
+    springs = np.array([s.lever**2 @ data.compliance for s in data.setups])[data.setup]
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(len(by))
+    return replace(data, displacement=springs * data.force + by + noise, q=None, tangential=None)
+
+
+def steps(data: GapData) -> tuple[Array, Array]:
+    """(n,) by how much the force changed to the hold of a reading, N; whether it is the first."""
+    force, number = data.force, data.run * 1000 + data.branch * 100 + data.step
+    first = np.append(True, np.diff(number) != 0)
+    hold = np.cumsum(first) - 1
+    level = np.bincount(hold, force) / np.bincount(hold)
+    change = np.diff(level, prepend=0.0)
+    change[np.diff(data.run[first], prepend=-1) != 0] = 0.0
+    return change[hold], first
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_what_is_ahead_of_the_load_does_not_lag(late: bool) -> None:
+    """The first reading of every hold: a tenth of the step too far, as a hand leaves it, or too
+    little."""
+    data = arm_data()
+    springs = np.array([s.lever**2 @ data.compliance for s in data.setups])[data.setup]
+    change, first = steps(data)
+    off = springs * change * first * (-0.3 if late else 0.1)
+    assert (explained(moved(data, off)).verdict == "time_lag") is late
+
+
+def test_what_is_stiff_then_soft_then_stiff_again_is_no_seat() -> None:
+    """It snaps, in every pose and direction."""
+    data = arm_data()
+    share = np.abs(data.force) / np.abs(data.force).max()
+    snaps = 6e-5 * np.clip((share - 0.27) / 0.18, 0.0, 1.0) * np.sign(data.force)
+    assert explained(moved(data, snaps)).verdict != "contact_seating"
+
+
+def test_what_never_yielded_leaves_nothing_to_flow_back() -> None:
+    bench = make_bench(arm_data())
+    some = [
+        v
+        for v in library(bench, ["joint_yield"])
+        if v.label.endswith(FLOWS_BACK) and v.info["memory"] == ""
+    ]
+    assert some
+    for v in some:
+        (limit,), k = v.within, len(v.info["radius"])
+        yields, flows = np.zeros(len(limit)), np.zeros(len(limit))
+        yields[:k], flows[k:] = 1.0, 1.0
+        assert limit @ yields >= 0.0
+        assert limit @ flows < 0.0
+        assert limit @ (yields + 1e-3 * flows) >= 0.0 or not limit @ yields > 1e-2
